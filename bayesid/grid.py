@@ -1,0 +1,184 @@
+"""From a recording's motion to the arrays a simulation runs on: integration steps, samples and their tables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
+
+from bayesid.dynamics import Grid, Instants
+from bayesid.effects.base import Environment
+from bayesid.motion import Motion
+from bayesid.orbit import Orbit
+from bayesid.recording import Recording
+from bayesid.robot import Robot
+from bayesid.tables import WIDTH, kinematics, link_table
+
+__all__ = ["Actions", "build_grid", "pad_grids"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Actions:
+    """Known actions on the base: a wrench held from each time to the next, and the wheels' momentum.
+
+    Parameters
+    ----------
+    time : (n,) array
+    wrench : (n, 6) array
+        Force and torque at the base origin, base axes.
+    wheel_time : (m,) array
+    wheel_momentum : (m, 3) array
+    """
+
+    time: Floats
+    wrench: Floats
+    wheel_time: Floats
+    wheel_momentum: Floats
+
+    @classmethod
+    def none(cls) -> Actions:
+        """Return no actions."""
+        return cls(np.zeros(0), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 3)))
+
+    @classmethod
+    def from_recording(cls, recording: Recording) -> Actions:
+        """Read the actions a recording holds; what it does not hold is zero."""
+        series = [_vector(recording, family) for family in ("base_force", "base_torque")]
+        time = np.unique(np.concatenate([t for t, _ in series]))
+        wrench = np.concatenate([_held(t, values, time) for t, values in series], axis=1)
+        return cls(time, wrench, *_vector(recording, "wheel_momentum"))
+
+    def held(self, time: Floats) -> Floats:
+        """Wrench in force at the times, shape (T, 6)."""
+        return _held(self.time, self.wrench, time)
+
+    def wheels(self, time: Floats) -> tuple[Floats, Floats]:
+        """Momentum of the wheels and its derivative at the times, each (T, 3)."""
+        if len(self.wheel_time) == 0:
+            return np.zeros((len(time), 3)), np.zeros((len(time), 3))
+        if len(self.wheel_time) < 3:
+            return np.broadcast_to(self.wheel_momentum[0], (len(time), 3)), np.zeros((len(time), 3))
+        curve = Akima1DInterpolator(self.wheel_time, self.wheel_momentum, method="makima")
+        inside = np.clip(time, self.wheel_time[0], self.wheel_time[-1])
+        return curve(inside), curve.derivative()(inside)
+
+
+def _vector(recording: Recording, family: str) -> tuple[Floats, Floats]:
+    if f"{family}.x" not in recording.channels:
+        return np.zeros(0), np.zeros((0, 3))
+    return recording.vector(family, ("x", "y", "z"))
+
+
+def _held(times: Floats, values: Floats, at: Floats) -> Floats:
+    if len(times) == 0:
+        return np.zeros((len(at), values.shape[1]))
+    index = np.searchsorted(times, at, side="right") - 1
+    return np.where((index >= 0)[:, None], values[np.maximum(index, 0)], 0.0)
+
+
+def build_grid(
+    robot: Robot,
+    unknown: tuple[str, ...],
+    motion: Motion,
+    samples: Floats,
+    step: float,
+    *,
+    orbit: Orbit | None = None,
+    latitude: float = 0.0,
+    actions: Actions | None = None,
+) -> Grid:
+    """Reduce one recording to a `Grid`.
+
+    Parameters
+    ----------
+    robot : Robot
+    unknown : tuple of str
+        Links whose parameters the simulation takes as an argument, in that order; the others are summed.
+    motion : Motion
+    samples : (T,) array
+        Times at which sensors are read [s].
+    step : float
+        Longest integration step [s]; steps end where a held action changes.
+    latitude : float
+        Argument of latitude at time 0 [rad].
+    """
+    actions = Actions.none() if actions is None else actions
+    nodes = _nodes(float(samples[-1]), step, actions.time)
+    stage = np.sort(np.concatenate([nodes, 0.5 * (nodes[1:] + nodes[:-1])]))
+    instants = [_instants(robot, unknown, motion, time, orbit, latitude, actions) for time in (stage, samples)]
+    index = np.clip(np.searchsorted(nodes, samples, side="right") - 1, 0, len(nodes) - 2)
+    size = np.diff(nodes)
+    grid = Grid(
+        step=size,
+        stage=instants[0],
+        held=actions.held(nodes[:-1]),
+        sample=instants[1],
+        index=index.astype(np.int32),
+        fraction=(samples - nodes[index]) / size[index],
+    )
+    return jax.tree.map(jnp.asarray, grid)
+
+
+def _nodes(end: float, step: float, changes: Floats) -> Floats:
+    inner = changes[(changes > 0.0) & (changes < end)]
+    breaks = np.concatenate([[0.0], inner, [end]])
+    pieces = [
+        np.linspace(left, right, int(np.ceil((right - left) / step - 1e-9)) + 1)[:-1]
+        for left, right in zip(breaks[:-1], breaks[1:], strict=True)
+    ]
+    return np.concatenate([*pieces, [end]])
+
+
+def _instants(
+    robot: Robot,
+    unknown: tuple[str, ...],
+    motion: Motion,
+    time: Floats,
+    orbit: Orbit | None,
+    latitude: float,
+    actions: Actions,
+) -> Instants:
+    moved = kinematics(robot, motion.evaluate(time))
+    known = np.zeros((len(time), WIDTH))
+    for name, link in robot.links.items():
+        if name not in unknown and link.inertial.mass > 0.0:
+            known += link_table(robot, name, moved) @ link.inertial.vector
+    tables = [link_table(robot, name, moved) for name in unknown]
+    momentum, torque = actions.wheels(time)
+    if orbit is None:
+        state = [np.zeros((len(time), 3)), np.zeros(len(time)), *np.zeros((2, len(time), 3)), np.zeros(len(time))]
+    else:
+        state = list(orbit.state(time, latitude))
+    environment = Environment(time, *state, momentum, torque)
+    return Instants(known, np.concatenate(tables, axis=2) if tables else np.zeros((len(time), WIDTH, 0)), environment)
+
+
+def pad_grids(grids: list[Grid], steps: int | None = None) -> Grid:
+    """Stack grids of different lengths, shape (R, ...); the padding is steps of no length and copies of a sample."""
+    steps = max(len(grid.step) for grid in grids) if steps is None else steps
+    samples = max(len(grid.index) for grid in grids)
+
+    def lengthen(array: jax.Array, length: int) -> Floats:
+        values = np.asarray(array)
+        return np.concatenate([values, np.repeat(values[-1:], length - len(values), axis=0)])
+
+    padded = []
+    for grid in grids:
+        extra = steps - len(grid.step)
+        padded.append(
+            Grid(
+                step=np.concatenate([np.asarray(grid.step), np.zeros(extra)]),
+                stage=jax.tree.map(lambda x: lengthen(x, 2 * steps + 1), grid.stage),
+                held=lengthen(grid.held, steps),
+                sample=jax.tree.map(lambda x: lengthen(x, samples), grid.sample),
+                index=lengthen(grid.index, samples),
+                fraction=lengthen(grid.fraction, samples),
+            )
+        )
+    return jax.tree.map(lambda *arrays: jnp.asarray(np.stack(arrays)), *padded)
