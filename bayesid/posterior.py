@@ -1,0 +1,396 @@
+"""Model and manoeuvres to a posterior density: residuals whitened by their noise, with exact derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from bayesid import whitening
+from bayesid.dynamics import Grid, Start, quaternion_product, simulate
+from bayesid.effects.base import Readings
+from bayesid.errors import InputError
+from bayesid.grid import Actions, build_grid, pad_grids
+from bayesid.inertia import InertialParameters
+from bayesid.model import Manoeuvre, Model
+from bayesid.motion import MeasuredMotion
+from bayesid.sensors import Kind, Sensor
+from bayesid.tables import joint_sensitivity
+from bayesid.unknowns import Unknowns, Values
+from bayesid.whitening import Channel, NoiseModel, Whitening
+
+__all__ = ["Posterior", "Predictions"]
+
+Floats = NDArray[np.float64]
+
+LONGEST_STEP = 2.0
+"""Integration step tried first [s]."""
+
+STEP_TOLERANCE = 0.01
+"""Largest integration error allowed, in standard deviations of a sample."""
+
+BATCH = 64
+"""Points evaluated together; one compiled shape serves every sampler."""
+
+
+class Data(NamedTuple):
+    """Arrays of all recordings, stacked and padded, leading axis R."""
+
+    grid: Grid
+    attitude: Array  # (R, 4) at time 0
+    measured: Array  # (R, T, C); attitude as quaternion columns kept apart
+    quaternion: Array  # (R, T, 4)
+    weights: Array  # (R, O, C, width, C)
+    start: Array  # (R, O)
+
+
+class Predictions(NamedTuple):
+    """What one recording's sensors should read: time (T,) and per sensor (T, 3) or, for an attitude, (T, 4)."""
+
+    time: Floats
+    rate: Floats
+    accel: Floats
+    attitude: Floats
+
+
+class Posterior:
+    """Posterior of the unknowns of a model given manoeuvres.
+
+    Coordinates ``z`` have a standard-normal prior (`Unknowns`).
+
+    Parameters
+    ----------
+    model : Model
+    manoeuvres : sequence of Manoeuvre
+    step : float, optional
+        Integration step [s]; chosen from the sensors' noise where left out.
+    flat_prior : bool
+        Leave the prior out, for the noise-free comparisons of the paper.
+    """
+
+    def __init__(
+        self, model: Model, manoeuvres: Sequence[Manoeuvre], *, step: float | None = None, flat_prior: bool = False
+    ) -> None:
+        if not manoeuvres:
+            raise InputError("there is no recording", remedy="Give at least one")
+        self.model, self.manoeuvres, self.flat_prior = model, tuple(manoeuvres), flat_prior
+        self._samples = [_Samples(model, manoeuvre) for manoeuvre in manoeuvres]
+        self.unknowns = Unknowns(
+            bodies=model.priors,
+            effects=model.effects,
+            recordings=len(manoeuvres),
+            rate_sigma=self._rate_sigma(),
+            tilt_sigma=np.array([manoeuvre.attitude_sigma for manoeuvre in manoeuvres]),
+        )
+        self.step = self._choose_step() if step is None else step
+        self.whitenings = [self._whitening(index, None, None) for index in range(len(self._samples))]
+        self.data = self._stack(self._grids(self.step))
+
+    def at(self, z: Floats) -> Posterior:
+        """Return the posterior with the encoder noise carried through the robot at ``z`` instead of the prior's centre."""
+        new = object.__new__(Posterior)
+        new.__dict__.update({key: value for key, value in self.__dict__.items() if key != "data"})
+        inertials = self.inertials(z)
+        new.whitenings = [
+            self._whitening(index, inertials, old.window) for index, old in enumerate(self.whitenings)
+        ]
+        new.data = new._stack_noise(self.data)
+        return new
+
+    # ---- sizes ----
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.unknowns.size
+
+    @property
+    def samples(self) -> int:
+        """Number of scalar samples."""
+        return sum(item.samples for item in self.whitenings)
+
+    @property
+    def log_normalisation(self) -> Floats:
+        """Constant of each recording's log likelihood, shape (R,)."""
+        return np.array([-0.5 * item.samples * np.log(2.0 * np.pi) - item.log_sigma for item in self.whitenings])
+
+    # ---- densities ----
+
+    def residuals(self, z: Floats) -> Floats:
+        """Whitened residuals of all recordings, shape (R, O, C); zero where there is no sample."""
+        return np.asarray(self._compiled.residuals(jnp.asarray(z), self.data))
+
+    def least_squares(self, z: Floats) -> Floats:
+        """Residuals whose half square sum is minus the log posterior, up to a constant."""
+        r = self.residuals(z).ravel()
+        return r if self.flat_prior else np.concatenate([r, z])
+
+    def jacobian(self, z: Floats) -> Floats:
+        """Jacobian of `least_squares`, exact by forward-mode differentiation."""
+        j = np.asarray(self._compiled.jacobian(jnp.asarray(z), self.data)).reshape(-1, self.size)
+        return j if self.flat_prior else np.concatenate([j, np.eye(self.size)])
+
+    def log_likelihoods(self, z: Floats) -> Floats:
+        """Log likelihood of each recording for many points, shape (n, size) -> (n, R)."""
+        return -0.5 * self._batched(self._compiled.chi2, np.atleast_2d(z)) + self.log_normalisation
+
+    def log_density(self, z: Floats) -> Floats:
+        """Normalised log prior plus log likelihood for many points, shape (n, size) -> (n,)."""
+        z = np.atleast_2d(z)
+        log_prior = 0.0 if self.flat_prior else -0.5 * (z**2).sum(axis=1) - 0.5 * self.size * np.log(2.0 * np.pi)
+        total = self.log_likelihoods(z).sum(axis=1) + log_prior
+        return np.where(np.isfinite(total), total, -np.inf)
+
+    # ---- physical quantities ----
+
+    def values(self, z: Floats) -> Values:
+        """Physical values of one point."""
+        return jax.tree.map(np.asarray, self._compiled.values(jnp.asarray(z)))
+
+    def values_of(self, z: Floats) -> Values:
+        """Physical values of many points; every array gets a leading axis."""
+        return jax.tree.map(np.asarray, self._compiled.many_values(jnp.asarray(z)))
+
+    def inertials(self, z: Floats) -> list[InertialParameters]:
+        """Inertial parameters of the bodies of `Model.priors`."""
+        return [InertialParameters.from_vector(row) for row in self.values(z).inertial.reshape(-1, 10)]
+
+    def predict(self, z: Floats) -> list[Predictions]:
+        """What the sensors of each recording should read at ``z``, in sensor axes."""
+        readings = jax.tree.map(np.asarray, self._compiled.readings(jnp.asarray(z), self.data))
+        return [
+            Predictions(*(np.asarray(field)[index, : len(samples.time)] for field in readings))
+            for index, samples in enumerate(self._samples)
+        ]
+
+    def initial_point(self) -> Floats:
+        """Return the prior's centre, with initial rates from the first rate samples."""
+        if self.unknowns.rate_sigma == 0.0:
+            return np.zeros(self.size)
+        rates = np.stack([samples.first_rate for samples in self._samples])
+        return self.unknowns.coordinates([body.centre for body in self.model.priors], rates)
+
+    def integration_error(self, z: Floats) -> float:
+        """Largest error of any sample from the integration step, in its standard deviations (Richardson)."""
+        return self._step_error(self.step, z)
+
+    # ---- construction ----
+
+    def _rate_sigma(self) -> float:
+        if self.model.rate_sigma == 0.0:
+            return 0.0
+        return max(self.model.rate_sigma, 3.0 * max(float(np.abs(item.first_rate).max()) for item in self._samples))
+
+    def _grids(self, step: float) -> list[Grid]:
+        names = tuple(prior.name for prior in self.model.priors)
+        return [
+            build_grid(
+                self.model.robot,
+                names,
+                manoeuvre.motion,
+                samples.time,
+                step,
+                orbit=self.model.orbit,
+                latitude=manoeuvre.latitude,
+                actions=Actions.from_recording(manoeuvre.recording),
+            )
+            for manoeuvre, samples in zip(self.manoeuvres, self._samples, strict=True)
+        ]
+
+    def _choose_step(self) -> float:
+        step, z = LONGEST_STEP, self.initial_point()
+        while self._step_error(step, z) > STEP_TOLERANCE:
+            step *= 0.5
+            if step < 1e-4 * LONGEST_STEP:
+                raise InputError(
+                    "no integration step reaches 1 % of the sensors' noise",
+                    remedy="Check the units of joint motion and of the sensors' sigma",
+                )
+        return step
+
+    def _step_error(self, step: float, z: Floats) -> float:
+        fine = self._grids(0.5 * step)
+        steps = max(len(grid.step) for grid in fine)
+        readings = []
+        for grids in (self._grids(step), fine):
+            stacked = pad_grids(grids, steps)
+            readings.append(self._compiled.simulated(jnp.asarray(z), stacked, self._attitudes()))
+        worst = 0.0
+        for sensor in self.model.sensors:
+            sigma = np.stack([item.sigma(sensor) for item in self._samples])
+            first, second = (np.asarray(getattr(item, sensor.kind.value)) for item in readings)
+            worst = max(worst, float((np.abs(first - second)[..., :3] / sigma[:, None]).max()))
+        return worst * 16.0 / 15.0  # the error of a fourth-order step, from its difference to half the step
+
+    def _attitudes(self) -> Array:
+        return jnp.asarray(np.stack([manoeuvre.attitude for manoeuvre in self.manoeuvres]))
+
+    def _whitening(self, index: int, inertials: list[InertialParameters] | None, window: int | None) -> Whitening:
+        robot = self.model.robot
+        for prior, inertial in zip(self.model.priors, inertials or [p.centre for p in self.model.priors], strict=True):
+            robot = robot.with_inertial(prior.name, inertial)
+        samples = self._samples[index]
+        return whitening.build(samples.noise_model(self.model, robot), window)
+
+    def _stack(self, grids: list[Grid]) -> Data:
+        grid = pad_grids(grids)
+        count = grid.index.shape[1]
+        measured = np.stack([_lengthen(item.measured, count) for item in self._samples])
+        quaternion = np.stack([_lengthen(item.quaternion, count) for item in self._samples])
+        bare = Data(grid, self._attitudes(), jnp.asarray(measured), jnp.asarray(quaternion), jnp.zeros(0), jnp.zeros(0))
+        return self._stack_noise(bare)
+
+    def _stack_noise(self, data: Data) -> Data:
+        outputs = max(len(item.start) for item in self.whitenings)
+        width = max(item.weights.shape[2] for item in self.whitenings)
+        channels = self.whitenings[0].weights.shape[1]
+        weights = np.zeros((len(self.whitenings), outputs, channels, width, channels))
+        start = np.zeros((len(self.whitenings), outputs), dtype=np.int32)
+        for row, item in enumerate(self.whitenings):
+            weights[row, : len(item.start), :, : item.weights.shape[2]] = item.weights
+            start[row, : len(item.start)] = item.start
+        return data._replace(weights=jnp.asarray(weights), start=jnp.asarray(start))
+
+    def _batched(self, function: Callable[..., Array], z: Floats) -> Floats:
+        padding = -len(z) % BATCH
+        padded = np.concatenate([z, np.repeat(z[-1:], padding, axis=0)]) if padding else z
+        parts = [np.asarray(function(jnp.asarray(padded[i : i + BATCH]), self.data)) for i in range(0, len(padded), BATCH)]
+        return np.concatenate(parts)[: len(z)]
+
+    @cached_property
+    def _compiled(self) -> _Compiled:
+        return _Compiled(self.model, self.unknowns)
+
+
+class _Compiled:
+    """Compiled functions of a model; data are arguments, so that a change of the noise compiles nothing anew."""
+
+    def __init__(self, model: Model, unknowns: Unknowns) -> None:
+        point = jnp.asarray(model.point)
+        turn = {sensor.kind: jnp.asarray(sensor.rotation) for sensor in model.sensors}
+        kinds = [sensor.kind for sensor in model.sensors]
+
+        def one(grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Readings:
+            small = jnp.concatenate([0.5 * tilt, jnp.ones(1)])
+            start = Start(quaternion_product(attitude, small / jnp.linalg.norm(small)), rate)
+            readings = simulate(grid, inertial, start, model.effects, effects, point)
+            readings = readings._replace(
+                rate=readings.rate @ turn.get(Kind.RATE, jnp.eye(3)), accel=readings.accel @ turn.get(Kind.ACCEL, jnp.eye(3))
+            )
+            for effect, values in zip(model.effects, effects, strict=True):
+                readings = effect.read(values, readings)
+            return readings
+
+        def simulated(z: Array, grid: Grid, attitude: Array) -> Readings:
+            values = unknowns.values(z)
+            axes = tuple(0 if effect.per_recording else None for effect in model.effects)
+            return jax.vmap(one, (0, 0, None, 0, 0, axes))(
+                grid, attitude, values.inertial, values.rate, values.tilt, values.effects
+            )
+
+        def residuals(z: Array, data: Data) -> Array:
+            readings = simulated(z, data.grid, data.attitude)
+            parts = []
+            for kind in kinds:
+                if kind is Kind.ATTITUDE:
+                    parts.append(jax.vmap(jax.vmap(_rotation_between))(readings.attitude, data.quaternion))
+                else:
+                    first = 3 * kinds.index(kind)
+                    parts.append(data.measured[..., first : first + 3] - getattr(readings, kind.value))
+            residual = jnp.concatenate(parts, axis=-1)
+            padded = jnp.pad(residual, ((0, 0), (0, data.weights.shape[3]), (0, 0)))
+            return jax.vmap(whitening.apply)(data.weights, data.start, padded)
+
+        def chi2(z: Array, data: Data) -> Array:
+            return jnp.sum(residuals(z, data) ** 2, axis=(1, 2))
+
+        self.simulated = jax.jit(simulated)
+        self.readings = jax.jit(lambda z, data: simulated(z, data.grid, data.attitude))
+        self.residuals = jax.jit(residuals)
+        self.jacobian = jax.jit(jax.jacfwd(residuals))
+        self.chi2 = jax.jit(jax.vmap(chi2, (0, None)))
+        self.values = jax.jit(unknowns.values)
+        self.many_values = jax.jit(jax.vmap(unknowns.values))
+
+
+def _rotation_between(predicted: Array, measured: Array) -> Array:
+    """Small rotation, base axes, from the predicted to the measured attitude."""
+    difference = quaternion_product(predicted * jnp.array([-1.0, -1.0, -1.0, 1.0]), measured)
+    return 2.0 * difference[:3] * jnp.sign(difference[3])
+
+
+def _lengthen(array: Floats, length: int) -> Floats:
+    return np.concatenate([array, np.repeat(array[-1:], length - len(array), axis=0)])
+
+
+class _Samples:
+    """Sensor samples of one recording on one time grid."""
+
+    def __init__(self, model: Model, manoeuvre: Manoeuvre) -> None:
+        recording = manoeuvre.recording
+        self.motion = manoeuvre.motion
+        self.sensors = model.sensors
+        self.series = {}
+        for sensor in model.sensors:
+            axes = ("x", "y", "z", "w") if sensor.kind is Kind.ATTITUDE else ("x", "y", "z")
+            if f"{sensor.kind.value}.x" not in recording.channels:
+                raise InputError(
+                    f"no column {sensor.kind.value}.x|y|z, but the study declares the sensor",
+                    file=recording.file or recording.name,
+                    remedy="Record the sensor or take it out of [sensors]",
+                )
+            self.series[sensor.kind] = recording.vector(sensor.kind.value, axes)
+        self.time = np.unique(np.concatenate([time for time, _ in self.series.values()]))
+        self.rows = {kind: np.searchsorted(self.time, time) for kind, (time, _) in self.series.items()}
+        self.measured = np.zeros((len(self.time), 3 * len(self.sensors)))
+        self.quaternion = np.tile([0.0, 0.0, 0.0, 1.0], (len(self.time), 1))
+        for slot, sensor in enumerate(self.sensors):
+            values = self.series[sensor.kind][1]
+            if sensor.kind is Kind.ATTITUDE:
+                self.quaternion[self.rows[sensor.kind]] = values
+            else:
+                self.measured[self.rows[sensor.kind], 3 * slot : 3 * slot + 3] = values
+
+    @property
+    def first_rate(self) -> Floats:
+        """Rate at the start in base axes, from the first samples."""
+        for sensor in self.sensors:
+            if sensor.kind is Kind.RATE:
+                return sensor.rotation @ self.series[sensor.kind][1][:3].mean(axis=0)
+        return np.zeros(3)
+
+    def interval(self, kind: Kind) -> float:
+        """Median sampling interval of a sensor [s]."""
+        return float(np.median(np.diff(self.series[kind][0])))
+
+    def sigma(self, sensor: Sensor) -> Floats:
+        """Noise per axis, shape (3,)."""
+        return sensor.noise.sigma(self.interval(sensor.kind))
+
+    def noise_model(self, model: Model, robot: Any) -> NoiseModel:
+        """Return the second moments of the errors, with the encoder noise seen through ``robot``."""
+        channels = [
+            Channel(float(value), self.rows[sensor.kind], sensor.filter)
+            for sensor in self.sensors
+            for value in self.sigma(sensor)
+        ]
+        if not isinstance(self.motion, MeasuredMotion):
+            empty = np.zeros((0, 3, len(self.time), len(channels)))
+            return NoiseModel(self.time, channels, empty, np.zeros((0, 1, len(self.time), 3, 3)))
+        response = joint_sensitivity(robot, self.motion.evaluate(self.time).position, model.point)
+        joints = len(robot.joints)
+        sensitivity = np.zeros((joints, 3, len(self.time), len(channels)))
+        for slot, sensor in enumerate(self.sensors):
+            # the rate follows joint velocity, the acceleration joint acceleration, the attitude joint position
+            derivative = {Kind.RATE: 1, Kind.ACCEL: 2, Kind.ATTITUDE: 0}[sensor.kind]
+            source = response.acceleration if sensor.kind is Kind.ACCEL else response.rate
+            turn = np.eye(3) if sensor.kind is Kind.ATTITUDE else sensor.rotation
+            sensitivity[:, derivative, :, 3 * slot : 3 * slot + 3] = np.swapaxes(source @ turn, 0, 1)
+        covariance = self.motion.lag_covariance(self.time, min(max(whitening.WINDOWS), len(self.time) - 1))
+        return NoiseModel(self.time, channels, sensitivity, covariance)

@@ -1,0 +1,174 @@
+"""The unknowns of an identification: one vector of coordinates whose prior is standard normal.
+
+Inertial parameters are log-Cholesky coordinates relative to the prior's centre: ``J = U0 U(spread z) U(spread z)' U0'``
+with ``U0`` the factor of the given pseudo-inertia, so that every value of z is a physical body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from bayesid.effects.base import Effect
+from bayesid.errors import InputError
+from bayesid.inertia import InertialParameters, log_cholesky_factor, parameters_from_pseudo_inertia, upper_cholesky
+
+__all__ = ["BodyPrior", "Unknowns", "Values", "draw_inertial"]
+
+LOG_CHOLESKY = ("alpha", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3")
+
+
+@dataclass(frozen=True)
+class BodyPrior:
+    """Prior of one body's inertial parameters.
+
+    Parameters
+    ----------
+    name : str
+        Link or load.
+    centre : InertialParameters
+    spread : float
+        Standard deviation of each log-Cholesky coordinate relative to the centre's pseudo-inertia. The mass is then
+        log-normal with twice that relative width.
+    nuisance : bool
+        Whether the body is marginalised only because it is not known exactly.
+    """
+
+    name: str
+    centre: InertialParameters
+    spread: float
+    nuisance: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.spread > 0.0:
+            raise InputError(f"spread {self.spread:g} of {self.name} is not positive", remedy="Give the prior's relative width")
+        if not self.centre.is_extended:
+            raise InputError(
+                f"the prior of {self.name} centres on a body without extent (mass {self.centre.mass:g} kg)",
+                place=f"link {self.name}",
+                remedy="Give mass and inertia of a body with volume, or leave it out of the unknowns",
+            )
+
+
+class Values(NamedTuple):
+    """Physical values of the unknowns.
+
+    inertial (10 bodies,) linear parameters body after body; rate (R, 3) initial rates; tilt (R, 3) small rotation of the
+    initial attitude, base axes; effects: per effect (n,) or, per recording, (R, n).
+    """
+
+    inertial: Array
+    rate: Array
+    tilt: Array
+    effects: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """Layout of the vector of unknowns and its map to physical values.
+
+    Parameters
+    ----------
+    bodies : sequence of BodyPrior
+    effects : sequence of Effect
+        All effects of the model, with or without parameters.
+    recordings : int
+    rate_sigma : float
+        Prior standard deviation of the initial rate [rad/s]; 0 for exactly zero.
+    tilt_sigma : (R,) array
+        Of the initial attitude [rad]; 0 for exact.
+    """
+
+    bodies: tuple[BodyPrior, ...]
+    effects: tuple[Effect, ...]
+    recordings: int
+    rate_sigma: float
+    tilt_sigma: NDArray[np.float64]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """One name per coordinate."""
+        names = [f"{body.name}.{key}" for body in self.bodies for key in LOG_CHOLESKY]
+        names += [f"initial-rate[{i}].{axis}" for i in self._rates for axis in "xyz"]
+        names += [f"initial-attitude[{i}].{axis}" for i in self._tilts for axis in "xyz"]
+        for effect in self.effects:
+            copies = [f"{effect.label}[{i}]" for i in range(self.recordings)] if effect.per_recording else [effect.label]
+            names += [f"{copy}.{parameter.name}" for copy in copies for parameter in effect.parameters]
+        return tuple(names)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return len(self.names)
+
+    @property
+    def _rates(self) -> range:
+        return range(self.recordings if self.rate_sigma > 0.0 else 0)
+
+    @property
+    def _tilts(self) -> list[int]:
+        return [index for index, sigma in enumerate(self.tilt_sigma) if sigma > 0.0]
+
+    def values(self, z: Array) -> Values:
+        """Map standard-normal coordinates, shape (size,), to physical values."""
+        cursor = 0
+
+        def take(*shape: int) -> Array:
+            nonlocal cursor
+            count = int(np.prod(shape))
+            cursor += count
+            return z[cursor - count : cursor].reshape(shape)
+
+        inertial = [_inertial(body, take(10)) for body in self.bodies]
+        rate = jnp.zeros((self.recordings, 3))
+        if self._rates:
+            rate = self.rate_sigma * take(self.recordings, 3)
+        tilt = jnp.zeros((self.recordings, 3))
+        if self._tilts:
+            rows = np.array(self._tilts)
+            tilt = tilt.at[rows].set(self.tilt_sigma[rows][:, None] * take(len(rows), 3))
+        effects = []
+        for effect in self.effects:
+            count = len(effect.parameters)
+            scale = jnp.array([parameter.sigma for parameter in effect.parameters])
+            mean = jnp.array([parameter.mean for parameter in effect.parameters])
+            own = take(self.recordings, count) if effect.per_recording else take(count)
+            effects.append(mean + scale * own if count else own)
+        return Values(jnp.concatenate(inertial) if inertial else jnp.zeros(0), rate, tilt, tuple(effects))
+
+    def coordinates(self, inertials: Sequence[InertialParameters], rate: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """Coordinates of given bodies and initial rates, everything else at its prior mean."""
+        z = np.zeros(self.size)
+        for index, (body, inertial) in enumerate(zip(self.bodies, inertials, strict=True)):
+            z[10 * index : 10 * index + 10] = coordinates_of(body, inertial)
+        if rate is not None and self._rates:
+            first = 10 * len(self.bodies)
+            z[first : first + 3 * self.recordings] = (rate / self.rate_sigma).ravel()
+        return z
+
+
+def _inertial(body: BodyPrior, z: Array) -> Array:
+    factor = jnp.asarray(upper_cholesky(body.centre.pseudo_inertia)) @ log_cholesky_factor(body.spread * z)
+    return parameters_from_pseudo_inertia(factor @ factor.T)
+
+
+def coordinates_of(body: BodyPrior, inertial: InertialParameters) -> NDArray[np.float64]:
+    """Standard-normal coordinates of a body under its prior, shape (10,)."""
+    relative = np.linalg.solve(upper_cholesky(body.centre.pseudo_inertia), upper_cholesky(inertial.pseudo_inertia))
+    alpha = np.log(relative[3, 3])
+    u = relative / relative[3, 3]
+    d = np.log(np.diag(u)[:3])
+    return np.array([alpha, *d, u[0, 1], u[1, 2], u[0, 2], u[0, 3], u[1, 3], u[2, 3]]) / body.spread
+
+
+def draw_inertial(centre: InertialParameters, spread: float, rng: np.random.Generator) -> InertialParameters:
+    """Draw a body from the log-Cholesky prior about a centre."""
+    vector = jax.jit(_inertial, static_argnums=0)(BodyPrior("link", centre, spread), jnp.asarray(rng.normal(size=10)))
+    return InertialParameters.from_vector(np.asarray(vector))
