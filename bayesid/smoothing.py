@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sla
@@ -56,6 +57,8 @@ class SmoothedJoint:
     ----------
     sigmas : tuple of float
         Noise of each series of samples, declared or estimated.
+    declared : tuple of bool
+        Which of them the user declared.
     order : int
         Derivative of the position that is white noise.
     intensity : float
@@ -69,6 +72,7 @@ class SmoothedJoint:
     scale: float  # time unit of the scaled derivatives
     factor: Floats  # banded Cholesky factor of the posterior precision, scaled
     sigmas: tuple[float, ...]
+    declared: tuple[bool, ...]
     order: int
     intensity: float
     log_likelihood: float
@@ -81,8 +85,12 @@ class SmoothedJoint:
 
     def evaluate(self, time: Floats) -> Floats:
         """Return position, velocity and acceleration, shape (3, T)."""
+        return np.stack([spline(time) for spline in self._splines])
+
+    @cached_property
+    def _splines(self) -> tuple[BPoly, BPoly, BPoly]:
         spline = BPoly.from_derivatives(self.nodes, self.states * self._units, extrapolate=True)
-        return np.stack([spline.derivative(order)(time) if order else spline(time) for order in range(3)])
+        return spline, spline.derivative(1), spline.derivative(2)
 
     def lag_covariance(self, time: Floats, lags: int) -> Floats:
         """Covariance of the errors of position, velocity and acceleration with those of earlier times.
@@ -176,6 +184,7 @@ def _fit(samples: list[JointSamples], nodes: Floats, scale: float, start: float 
         scale=scale,
         factor=factor,
         sigmas=tuple(sigma / unit for sigma, unit in zip(sigmas, units, strict=True)),
+        declared=tuple(series.sigma is not None for series in samples),
         order=order,
         intensity=intensity / scale ** (order - 0.5),
         log_likelihood=log_likelihood,

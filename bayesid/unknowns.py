@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -143,6 +142,28 @@ class Unknowns:
             effects.append(mean + scale * own if count else own)
         return Values(jnp.concatenate(inertial) if inertial else jnp.zeros(0), rate, tilt, tuple(effects))
 
+    def to_linear(self, z: Array) -> Array:
+        """Coordinates linear in the inertial parameters: entries of each relative pseudo-inertia, less the identity.
+
+        Whatever else is unknown keeps its coordinates. What the dynamics determines sharply are linear combinations of
+        inertial parameters up to a common factor, so ridges of the posterior are straight here.
+        """
+        bodies = [_relative(body, z[start : start + 10]) for start, body in self._starts]
+        return jnp.concatenate([*bodies, z[10 * len(self.bodies) :]])
+
+    def from_linear(self, y: Array) -> Array:
+        """Inverse of `to_linear`; not a number where no physical body has these coordinates."""
+        bodies = [_absolute(body, y[start : start + 10]) for start, body in self._starts]
+        return jnp.concatenate([*bodies, y[10 * len(self.bodies) :]])
+
+    def log_volume(self, z: Array) -> Array:
+        """Logarithm of the determinant of d to_linear / d z."""
+        return sum((_log_volume(body, z[start : start + 10]) for start, body in self._starts), jnp.zeros(()))
+
+    @property
+    def _starts(self) -> list[tuple[int, BodyPrior]]:
+        return [(10 * index, body) for index, body in enumerate(self.bodies)]
+
     def coordinates(self, inertials: Sequence[InertialParameters], rate: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Coordinates of given bodies and initial rates, everything else at its prior mean."""
         z = np.zeros(self.size)
@@ -159,6 +180,31 @@ def _inertial(body: BodyPrior, z: Array) -> Array:
     return parameters_from_pseudo_inertia(factor @ factor.T)
 
 
+_ROW, _COLUMN = np.triu_indices(4)
+
+
+def _relative(body: BodyPrior, z: Array) -> Array:
+    factor = log_cholesky_factor(body.spread * z)
+    return ((factor @ factor.T) - jnp.eye(4))[_ROW, _COLUMN] / body.spread
+
+
+def _absolute(body: BodyPrior, y: Array) -> Array:
+    upper = jnp.zeros((4, 4)).at[_ROW, _COLUMN].set(body.spread * y)
+    matrix = jnp.eye(4) + upper + upper.T - jnp.diag(jnp.diag(upper))
+    u = jnp.linalg.cholesky(matrix[::-1, ::-1])[::-1, ::-1]
+    unit = u / u[3, 3]
+    d = jnp.log(jnp.diag(unit)[:3])
+    rest = jnp.stack([unit[0, 1], unit[1, 2], unit[0, 2], unit[0, 3], unit[1, 3], unit[2, 3]])
+    return jnp.concatenate([jnp.log(u[3, 3])[None], d, rest]) / body.spread
+
+
+def _log_volume(body: BodyPrior, z: Array) -> Array:
+    # |d(U U')/dU| = 2^4 prod u_ii^i for upper-triangular U, times |dU/dtheta| = u_11 u_22 u_33 u_44 u_44^6
+    alpha, d = body.spread * z[0], body.spread * z[1:4]
+    logs = jnp.concatenate([alpha + d, alpha[None]])
+    return 4.0 * jnp.log(2.0) + (jnp.arange(1.0, 5.0) @ logs) + logs.sum() + 6.0 * alpha
+
+
 def coordinates_of(body: BodyPrior, inertial: InertialParameters) -> NDArray[np.float64]:
     """Standard-normal coordinates of a body under its prior, shape (10,)."""
     relative = np.linalg.solve(upper_cholesky(body.centre.pseudo_inertia), upper_cholesky(inertial.pseudo_inertia))
@@ -170,5 +216,5 @@ def coordinates_of(body: BodyPrior, inertial: InertialParameters) -> NDArray[np.
 
 def draw_inertial(centre: InertialParameters, spread: float, rng: np.random.Generator) -> InertialParameters:
     """Draw a body from the log-Cholesky prior about a centre."""
-    vector = jax.jit(_inertial, static_argnums=0)(BodyPrior("link", centre, spread), jnp.asarray(rng.normal(size=10)))
+    vector = _inertial(BodyPrior("link", centre, spread), jnp.asarray(rng.normal(size=10)))
     return InertialParameters.from_vector(np.asarray(vector))

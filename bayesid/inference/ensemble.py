@@ -1,0 +1,234 @@
+"""Posterior samples by emcee: independent ensembles, started from the Laplace approximation and stopped by convergence.
+
+Two kinds of move alternate: an independence move that proposes from a Student-t about the mode, which mixes in a few
+steps where the posterior is nearly normal, and emcee's differential evolution, which needs no approximation.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import arviz as az
+import emcee
+import numpy as np
+from emcee.autocorr import integrated_time
+from emcee.moves import DEMove, DESnookerMove
+from emcee.moves.red_blue import RedBlueMove
+from numpy.typing import NDArray
+
+from bayesid.errors import InputError
+from bayesid.inference.charts import Chart
+from bayesid.inference.optimum import Optimum
+from bayesid.inference.proposal import StudentT
+from bayesid.posterior import BATCH, Posterior
+
+__all__ = ["Chains", "LaplaceMove", "Progress", "sample"]
+
+Floats = NDArray[np.float64]
+
+ENSEMBLES = 4
+BLOCK = 50
+"""Steps between two looks at convergence."""
+
+LENGTHS = 50.0
+"""Steps demanded, in autocorrelation times, as emcee advises."""
+
+R_HAT = 1.01
+
+
+class LaplaceMove(RedBlueMove):
+    """Independence move of emcee: propose from a Student-t about the mode, whatever the other walkers do."""
+
+    def __init__(self, proposal: StudentT) -> None:
+        self.proposal = proposal
+        super().__init__()
+
+    def get_proposal(self, sample: Floats, complement: list[Floats], random: np.random.RandomState) -> tuple[Floats, Floats]:
+        """Return proposals and the log ratio of backward to forward densities."""
+        new = self.proposal.draw(len(sample), random)
+        return new, self.proposal.log_density(sample) - self.proposal.log_density(new)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """State of a running sampler, handed to a callback after every block of steps."""
+
+    steps: int
+    limit: int
+    evaluations: int
+    effective_samples: float
+    wanted: float
+    r_hat: float
+    acceptance: float
+
+
+@dataclass(frozen=True)
+class Chains:
+    """Samples of all ensembles after burn-in.
+
+    Attributes
+    ----------
+    z : (ensembles, draws, n) array
+        Steps and walkers of an ensemble run along one axis, step-major.
+    log_density : (ensembles, draws) array
+        Over the coordinates of the chart.
+    effective_samples : float
+        Total draws over the longest autocorrelation time.
+    r_hat : float
+        Largest over the coordinates, between independent ensembles.
+    autocorrelation : float
+        Longest over ensembles and coordinates [steps].
+    converged : bool
+        Whether length, r_hat and effective samples all reached their goals.
+    """
+
+    z: Floats
+    log_density: Floats
+    effective_samples: float
+    r_hat: float
+    autocorrelation: float
+    acceptance: float
+    evaluations: int
+    steps: int
+    walkers: int
+    converged: bool
+
+    @property
+    def flat(self) -> Floats:
+        """All draws, shape (ensembles * draws, n)."""
+        return self.z.reshape(-1, self.z.shape[-1])
+
+
+def sample(
+    chart: Chart,
+    optimum: Optimum,
+    seed: int | np.random.SeedSequence,
+    *,
+    effective_samples: float = 4000.0,
+    max_steps: int = 5000,
+    file: Path | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Chains:
+    """Sample the posterior until it has converged.
+
+    Parameters
+    ----------
+    chart : Chart
+        The posterior, in the coordinates the walkers move in.
+    seed : int or SeedSequence
+        Same seed, same samples; a resumed run gives what the uninterrupted one would have given.
+    effective_samples : float
+        Goal over all ensembles.
+    max_steps : int
+        Per ensemble; reaching it leaves ``converged`` false.
+    file : path, optional
+        HDF5 file that keeps every step. If it holds part of the same run, sampling goes on from there.
+    progress : callable, optional
+        Called after every block of steps.
+    """
+    posterior = chart.posterior
+    proposal = chart.proposal(optimum)
+    moves = [(LaplaceMove(proposal), 0.6), (DEMove(), 0.3), (DESnookerMove(), 0.1)]
+    walkers = _walkers(posterior.size)
+    sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+    mark = _fingerprint(posterior, optimum, sequence)
+    samplers = []
+    for number, child in enumerate(sequence.spawn(ENSEMBLES)):
+        backend = _backend(file, number, mark)
+        state = np.random.RandomState(child.generate_state(8))  # noqa: NPY002, emcee's generator
+        fresh = backend.iteration == 0 if file is not None else True
+        sampler = emcee.EnsembleSampler(
+            walkers, posterior.size, chart.log_density, moves=moves, vectorize=True, backend=backend
+        )
+        if fresh:
+            sampler.random_state = state.get_state()
+        samplers.append((sampler, None if not fresh else _start(chart, proposal, walkers, state)))
+    while True:
+        steps = min(sampler.iteration for sampler, _ in samplers)
+        if steps:
+            chains = _summary(chart, [sampler for sampler, _ in samplers], effective_samples)
+            if progress is not None:
+                progress(
+                    Progress(steps, max_steps, chains.evaluations, chains.effective_samples, effective_samples, chains.r_hat, chains.acceptance)
+                )
+            if chains.converged or steps >= max_steps:
+                return chains
+        for number, (sampler, start) in enumerate(samplers):
+            if sampler.iteration == steps:  # after an interruption some ensembles are a block ahead
+                sampler.run_mcmc(start, BLOCK, skip_initial_state_check=True)
+            samplers[number] = (sampler, None)
+
+
+def _walkers(size: int) -> int:
+    pair = 2 * BATCH  # both halves of an ensemble fill whole batches
+    return pair * max(1, int(np.ceil((2 * size + 2) / pair)))
+
+
+def _start(chart: Chart, proposal: StudentT, walkers: int, state: np.random.RandomState) -> Floats:
+    """Draw walkers that have a finite density."""
+    points = proposal.draw(4 * walkers, state)
+    finite = points[np.isfinite(chart.log_density(points))]
+    if len(finite) < walkers:
+        raise InputError("the Laplace approximation lies outside the support", remedy="Check the priors and the data")
+    return finite[:walkers]
+
+
+def _backend(file: Path | None, number: int, mark: str) -> emcee.backends.Backend:
+    if file is None:
+        return emcee.backends.Backend()
+    backend = emcee.backends.HDFBackend(str(file), name=f"ensemble-{number}")
+    if backend.initialized:
+        with backend.open() as opened:
+            found = opened[f"ensemble-{number}"].attrs.get("run", "")
+        if found != mark:
+            raise InputError(
+                "holds the samples of another run (other data, model or seed)", file=file, remedy="Delete it or choose another output folder"
+            )
+    return _Marked(backend, mark)
+
+
+class _Marked(emcee.backends.HDFBackend):
+    """HDF5 backend that writes down which run its samples belong to."""
+
+    def __init__(self, backend: emcee.backends.HDFBackend, mark: str) -> None:
+        super().__init__(backend.filename, name=backend.name)
+        self.mark = mark
+
+    def reset(self, nwalkers: int, ndim: int) -> None:
+        super().reset(nwalkers, ndim)
+        with self.open("a") as opened:
+            opened[self.name].attrs["run"] = self.mark
+
+
+def _fingerprint(posterior: Posterior, optimum: Optimum, sequence: np.random.SeedSequence) -> str:
+    digest = hashlib.sha256(repr((posterior.unknowns.names, sequence.entropy, sequence.spawn_key)).encode())
+    digest.update(np.round(optimum.z, 6).tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _summary(chart: Chart, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
+    steps = min(sampler.iteration for sampler in samplers)
+    chains = [sampler.get_chain()[:steps] for sampler in samplers]
+    densities = [sampler.get_log_prob()[:steps] for sampler in samplers]
+    tau = max(float(np.max(integrated_time(chain, tol=0, quiet=True))) for chain in chains)
+    tau = max(tau, 1.0) if np.isfinite(tau) else float(steps)
+    burn = min(int(np.ceil(5.0 * tau)), steps // 2)
+    y = np.stack([chain[burn:].reshape(-1, chain.shape[-1]) for chain in chains])
+    walkers = chains[0].shape[1]
+    effective = y.shape[0] * y.shape[1] / tau
+    r_hat = float(np.max([az.rhat(y[:, :, k]) for k in range(y.shape[2])]))
+    return Chains(
+        z=np.stack([chart.to_z(own) for own in y]),
+        log_density=np.stack([density[burn:].ravel() for density in densities]),
+        effective_samples=effective,
+        r_hat=r_hat,
+        autocorrelation=tau,
+        acceptance=float(np.mean([sampler.acceptance_fraction.mean() for sampler in samplers])),
+        evaluations=steps * walkers * len(samplers),
+        steps=steps,
+        walkers=walkers,
+        converged=bool(steps >= LENGTHS * tau and r_hat < R_HAT and effective >= wanted),
+    )

@@ -1,0 +1,265 @@
+"""Identification from end to end: mode, Laplace, evidence and samples of one posterior, and whether they agree."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid.inference.ensemble import Chains, Progress, sample
+from bayesid.inference.importance import Evidence, choose_chart, importance_sample
+from bayesid.inference.optimum import Optimum, maximise
+from bayesid.posterior import Posterior
+
+__all__ = ["BODY_QUANTITIES", "BodyDraws", "Identification", "identify"]
+
+Floats = NDArray[np.float64]
+
+BODY_QUANTITIES = {
+    "mass": "kg",
+    "com.x": "m",
+    "com.y": "m",
+    "com.z": "m",
+    "inertia.xx": "kg m2",
+    "inertia.yy": "kg m2",
+    "inertia.zz": "kg m2",
+    "inertia.xy": "kg m2",
+    "inertia.xz": "kg m2",
+    "inertia.yz": "kg m2",
+}
+"""What is reported of a body, with units; the inertia is about its own centre of mass, in the link's axes."""
+
+MEAN_TOLERANCE, WIDTH_TOLERANCE = 0.25, 0.2
+"""How far two methods may differ before the result says so: in standard deviations, and relative in their width."""
+
+
+@dataclass(frozen=True)
+class BodyDraws:
+    """Draws of one body's quantities, shape (draws, 10), in the order of `BODY_QUANTITIES`."""
+
+    name: str
+    values: Floats
+
+    @property
+    def mean(self) -> Floats:
+        """Posterior mean, shape (10,)."""
+        return self.values.mean(axis=0)
+
+    @property
+    def sd(self) -> Floats:
+        """Posterior standard deviation, shape (10,)."""
+        return self.values.std(axis=0, ddof=1)
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Result of `identify`.
+
+    Attributes
+    ----------
+    posterior : Posterior
+        With its noise linearised at the mode.
+    optimum : Optimum
+    evidence : Evidence
+    chains : Chains
+    seconds : float
+        Wall time of the sampler.
+    """
+
+    posterior: Posterior
+    optimum: Optimum
+    evidence: Evidence
+    chains: Chains
+    seconds: float
+
+    @cached_property
+    def bodies(self) -> dict[str, BodyDraws]:
+        """Draws of every identified body."""
+        return bodies_of(self.posterior, self.chains.flat)
+
+    @cached_property
+    def effects(self) -> dict[str, Floats]:
+        """Draws of every effect with parameters, (draws, n) or, per recording, (draws, R, n)."""
+        values = self.posterior.values_of(self.chains.flat)
+        return {
+            effect.label: draws
+            for effect, draws in zip(self.posterior.model.effects, values.effects, strict=True)
+            if effect.parameters
+        }
+
+    @cached_property
+    def integration_error(self) -> float:
+        """Largest error of any sample from the integration step, in its standard deviations."""
+        return self.posterior.integration_error(self.optimum.z)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the reported quantities of all bodies."""
+        return tuple(f"{body}.{key}" for body in self.bodies for key in BODY_QUANTITIES)
+
+    @property
+    def covariance(self) -> Floats:
+        """Posterior covariance of the reported quantities of all bodies."""
+        return np.atleast_2d(np.cov(np.concatenate([body.values for body in self.bodies.values()], axis=1).T))
+
+    @property
+    def disagreements(self) -> tuple[str, ...]:
+        """Sentences on where mode, importance sampling and ensembles differ; empty when they agree."""
+        found = []
+        draws = self.chains.flat
+        mean, sd = draws.mean(axis=0), draws.std(axis=0)
+        laplace_sd = np.sqrt(np.diag(self.optimum.covariance))
+        methods = [("Laplace approximation", self.optimum.z, laplace_sd)]
+        if self.evidence.trusted:
+            methods.append(("importance sampling", self.evidence.mean, self.evidence.sd))
+        else:
+            found.append(
+                f"Importance sampling is not evaluated: Pareto k-hat {self.evidence.pareto_k:.2f} is above 0.7, "
+                "so the evidence may not be trusted."
+            )
+        for method, other_mean, other_sd in methods:
+            shift = np.abs(mean - other_mean) / sd
+            ratio = np.abs(other_sd / sd - 1.0)
+            worst = int(np.argmax(np.maximum(shift / MEAN_TOLERANCE, ratio / WIDTH_TOLERANCE)))
+            if shift[worst] > MEAN_TOLERANCE or ratio[worst] > WIDTH_TOLERANCE:
+                found.append(
+                    f"The {method} and the samples differ most in {self.posterior.unknowns.names[worst]}: "
+                    f"means by {shift[worst]:.2f} sd, widths by {100.0 * ratio[worst]:.0f} %. The samples are reported."
+                )
+        if not self.chains.converged:
+            found.append(
+                f"The sampler has not converged: R-hat {self.chains.r_hat:.3f}, "
+                f"{self.chains.effective_samples:.0f} effective samples after {self.chains.steps} steps."
+            )
+        return tuple(found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Content of identification.json."""
+        return {
+            "bodies": {name: _body_dict(body) for name, body in self.bodies.items()},
+            "effects": self._effects_dict(),
+            "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
+            "fit": {"chi2": self.optimum.chi2, "samples": self.posterior.samples, "unknowns": self.posterior.size},
+            "sampler": {
+                "effective_samples": self.chains.effective_samples,
+                "r_hat": self.chains.r_hat,
+                "evaluations": self.chains.evaluations,
+                "seconds": self.seconds,
+                "converged": self.chains.converged,
+            },
+            "log_evidence": {
+                "value": self.evidence.value,
+                "error": self.evidence.error,
+                "pareto_k": self.evidence.pareto_k,
+                "trusted": self.evidence.trusted,
+            },
+            "disagreements": list(self.disagreements),
+            "integration": {"step": self.posterior.step, "error_in_sigma": self.integration_error},
+        }
+
+    def write_json(self, file: Path) -> None:
+        """Write `to_dict`, all or nothing."""
+        text = json.dumps(self.to_dict(), indent=1)
+        part = file.with_suffix(".part")
+        part.write_text(text, encoding="utf-8")
+        part.replace(file)
+
+    def _effects_dict(self) -> dict[str, Any]:
+        result: dict[str, Any] = {}
+        for effect in self.posterior.model.effects:
+            if not effect.parameters:
+                continue
+            draws = self.effects[effect.label]
+            mean, sd = draws.mean(axis=0), draws.std(axis=0, ddof=1)
+            rows = [(effect.label, mean, sd)]
+            if effect.per_recording:
+                rows = [
+                    (f"{effect.label}[{manoeuvre.recording.name}]", mean[i], sd[i])
+                    for i, manoeuvre in enumerate(self.posterior.manoeuvres)
+                ]
+            for label, centre, width in rows:
+                result[label] = {
+                    parameter.name: quantity(centre[k], width[k], parameter.unit)
+                    for k, parameter in enumerate(effect.parameters)
+                }
+        return result
+
+
+def identify(
+    posterior: Posterior,
+    seed: int = 0,
+    *,
+    effective_samples: float = 4000.0,
+    max_steps: int = 5000,
+    file: Path | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> Identification:
+    """Identify the unknowns of a posterior.
+
+    Parameters
+    ----------
+    seed : int
+        Every random number follows from it.
+    effective_samples, max_steps, file, progress
+        See `bayesid.inference.sample`.
+    """
+    starts, weights, walkers = np.random.SeedSequence(seed).spawn(3)
+    refined, optimum = maximise(posterior, np.random.default_rng(starts))
+    rng = np.random.default_rng(weights)
+    chart = choose_chart(refined, optimum, rng)
+    evidence = importance_sample(chart, optimum, rng)
+    began = time.perf_counter()
+    chains = sample(
+        chart, optimum, walkers, effective_samples=effective_samples, max_steps=max_steps, file=file, progress=progress
+    )
+    return Identification(refined, optimum, evidence, chains, time.perf_counter() - began)
+
+
+def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
+    """Reported quantities of the identified bodies at many points, shape (draws, size)."""
+    inertial = posterior.values_of(z).inertial.reshape(len(z), -1, 10)
+    return {
+        prior.name: BodyDraws(prior.name, reported(inertial[:, index]))
+        for index, prior in enumerate(posterior.model.priors)
+        if not prior.nuisance
+    }
+
+
+def reported(vectors: Floats) -> Floats:
+    """Linear inertial parameters (..., 10) to `BODY_QUANTITIES` (..., 10)."""
+    mass, first = vectors[..., :1], vectors[..., 1:4]
+    com = first / mass
+    xx, xy, yy, xz, yz, zz = np.moveaxis(vectors[..., 4:], -1, 0)
+    m, (x, y, z) = mass[..., 0], np.moveaxis(com, -1, 0)
+    tensor = [
+        xx - m * (y * y + z * z),
+        yy - m * (x * x + z * z),
+        zz - m * (x * x + y * y),
+        xy + m * x * y,
+        xz + m * x * z,
+        yz + m * y * z,
+    ]
+    return np.concatenate([mass, com, np.stack(tensor, axis=-1)], axis=-1)
+
+
+def quantity(mean: float, sd: float, unit: str) -> dict[str, Any]:
+    """Return the form every quantity has in JSON."""
+    return {"mean": float(mean), "sd": float(sd), "unit": unit}
+
+
+def _body_dict(body: BodyDraws) -> dict[str, Any]:
+    entries = [
+        quantity(mean, sd, unit) for mean, sd, unit in zip(body.mean, body.sd, BODY_QUANTITIES.values(), strict=True)
+    ]
+    return {
+        "mass": entries[0],
+        "com": entries[1:4],
+        "inertia": dict(zip(("xx", "yy", "zz", "xy", "xz", "yz"), entries[4:], strict=True)),
+    }
