@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     AllowInfNan,
@@ -39,6 +38,7 @@ from pydantic_core import ErrorDetails
 
 from bayesid.errors import InputError
 from bayesid.inertia import InertialParameters
+from bayesid.sensors import ARCSEC, AngleRandomWalk, Noise, NoiseDensity, StarTracker, White
 
 __all__ = [
     "AccelSensor",
@@ -57,9 +57,6 @@ __all__ = [
     "Study",
     "UnknownsSection",
 ]
-
-ARCSEC = math.pi / 648000.0
-"""One second of arc [rad]."""
 
 LOWEST_ORBIT = 6.3e6
 """Radii below this are inside the Earth [m]."""
@@ -297,11 +294,6 @@ def _exactly_one(section: BaseModel, keys: Sequence[str]) -> None:
         raise InputError(problem, remedy=f"Give exactly one of {', '.join(keys)}")
 
 
-def _check_interval(interval: float) -> None:
-    if not (interval > 0.0 and math.isfinite(interval)):
-        raise InputError(f"sample interval {interval!r} s", remedy="Give a positive time in seconds")
-
-
 class RateSensor(_Section):
     """Angular velocity of the base, ``[sensors.rate]``. Exactly one of the first three keys says how noisy it is.
 
@@ -340,14 +332,14 @@ class RateSensor(_Section):
         _exactly_one(self, ("sigma", "angle_random_walk", "attitude_arcsec"))
         return self
 
-    def sigma_at(self, interval: float) -> NDArray[np.float64]:
-        """White noise per sample and axis, shape (3,) [rad/s], for samples ``interval`` [s] apart."""
-        _check_interval(interval)
+    @property
+    def noise(self) -> Noise:
+        """Noise of the recorded samples, before any filter."""
         if self.sigma is not None:
-            return np.array(self.sigma)
+            return White(self.sigma)
         if self.angle_random_walk is not None:
-            return np.full(3, self.angle_random_walk / math.sqrt(interval))
-        return np.full(3, math.sqrt(2.0) * (self.attitude_arcsec or math.nan) * ARCSEC / interval)
+            return AngleRandomWalk(self.angle_random_walk)
+        return StarTracker(self.attitude_arcsec or math.nan)
 
 
 class AccelSensor(_Section):
@@ -386,12 +378,10 @@ class AccelSensor(_Section):
         _exactly_one(self, ("sigma", "noise_density"))
         return self
 
-    def sigma_at(self, interval: float) -> NDArray[np.float64]:
-        """White noise per sample and axis, shape (3,) [m/s2], for samples ``interval`` [s] apart."""
-        _check_interval(interval)
-        if self.sigma is not None:
-            return np.array(self.sigma)
-        return np.full(3, (self.noise_density or math.nan) * math.sqrt(0.5 / interval))
+    @property
+    def noise(self) -> Noise:
+        """Noise of the recorded samples, before any filter."""
+        return White(self.sigma) if self.sigma is not None else NoiseDensity(self.noise_density or math.nan)
 
 
 class AttitudeSensor(_Section):
@@ -419,10 +409,10 @@ class AttitudeSensor(_Section):
         _exactly_one(self, ("sigma", "arcsec"))
         return self
 
-    def sigma_at(self, interval: float) -> NDArray[np.float64]:
-        """White noise per sample and axis, shape (3,) [rad]; the same whatever the ``interval`` [s] between samples."""
-        _check_interval(interval)
-        return np.array(self.sigma) if self.sigma is not None else np.full(3, (self.arcsec or math.nan) * ARCSEC)
+    @property
+    def noise(self) -> Noise:
+        """Noise of the recorded samples, before any filter."""
+        return White(self.sigma if self.sigma is not None else (self.arcsec or math.nan) * ARCSEC)
 
 
 class EncoderSensor(_Section):

@@ -1,0 +1,297 @@
+"""What a study's recordings look like before anyone waits for a sampler, and the mistakes that can be seen there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid.errors import InputError
+from bayesid.model import Manoeuvre, Model
+from bayesid.motion import MeasuredMotion
+from bayesid.posterior import Posterior, Predictions
+from bayesid.recording import Recording
+from bayesid.robot import Robot
+from bayesid.sensors import Kind, Sensor
+
+__all__ = ["Channel", "JointCheck", "RecordingCheck", "SensorCheck", "check_recording", "refuse_wrong_units"]
+
+Floats = NDArray[np.float64]
+
+STILL = 1e-3
+"""A joint that moves less than this hardly excites anything [rad or m]."""
+
+DEGREES = 180.0 / np.pi
+
+WRONG_UNIT = 15.0
+"""Factor between measured and possible motion that no plausible error of the robot explains."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Sampling of one sensor or joint: samples, median interval [s], longest gap [s]."""
+
+    name: str
+    samples: int
+    interval: float
+    longest_gap: float
+
+
+@dataclass(frozen=True)
+class JointCheck:
+    """A joint's motion: range and largest speed, encoder noise used, misfit of the smoothing, and its uncertainty.
+
+    ``velocity_sd`` and ``acceleration_sd`` are the medians over time of what the smoothing leaves uncertain.
+    """
+
+    name: str
+    unit: str
+    lowest: float
+    highest: float
+    speed: float
+    sigma: float
+    declared: bool
+    chi2_per_sample: float
+    velocity_sd: float
+    acceleration_sd: float
+
+    @property
+    def still(self) -> bool:
+        """Whether the joint hardly moves."""
+        return self.highest - self.lowest < STILL
+
+
+@dataclass(frozen=True)
+class SensorCheck:
+    """A sensor's noise and clock.
+
+    ``measured_sigma`` (3,) is estimated from quiet stretches, None where there are too few quiet samples; ``delay`` is
+    how far the samples lag behind the joints' motion [s], with its standard deviation, None where the motion is too
+    faint to tell.
+    """
+
+    kind: Kind
+    sigma: Floats
+    measured_sigma: Floats | None
+    delay: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class RecordingCheck:
+    """Everything `check_recording` found."""
+
+    name: str
+    duration: float
+    channels: tuple[Channel, ...]
+    joints: tuple[JointCheck, ...]
+    sensors: tuple[SensorCheck, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what deserves a look."""
+        found = [
+            f"Joint {joint.name} moves by {joint.highest - joint.lowest:.2g} {joint.unit} only." for joint in self.joints if joint.still
+        ]
+        found += [
+            f"The spline does not follow joint {joint.name}: chi-square per sample {joint.chi2_per_sample:.2f}."
+            for joint in self.joints
+            if joint.chi2_per_sample > 1.5
+        ]
+        for sensor in self.sensors:
+            if sensor.measured_sigma is not None:
+                ratio = sensor.measured_sigma / sensor.sigma
+                if (ratio > 1.3).any() or (ratio < 0.7).any():
+                    found.append(
+                        f"The noise of {sensor.kind.value} in quiet stretches is "
+                        f"{', '.join(f'{value:.2g}' for value in sensor.measured_sigma)} {sensor.kind.unit}, declared "
+                        f"{', '.join(f'{value:.2g}' for value in sensor.sigma)}."
+                    )
+            if sensor.delay is not None and abs(sensor.delay[0]) > 4.0 * sensor.delay[1]:
+                found.append(
+                    f"The samples of {sensor.kind.value} seem {sensor.delay[0]:.3g} +- {sensor.delay[1]:.2g} s late "
+                    "against the joints."
+                )
+        for channel in self.channels:
+            if channel.longest_gap > 5.0 * channel.interval:
+                found.append(f"{channel.name} has a gap of {channel.longest_gap:.3g} s.")
+        return tuple(found)
+
+
+def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
+    """Look at one recording of a posterior, with the robot at the prior's centre."""
+    manoeuvre, model = posterior.manoeuvres[index], posterior.model
+    recording = manoeuvre.recording
+    predicted = posterior.predict(posterior.initial_point())[index]
+    return RecordingCheck(
+        name=recording.name,
+        duration=float(recording.time[-1] - recording.time[0]),
+        channels=_channels(recording, model),
+        joints=_joints(manoeuvre, model.robot),
+        sensors=tuple(_sensor(sensor, manoeuvre, model, predicted) for sensor in model.sensors),
+    )
+
+
+def refuse_wrong_units(posterior: Posterior) -> None:
+    """Refuse recordings whose numbers cannot be in rad, rad/s or m/s2.
+
+    Raises
+    ------
+    InputError
+        Where a joint leaves its limits, or a sensor shows many times more or less than the joints can cause.
+    """
+    for manoeuvre in posterior.manoeuvres:
+        refuse_impossible_joints(manoeuvre.recording, posterior.model.robot)
+    predictions = posterior.predict(posterior.initial_point())
+    for manoeuvre, predicted in zip(posterior.manoeuvres, predictions, strict=True):
+        for sensor in posterior.model.sensors:
+            if sensor.kind is not Kind.ATTITUDE:
+                _refuse_factor(manoeuvre.recording, sensor, predicted)
+
+
+def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
+    """Refuse joint positions far outside the joints' limits, as degrees taken for radians are."""
+    for joint in robot.joints:
+        name = f"position.{joint.name}"
+        if name not in recording.channels:
+            continue
+        time, position = recording.series(name)
+        slack = 0.1 * (joint.upper - joint.lower) if np.isfinite(joint.upper - joint.lower) else 0.0
+        outside = (position < joint.lower - slack) | (position > joint.upper + slack)
+        speed = np.abs(np.diff(position) / np.diff(time))
+        fast = speed > 5.0 * joint.velocity
+        remedy = "Give positions in radians, not degrees" if joint.unit == "rad" else "Give positions in metres, not millimetres"
+        file = recording.file or recording.name
+        if outside.any():
+            row = int(np.argmax(outside))
+            raise InputError(
+                f"{position[row]:g} {joint.unit} at time {time[row]:g} s is outside the joint's limits "
+                f"[{joint.lower:g}, {joint.upper:g}]",
+                file=file,
+                place=f"column {name}",
+                remedy=f"{remedy}, or correct the limits in the URDF",
+            )
+        if fast.any():
+            row = int(np.argmax(fast))
+            raise InputError(
+                f"the joint moves at {speed[row]:.3g} {joint.unit}/s at time {time[row]:g} s; its limit is {joint.velocity:g}",
+                file=file,
+                place=f"column {name}",
+                remedy=f"{remedy}, or correct the limit in the URDF",
+            )
+
+
+def _refuse_factor(recording: Recording, sensor: Sensor, predicted: Predictions) -> None:
+    time, measured = recording.vector(sensor.kind.value)
+    expected = getattr(predicted, sensor.kind.value)[np.searchsorted(predicted.time, time)]
+    first, second = _detrend(time, measured), _detrend(time, expected)
+    energy, cross = float((second**2).sum()), float((first * second).sum())
+    correlation = cross / np.sqrt(energy * float((first**2).sum()) + 1e-300)
+    loud = float(np.sqrt((first**2).mean())) > 5.0 * float(sensor.noise.sigma(float(np.median(np.diff(time)))).max())
+    if not loud or abs(correlation) < 0.8:
+        return
+    factor = cross / energy
+    if abs(factor) > WRONG_UNIT:
+        hint = "degrees per second" if sensor.kind is Kind.RATE else "mm/s2 or micro-g"
+        raise InputError(
+            f"the readings follow the joints' motion but are {factor:.3g} times what it can cause with this robot",
+            file=recording.file or recording.name,
+            place=f"column {sensor.kind.value}.x|y|z",
+            remedy=f"Give them in {sensor.kind.unit}, not in {hint}, or correct the robot",
+        )
+    if abs(factor) < 1.0 / WRONG_UNIT:
+        raise InputError(
+            f"the readings follow the joints' motion but are {1.0 / factor:.3g} times smaller than what it causes",
+            file=recording.file or recording.name,
+            place=f"column {sensor.kind.value}.x|y|z",
+            remedy=f"Give them in {sensor.kind.unit} (g or deg?), joint positions in radians, or correct the robot",
+        )
+
+
+def _detrend(time: Floats, values: Floats) -> Floats:
+    basis = np.vander((time - time.mean()) / (np.ptp(time) + 1e-300), 3)
+    return values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+
+
+def _channels(recording: Recording, model: Model) -> tuple[Channel, ...]:
+    names = [sensor.kind.value for sensor in model.sensors]
+    series = [(name, recording.series(f"{name}.x")[0]) for name in names]
+    for joint in model.robot.joints:
+        for family in ("position", "velocity", "acceleration"):
+            if f"{family}.{joint.name}" in recording.channels:
+                series.append((f"{family}.{joint.name}", recording.series(f"{family}.{joint.name}")[0]))
+    return tuple(
+        Channel(name, len(time), float(np.median(np.diff(time))), float(np.diff(time).max())) for name, time in series
+    )
+
+
+def _joints(manoeuvre: Manoeuvre, robot: Robot) -> tuple[JointCheck, ...]:
+    motion = manoeuvre.motion
+    time = manoeuvre.recording.time
+    state = motion.evaluate(time)
+    checks = []
+    for index, joint in enumerate(robot.joints):
+        fit = motion.joints[index] if isinstance(motion, MeasuredMotion) else None
+        sd = np.zeros((3, 1)) if fit is None else fit.standard_deviation(time)
+        checks.append(
+            JointCheck(
+                name=joint.name,
+                unit=joint.unit,
+                lowest=float(state.position[:, index].min()),
+                highest=float(state.position[:, index].max()),
+                speed=float(np.abs(state.velocity[:, index]).max()),
+                sigma=0.0 if fit is None else fit.sigmas[0],
+                declared=True if fit is None else fit.declared[0],
+                chi2_per_sample=0.0 if fit is None else fit.chi2 / fit.samples,
+                velocity_sd=float(np.median(sd[1])) if fit is not None else 0.0,
+                acceleration_sd=float(np.median(sd[2])) if fit is not None else 0.0,
+            )
+        )
+    return tuple(checks)
+
+
+def _sensor(sensor: Sensor, manoeuvre: Manoeuvre, model: Model, predicted: Predictions) -> SensorCheck:
+    if sensor.kind is Kind.ATTITUDE:
+        time, _ = manoeuvre.recording.vector("attitude", ("x", "y", "z", "w"))
+        return SensorCheck(sensor.kind, sensor.noise.sigma(float(np.median(np.diff(time)))), None, None)
+    time, measured = manoeuvre.recording.vector(sensor.kind.value)
+    expected = getattr(predicted, sensor.kind.value)[np.searchsorted(predicted.time, time)]
+    return SensorCheck(
+        kind=sensor.kind,
+        sigma=sensor.noise.sigma(float(np.median(np.diff(time)))),
+        measured_sigma=_quiet_sigma(expected, measured),
+        delay=_delay(time, expected, measured),
+    )
+
+
+def _quiet_sigma(expected: Floats, measured: Floats) -> Floats | None:
+    """Noise from third differences where the expected signal hardly changes from sample to sample."""
+    rough = np.abs(np.diff(expected, n=3, axis=0)).max(axis=1)
+    difference = np.diff(measured, n=3, axis=0)
+    quiet = rough < 0.2 * np.median(np.abs(difference))
+    if quiet.sum() < 30:
+        return None
+    return 1.4826 * np.median(np.abs(difference[quiet]), axis=0) / np.sqrt(20.0)
+
+
+def _delay(time: Floats, expected: Floats, measured: Floats) -> tuple[float, float] | None:
+    """Delay of the measured against the expected signal, with gain and trend fitted, axis by axis."""
+    estimates = []
+    for axis in range(3):
+        slope = np.gradient(expected[:, axis], time)
+        basis = np.column_stack([expected[:, axis], slope, np.vander((time - time.mean()) / (np.ptp(time) + 1e-300), 3)])
+        scale = np.abs(basis).max(axis=0) + 1e-300
+        solution, *_ = np.linalg.lstsq(basis / scale, measured[:, axis], rcond=None)
+        residual = measured[:, axis] - basis / scale @ solution
+        covariance = np.linalg.pinv((basis / scale).T @ (basis / scale)) * residual.var()
+        gain, delay = solution[0] / scale[0], -solution[1] / scale[1]
+        sd = np.sqrt(covariance[1, 1]) / scale[1]
+        if np.corrcoef(expected[:, axis], measured[:, axis])[0, 1] ** 2 > 0.9 and gain != 0.0:
+            estimates.append((delay / gain, sd / abs(gain)))
+    if not estimates:
+        return None
+    weight = np.array([1.0 / sd**2 for _, sd in estimates])
+    values = np.array([value for value, _ in estimates])
+    mean = float((weight * values).sum() / weight.sum())
+    scatter = float(np.sqrt((weight * (values - mean) ** 2).sum() / weight.sum()))  # the robot's own errors also shift it
+    return mean, float(np.hypot(weight.sum() ** -0.5, scatter))
