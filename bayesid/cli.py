@@ -1,0 +1,111 @@
+"""The command line: ``bayesid check|identify|simulate STUDY.toml --output DIR`` and ``bayesid demo --output DIR``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from bayesid.errors import InputError
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Identify the inertial parameters of free-flying space robots from recordings.",
+)
+
+StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")]
+Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; it is created.")]
+Seed = Annotated[int, typer.Option(help="Every random number follows from it.")]
+Samples = Annotated[float, typer.Option("--samples", help="Effective samples wanted.")]
+
+console = Console(stderr=True)
+
+
+@app.command()
+def check(study: StudyFile, output: Output) -> None:
+    """Validate a study and its recordings and say what was read, before anyone waits for a sampler."""
+    from bayesid.commands import run_check
+
+    with _reported():
+        for line in run_check(study, output):
+            console.print(line)
+
+
+@app.command()
+def identify(study: StudyFile, output: Output, seed: Seed = 0, samples: Samples = 4000.0) -> None:
+    """Identify the unknown bodies: identification.json, posterior.nc and report.pdf."""
+    from bayesid.commands import run_identify
+
+    with _reported(), _progress() as show:
+        for line in run_identify(study, output, seed=seed, effective_samples=samples, progress=show):
+            console.print(line)
+
+
+@app.command()
+def simulate(
+    study: StudyFile,
+    output: Output,
+    seed: Seed = 0,
+    noise: Annotated[bool, typer.Option(help="Add the declared noise of the sensors.")] = True,
+) -> None:
+    """Simulate the sensors of a study's recordings at the given values: recordings, simulation.json and report.pdf."""
+    from bayesid.commands import run_simulate
+
+    with _reported():
+        for line in run_simulate(study, output, seed=seed, noise=noise):
+            console.print(line)
+
+
+@app.command()
+def demo(output: Output, seed: Seed = 0, samples: Samples = 4000.0) -> None:
+    """Simulate the ETS-VII base with sensor noise, identify it and write the report; needs no file."""
+    from bayesid.commands import run_demo
+
+    with _reported(), _progress() as show:
+        for line in run_demo(output, seed=seed, effective_samples=samples, progress=show):
+            console.print(line)
+
+
+@contextmanager
+def _reported() -> Iterator[None]:
+    """Turn errors a user can mend into one message and exit status 2."""
+    try:
+        yield
+    except InputError as error:
+        Console(stderr=True, soft_wrap=True).print(f"Error: {error}", style="red", highlight=False, markup=False)
+        raise typer.Exit(2) from None
+    except KeyboardInterrupt:
+        console.print("Interrupted; the same command goes on from the samples kept so far.")
+        raise typer.Exit(130) from None
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[float, str], None]]:
+    """Show a bar; the callable takes the fraction done and a text."""
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("starting", total=1.0)
+
+        def show(fraction: float, text: str) -> None:
+            bar.update(task, completed=min(fraction, 1.0), description=text)
+
+        yield show
+
+
+def main() -> None:
+    """Run the command line."""
+    sys.exit(app())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,163 @@
+"""What the commands do, apart from the terminal: each yields sentences to show and writes its files.
+
+Files are written to a temporary folder and moved when complete, so that nothing is left half-written.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayesid.assemble import load_posterior
+from bayesid.checks import RecordingCheck, check_recording, refuse_wrong_units
+from bayesid.demo import write_demo
+from bayesid.errors import InputError
+from bayesid.inference import Identification
+from bayesid.inference import identify as identify_posterior
+from bayesid.inference.ensemble import Progress
+from bayesid.posterior import Posterior
+from bayesid.report import check_report, identification_report, simulation_report
+from bayesid.sensors import Kind
+from bayesid.simulation import simulate_recordings
+from bayesid.storage import write_netcdf
+from bayesid.study import Study
+
+__all__ = ["run_check", "run_demo", "run_identify", "run_simulate"]
+
+Show = Callable[[float, str], None]
+
+
+def run_check(file: Path, output: Path) -> Iterator[str]:
+    """Write check.json and report.pdf of a study."""
+    study, posterior = _read(file)
+    yield f"{study.title}: {len(posterior.manoeuvres)} recordings, {posterior.samples} samples, {posterior.size} unknowns."
+    checks = [check_recording(posterior, index) for index in range(len(posterior.manoeuvres))]
+    with _complete(output) as folder:
+        _write_json(folder / "check.json", {"title": study.title, "recordings": [_check_dict(check) for check in checks]})
+        check_report(posterior, checks, study.title, folder / "report.pdf")
+    for check in checks:
+        yield f"{check.name}: {check.duration:.4g} s. " + (" ".join(check.warnings) or "Nothing conspicuous.")
+    yield f"Wrote {output / 'report.pdf'}."
+
+
+def run_identify(file: Path, output: Path, *, seed: int, effective_samples: float, progress: Show) -> Iterator[str]:
+    """Write identification.json, posterior.nc and report.pdf of a study."""
+    study, posterior = _read(file)
+    if not posterior.size:
+        raise InputError("nothing is unknown", file=file, place="unknowns.bodies", remedy="Name a body to identify")
+    yield f"{study.title}: {posterior.samples} samples, {posterior.size} unknowns, integration step {posterior.step:g} s."
+    result = _identify(posterior, output, seed, effective_samples, progress)
+    _write_identification(result, study.title, output, seed)
+    yield from _summary(result)
+    yield f"Wrote {output / 'report.pdf'}."
+
+
+def run_simulate(file: Path, output: Path, *, seed: int, noise: bool) -> Iterator[str]:
+    """Write simulated recordings, simulation.json and report.pdf of a study."""
+    study, posterior = _read(file)
+    recordings = simulate_recordings(posterior, np.random.default_rng(seed) if noise else None)
+    error = posterior.integration_error(posterior.initial_point())
+    with _complete(output) as folder:
+        for recording in recordings:
+            recording.write(folder / f"{recording.name}.csv")
+        content = {
+            "recordings": [
+                {
+                    "file": f"{recording.name}.csv",
+                    "largest": {
+                        kind.value: [float(np.nanmax(np.abs(recording.channels[f"{kind.value}.{axis}"]))) for axis in "xyz"]
+                        for kind in (sensor.kind for sensor in posterior.model.sensors)
+                        if kind is not Kind.ATTITUDE
+                    },
+                }
+                for recording in recordings
+            ],
+            "noise": noise,
+            "integration": {"step": posterior.step, "error_in_sigma": error},
+        }
+        _write_json(folder / "simulation.json", content)
+        simulation_report(posterior, recordings, study.title, folder / "report.pdf")
+    yield f"Simulated {len(recordings)} recordings; integration step {posterior.step:g} s, error {error:.2g} sigma."
+    yield f"Wrote {output / 'report.pdf'}."
+
+
+def run_demo(output: Path, *, seed: int, effective_samples: float, progress: Show) -> Iterator[str]:
+    """Simulate ETS-VII, identify its base and write the report, beside the study that was made."""
+    output.mkdir(parents=True, exist_ok=True)
+    truth = write_demo(output / "study", seed)
+    yield f"Simulated three manoeuvres of ETS-VII into {output / 'study'}."
+    study, posterior = _read(output / "study" / "study.toml")
+    result = _identify(posterior, output, seed, effective_samples, progress)
+    _write_identification(result, study.title, output, seed)
+    yield from _summary(result)
+    draws = result.bodies[posterior.model.robot.base]
+    yield f"True mass {truth.mass:.1f} kg: {(draws.mean[0] - truth.mass) / draws.sd[0]:+.1f} sd from it."
+    yield f"Wrote {output / 'report.pdf'}."
+
+
+def _read(file: Path) -> tuple[Study, Posterior]:
+    study = Study.load(file)
+    posterior = load_posterior(study)
+    refuse_wrong_units(posterior)
+    return study, posterior
+
+
+def _identify(posterior: Posterior, output: Path, seed: int, wanted: float, show: Show) -> Identification:
+    output.mkdir(parents=True, exist_ok=True)
+    show(0.0, "fitting")
+
+    def report(state: Progress) -> None:
+        done = max(state.effective_samples / state.wanted if state.r_hat < 1.05 else 0.0, state.steps / state.limit)
+        show(done, f"step {state.steps}, {state.effective_samples:.0f} effective samples, R-hat {state.r_hat:.3f}")
+
+    return identify_posterior(
+        posterior, seed, effective_samples=wanted, file=output / "samples.h5", progress=report
+    )
+
+
+def _write_identification(result: Identification, title: str, output: Path, seed: int) -> None:
+    with _complete(output) as folder:
+        result.write_json(folder / "identification.json")
+        write_netcdf(result, folder / "posterior.nc", np.random.default_rng(seed))
+        identification_report(result, title, [], folder / "report.pdf")
+    (output / "samples.h5").unlink(missing_ok=True)
+
+
+def _summary(result: Identification) -> Iterator[str]:
+    yield f"chi-square {result.optimum.chi2:.0f} over {result.posterior.samples} samples."
+    for name, body in result.bodies.items():
+        yield f"{name}: mass {body.mean[0]:.6g} +- {body.sd[0]:.2g} kg"
+    yield from result.disagreements
+
+
+def _check_dict(check: RecordingCheck) -> dict[str, Any]:
+    content = asdict(check)
+    for sensor in content["sensors"]:
+        sensor["kind"] = sensor["kind"].value
+    content["warnings"] = list(check.warnings)
+    return content
+
+
+def _write_json(file: Path, content: dict[str, Any]) -> None:
+    file.write_text(json.dumps(content, indent=1, default=lambda value: np.asarray(value).tolist()), encoding="utf-8")
+
+
+@contextmanager
+def _complete(output: Path) -> Iterator[Path]:
+    """Yield a folder whose files appear in the output together, or not at all."""
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot create the folder: {error.strerror}", file=output, remedy="Choose another output") from None
+    with tempfile.TemporaryDirectory(dir=output, prefix=".part-") as name:
+        yield Path(name)
+        for item in sorted(Path(name).iterdir()):
+            shutil.move(str(item), output / item.name)

@@ -1,0 +1,94 @@
+"""Simulated recordings: what the sensors of a model would read, with their declared noise."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid.model import Manoeuvre, Model
+from bayesid.motion import Motion, sample_joints
+from bayesid.posterior import Posterior
+from bayesid.recording import Recording
+from bayesid.sensors import Kind
+
+__all__ = ["simulate_manoeuvre", "simulate_recordings"]
+
+Floats = NDArray[np.float64]
+
+
+def simulate_recordings(posterior: Posterior, rng: np.random.Generator | None = None, z: Floats | None = None) -> list[Recording]:
+    """Simulate the recordings of a posterior, at the same times.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator, optional
+        For the sensors' noise; none is added where left out.
+    z : (size,) array, optional
+        Point to simulate at; `Posterior.initial_point` where left out.
+    """
+    predictions = posterior.predict(posterior.initial_point() if z is None else z)
+    recordings = []
+    for index, (manoeuvre, predicted) in enumerate(zip(posterior.manoeuvres, predictions, strict=True)):
+        channels = dict(manoeuvre.recording.channels)
+        for sensor in posterior.model.sensors:
+            values = np.asarray(getattr(predicted, sensor.kind.value))
+            if rng is not None:
+                values = _noisy(values, sensor.kind, posterior.sigma(index, sensor.kind), rng)
+            for column, axis in enumerate("xyzw"[: values.shape[1]]):
+                name = f"{sensor.kind.value}.{axis}"
+                full = np.full(len(manoeuvre.recording.time), np.nan)
+                full[np.searchsorted(manoeuvre.recording.time, predicted.time)] = values[:, column]
+                channels[name] = np.where(np.isnan(manoeuvre.recording.channels[name]), np.nan, full)
+        recordings.append(Recording(manoeuvre.recording.name, None, manoeuvre.recording.time, channels))
+    return recordings
+
+
+def simulate_manoeuvre(
+    model: Model,
+    motion: Motion,
+    time: Floats,
+    *,
+    name: str = "manoeuvre",
+    attitude: Floats | None = None,
+    rng: np.random.Generator | None = None,
+    encoder_sigma: float = 0.0,
+) -> Recording:
+    """Simulate a planned manoeuvre with the bodies of a model at their prior's centre.
+
+    Parameters
+    ----------
+    motion : Motion
+    time : (T,) array
+        Sample times of all sensors and joints [s].
+    attitude : (4,) array, optional
+        Base to orbit axes at time 0.
+    rng : numpy.random.Generator, optional
+        For the noise of sensors and encoders.
+    encoder_sigma : float
+        Noise of the recorded joint positions [rad or m].
+    """
+    blank = {
+        f"{sensor.kind.value}.{axis}": np.full(len(time), 1.0 if axis == "w" else 0.0)
+        for sensor in model.sensors
+        for axis in ("xyzw" if sensor.kind is Kind.ATTITUDE else "xyz")
+    }
+    joints = sample_joints(motion, model.robot, time)
+    planned = Recording(name, None, time, {**joints, **blank})
+    start = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude, dtype=float)
+    posterior = Posterior(model, [Manoeuvre(planned, motion, start)])
+    recording = simulate_recordings(posterior, rng, np.zeros(posterior.size))[0]
+    if rng is None or encoder_sigma == 0.0:
+        return recording
+    noisy = {key: recording.channels[key] + encoder_sigma * rng.normal(size=len(time)) for key in joints}
+    return Recording(name, None, time, {**recording.channels, **noisy})
+
+
+def _noisy(values: Floats, kind: Kind, sigma: Floats, rng: np.random.Generator) -> Floats:
+    noise = sigma * rng.normal(size=(len(values), 3))
+    if kind is not Kind.ATTITUDE:
+        return values + noise
+    w = values[:, 3]  # a small rotation in base axes, after the attitude
+    half = 0.5 * noise
+    vector = values[:, 3:] * half + np.cross(values[:, :3], half)
+    turned = np.column_stack([values[:, :3] + vector, w - np.einsum("ij,ij->i", values[:, :3], half)])
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True)

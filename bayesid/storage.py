@@ -1,0 +1,156 @@
+"""Results as ArviZ objects: posterior, log likelihood, posterior predictive and observed data, with units and frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import arviz as az
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid.inference.identification import BODY_QUANTITIES, Identification, bodies_of
+from bayesid.sensors import Kind
+
+__all__ = ["to_arviz", "write_netcdf"]
+
+Floats = NDArray[np.float64]
+
+STORED = 1000
+"""Draws kept per ensemble: samples closer than an autocorrelation time tell nothing new."""
+
+PREDICTED = 50
+"""Draws of the posterior predictive per ensemble."""
+
+FRAMES = {
+    Kind.RATE: "angular velocity of the base relative to inertial space, sensor axes",
+    Kind.ACCEL: "non-gravitational acceleration of the mounting point, sensor axes",
+    Kind.ATTITUDE: "quaternion x, y, z, w, base axes to orbit axes",
+}
+
+
+def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceData:
+    """Convert a result.
+
+    Chains are independent ensembles. Groups: ``posterior`` (physical quantities, and ``z``, the coordinates with a
+    standard-normal prior), ``log_likelihood`` per recording, ``posterior_predictive`` with sensor noise, and
+    ``observed_data``.
+    """
+    z = _thin(result.chains.z, STORED)
+    few = z[:, :: max(1, z.shape[1] // PREDICTED)][:, :PREDICTED]
+    posterior, dims, units = _posterior_group(result, z)
+    data = az.from_dict(
+        posterior=posterior,
+        log_likelihood=_log_likelihood(result, z),
+        posterior_predictive=_predictive(result, few, rng),
+        observed_data=_observed(result),
+        dims={**dims, **_sensor_dims(result)},
+        coords=_coords(result),
+    )
+    for name, unit in units.items():
+        data.posterior[name].attrs.update(unit=unit, frame="link axes; the inertia is about the centre of mass")
+    for group in (data.posterior_predictive, data.observed_data):
+        for sensor in result.posterior.model.sensors:
+            for manoeuvre in result.posterior.manoeuvres:
+                variable = group[_name(sensor.kind, manoeuvre.recording.name)]
+                variable.attrs.update(unit=sensor.kind.unit, frame=FRAMES[sensor.kind])
+    data.posterior.attrs.update(
+        unknowns=list(result.posterior.unknowns.names),
+        log_evidence=result.evidence.value,
+        log_evidence_error=result.evidence.error,
+        pareto_k=result.evidence.pareto_k,
+    )
+    return data
+
+
+def write_netcdf(result: Identification, file: Path, rng: np.random.Generator) -> None:
+    """Write `to_arviz` to a NetCDF file, all or nothing."""
+    part = file.with_name(file.name + ".part")
+    to_arviz(result, rng).to_netcdf(str(part))
+    part.replace(file)
+
+
+def _thin(draws: Floats, count: int) -> Floats:
+    return draws[:, :: max(1, draws.shape[1] // count)][:, :count]
+
+
+def _posterior_group(result: Identification, z: Floats) -> tuple[dict[str, Floats], dict[str, list[str]], dict[str, str]]:
+    chains, draws, size = z.shape
+    flat = z.reshape(-1, size)
+    group: dict[str, Floats] = {"z": z}
+    dims: dict[str, list[str]] = {"z": ["unknown"]}
+    units = {"z": "1"}
+    for name, body in bodies_of(result.posterior, flat).items():
+        for column, (key, unit) in enumerate(BODY_QUANTITIES.items()):
+            group[f"{name}.{key}"] = body.values[:, column].reshape(chains, draws)
+            units[f"{name}.{key}"] = unit
+    values = result.posterior.values_of(flat)
+    for effect, parameters in zip(result.posterior.model.effects, values.effects, strict=True):
+        for column, parameter in enumerate(effect.parameters):
+            name = f"{effect.label}.{parameter.name}"
+            group[name] = parameters[..., column].reshape(chains, draws, *parameters.shape[1:-1])
+            units[name] = parameter.unit
+            if effect.per_recording:
+                dims[name] = ["recording"]
+    group["initial-rate"] = values.rate.reshape(chains, draws, -1, 3)
+    dims["initial-rate"], units["initial-rate"] = ["recording", "axis"], "rad/s"
+    return group, dims, units
+
+
+def _coords(result: Identification) -> dict[str, Any]:
+    coords: dict[str, Any] = {
+        "unknown": list(result.posterior.unknowns.names),
+        "recording": [manoeuvre.recording.name for manoeuvre in result.posterior.manoeuvres],
+        "axis": ["x", "y", "z"],
+        "quaternion": ["x", "y", "z", "w"],
+    }
+    for index, manoeuvre in enumerate(result.posterior.manoeuvres):
+        coords[f"time.{manoeuvre.recording.name}"] = result.posterior.sample_times(index)
+    return coords
+
+
+def _sensor_dims(result: Identification) -> dict[str, list[str]]:
+    return {
+        _name(sensor.kind, manoeuvre.recording.name): [
+            f"time.{manoeuvre.recording.name}",
+            "quaternion" if sensor.kind is Kind.ATTITUDE else "axis",
+        ]
+        for sensor in result.posterior.model.sensors
+        for manoeuvre in result.posterior.manoeuvres
+    }
+
+
+def _name(kind: Kind, recording: str) -> str:
+    return f"{kind.value}.{recording}"
+
+
+def _log_likelihood(result: Identification, z: Floats) -> dict[str, Floats]:
+    chains, draws, size = z.shape
+    values = result.posterior.log_likelihoods(z.reshape(-1, size)).reshape(chains, draws, -1)
+    return {m.recording.name: values[:, :, index] for index, m in enumerate(result.posterior.manoeuvres)}
+
+
+def _observed(result: Identification) -> dict[str, Floats]:
+    observed = {}
+    for index, manoeuvre in enumerate(result.posterior.manoeuvres):
+        times = result.posterior.sample_times(index)
+        for sensor in result.posterior.model.sensors:
+            time, values = result.posterior.measured(index, sensor.kind)
+            grid = np.full((len(times), values.shape[1]), np.nan)
+            grid[np.searchsorted(times, time)] = values
+            observed[_name(sensor.kind, manoeuvre.recording.name)] = grid
+    return observed
+
+
+def _predictive(result: Identification, z: Floats, rng: np.random.Generator) -> dict[str, Floats]:
+    """Predictions with fresh white noise of the sensors, for draws of shape (chains, draws, size)."""
+    chains, draws, size = z.shape
+    points = [result.posterior.predict(point) for point in z.reshape(-1, size)]
+    predictive = {}
+    for index, manoeuvre in enumerate(result.posterior.manoeuvres):
+        for sensor in result.posterior.model.sensors:
+            mean = np.stack([np.asarray(getattr(point[index], sensor.kind.value)) for point in points])
+            if sensor.kind is not Kind.ATTITUDE:
+                mean = mean + result.posterior.sigma(index, sensor.kind) * rng.normal(size=mean.shape)
+            predictive[_name(sensor.kind, manoeuvre.recording.name)] = mean.reshape(chains, draws, *mean.shape[1:])
+    return predictive
