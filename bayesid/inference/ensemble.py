@@ -139,7 +139,7 @@ def sample(
     for number, child in enumerate(sequence.spawn(ENSEMBLES)):
         backend = _backend(file, number, mark)
         state = np.random.RandomState(child.generate_state(8))  # noqa: NPY002, emcee's generator
-        fresh = backend.iteration == 0 if file is not None else True
+        fresh = not backend.initialized or backend.iteration == 0
         sampler = emcee.EnsembleSampler(
             walkers, posterior.size, chart.log_density, moves=moves, vectorize=True, backend=backend
         )
@@ -147,7 +147,7 @@ def sample(
             sampler.random_state = state.get_state()
         samplers.append((sampler, None if not fresh else _start(chart, proposal, walkers, state)))
     while True:
-        steps = min(sampler.iteration for sampler, _ in samplers)
+        steps = min(int(sampler.iteration) for sampler, _ in samplers)
         if steps:
             chains = _summary(chart, [sampler for sampler, _ in samplers], effective_samples)
             if progress is not None:
@@ -210,7 +210,7 @@ def _fingerprint(posterior: Posterior, optimum: Optimum, sequence: np.random.See
 
 
 def _summary(chart: Chart, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
-    steps = min(sampler.iteration for sampler in samplers)
+    steps = min(int(sampler.iteration) for sampler in samplers)
     chains = [sampler.get_chain()[:steps] for sampler in samplers]
     densities = [sampler.get_log_prob()[:steps] for sampler in samplers]
     tau = max(float(np.max(integrated_time(chain, tol=0, quiet=True))) for chain in chains)
