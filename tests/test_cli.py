@@ -1,0 +1,194 @@
+"""The command line as a user meets it: files written, exit status, one clear error for each kind of bad input."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import arviz as az
+import numpy as np
+import pytest
+from mujoco_truth import Manoeuvres, write_study
+from typer.testing import CliRunner
+
+from bayesid.cli import app
+
+ROBOTS = Path(__file__).parent / "robots"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study of the four-joint servicer, made by MuJoCo."""
+    folder = tmp_path_factory.mktemp("study")
+    made = write_study(
+        folder, ROBOTS / "servicer4.urdf", np.random.default_rng(3), manoeuvres=Manoeuvres(count=1, duration=60.0), title="Servicer"
+    )
+    return made.file
+
+
+def run(*arguments: object) -> tuple[int, str]:
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    return result.exit_code, re.sub(r"\s+", " ", result.output)
+
+
+def copy(study: Path, folder: Path) -> Path:
+    for item in study.parent.iterdir():
+        (folder / item.name).write_bytes(item.read_bytes())
+    return folder / study.name
+
+
+def test_identify_writes_what_the_contract_names(study: Path, tmp_path: Path) -> None:
+    status, output = run("identify", study, "--output", tmp_path, "--samples", 300)
+    assert status == 0, output
+    assert sorted(item.name for item in tmp_path.iterdir()) == ["identification.json", "posterior.nc", "report.pdf"]
+    content = json.loads((tmp_path / "identification.json").read_text())
+    assert set(content) >= {"bodies", "effects", "covariance", "fit", "sampler", "log_evidence"}
+    body = content["bodies"]["base_link"]
+    assert set(body["inertia"]) == {"xx", "yy", "zz", "xy", "xz", "yz"}
+    assert set(body["mass"]) == {"mean", "sd", "unit"}
+    assert len(content["covariance"]["names"]) == len(content["covariance"]["matrix"]) == 10
+    assert content["covariance"]["names"][:3] == ["base_link.mass", "base_link.com.x", "base_link.com.y"]
+    variance = content["covariance"]["matrix"][0][0]
+    assert body["mass"]["sd"] == pytest.approx(np.sqrt(variance), rel=1e-6)
+    data = az.from_netcdf(tmp_path / "posterior.nc")
+    assert {"posterior", "log_likelihood", "posterior_predictive", "observed_data"} <= set(data.groups())
+    assert data.posterior["base_link.mass"].attrs["unit"] == "kg"
+    assert (tmp_path / "report.pdf").read_bytes()[:5] == b"%PDF-"
+
+
+def test_check_and_simulate(study: Path, tmp_path: Path) -> None:
+    status, output = run("check", study, "--output", tmp_path / "check")
+    assert status == 0, output
+    assert sorted(item.name for item in (tmp_path / "check").iterdir()) == ["check.json", "report.pdf"]
+    channels = json.loads((tmp_path / "check" / "check.json").read_text())["recordings"][0]["channels"]
+    assert {"rate", "accel", "position.joint1"} <= {channel["name"] for channel in channels}
+    status, output = run("simulate", study, "--output", tmp_path / "simulate", "--seed", 5)
+    assert status == 0, output
+    names = sorted(item.name for item in (tmp_path / "simulate").iterdir())
+    assert "simulation.json" in names
+    assert sum(name.endswith(".csv") for name in names) == 1
+    again = tmp_path / "again"
+    run("simulate", study, "--output", again, "--seed", 5)
+    csv = next(name for name in names if name.endswith(".csv"))
+    assert (again / csv).read_bytes() == (tmp_path / "simulate" / csv).read_bytes()
+
+
+def edit(file: Path, change) -> None:
+    file.write_text(change(file.read_text()))
+
+
+def recording_of(folder: Path) -> Path:
+    return next(iter(sorted(folder.glob("*.csv"))))
+
+
+def cell(row: int, column: str, value: str):
+    """Change one cell of a CSV file; rows count from the first data line."""
+
+    def change(text: str) -> str:
+        lines = text.splitlines()
+        at = lines[0].split(",").index(column)
+        cells = lines[1 + row].split(",")
+        cells[at] = value
+        lines[1 + row] = ",".join(cells)
+        return "\n".join(lines) + "\n"
+
+    return change
+
+
+def drop(column: str):
+    def change(text: str) -> str:
+        rows = [line.split(",") for line in text.splitlines()]
+        at = rows[0].index(column)
+        return "\n".join(",".join(cells[:at] + cells[at + 1 :]) for cells in rows) + "\n"
+
+    return change
+
+
+def scale(prefix: str, factor: float):
+    def change(text: str) -> str:
+        rows = [line.split(",") for line in text.splitlines()]
+        for at, name in enumerate(rows[0]):
+            if name.startswith(prefix):
+                for cells in rows[1:]:
+                    if cells[at]:
+                        cells[at] = repr(float(cells[at]) * factor)
+        return "\n".join(",".join(cells) for cells in rows) + "\n"
+
+    return change
+
+
+BAD = {
+    "NaN": ("recording", cell(4, "rate.x", "nan"), ["rate.x", "nan", "line 6"]),
+    "not monotonic": ("recording", cell(5, "time", "0.0"), ["time", "line 7"]),
+    "missing column": ("recording", drop("rate.y"), ["rate.y"]),
+    "missing joint": ("recording", drop("position.joint3"), ["joint3", "Record every moving joint"]),
+    "empty file": ("recording", lambda text: "", ["empty"]),
+    "joints in degrees": ("recording", scale("position.", 57.29577951308232), ["position.joint", "radians"]),
+    "rate in degrees": ("recording", scale("rate.", 57.29577951308232), ["rate", "degrees per second"]),
+    "acceleration in mm/s2": ("recording", scale("accel.", 1000.0), ["accel", "m/s2"]),
+    "unknown key": ("study", lambda text: text.replace("[orbit]", "[orbit]\nradios = 1.0"), ["orbit", "radios", "radius"]),
+    "orbit in km": ("study", lambda text: re.sub(r"radius = .*", "radius = 6916.0", text), ["radius", "metres"]),
+    "unknown effect": ("study", lambda text: text.replace("gravity-gradient", "gravity-gradiant"), ["gravity-gradiant", "gravity-gradient"]),
+    "unknown body": ("study", lambda text: text.replace('bodies = ["base_link"]', 'bodies = ["base"]'), ["'base'", "base_link"]),
+    "wrong robot": ("robot", lambda text: text.replace('name="joint2"', 'name="elbow"'), ["elbow", "joint2"]),
+    "negative mass": ("robot", lambda text: re.sub(r'mass value="[^"]*"', 'mass value="-3.0"', text, count=1), ["mass >= 0", "link"]),
+    "unphysical inertia": ("robot", lambda text: re.sub(r'izz="[^"]*"', 'izz="1e6"', text, count=1), ["triangle inequality", "link"]),
+    "not XML": ("robot", lambda text: text[:-20], ["XML"]),
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_bad_input_gives_one_clear_error_and_nothing_half_written(kind: str, study: Path, tmp_path: Path) -> None:
+    where, change, words = BAD[kind]
+    folder = tmp_path / "study"
+    folder.mkdir()
+    file = copy(study, folder)
+    edit({"recording": recording_of(folder), "study": file, "robot": folder / "robot.urdf"}[where], change)
+    output = tmp_path / "out"
+    status, text = run("identify", file, "--output", output)
+    assert status == 2, text
+    assert text.count("Error:") == 1
+    assert "Traceback" not in text
+    for word in words:
+        assert word in text, text
+    assert not output.exists() or not list(output.iterdir())
+
+
+def test_a_missing_study_is_an_error(tmp_path: Path) -> None:
+    status, text = run("check", tmp_path / "none.toml", "--output", tmp_path / "out")
+    assert status == 2
+    assert "none.toml" in text
+
+
+def test_a_users_effect_joins_a_study(study: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    folder.mkdir()
+    file = copy(study, folder)
+    (folder / "mine.py").write_text(PLUGIN)
+    edit(
+        file,
+        lambda text: text.replace('["gravity-gradient"]', '["gravity-gradient", "test-steady-torque"]') + '\nplugins = ["mine.py"]\n',
+    )
+    status, text = run("check", file, "--output", tmp_path / "out")
+    assert status == 0, text
+    assert "22" in text or "unknowns" in text
+
+
+PLUGIN = '''
+import jax.numpy as jnp
+from bayesid.effects import Effect, Parameter, Wrench, register
+
+
+@register
+class SteadyTorque(Effect):
+    """A torque that never changes, in base axes."""
+
+    name = "test-steady-torque"
+    summary = "Something pushes steadily."
+    parameters = tuple(Parameter(axis, "N m", 1e-3) for axis in "xyz")
+
+    def wrench(self, values, moment, inner):
+        """Return the torque."""
+        return Wrench(jnp.zeros(3), values)
+'''
