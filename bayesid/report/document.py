@@ -1,0 +1,191 @@
+"""A PDF document built piece by piece and set with Typst, with no other programs and only the fonts Typst brings.
+
+Text that callers give is never read as markup: it reaches Typst as string literals.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import typst
+from matplotlib.collections import PathCollection, QuadMesh
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from bayesid.errors import InputError
+
+__all__ = ["Document"]
+
+MANY_POINTS = 4000
+"""Points of a line or a scatter plot above which it is drawn as pixels inside the vector figure."""
+
+RESOLUTION = 250
+"""Of what is drawn as pixels [dots per inch]."""
+
+LONG_WORD = 14
+"""Characters from which on a word in a table may break at its punctuation."""
+
+_TEMPLATE = """\
+#set page(paper: "a4", margin: (x: 20mm, top: 20mm, bottom: 22mm), numbering: "1 / 1")
+#set text(font: "Libertinus Serif", size: 10.5pt, lang: "en")
+#set par(justify: true, leading: 0.62em, spacing: 0.95em)
+#set heading(numbering: "1")
+#show heading: set block(above: 1.5em, below: 0.8em, sticky: true)
+#set list(indent: 0.4em, spacing: 0.65em)
+#set figure(gap: 0.7em)
+#show figure: set block(above: 1.3em, below: 1.3em)
+#show figure.where(kind: table): set block(breakable: true)
+#show figure.where(kind: table): set figure.caption(position: top)
+#show figure.caption: it => block(width: 100%, { set text(size: 9pt); set par(justify: true); set align(left)
+  strong(it.supplement + " " + context it.counter.display(it.numbering) + ". ") + it.body })
+#set table(stroke: none, inset: (x: 5pt, y: 2.9pt))
+#show table: set text(size: 8.5pt)
+#show table: set par(justify: false, leading: 0.5em)
+#show table.cell.where(y: 0): strong
+#let title(main, sub, date) = align(left, {
+  text(size: 18pt, weight: "bold", main)
+  if sub != "" { linebreak() + text(size: 12pt, fill: luma(35%), sub) }
+  if date != "" { linebreak() + text(size: 10pt, fill: luma(35%), date) }
+  v(-0.4em) + line(length: 100%, stroke: 0.6pt) + v(0.2em)
+})
+"""
+
+
+class Document:
+    """A report under construction.
+
+    Parameters
+    ----------
+    title, subtitle : str
+    date : str, optional
+        Printed under the title. Left out, the document does not depend on when it was written.
+    """
+
+    def __init__(self, title: str, subtitle: str = "", date: str | None = None) -> None:
+        self._parts = [
+            _TEMPLATE,
+            f"#set document(title: {literal(title)}, date: none)\n",
+            f"#title({literal(title)}, {literal(subtitle)}, {literal(date or '')})\n",
+        ]
+        self._figures: list[bytes] = []
+
+    def section(self, title: str) -> None:
+        """Begin a numbered section."""
+        self._parts.append(f"#heading(level: 1, {literal(title)})\n")
+
+    def paragraph(self, text: str) -> None:
+        """Add a paragraph of plain text."""
+        self._parts.append(f"#par({literal(text)})\n")
+
+    def items(self, texts: Sequence[str]) -> None:
+        """Add a bulleted list."""
+        if texts:
+            self._parts.append(f"#list({', '.join(literal(text) for text in texts)})\n")
+
+    def formula(self, typst_math: str) -> None:
+        """Add a displayed formula in Typst's notation, which is not escaped."""
+        self._parts.append(f"$ {typst_math} $\n")
+
+    def table(
+        self,
+        header: Sequence[str],
+        rows: Sequence[Sequence[str]],
+        caption: str | None = None,
+        align: Sequence[str] | None = None,
+    ) -> None:
+        """Add a table, which may run over pages; it is numbered if it has a caption.
+
+        Parameters
+        ----------
+        header : sequence of str
+            One title per column.
+        rows : sequence of sequence of str
+        align : sequence of str, optional
+            ``left``, ``center`` or ``right`` per column; left where left out.
+        """
+        align = ["left"] * len(header) if align is None else list(align)
+        _check_table(header, rows, align)
+        cells = [_cell(text) for row in rows for text in row]
+        table = (
+            f"table(columns: {len(header)}, align: ({', '.join(align)},), table.hline(stroke: 0.8pt), "
+            f"table.header({', '.join(_cell(text) for text in header)}), table.hline(stroke: 0.4pt), "
+            f"{', '.join([*cells, 'table.hline(stroke: 0.8pt)'])})"
+        )
+        numbered = f"#figure(kind: table, caption: {literal(caption or '')}, {table})\n"
+        self._parts.append(numbered if caption is not None else f"#{table}\n")
+
+    def figure(self, fig: Figure, caption: str, width: str = "100%") -> None:
+        """Add a numbered figure and clear it.
+
+        Parameters
+        ----------
+        fig : matplotlib.figure.Figure
+        width : str
+            In percent of the text's width.
+        """
+        if not re.fullmatch(r"\d+(\.\d+)?%", width):
+            raise InputError(f"width {width!r} is not a percentage", remedy='Give the width of a figure as "80%"')
+        self._figures.append(_svg(fig))
+        name = literal(f"figure-{len(self._figures)}.svg")
+        self._parts.append(f"#figure(image({name}, width: {width}), kind: image, caption: {literal(caption)})\n")
+
+    def write(self, path: str | Path) -> None:
+        """Set the document and write it as PDF, all or nothing."""
+        target = Path(path)
+        with tempfile.TemporaryDirectory() as folder:
+            source = Path(folder) / "main.typ"
+            source.write_text("".join(self._parts), encoding="utf-8")
+            for number, content in enumerate(self._figures, start=1):
+                (Path(folder) / f"figure-{number}.svg").write_bytes(content)
+            pdf = typst.compile(str(source), root=folder, format="pdf")
+        part = target.with_name(target.name + ".part")
+        part.write_bytes(pdf)
+        os.replace(part, target)
+
+
+def literal(text: str) -> str:
+    """Return plain text as a string literal of Typst."""
+    clean = text.encode("utf-8", "replace").decode("utf-8")
+    escaped = clean.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return '"' + re.sub(r"[\x00-\x09\x0b-\x1f\x7f]", " ", escaped) + '"'
+
+
+def _cell(text: str) -> str:
+    """Literal of a table's cell, whose long words may break after their punctuation."""
+    words = (
+        re.sub(r"([._/:\-])(?=\w)", "\\1\u200b", word) if len(word) >= LONG_WORD else word for word in text.split(" ")
+    )
+    return literal(" ".join(words))
+
+
+def _check_table(header: Sequence[str], rows: Sequence[Sequence[str]], align: Sequence[str]) -> None:
+    lengths = {len(row) for row in rows} | {len(align)}
+    if lengths != {len(header)}:
+        raise InputError(
+            f"a table of {len(header)} columns has rows or alignments of length {sorted(lengths)}",
+            remedy="Fill every row",
+        )
+    if unknown := set(align) - {"left", "center", "right"}:
+        raise InputError(f"unknown alignment {', '.join(sorted(unknown))}", remedy="Choose left, center or right")
+
+
+def _svg(fig: Figure) -> bytes:
+    for line in fig.findobj(Line2D):
+        if isinstance(line, Line2D) and len(line.get_xdata()) > MANY_POINTS:  # type: ignore[arg-type]
+            line.set_rasterized(True)
+    for points in fig.findobj(PathCollection):
+        if isinstance(points, PathCollection) and len(points.get_offsets()) > MANY_POINTS:  # type: ignore[arg-type]
+            points.set_rasterized(True)
+    for mesh in fig.findobj(QuadMesh):
+        mesh.set_rasterized(True)
+    content = io.BytesIO()
+    with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": "bayesid"}):
+        fig.savefig(content, format="svg", dpi=RESOLUTION, metadata={"Date": None})
+    fig.clear()
+    return content.getvalue()
