@@ -6,6 +6,7 @@ import copy
 import importlib.util
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -84,9 +85,10 @@ def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Man
     recording = Recording.read(section.file)
     encoder = study.sensors.encoder
     joints = [joint.name for joint in robot.joints]
+    families: tuple[Literal["position", "velocity", "acceleration"], ...] = ("position", "velocity", "acceleration")
     sigma = {
         derivative: {joint: encoder.sigma_of(family, joint) for joint in joints}
-        for derivative, family in enumerate(("position", "velocity", "acceleration"))
+        for derivative, family in enumerate(families)
     }
     motion = MeasuredMotion.from_recording(recording, robot, sigma=sigma, start=section.start)
     return Manoeuvre(
@@ -114,7 +116,9 @@ def _sensors(study: Study) -> tuple[Sensor, ...]:
     sensors = []
     rate, accel, attitude = study.sensors.rate, study.sensors.accel, study.sensors.attitude
     if rate is not None:
-        sensors.append(Sensor(Kind.RATE, rate.noise, mounting=rate.mounting, filter=Filter(rate.low_pass, rate.decimate)))
+        sensors.append(
+            Sensor(Kind.RATE, rate.noise, mounting=rate.mounting, filter=Filter(rate.low_pass, rate.decimate))
+        )
     if accel is not None:
         sensors.append(
             Sensor(
@@ -139,7 +143,11 @@ def _effects(study: Study) -> tuple[Effect, ...]:
     known = [effect.label for effect in effects]
     for label in study.model.priors:
         if label not in known:
-            raise InputError(f"prior of an effect that is not in the model: {label!r}", place="model.priors", remedy=f"Effects in the model: {', '.join(known)}")
+            raise InputError(
+                f"prior of an effect that is not in the model: {label!r}",
+                place="model.priors",
+                remedy=f"Effects in the model: {', '.join(known)}",
+            )
     return tuple(with_prior(effect, study.model.priors.get(effect.label, {})) for effect in effects)
 
 
@@ -148,7 +156,11 @@ def with_prior(effect: Effect, sigma: Mapping[str, float]) -> Effect:
     keys = [parameter.name for parameter in effect.parameters]
     for key in sigma:
         if key not in keys:
-            raise InputError(f"effect {effect.label!r} has no parameter {key!r}", place="model.priors", remedy=f"Parameters: {', '.join(keys)}")
+            raise InputError(
+                f"effect {effect.label!r} has no parameter {key!r}",
+                place="model.priors",
+                remedy=f"Parameters: {', '.join(keys)}",
+            )
     changed = copy.copy(effect)
     changed.parameters = tuple(p._replace(sigma=float(sigma.get(p.name, p.sigma))) for p in effect.parameters)
     return changed
@@ -171,4 +183,6 @@ def _import(file: Path) -> None:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise InputError(f"the plugin fails: {type(error).__name__}: {error}", file=file, remedy="Correct the file") from error
+        raise InputError(
+            f"the plugin fails: {type(error).__name__}: {error}", file=file, remedy="Correct the file"
+        ) from error

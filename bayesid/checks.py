@@ -5,19 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid.arrays import Floats
 from bayesid.errors import InputError
 from bayesid.model import Manoeuvre, Model
 from bayesid.motion import MeasuredMotion
 from bayesid.posterior import Posterior, Predictions
-from bayesid.recording import Recording
+from bayesid.recording import JOINT_FAMILIES, Recording
 from bayesid.robot import Robot
 from bayesid.sensors import Kind, Sensor
 
 __all__ = ["Channel", "JointCheck", "RecordingCheck", "SensorCheck", "check_recording", "refuse_wrong_units"]
 
-Floats = NDArray[np.float64]
 
 STILL = 1e-3
 """A joint that moves less than this hardly excites anything [rad or m]."""
@@ -91,7 +90,9 @@ class RecordingCheck:
     def warnings(self) -> tuple[str, ...]:
         """Sentences on what deserves a look."""
         found = [
-            f"Joint {joint.name} moves by {joint.highest - joint.lowest:.2g} {joint.unit} only." for joint in self.joints if joint.still
+            f"Joint {joint.name} moves by {joint.highest - joint.lowest:.2g} {joint.unit} only."
+            for joint in self.joints
+            if joint.still
         ]
         found += [
             f"The spline does not follow joint {joint.name}: chi-square per sample {joint.chi2_per_sample:.2f}."
@@ -160,7 +161,11 @@ def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
         outside = (position < joint.lower - slack) | (position > joint.upper + slack)
         speed = np.abs(np.diff(position) / np.diff(time))
         fast = speed > 5.0 * joint.velocity
-        remedy = "Give positions in radians, not degrees" if joint.unit == "rad" else "Give positions in metres, not millimetres"
+        remedy = (
+            "Give positions in radians, not degrees"
+            if joint.unit == "rad"
+            else "Give positions in metres, not millimetres"
+        )
         file = recording.file or recording.name
         if outside.any():
             row = int(np.argmax(outside))
@@ -174,7 +179,8 @@ def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
         if fast.any():
             row = int(np.argmax(fast))
             raise InputError(
-                f"the joint moves at {speed[row]:.3g} {joint.unit}/s at time {time[row]:g} s; its limit is {joint.velocity:g}",
+                f"the joint moves at {speed[row]:.3g} {joint.unit}/s at time {time[row]:g} s, "
+                f"its limit is {joint.velocity:g}",
                 file=file,
                 place=f"column {name}",
                 remedy=f"{remedy}, or correct the limit in the URDF",
@@ -214,12 +220,9 @@ def _detrend(time: Floats, values: Floats) -> Floats:
 
 
 def _channels(recording: Recording, model: Model) -> tuple[Channel, ...]:
-    names = [sensor.kind.value for sensor in model.sensors]
-    series = [(name, recording.series(f"{name}.x")[0]) for name in names]
-    for joint in model.robot.joints:
-        for family in ("position", "velocity", "acceleration"):
-            if f"{family}.{joint.name}" in recording.channels:
-                series.append((f"{family}.{joint.name}", recording.series(f"{family}.{joint.name}")[0]))
+    series = [(sensor.kind.value, recording.series(f"{sensor.kind.value}.x")[0]) for sensor in model.sensors]
+    joints = [f"{family}.{joint.name}" for joint in model.robot.joints for family in JOINT_FAMILIES]
+    series += [(name, recording.series(name)[0]) for name in joints if name in recording.channels]
     return tuple(
         Channel(name, len(time), float(np.median(np.diff(time))), float(np.diff(time).max())) for name, time in series
     )
@@ -279,7 +282,9 @@ def _delay(time: Floats, expected: Floats, measured: Floats) -> tuple[float, flo
     estimates = []
     for axis in range(3):
         slope = np.gradient(expected[:, axis], time)
-        basis = np.column_stack([expected[:, axis], slope, np.vander((time - time.mean()) / (np.ptp(time) + 1e-300), 3)])
+        basis = np.column_stack(
+            [expected[:, axis], slope, np.vander((time - time.mean()) / (np.ptp(time) + 1e-300), 3)]
+        )
         scale = np.abs(basis).max(axis=0) + 1e-300
         solution, *_ = np.linalg.lstsq(basis / scale, measured[:, axis], rcond=None)
         residual = measured[:, axis] - basis / scale @ solution
@@ -293,5 +298,7 @@ def _delay(time: Floats, expected: Floats, measured: Floats) -> tuple[float, flo
     weight = np.array([1.0 / sd**2 for _, sd in estimates])
     values = np.array([value for value, _ in estimates])
     mean = float((weight * values).sum() / weight.sum())
-    scatter = float(np.sqrt((weight * (values - mean) ** 2).sum() / weight.sum()))  # the robot's own errors also shift it
+    scatter = float(
+        np.sqrt((weight * (values - mean) ** 2).sum() / weight.sum())
+    )  # the robot's own errors also shift it
     return mean, float(np.hypot(weight.sum() ** -0.5, scatter))

@@ -92,7 +92,13 @@ def _reported() -> Iterator[None]:
 @contextmanager
 def _progress() -> Iterator[Callable[[float, str], None]]:
     """Show a bar; the callable takes the fraction done and a text."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=console, transient=True) as bar:
         task = bar.add_task("starting", total=1.0)
 

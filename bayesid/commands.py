@@ -38,10 +38,13 @@ Show = Callable[[float, str], None]
 def run_check(file: Path, output: Path) -> Iterator[str]:
     """Write check.json and report.pdf of a study."""
     study, posterior = _read(file)
-    yield f"{study.title}: {len(posterior.manoeuvres)} recordings, {posterior.samples} samples, {posterior.size} unknowns."
+    count = len(posterior.manoeuvres)
+    yield f"{study.title}: {count} recordings, {posterior.samples} samples, {posterior.size} unknowns."
     checks = [check_recording(posterior, index) for index in range(len(posterior.manoeuvres))]
     with _complete(output) as folder:
-        _write_json(folder / "check.json", {"title": study.title, "recordings": [_check_dict(check) for check in checks]})
+        _write_json(
+            folder / "check.json", {"title": study.title, "recordings": [_check_dict(check) for check in checks]}
+        )
         check_report(posterior, checks, study.title, folder / "report.pdf")
     for check in checks:
         yield f"{check.name}: {check.duration:.4g} s. " + (" ".join(check.warnings) or "Nothing conspicuous.")
@@ -53,7 +56,7 @@ def run_identify(file: Path, output: Path, *, seed: int, effective_samples: floa
     study, posterior = _read(file)
     if not posterior.size:
         raise InputError("nothing is unknown", file=file, place="unknowns.bodies", remedy="Name a body to identify")
-    yield f"{study.title}: {posterior.samples} samples, {posterior.size} unknowns, integration step {posterior.step:g} s."
+    yield f"{study.title}: {posterior.samples} samples, {posterior.size} unknowns, step {posterior.step:g} s."
     result = _identify(posterior, output, seed, effective_samples, progress)
     _write_identification(result, study.title, output, seed)
     yield from _summary(result)
@@ -73,7 +76,9 @@ def run_simulate(file: Path, output: Path, *, seed: int, noise: bool) -> Iterato
                 {
                     "file": f"{recording.name}.csv",
                     "largest": {
-                        kind.value: [float(np.nanmax(np.abs(recording.channels[f"{kind.value}.{axis}"]))) for axis in "xyz"]
+                        kind.value: [
+                            float(np.nanmax(np.abs(recording.channels[f"{kind.value}.{axis}"]))) for axis in "xyz"
+                        ]
                         for kind in (sensor.kind for sensor in posterior.model.sensors)
                         if kind is not Kind.ATTITUDE
                     },
@@ -118,9 +123,7 @@ def _identify(posterior: Posterior, output: Path, seed: int, wanted: float, show
         done = max(state.effective_samples / state.wanted if state.r_hat < 1.05 else 0.0, state.steps / state.limit)
         show(done, f"step {state.steps}, {state.effective_samples:.0f} effective samples, R-hat {state.r_hat:.3f}")
 
-    return identify_posterior(
-        posterior, seed, effective_samples=wanted, file=output / "samples.h5", progress=report
-    )
+    return identify_posterior(posterior, seed, effective_samples=wanted, file=output / "samples.h5", progress=report)
 
 
 def _write_identification(result: Identification, title: str, output: Path, seed: int) -> None:
@@ -156,7 +159,9 @@ def _complete(output: Path) -> Iterator[Path]:
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"cannot create the folder: {error.strerror}", file=output, remedy="Choose another output") from None
+        raise InputError(
+            f"cannot create the folder: {error.strerror}", file=output, remedy="Choose another output"
+        ) from None
     with tempfile.TemporaryDirectory(dir=output, prefix=".part-") as name:
         yield Path(name)
         for item in sorted(Path(name).iterdir()):

@@ -34,14 +34,14 @@ class Grid(NamedTuple):
     """Everything about one recording that a simulation needs, reduced to arrays.
 
     ``stage`` holds nodes and midpoints of the K integration steps, 2 K + 1 instants; ``held`` the known force and
-    torque on the base during each step, (K, 6); a sample lies in step ``index`` at the given ``fraction`` of it.
+    torque on the base during each step, (K, 6); a sample lies in step ``step_of`` at the given ``fraction`` of it.
     """
 
     step: Array
     stage: Instants
     held: Array
     sample: Instants
-    index: Array
+    step_of: Array
     fraction: Array
 
 
@@ -103,7 +103,9 @@ def simulate(
     system = _System(tuple(effects), tuple(values))
     bodies = jax.vmap(composite)(grid.stage.known + grid.stage.unknown @ inertial)
     stages = (bodies, grid.stage.environment)
-    first, middle, last = (jax.tree.map(lambda x, s=s: x[s], stages) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)))
+    first, middle, last = (
+        jax.tree.map(lambda x, s=s: x[s], stages) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
+    )
     initial = system.initial(jax.tree.map(lambda x: x[0], stages), start)
 
     def step(state: Array, given: tuple) -> tuple[Array, tuple[Array, Array, Array]]:
@@ -118,7 +120,7 @@ def simulate(
 
     final, (states, slopes, end_slopes) = jax.lax.scan(step, initial, (grid.step, grid.held, first, middle, last))
     ends = jnp.concatenate([states[1:], final[None]])
-    index, s = grid.index, grid.fraction[:, None]
+    index, s = grid.step_of, grid.fraction[:, None]
     between = _hermite(states[index], ends[index], slopes[index], end_slopes[index], s)
     seen = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ inertial)
     rate, accel, attitude = jax.vmap(system.sense, (0, 0, 0, None))(
@@ -150,7 +152,9 @@ class _System(NamedTuple):
         ]
         return jnp.concatenate(parts)
 
-    def sense(self, state: Array, instant: tuple[Composite, Environment], held: Array, point: Array) -> tuple[Array, Array, Array]:
+    def sense(
+        self, state: Array, instant: tuple[Composite, Environment], held: Array, point: Array
+    ) -> tuple[Array, Array, Array]:
         moment, momentum_rate = self.moment(state, instant)
         body, rate = moment.body, moment.rate
         wrench = self.wrench(moment, state[INNER], held)
@@ -224,7 +228,9 @@ def _quaternion_rate(quaternion: Array, rate: Array) -> Array:
 
 def _hermite(left: Array, right: Array, left_slope: Array, right_slope: Array, s: Array) -> Array:
     jump = right - left
-    return left + s * (left_slope + s * (3.0 * jump - 2.0 * left_slope - right_slope + s * (left_slope + right_slope - 2.0 * jump)))
+    return left + s * (
+        left_slope + s * (3.0 * jump - 2.0 * left_slope - right_slope + s * (left_slope + right_slope - 2.0 * jump))
+    )
 
 
 def _cross(a: Array, b: Array) -> Array:

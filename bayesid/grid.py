@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 
+from bayesid.arrays import Floats
 from bayesid.dynamics import Grid, Instants
 from bayesid.effects.base import Environment
 from bayesid.motion import Motion
-from bayesid.orbit import Orbit
+from bayesid.orbit import Orbit, OrbitState
 from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.tables import WIDTH, kinematics, link_table
 
 __all__ = ["Actions", "build_grid", "pad_grids"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -114,15 +113,14 @@ def build_grid(
     instants = [_instants(robot, unknown, motion, time, orbit, latitude, actions) for time in (stage, samples)]
     index = np.clip(np.searchsorted(nodes, samples, side="right") - 1, 0, len(nodes) - 2)
     size = np.diff(nodes)
-    grid = Grid(
-        step=size,
+    return Grid(
+        step=jnp.asarray(size),
         stage=instants[0],
-        held=actions.held(nodes[:-1]),
+        held=jnp.asarray(actions.held(nodes[:-1])),
         sample=instants[1],
-        index=index.astype(np.int32),
-        fraction=(samples - nodes[index]) / size[index],
+        step_of=jnp.asarray(index, dtype=jnp.int32),
+        fraction=jnp.asarray((samples - nodes[index]) / size[index]),
     )
-    return jax.tree.map(jnp.asarray, grid)
 
 
 def _nodes(end: float, step: float, changes: Floats) -> Floats:
@@ -130,7 +128,7 @@ def _nodes(end: float, step: float, changes: Floats) -> Floats:
     breaks = np.concatenate([[0.0], inner, [end]])
     pieces = [
         np.linspace(left, right, int(np.ceil((right - left) / step - 1e-9)) + 1)[:-1]
-        for left, right in zip(breaks[:-1], breaks[1:], strict=True)
+        for left, right in pairwise(breaks)
     ]
     return np.concatenate([*pieces, [end]])
 
@@ -149,35 +147,42 @@ def _instants(
     for name, link in robot.links.items():
         if name not in unknown and link.inertial.mass > 0.0:
             known += link_table(robot, name, moved) @ link.inertial.vector
-    tables = [link_table(robot, name, moved) for name in unknown]
+    tables = [np.zeros((len(time), WIDTH, 0)), *(link_table(robot, name, moved) for name in unknown)]
+    none = OrbitState(*(np.zeros((len(time), *shape)) for shape in ((3,), (), (3,), (3,), ())))
+    state = none if orbit is None else orbit.state(time, latitude)
     momentum, torque = actions.wheels(time)
-    if orbit is None:
-        state = [np.zeros((len(time), 3)), np.zeros(len(time)), *np.zeros((2, len(time), 3)), np.zeros(len(time))]
-    else:
-        state = list(orbit.state(time, latitude))
-    environment = Environment(time, *state, momentum, torque)
-    return Instants(known, np.concatenate(tables, axis=2) if tables else np.zeros((len(time), WIDTH, 0)), environment)
+    environment = Environment(
+        time=jnp.asarray(time),
+        zenith=jnp.asarray(state.zenith),
+        gradient=jnp.asarray(state.gradient),
+        velocity=jnp.asarray(state.velocity),
+        sun=jnp.asarray(state.sun),
+        latitude=jnp.asarray(state.latitude),
+        wheel_momentum=jnp.asarray(momentum),
+        wheel_torque=jnp.asarray(torque),
+    )
+    return Instants(jnp.asarray(known), jnp.asarray(np.concatenate(tables, axis=2)), environment)
 
 
 def pad_grids(grids: list[Grid], steps: int | None = None) -> Grid:
     """Stack grids of different lengths, shape (R, ...); the padding is steps of no length and copies of a sample."""
     steps = max(len(grid.step) for grid in grids) if steps is None else steps
-    samples = max(len(grid.index) for grid in grids)
+    samples = max(len(grid.step_of) for grid in grids)
 
-    def lengthen(array: jax.Array, length: int) -> Floats:
+    def lengthen(array: jax.Array, length: int) -> jax.Array:
         values = np.asarray(array)
-        return np.concatenate([values, np.repeat(values[-1:], length - len(values), axis=0)])
+        return jnp.asarray(np.concatenate([values, np.repeat(values[-1:], length - len(values), axis=0)]))
 
     padded = []
     for grid in grids:
         extra = steps - len(grid.step)
         padded.append(
             Grid(
-                step=np.concatenate([np.asarray(grid.step), np.zeros(extra)]),
+                step=jnp.concatenate([grid.step, jnp.zeros(extra)]),
                 stage=jax.tree.map(lambda x: lengthen(x, 2 * steps + 1), grid.stage),
                 held=lengthen(grid.held, steps),
                 sample=jax.tree.map(lambda x: lengthen(x, samples), grid.sample),
-                index=lengthen(grid.index, samples),
+                step_of=lengthen(grid.step_of, samples),
                 fraction=lengthen(grid.fraction, samples),
             )
         )

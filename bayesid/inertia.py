@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bayesid.arrays import Floats
 from bayesid.errors import InputError
 
 __all__ = ["BASIS", "InertialParameters", "log_cholesky_factor", "parameters_from_pseudo_inertia", "upper_cholesky"]
@@ -22,7 +23,7 @@ PARAMETERS = 10
 """Inertial parameters of a rigid body."""
 
 
-def _basis() -> NDArray[np.float64]:
+def _basis() -> Floats:
     """Return the ten 4x4 matrices E_p with pseudo-inertia = sum_p parameter_p E_p, in Pinocchio's order."""
     basis = np.zeros((PARAMETERS, 4, 4))
     basis[0, 3, 3] = 1.0
@@ -61,8 +62,8 @@ class InertialParameters:
     """
 
     mass: float
-    com: NDArray[np.float64]
-    inertia: NDArray[np.float64]
+    com: Floats
+    inertia: Floats
 
     def __init__(self, mass: float, com: ArrayLike, inertia: ArrayLike) -> None:
         centre, tensor = np.array(com, dtype=float), np.array(inertia, dtype=float)
@@ -110,14 +111,14 @@ class InertialParameters:
         return cls(mass, com, about_origin - mass * (com @ com * np.eye(3) - np.outer(com, com)))
 
     @property
-    def vector(self) -> NDArray[np.float64]:
+    def vector(self) -> Floats:
         """Ten parameters, linear in the dynamics, in Pinocchio's order (`from_vector`)."""
         c = self.com
         tensor = self.inertia + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
         return np.array([self.mass, *(self.mass * c), *tensor[np.tril_indices(3)]])
 
     @property
-    def pseudo_inertia(self) -> NDArray[np.float64]:
+    def pseudo_inertia(self) -> Floats:
         """Pseudo-inertia, shape (4, 4) [kg m2, kg m, kg]."""
         return np.einsum("p,pij->ij", self.vector, BASIS)
 
@@ -150,7 +151,7 @@ def log_cholesky_factor(coordinates: Array) -> Array:
     return jnp.exp(alpha) * jnp.stack([jnp.stack(row) for row in rows])
 
 
-def upper_cholesky(pseudo_inertia: NDArray[np.float64]) -> NDArray[np.float64]:
+def upper_cholesky(pseudo_inertia: Floats) -> Floats:
     """Upper-triangular U with ``U U' = pseudo_inertia``, shape (4, 4)."""
     flipped = np.linalg.cholesky(pseudo_inertia[::-1, ::-1])
     return flipped[::-1, ::-1]

@@ -1,4 +1,4 @@
-"""What is assumed: the robot, its sensors, the effects at work and the priors; and the manoeuvres that were recorded."""
+"""What is assumed: the robot, its sensors, the effects at work, the priors; and the manoeuvres that were recorded."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid.arrays import Floats
 from bayesid.effects.base import Effect
 from bayesid.errors import InputError
 from bayesid.motion import Motion
@@ -43,7 +43,7 @@ class Manoeuvre:
 
     recording: Recording
     motion: Motion
-    attitude: NDArray[np.float64] = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
+    attitude: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
     attitude_sigma: float = 0.0
     latitude: float = 0.0
 
@@ -96,7 +96,7 @@ class Model:
         return replace(self, effects=(*self.effects, effect))
 
     @property
-    def point(self) -> NDArray[np.float64]:
+    def point(self) -> Floats:
         """Mounting point of the accelerometer in the base [m]; the origin where there is none."""
         for sensor in self.sensors:
             if sensor.kind is Kind.ACCEL:

@@ -10,17 +10,16 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import BPoly
 
+from bayesid.arrays import Floats
 from bayesid.errors import InputError
 from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.smoothing import JointSamples, SmoothedJoint, smooth
 
 __all__ = ["Excitation", "JointState", "MeasuredMotion", "Motion"]
-
-Floats = NDArray[np.float64]
 
 
 class JointState(NamedTuple):
@@ -44,8 +43,9 @@ class Excitation:
     """The paper's excitation (27) with its connecting splines.
 
     Each joint goes from ``start`` at rest to ``offset + amplitude``, oscillates as
-    ``offset + amplitude cos(frequency (t - ramp))`` for a whole number of periods, and returns. The paper connects to the
-    offset itself, where its cosine does not begin; the spline here meets position, velocity and acceleration of (27).
+    ``offset + amplitude cos(frequency (t - ramp))`` for a whole number of periods, and returns. The paper
+    connects to the offset itself, where its cosine does not begin; the spline here meets position, velocity and
+    acceleration of (27).
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class Excitation:
             (t > last, [last, self.duration], [swing, rest]),
         ):
             spline = BPoly.from_derivatives(interval, np.array(ends))
-            inside = np.clip(t[use], *interval)
+            inside = np.clip(t[use], interval[0], interval[1])
             for order in range(3):
                 state[order, use] = spline.derivative(order)(inside) if order else spline(inside)
         return JointState(*state)
@@ -118,7 +118,7 @@ class MeasuredMotion:
         recording: Recording,
         robot: Robot,
         *,
-        sigma: Mapping[int, float | Mapping[str, float] | None] | None = None,
+        sigma: Mapping[int, float | Mapping[str, float | None] | None] | None = None,
         start: Mapping[str, float] | None = None,
     ) -> MeasuredMotion:
         """Smooth the joint channels of a recording.
@@ -155,7 +155,9 @@ class MeasuredMotion:
         return np.stack([joint.lag_covariance(time, lags) for joint in self.joints])
 
 
-def _samples(recording: Recording, joint: str, sigma: Mapping[int, float | Mapping[str, float] | None]) -> list[JointSamples]:
+def _samples(
+    recording: Recording, joint: str, sigma: Mapping[int, float | Mapping[str, float | None] | None]
+) -> list[JointSamples]:
     samples = []
     for derivative, family in enumerate(("position", "velocity", "acceleration")):
         channel = f"{family}.{joint}"
@@ -170,9 +172,7 @@ def _samples(recording: Recording, joint: str, sigma: Mapping[int, float | Mappi
 
 def _check_names(recording: Recording, robot: Robot) -> None:
     known = [joint.name for joint in robot.joints]
-    missing = [
-        name for name in known if not {f"position.{name}", f"velocity.{name}"} & set(recording.channels)
-    ]
+    missing = [name for name in known if not {f"position.{name}", f"velocity.{name}"} & set(recording.channels)]
     strangers = [name for name in recording.joints if name not in known]
     if missing or strangers:
         parts = []

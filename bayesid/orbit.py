@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bayesid.arrays import Floats
 from bayesid.errors import InputError
 
 __all__ = ["EARTH", "Orbit", "OrbitState"]
@@ -23,11 +24,11 @@ EARTH = 3.986004418e14
 class OrbitState(NamedTuple):
     """What the orbit gives at some times; vectors in orbit axes, shape (T, 3), scalars shape (T,)."""
 
-    zenith: NDArray[np.float64]
-    gradient: NDArray[np.float64]  # mu / r^3 [1/s2]
-    velocity: NDArray[np.float64]  # direction of motion
-    sun: NDArray[np.float64]
-    latitude: NDArray[np.float64]  # argument of latitude [rad]
+    zenith: Floats
+    gradient: Floats  # mu / r^3 [1/s2]
+    velocity: Floats  # direction of motion
+    sun: Floats
+    latitude: Floats  # argument of latitude [rad]
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,10 @@ class Orbit:
 
     def __post_init__(self) -> None:
         if not self.radius > 6.3e6:
-            raise InputError(f"orbit radius {self.radius:g} m lies inside the Earth", remedy="Give it in metres, from the Earth's centre")
+            raise InputError(
+                f"orbit radius {self.radius:g} m lies inside the Earth",
+                remedy="Give it in metres, from the Earth's centre",
+            )
         if not 0.0 <= self.eccentricity < 1.0:
             raise InputError(f"eccentricity {self.eccentricity:g} is not in [0, 1)", remedy="Give a closed orbit")
 
@@ -91,7 +95,7 @@ class Orbit:
             latitude=argument_of_latitude + angle,
         )
 
-    def _true_anomaly(self, t: NDArray[np.float64], start: float) -> NDArray[np.float64]:
+    def _true_anomaly(self, t: Floats, start: float) -> Floats:
         e = self.eccentricity
         if e == 0.0:
             return start + self.mean_motion * t
@@ -108,7 +112,7 @@ class Orbit:
         turns = np.round(eccentric / (2.0 * np.pi)) * 2.0 * np.pi
         return 2.0 * np.arctan(np.tan((eccentric - turns) / 2.0) / half) + turns
 
-    def _sun(self, latitude: float) -> NDArray[np.float64]:
+    def _sun(self, latitude: float) -> Floats:
         if self.sun is None:
             return np.zeros(3)
         cos, sin = np.cos(latitude), np.sin(latitude)

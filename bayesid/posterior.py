@@ -10,9 +10,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
 from bayesid import whitening
+from bayesid.arrays import Floats
 from bayesid.dynamics import Grid, Start, quaternion_product, simulate
 from bayesid.effects.base import Readings
 from bayesid.errors import InputError
@@ -27,7 +27,6 @@ from bayesid.whitening import Channel, NoiseModel, Whitening
 
 __all__ = ["Posterior", "Predictions"]
 
-Floats = NDArray[np.float64]
 
 LONGEST_STEP = 2.0
 """Integration step tried first [s]."""
@@ -98,20 +97,21 @@ class Posterior:
         self.data = self._stack(self._grids(self.step))
 
     def at(self, z: Floats) -> Posterior:
-        """Return the posterior with the encoder noise carried through the robot at ``z`` instead of the prior's centre."""
+        """Return the posterior with the encoder noise carried through the robot at ``z`` in place of the prior's."""
         new = object.__new__(Posterior)
         new.__dict__.update({key: value for key, value in self.__dict__.items() if key != "data"})
         inertials = self.inertials(z)
-        new.whitenings = [
-            self._whitening(index, inertials, old.window) for index, old in enumerate(self.whitenings)
-        ]
+        new.whitenings = [self._whitening(index, inertials, old.window) for index, old in enumerate(self.whitenings)]
         new.data = new._stack_noise(self.data)
         return new
 
     def with_manoeuvres(self, manoeuvres: Sequence[Manoeuvre]) -> Posterior:
-        """Return the posterior of the same model given other manoeuvres; compiled functions are shared where they fit."""
+        """Return the posterior of the same model given other manoeuvres, sharing compiled functions where they fit."""
         new = Posterior(self.model, manoeuvres, step=self.step, flat_prior=self.flat_prior)
-        same = (new.unknowns.recordings, new.unknowns.rate_sigma) == (self.unknowns.recordings, self.unknowns.rate_sigma)
+        same = (new.unknowns.recordings, new.unknowns.rate_sigma) == (
+            self.unknowns.recordings,
+            self.unknowns.rate_sigma,
+        )
         if same and np.array_equal(new.unknowns.tilt_sigma, self.unknowns.tilt_sigma):
             new.__dict__["_compiled"] = self._compiled
         return new
@@ -193,7 +193,7 @@ class Posterior:
         return [InertialParameters.from_vector(row) for row in self.values(z).inertial.reshape(-1, 10)]
 
     def predict(self, z: Floats) -> list[Predictions]:
-        """What the sensors of each recording should read at ``z``, in sensor axes."""
+        """Return what the sensors of each recording should read at ``z``, in sensor axes."""
         readings = jax.tree.map(np.asarray, self._compiled.readings(jnp.asarray(z), self.data))
         return [
             Predictions(*(np.asarray(field)[index, : len(samples.time)] for field in readings))
@@ -201,11 +201,11 @@ class Posterior:
         ]
 
     def sample_times(self, index: int) -> Floats:
-        """Times at which some sensor of a recording was sampled, the grid of `predict` and of `residuals`, shape (T,)."""
+        """Return the times at which some sensor of a recording was sampled: the grid of `predict`, shape (T,)."""
         return self._samples[index].time
 
     def measured(self, index: int, kind: Kind) -> tuple[Floats, Floats]:
-        """Times and values of one sensor of a recording, as recorded."""
+        """Return times and values of one sensor of a recording, as recorded."""
         return self._samples[index].series[kind]
 
     def sigma(self, index: int, kind: Kind) -> Floats:
@@ -289,7 +289,7 @@ class Posterior:
 
     def _stack(self, grids: list[Grid]) -> Data:
         grid = pad_grids(grids)
-        count = grid.index.shape[1]
+        count = grid.step_of.shape[1]
         measured = np.stack([_lengthen(item.measured, count) for item in self._samples])
         quaternion = np.stack([_lengthen(item.quaternion, count) for item in self._samples])
         bare = Data(grid, self._attitudes(), jnp.asarray(measured), jnp.asarray(quaternion), jnp.zeros(0), jnp.zeros(0))
@@ -313,7 +313,9 @@ class Posterior:
     def _batched(self, function: Callable[..., Array], z: Floats) -> Floats:
         padding = -len(z) % BATCH
         padded = np.concatenate([z, np.repeat(z[-1:], padding, axis=0)]) if padding else z
-        parts = [np.asarray(function(jnp.asarray(padded[i : i + BATCH]), self.data)) for i in range(0, len(padded), BATCH)]
+        parts = [
+            np.asarray(function(jnp.asarray(padded[i : i + BATCH]), self.data)) for i in range(0, len(padded), BATCH)
+        ]
         return np.concatenate(parts)[: len(z)]
 
     @cached_property
@@ -334,7 +336,8 @@ class _Compiled:
             start = Start(quaternion_product(attitude, small / jnp.linalg.norm(small)), rate)
             readings = simulate(grid, inertial, start, model.effects, effects, point)
             readings = readings._replace(
-                rate=readings.rate @ turn.get(Kind.RATE, jnp.eye(3)), accel=readings.accel @ turn.get(Kind.ACCEL, jnp.eye(3))
+                rate=readings.rate @ turn.get(Kind.RATE, jnp.eye(3)),
+                accel=readings.accel @ turn.get(Kind.ACCEL, jnp.eye(3)),
             )
             for effect, values in zip(model.effects, effects, strict=True):
                 readings = effect.read(values, readings)

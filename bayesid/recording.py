@@ -19,13 +19,14 @@ from types import MappingProxyType
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from bayesid.arrays import Floats
 from bayesid.errors import InputError
 
 __all__ = ["JOINT_FAMILIES", "VECTOR_FAMILIES", "Recording"]
 
-Array = NDArray[np.float64]
+Array = Floats
 
 JOINT_FAMILIES = ("position", "velocity", "acceleration", "torque")
 """Families with one column per joint: ``position.<joint>`` [rad, m], its derivatives, ``torque.<joint>`` [N m, N]."""

@@ -11,8 +11,8 @@ from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from bayesid.arrays import Floats
 from bayesid.errors import InputError
 from bayesid.inertia import InertialParameters
 
@@ -52,7 +52,7 @@ class Link:
 
     inertial: InertialParameters
     joint: int
-    placement: NDArray[np.float64]
+    placement: Floats
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,9 @@ class Robot:
         try:
             model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
         except Exception as error:
-            raise InputError(f"Pinocchio cannot read the robot: {error}", file=file, remedy="Correct the URDF") from error
+            raise InputError(
+                f"Pinocchio cannot read the robot: {error}", file=file, remedy="Correct the URDF"
+            ) from error
         model.gravity.setZero()
         links = {}
         for frame in model.frames:
@@ -134,7 +136,10 @@ class Robot:
         base = next(iter(links))
         if links[base].inertial.mass <= 0.0:
             raise InputError(
-                "mass > 0 fails: the root link has no mass", file=file, place=f"link {base}", remedy="The root link is the base body: give it its <inertial>"
+                "mass > 0 fails: the root link has no mass",
+                file=file,
+                place=f"link {base}",
+                remedy="The root link is the base body: give it its <inertial>",
             )
         return cls(
             name=root.get("name", "robot"),
@@ -165,7 +170,9 @@ class Robot:
             If there is none of that name.
         """
         if name not in self.links:
-            raise InputError(f"no link or load named {name!r}", file=self.file, remedy=f"Choose one of {', '.join(self.links)}")
+            raise InputError(
+                f"no link or load named {name!r}", file=self.file, remedy=f"Choose one of {', '.join(self.links)}"
+            )
         return self.links[name]
 
     def with_inertial(self, name: str, inertial: InertialParameters) -> Robot:
@@ -177,7 +184,9 @@ class Robot:
     def with_load(self, load: Load) -> Robot:
         """Return the robot with a rigid body fixed on a link."""
         if load.name in self.links:
-            raise InputError(f"the name {load.name!r} is taken by a link", file=self.file, remedy="Give the load another name")
+            raise InputError(
+                f"the name {load.name!r} is taken by a link", file=self.file, remedy="Give the load another name"
+            )
         carrier = self.link(load.link)
         links = {**self.links, load.name: Link(load.inertial, carrier.joint, carrier.placement)}
         return replace(self, links=MappingProxyType(links), loads=(*self.loads, load.name))
@@ -192,7 +201,9 @@ class Robot:
         """Return the index of a joint in `joints`."""
         names = [joint.name for joint in self.joints]
         if name not in names:
-            raise InputError(f"no moving joint named {name!r}", file=self.file, remedy=f"Choose one of {', '.join(names)}")
+            raise InputError(
+                f"no moving joint named {name!r}", file=self.file, remedy=f"Choose one of {', '.join(names)}"
+            )
         return names.index(name)
 
     def to_urdf(self) -> str:
@@ -239,7 +250,12 @@ def _inertials(root: ET.Element, file: Path | None) -> dict[str, InertialParamet
         except InputError as error:
             raise error.within(file=file, place=f"link {name}") from None
         except (TypeError, ValueError, AttributeError) as error:
-            raise InputError(f"unreadable <inertial>: {error}", file=file, place=f"link {name}", remedy="Give mass and inertia as numbers") from None
+            raise InputError(
+                f"unreadable <inertial>: {error}",
+                file=file,
+                place=f"link {name}",
+                remedy="Give mass and inertia as numbers",
+            ) from None
     return inertials
 
 
@@ -284,10 +300,18 @@ def _check_joints(root: ET.Element, file: Path | None) -> None:
         name, kind = joint.get("name", ""), joint.get("type", "")
         if kind not in (*MOVING, "fixed"):
             raise InputError(
-                f"joint type {kind!r} is not supported", file=file, place=f"joint {name}", remedy=f"Use one of {', '.join(MOVING)} or fixed"
+                f"joint type {kind!r} is not supported",
+                file=file,
+                place=f"joint {name}",
+                remedy=f"Use one of {', '.join(MOVING)} or fixed",
             )
         if joint.find("mimic") is not None:
-            raise InputError("mimic joints are not supported", file=file, place=f"joint {name}", remedy="Make it a joint of its own and record it")
+            raise InputError(
+                "mimic joints are not supported",
+                file=file,
+                place=f"joint {name}",
+                remedy="Make it a joint of its own and record it",
+            )
 
 
 def _joint(model: pin.Model, index: int, root: ET.Element) -> Joint:

@@ -7,14 +7,14 @@ from enum import Enum
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from bayesid.arrays import Floats
 from bayesid.errors import InputError
 
 __all__ = ["AngleRandomWalk", "Filter", "Kind", "Noise", "NoiseDensity", "Sensor", "StarTracker", "White"]
 
-Floats = NDArray[np.float64]
 
 ARCSEC = np.pi / 180.0 / 3600.0
 """One second of arc [rad]."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid.arrays import Floats
 from bayesid.model import Manoeuvre, Model
 from bayesid.motion import Motion, sample_joints
 from bayesid.posterior import Posterior
@@ -13,10 +13,10 @@ from bayesid.sensors import Kind
 
 __all__ = ["simulate_manoeuvre", "simulate_recordings"]
 
-Floats = NDArray[np.float64]
 
-
-def simulate_recordings(posterior: Posterior, rng: np.random.Generator | None = None, z: Floats | None = None) -> list[Recording]:
+def simulate_recordings(
+    posterior: Posterior, rng: np.random.Generator | None = None, z: Floats | None = None
+) -> list[Recording]:
     """Simulate the recordings of a posterior, at the same times.
 
     Parameters

@@ -1,9 +1,10 @@
 """Smoothing spline of measured joint motion, as the posterior of a Gauss-Markov process.
 
-The joint's position is an integrated Wiener process: its ``order``-th derivative is white noise. The posterior mean given
-the samples is the smoothing spline of degree ``2 order - 1`` (Wahba 1978), and the posterior covariance is what the
-likelihood needs: the uncertainty of velocity and acceleration with their correlation in time. The order, the intensity of
-the process, and any noise level the user did not declare, maximise the marginal likelihood. All algebra is banded.
+The joint's position is an integrated Wiener process: its ``order``-th derivative is white noise. The posterior mean
+given the samples is the smoothing spline of degree ``2 order - 1`` (Wahba 1978), and the posterior covariance is what
+the likelihood needs: the uncertainty of velocity and acceleration with their correlation in time. The order, the
+intensity of the process, and any noise level the user did not declare, maximise the marginal likelihood. All algebra
+is banded.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sla
-from numpy.typing import NDArray
 from scipy.interpolate import BPoly
 from scipy.optimize import minimize, minimize_scalar
 
+from bayesid.arrays import Floats, Integers
+
 __all__ = ["JointSamples", "SmoothedJoint", "smooth"]
 
-Floats = NDArray[np.float64]
 
 ORDERS = (4, 3, 5, 6)
 """Derivatives of the position that may be the white one; 3 gives the quintic spline, the roughest with a continuous
@@ -126,7 +127,7 @@ class SmoothedJoint:
         return result
 
     def standard_deviation(self, time: Floats) -> Floats:
-        """Standard deviation of position, velocity and acceleration, shape (3, T)."""
+        """Return the standard deviation of position, velocity and acceleration, shape (3, T)."""
         return np.sqrt(np.diagonal(self.lag_covariance(time, 0)[0], axis1=1, axis2=2)).T
 
 
@@ -158,24 +159,37 @@ def _fit(samples: list[JointSamples], nodes: Floats, scale: float, start: float 
     problem = _Problem(nodes / scale, [_scaled(series, nodes, scale) for series in samples], start, order)
     units = [scale**series.derivative for series in samples]
     guess = [math.log(problem.roughness() * 10.0)]
-    guess += [math.log(max(problem.noise_guess(index), 1e-14)) for index, series in enumerate(samples) if series.sigma is None]
+    guess += [
+        math.log(max(problem.noise_guess(index), 1e-14)) for index, series in enumerate(samples) if series.sigma is None
+    ]
 
     def unpack(logs: Floats) -> tuple[float, list[float]]:
         free = iter(np.exp(np.clip(logs, -46.0, 23.0)))
         intensity = float(next(free))
         return intensity, [
-            float(next(free)) if series.sigma is None else series.sigma * unit for series, unit in zip(samples, units, strict=True)
+            float(next(free)) if series.sigma is None else series.sigma * unit
+            for series, unit in zip(samples, units, strict=True)
         ]
 
     def loss(logs: Floats) -> float:
         return -problem.solve(*unpack(logs))[0]
 
     if len(guess) == 1:
-        line = minimize_scalar(lambda log: loss(np.array([log])), bounds=(guess[0] - 25.0, guess[0] + 5.0), method="bounded", options={"xatol": 0.05})
+        line = minimize_scalar(
+            lambda log: loss(np.array([log])),
+            bounds=(guess[0] - 25.0, guess[0] + 5.0),
+            method="bounded",
+            options={"xatol": 0.05},
+        )
         optimum = np.array([line.x])
     else:
         simplex = np.array(guess) + np.vstack([np.zeros(len(guess)), 1.5 * np.eye(len(guess))])
-        optimum = minimize(loss, simplex[0], method="Nelder-Mead", options={"xatol": 0.05, "fatol": 1e-2, "maxiter": 400, "initial_simplex": simplex}).x
+        optimum = minimize(
+            loss,
+            simplex[0],
+            method="Nelder-Mead",
+            options={"xatol": 0.05, "fatol": 1e-2, "maxiter": 400, "initial_simplex": simplex},
+        ).x
     intensity, sigmas = unpack(optimum)
     log_likelihood, states, factor, chi2 = problem.solve(intensity, sigmas)
     return SmoothedJoint(
@@ -203,24 +217,26 @@ def _nodes(own: Floats, extra: Floats) -> tuple[Floats, float]:
     return nodes, scale
 
 
-def _nearest(nodes: Floats, time: Floats) -> NDArray[np.intp]:
+def _nearest(nodes: Floats, time: Floats) -> Integers:
     right = np.clip(np.searchsorted(nodes, time), 1, len(nodes) - 1)
     return np.where(time - nodes[right - 1] < nodes[right] - time, right - 1, right)
 
 
-def _scaled(series: JointSamples, nodes: Floats, scale: float) -> tuple[int, NDArray[np.intp], Floats]:
+def _scaled(series: JointSamples, nodes: Floats, scale: float) -> tuple[int, Integers, Floats]:
     return series.derivative, _nearest(nodes, series.time), series.value * scale**series.derivative
 
 
 class _Problem:
     """Banded normal equations of the smoothing problem in scaled time."""
 
-    def __init__(self, nodes: Floats, series: list[tuple[int, NDArray[np.intp], Floats]], start: float | None, order: int) -> None:
+    def __init__(
+        self, nodes: Floats, series: list[tuple[int, Integers, Floats]], start: float | None, order: int
+    ) -> None:
         self.series, self.count, self.order = series, len(nodes), order
         step = np.diff(nodes)
         powers = np.arange(order)
         lift = powers[None, :] - powers[:, None]
-        factorial = np.array([math.factorial(max(value, 0)) for value in lift.ravel()]).reshape(lift.shape)
+        factorial = np.array([math.factorial(max(int(value), 0)) for value in lift.ravel()]).reshape(lift.shape)
         self.transition = np.where(lift >= 0, step[:, None, None] ** np.maximum(lift, 0) / factorial, 0.0)
         exponent = 2 * order - 1 - powers[:, None] - powers[None, :]
         denominator = np.array([math.factorial(order - 1 - i) for i in powers])
@@ -256,7 +272,7 @@ class _Problem:
         diagonal = weight * self.diagonal
         diagonal[0] += np.diag(self.initial)
         for (derivative, node, _), sigma in zip(self.series, sigmas, strict=True):
-            np.add.at(diagonal, (node, derivative, derivative), sigma**-2)
+            np.add.at(diagonal[:, derivative, derivative], node, sigma**-2)
         band = np.zeros((2 * order, self.count, order))
         for row in range(order):
             for column in range(order):
@@ -270,9 +286,14 @@ class _Problem:
         states = np.zeros((self.count, order))
         for _ in range(3):  # iterative refinement: positions of 1 rad carry noise of 1e-6
             gradient = self._gradient(states, weight, sigmas)
-            states = states + sla.cho_solve_banded((factor, True), gradient.ravel(), check_finite=False).reshape(states.shape)
+            states = states + sla.cho_solve_banded((factor, True), gradient.ravel(), check_finite=False).reshape(
+                states.shape
+            )
         jump = states[1:] - np.einsum("kij,kj->ki", self.transition, states[:-1])
-        chi2 = sum(float(np.sum(((values - states[node, d]) / s) ** 2)) for (d, node, values), s in zip(self.series, sigmas, strict=True))
+        chi2 = sum(
+            float(np.sum(((values - states[node, d]) / s) ** 2))
+            for (d, node, values), s in zip(self.series, sigmas, strict=True)
+        )
         energy = chi2 + weight * float(np.einsum("ki,kij,kj->", jump, self.process, jump))
         energy += float(np.sum(self.initial * (states[0] - self.initial_mean) ** 2))
         counts = [len(values) for _, _, values in self.series]
@@ -289,5 +310,5 @@ class _Problem:
         gradient[:-1] += np.einsum("kji,kj->ki", self.transition, force)
         gradient[0] -= self.initial * (states[0] - self.initial_mean)
         for (derivative, node, values), sigma in zip(self.series, sigmas, strict=True):
-            np.add.at(gradient, (node, derivative), (values - states[node, derivative]) / sigma**2)
+            np.add.at(gradient[:, derivative], node, (values - states[node, derivative]) / sigma**2)
         return gradient

@@ -1,4 +1,4 @@
-"""Results as ArviZ objects: posterior, log likelihood, posterior predictive and observed data, with units and frames."""
+"""Results as ArviZ objects: posterior, log likelihood, predictive and observed data, with units and frames."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from typing import Any
 
 import arviz as az
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid.arrays import Floats
 from bayesid.inference.identification import BODY_QUANTITIES, Identification, bodies_of
 from bayesid.sensors import Kind
 
 __all__ = ["to_arviz", "write_netcdf"]
 
-Floats = NDArray[np.float64]
 
 STORED = 1000
 """Draws kept per ensemble: samples closer than an autocorrelation time tell nothing new."""
@@ -74,7 +73,9 @@ def _thin(draws: Floats, count: int) -> Floats:
     return draws[:, :: max(1, draws.shape[1] // count)][:, :count]
 
 
-def _posterior_group(result: Identification, z: Floats) -> tuple[dict[str, Floats], dict[str, list[str]], dict[str, str]]:
+def _posterior_group(
+    result: Identification, z: Floats
+) -> tuple[dict[str, Floats], dict[str, list[str]], dict[str, str]]:
     chains, draws, size = z.shape
     flat = z.reshape(-1, size)
     group: dict[str, Floats] = {"z": z}
@@ -88,11 +89,11 @@ def _posterior_group(result: Identification, z: Floats) -> tuple[dict[str, Float
     for effect, parameters in zip(result.posterior.model.effects, values.effects, strict=True):
         for column, parameter in enumerate(effect.parameters):
             name = f"{effect.label}.{parameter.name}"
-            group[name] = parameters[..., column].reshape(chains, draws, *parameters.shape[1:-1])
+            group[name] = np.asarray(parameters)[..., column].reshape(chains, draws, *parameters.shape[1:-1])
             units[name] = parameter.unit
             if effect.per_recording:
                 dims[name] = ["recording"]
-    group["initial-rate"] = values.rate.reshape(chains, draws, -1, 3)
+    group["initial-rate"] = np.asarray(values.rate).reshape(chains, draws, -1, 3)
     dims["initial-rate"], units["initial-rate"] = ["recording", "axis"], "rad/s"
     return group, dims, units
 

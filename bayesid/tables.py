@@ -11,15 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from bayesid.arrays import Floats
 from bayesid.inertia import BASIS
 from bayesid.motion import JointState
 from bayesid.robot import Robot
 
 __all__ = ["ENTRIES", "JointSensitivity", "Kinematics", "joint_sensitivity", "kinematics", "link_table"]
 
-Floats = NDArray[np.float64]
 
 ENTRIES = {
     "mass": slice(0, 1),

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 
+from bayesid.arrays import Floats
 from bayesid.effects.base import Effect
 from bayesid.errors import InputError
 from bayesid.inertia import InertialParameters, log_cholesky_factor, parameters_from_pseudo_inertia, upper_cholesky
@@ -47,7 +47,9 @@ class BodyPrior:
 
     def __post_init__(self) -> None:
         if not self.spread > 0.0:
-            raise InputError(f"spread {self.spread:g} of {self.name} is not positive", remedy="Give the prior's relative width")
+            raise InputError(
+                f"spread {self.spread:g} of {self.name} is not positive", remedy="Give the prior's relative width"
+            )
         if not self.centre.is_extended:
             raise InputError(
                 f"the prior of {self.name} centres on a body without extent (mass {self.centre.mass:g} kg)",
@@ -59,8 +61,8 @@ class BodyPrior:
 class Values(NamedTuple):
     """Physical values of the unknowns.
 
-    inertial (10 bodies,) linear parameters body after body; rate (R, 3) initial rates; tilt (R, 3) small rotation of the
-    initial attitude, base axes; effects: per effect (n,) or, per recording, (R, n).
+    inertial (10 bodies,) linear parameters body after body; rate (R, 3) initial rates; tilt (R, 3) small rotation
+    of the initial attitude, base axes; effects: per effect (n,) or, per recording, (R, n).
     """
 
     inertial: Array
@@ -89,7 +91,7 @@ class Unknowns:
     effects: tuple[Effect, ...]
     recordings: int
     rate_sigma: float
-    tilt_sigma: NDArray[np.float64]
+    tilt_sigma: Floats
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,7 +100,9 @@ class Unknowns:
         names += [f"initial-rate[{i}].{axis}" for i in self._rates for axis in "xyz"]
         names += [f"initial-attitude[{i}].{axis}" for i in self._tilts for axis in "xyz"]
         for effect in self.effects:
-            copies = [f"{effect.label}[{i}]" for i in range(self.recordings)] if effect.per_recording else [effect.label]
+            copies = (
+                [f"{effect.label}[{i}]" for i in range(self.recordings)] if effect.per_recording else [effect.label]
+            )
             names += [f"{copy}.{parameter.name}" for copy in copies for parameter in effect.parameters]
         return tuple(names)
 
@@ -164,7 +168,7 @@ class Unknowns:
     def _starts(self) -> list[tuple[int, BodyPrior]]:
         return [(10 * index, body) for index, body in enumerate(self.bodies)]
 
-    def coordinates(self, inertials: Sequence[InertialParameters], rate: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+    def coordinates(self, inertials: Sequence[InertialParameters], rate: Floats | None = None) -> Floats:
         """Coordinates of given bodies and initial rates, everything else at its prior mean."""
         z = np.zeros(self.size)
         for index, (body, inertial) in enumerate(zip(self.bodies, inertials, strict=True)):
@@ -205,7 +209,7 @@ def _log_volume(body: BodyPrior, z: Array) -> Array:
     return 4.0 * jnp.log(2.0) + (jnp.arange(1.0, 5.0) @ logs) + logs.sum() + 6.0 * alpha
 
 
-def coordinates_of(body: BodyPrior, inertial: InertialParameters) -> NDArray[np.float64]:
+def coordinates_of(body: BodyPrior, inertial: InertialParameters) -> Floats:
     """Standard-normal coordinates of a body under its prior, shape (10,)."""
     relative = np.linalg.solve(upper_cholesky(body.centre.pseudo_inertia), upper_cholesky(inertial.pseudo_inertia))
     alpha = np.log(relative[3, 3])

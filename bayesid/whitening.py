@@ -1,4 +1,4 @@
-"""Whitening of the residual: sensor noise, encoder noise seen through the dynamics, and filters, as one banded operator.
+"""Whitening of the residual: sensor noise, encoder noise through the dynamics, and filters, as one banded operator.
 
 The error of a sample is its sensor's white noise plus what the joints' smoothed velocity and acceleration leave
 uncertain, which is correlated over a few samples. Each block of scalars is whitened given the blocks shortly before it
@@ -17,12 +17,12 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from bayesid.arrays import Floats, Integers
 from bayesid.errors import InputError
 from bayesid.sensors import Filter
 
 __all__ = ["Channel", "NoiseModel", "Whitening", "apply", "build"]
 
-Floats = NDArray[np.float64]
 
 WINDOWS = (0, 2, 4, 8, 16, 32, 64)
 """Earlier blocks to condition on; the first window that changes the log determinant little is taken."""
@@ -35,7 +35,7 @@ class Channel(NamedTuple):
     """One sensor axis: its white noise, the rows of the sample grid where it was sampled, and its filter."""
 
     sigma: float
-    rows: NDArray[np.intp]
+    rows: Integers
     filter: Filter
 
 
@@ -67,11 +67,11 @@ class Whitening(NamedTuple):
     """
 
     weights: Floats
-    start: NDArray[np.int32]
+    start: Integers
     log_sigma: float
     samples: int
     outputs: NDArray[np.bool_]  # (O, C): which scalars exist
-    rows: NDArray[np.intp]  # (O,): row of the sample grid an output block belongs to
+    rows: Integers  # (O,): row of the sample grid an output block belongs to
     window: int
 
 
@@ -105,7 +105,7 @@ class _Output(NamedTuple):
     """One filtered scalar: the residual rows that enter it and their weights."""
 
     channel: int
-    rows: NDArray[np.intp]
+    rows: Integers
     taps: Floats
 
 
@@ -165,7 +165,13 @@ def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: 
         present[number, slots] = True
         log_sigma += float(np.log(np.diag(factor)[-len(group) :]).sum())
     return Whitening(
-        weights, np.array(starts, dtype=np.int32), log_sigma, int(present.sum()), present, np.array([row for row, _ in blocks]), window
+        weights,
+        np.array(starts, dtype=np.int32),
+        log_sigma,
+        int(present.sum()),
+        present,
+        np.array([row for row, _ in blocks]),
+        window,
     )
 
 
@@ -180,7 +186,11 @@ class _Band:
         g = noise.sensitivity
         for lag in range(min(self.lags, count - 1) + 1):
             self.blocks[lag, lag:] = np.einsum(
-                "jatc,jtab,jbtd->tcd", g[:, :, lag:], noise.joint_covariance[:, lag, lag:], g[:, :, : count - lag], optimize=True
+                "jatc,jtab,jbtd->tcd",
+                g[:, :, lag:],
+                noise.joint_covariance[:, lag, lag:],
+                g[:, :, : count - lag],
+                optimize=True,
             )
 
     def between(self, start: int, stop: int) -> Floats:

@@ -22,7 +22,11 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A study of the four-joint servicer, made by MuJoCo."""
     folder = tmp_path_factory.mktemp("study")
     made = write_study(
-        folder, ROBOTS / "servicer4.urdf", np.random.default_rng(3), manoeuvres=Manoeuvres(count=1, duration=60.0), title="Servicer"
+        folder,
+        ROBOTS / "servicer4.urdf",
+        np.random.default_rng(3),
+        manoeuvres=Manoeuvres(count=1, duration=60.0),
+        title="Servicer",
     )
     return made.file
 
@@ -127,13 +131,33 @@ BAD = {
     "joints in degrees": ("recording", scale("position.", 57.29577951308232), ["position.joint", "radians"]),
     "rate in degrees": ("recording", scale("rate.", 57.29577951308232), ["rate", "degrees per second"]),
     "acceleration in mm/s2": ("recording", scale("accel.", 1000.0), ["accel", "m/s2"]),
-    "unknown key": ("study", lambda text: text.replace("[orbit]", "[orbit]\nradios = 1.0"), ["orbit", "radios", "radius"]),
+    "unknown key": (
+        "study",
+        lambda text: text.replace("[orbit]", "[orbit]\nradios = 1.0"),
+        ["orbit", "radios", "radius"],
+    ),
     "orbit in km": ("study", lambda text: re.sub(r"radius = .*", "radius = 6916.0", text), ["radius", "metres"]),
-    "unknown effect": ("study", lambda text: text.replace("gravity-gradient", "gravity-gradiant"), ["gravity-gradiant", "gravity-gradient"]),
-    "unknown body": ("study", lambda text: text.replace('bodies = ["base_link"]', 'bodies = ["base"]'), ["'base'", "base_link"]),
+    "unknown effect": (
+        "study",
+        lambda text: text.replace("gravity-gradient", "gravity-gradiant"),
+        ["gravity-gradiant", "gravity-gradient"],
+    ),
+    "unknown body": (
+        "study",
+        lambda text: text.replace('bodies = ["base_link"]', 'bodies = ["base"]'),
+        ["'base'", "base_link"],
+    ),
     "wrong robot": ("robot", lambda text: text.replace('name="joint2"', 'name="elbow"'), ["elbow", "joint2"]),
-    "negative mass": ("robot", lambda text: re.sub(r'mass value="[^"]*"', 'mass value="-3.0"', text, count=1), ["mass >= 0", "link"]),
-    "unphysical inertia": ("robot", lambda text: re.sub(r'izz="[^"]*"', 'izz="1e6"', text, count=1), ["triangle inequality", "link"]),
+    "negative mass": (
+        "robot",
+        lambda text: re.sub(r'mass value="[^"]*"', 'mass value="-3.0"', text, count=1),
+        ["mass >= 0", "link"],
+    ),
+    "unphysical inertia": (
+        "robot",
+        lambda text: re.sub(r'izz="[^"]*"', 'izz="1e6"', text, count=1),
+        ["triangle inequality", "link"],
+    ),
     "not XML": ("robot", lambda text: text[:-20], ["XML"]),
 }
 
@@ -168,7 +192,10 @@ def test_a_users_effect_joins_a_study(study: Path, tmp_path: Path) -> None:
     (folder / "mine.py").write_text(PLUGIN)
     edit(
         file,
-        lambda text: text.replace('["gravity-gradient"]', '["gravity-gradient", "test-steady-torque"]') + '\nplugins = ["mine.py"]\n',
+        lambda text: (
+            text.replace('["gravity-gradient"]', '["gravity-gradient", "test-steady-torque"]')
+            + '\nplugins = ["mine.py"]\n'
+        ),
     )
     status, text = run("check", file, "--output", tmp_path / "out")
     assert status == 0, text

@@ -38,7 +38,9 @@ CASES = {
         },
     ),
     "branched, attitude in place of rate": Case(
-        ROBOTS / "branched.urdf", "bus", {"sensors": Sensors(rate_period=None, attitude_period=0.5, attitude_sigma=2e-5)}
+        ROBOTS / "branched.urdf",
+        "bus",
+        {"sensors": Sensors(rate_period=None, attitude_period=0.5, attitude_sigma=2e-5)},
     ),
     "known thrust": Case(
         ROBOTS / "servicer4.urdf",
@@ -59,9 +61,7 @@ def test_truth_lies_inside_the_posterior_and_noise_is_all_that_is_left(name: str
     made = write_study(
         tmp_path, case.urdf, np.random.default_rng(11), manoeuvres=Manoeuvres(count=2, duration=100.0), **case.options
     )
-    posterior, optimum = maximise(
-        bayesid.load_posterior(bayesid.Study.load(made.file)), np.random.default_rng(0)
-    )
+    posterior, optimum = maximise(bayesid.load_posterior(bayesid.Study.load(made.file)), np.random.default_rng(0))
     assert optimum.converged
     # chi-square has the samples less the fitted unknowns as its mean; four standard deviations on either side
     freedom = posterior.samples - posterior.size

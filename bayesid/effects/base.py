@@ -65,7 +65,8 @@ class Environment(NamedTuple):
 class Moment(NamedTuple):
     """One instant of a simulation, as an effect sees it.
 
-    ``attitude`` rotates base axes to orbit axes. ``rate`` is zero while momenta are being summed, since it follows from them.
+    ``attitude`` rotates base axes to orbit axes. ``rate`` is zero while momenta are being summed:
+    it follows from them.
     """
 
     environment: Environment
@@ -170,5 +171,8 @@ def create(label: str, **options: Any) -> Effect:
     """
     name, _, place = label.partition(":")
     if name not in _REGISTER:
-        raise InputError(f"unknown effect {label!r}", remedy=f"Choose from {', '.join(sorted(_REGISTER))}, or name your file under model.plugins")
+        raise InputError(
+            f"unknown effect {label!r}",
+            remedy=f"Choose from {', '.join(sorted(_REGISTER))}, or name your file under model.plugins",
+        )
     return _REGISTER[name](place, **options) if place else _REGISTER[name](**options)

@@ -18,7 +18,9 @@ class WheelMomentum(Effect):
     """
 
     name = "wheel-momentum"
-    summary = "Reaction wheels left spinning make the base a gyroscope: turning it about one axis turns it about another."
+    summary = (
+        "Reaction wheels left spinning make the base a gyroscope: turning it about one axis turns it about another."
+    )
 
     def __init__(self, sigma: float = 1.0) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")

@@ -10,15 +10,13 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid.arrays import Floats
 from bayesid.inference.optimum import Optimum
 from bayesid.inference.proposal import StudentT
 from bayesid.posterior import Posterior
 
 __all__ = ["Chart", "LinearChart", "LogCholeskyChart"]
-
-Floats = NDArray[np.float64]
 
 
 class Chart(Protocol):
@@ -71,8 +69,8 @@ class LinearChart:
     def log_density(self, y: Floats) -> Floats:
         """Log posterior density over y, shape (n,); minus infinity where no physical body exists."""
         z = self.to_z(y)
-        physical = np.isfinite(z).all(axis=1)
-        inside = np.where(physical[:, None], z, 0.0)
+        physical = np.all(np.isfinite(z), axis=1)
+        inside = np.where(np.isfinite(z), z, 0.0)
         value = self.posterior.log_density(inside) - self.posterior.log_volume(inside)
         return np.where(physical, value, -np.inf)
 

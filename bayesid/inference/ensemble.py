@@ -17,8 +17,8 @@ import numpy as np
 from emcee.autocorr import integrated_time
 from emcee.moves import DEMove, DESnookerMove
 from emcee.moves.red_blue import RedBlueMove
-from numpy.typing import NDArray
 
+from bayesid.arrays import Floats
 from bayesid.errors import InputError
 from bayesid.inference.charts import Chart
 from bayesid.inference.optimum import Optimum
@@ -27,7 +27,6 @@ from bayesid.posterior import BATCH, Posterior
 
 __all__ = ["Chains", "LaplaceMove", "Progress", "sample"]
 
-Floats = NDArray[np.float64]
 
 ENSEMBLES = 4
 BLOCK = 50
@@ -46,7 +45,9 @@ class LaplaceMove(RedBlueMove):
         self.proposal = proposal
         super().__init__()
 
-    def get_proposal(self, sample: Floats, complement: list[Floats], random: np.random.RandomState) -> tuple[Floats, Floats]:
+    def get_proposal(
+        self, sample: Floats, complement: list[Floats], random: np.random.RandomState
+    ) -> tuple[Floats, Floats]:
         """Return proposals and the log ratio of backward to forward densities."""
         new = self.proposal.draw(len(sample), random)
         return new, self.proposal.log_density(sample) - self.proposal.log_density(new)
@@ -138,7 +139,7 @@ def sample(
     samplers = []
     for number, child in enumerate(sequence.spawn(ENSEMBLES)):
         backend = _backend(file, number, mark)
-        state = np.random.RandomState(child.generate_state(8))  # noqa: NPY002, emcee's generator
+        state = np.random.RandomState(child.generate_state(8))
         fresh = not backend.initialized or backend.iteration == 0
         sampler = emcee.EnsembleSampler(
             walkers, posterior.size, chart.log_density, moves=moves, vectorize=True, backend=backend
@@ -152,7 +153,15 @@ def sample(
             chains = _summary(chart, [sampler for sampler, _ in samplers], effective_samples)
             if progress is not None:
                 progress(
-                    Progress(steps, max_steps, chains.evaluations, chains.effective_samples, effective_samples, chains.r_hat, chains.acceptance)
+                    Progress(
+                        steps,
+                        max_steps,
+                        chains.evaluations,
+                        chains.effective_samples,
+                        effective_samples,
+                        chains.r_hat,
+                        chains.acceptance,
+                    )
                 )
             if chains.converged or steps >= max_steps:
                 return chains
@@ -185,7 +194,9 @@ def _backend(file: Path | None, number: int, mark: str) -> emcee.backends.Backen
             found = opened[f"ensemble-{number}"].attrs.get("run", "")
         if found != mark:
             raise InputError(
-                "holds the samples of another run (other data, model or seed)", file=file, remedy="Delete it or choose another output folder"
+                "holds the samples of another run (other data, model or seed)",
+                file=file,
+                remedy="Delete it or choose another output folder",
             )
     return _Marked(backend, mark)
 

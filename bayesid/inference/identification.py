@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid.arrays import Floats
 from bayesid.inference.ensemble import Chains, Progress, sample
 from bayesid.inference.importance import Evidence, choose_chart, importance_sample
 from bayesid.inference.optimum import Optimum, maximise
@@ -20,7 +20,6 @@ from bayesid.posterior import Posterior
 
 __all__ = ["BODY_QUANTITIES", "BodyDraws", "Identification", "identify"]
 
-Floats = NDArray[np.float64]
 
 BODY_QUANTITIES = {
     "mass": "kg",
@@ -89,7 +88,7 @@ class Identification:
         """Draws of every effect with parameters, (draws, n) or, per recording, (draws, R, n)."""
         values = self.posterior.values_of(self.chains.flat)
         return {
-            effect.label: draws
+            effect.label: np.asarray(draws)
             for effect, draws in zip(self.posterior.model.effects, values.effects, strict=True)
             if effect.parameters
         }
@@ -223,8 +222,8 @@ def identify(
 
 
 def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
-    """Reported quantities of the identified bodies at many points, shape (draws, size)."""
-    inertial = posterior.values_of(z).inertial.reshape(len(z), -1, 10)
+    """Return the reported quantities of the identified bodies at many points, shape (draws, size)."""
+    inertial = np.asarray(posterior.values_of(z).inertial).reshape(len(z), -1, 10)
     return {
         prior.name: BodyDraws(prior.name, reported(inertial[:, index]))
         for index, prior in enumerate(posterior.model.priors)

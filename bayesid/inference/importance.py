@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 import arviz as az
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesid.inference.optimum import Optimum
+from bayesid.arrays import Floats
 from bayesid.inference.charts import Chart, LinearChart, LogCholeskyChart
+from bayesid.inference.optimum import Optimum
 from bayesid.posterior import Posterior
 
 __all__ = ["Evidence", "choose_chart", "importance_sample"]
 
-Floats = NDArray[np.float64]
 
 TRUSTED = 0.7
 """Pareto k-hat above which importance sampling may not be trusted (Vehtari et al., JMLR 2024)."""

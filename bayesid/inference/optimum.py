@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from bayesid.arrays import Floats
 from bayesid.posterior import Posterior
 
 __all__ = ["Optimum", "fit", "maximise"]
 
-Floats = NDArray[np.float64]
 
 TOLERANCE = 1e-10
 HUGE = 1e12
@@ -98,7 +97,10 @@ def maximise(posterior: Posterior, rng: np.random.Generator, start: Floats | Non
     evaluations = best.evaluations
     if best.chi2 > SUSPICIOUS * posterior.samples:
         for _ in range(STARTS):
-            other = fit(posterior, first + 0.5 * rng.normal(size=first.size) * (np.arange(first.size) < 10 * len(posterior.model.priors)))
+            other = fit(
+                posterior,
+                first + 0.5 * rng.normal(size=first.size) * (np.arange(first.size) < 10 * len(posterior.model.priors)),
+            )
             evaluations += other.evaluations
             if other.cost < best.cost:
                 best = other

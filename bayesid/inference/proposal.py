@@ -1,16 +1,15 @@
-"""Multivariate Student-t about the mode: the proposal of importance sampling and of the ensemble's independence move."""
+"""Multivariate Student-t about the mode: proposal of importance sampling and of the ensemble's independence move."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
-__all__ = ["StudentT"]
+from bayesid.arrays import Floats
 
-Floats = NDArray[np.float64]
+__all__ = ["StudentT"]
 
 
 @dataclass(frozen=True)
