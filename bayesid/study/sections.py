@@ -1,0 +1,182 @@
+"""Sections of a study file on recordings, unknowns, the model and the manoeuvre to design."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from bayesid.errors import InputError
+from bayesid.study.faults import suggest
+from bayesid.study.robot import BodySection
+from bayesid.study.values import (
+    FULL_TURN,
+    File,
+    Name,
+    Names,
+    NonNegative,
+    Number,
+    PerName,
+    Positive,
+    Quaternion,
+    Section,
+    Table,
+    list_of,
+    no_more_than,
+)
+
+
+def check_extended(body: BodySection, place: str) -> None:
+    """Reject a body without extent as the centre of a prior."""
+    if not body.parameters.is_extended:
+        raise InputError(
+            "the body is a point, a rod or a plate, about which no relative prior can be centred",
+            place=place,
+            remedy="Give it an inertia that fills a volume: I1 + I2 > I3 for its principal moments",
+        )
+
+
+class RecordingSection(Section):
+    """One recording, ``[[recordings]]``.
+
+    Parameters
+    ----------
+    file : Path
+        CSV or Parquet, see `bayesid.recording`.
+    attitude : (4,)
+        Quaternion, base to orbit axes at time 0.
+    attitude_sigma : float, optional
+        Its uncertainty [rad]; 0 = exact.
+    argument_of_latitude : float, optional
+        At time 0 [rad]; needed by effects that know where they are on the orbit.
+    start : table of joint to float, optional
+        Position at time 0 [rad or m] of joints recorded by speed alone; a joint left out starts from its zero.
+    """
+
+    file: File
+    attitude: Quaternion
+    attitude_sigma: Annotated[NonNegative, no_more_than(math.pi, "Radians, not arcsec or degrees?")] = 0.0
+    argument_of_latitude: Annotated[Number, FULL_TURN] | None = None
+    start: Mapping[Name, Number] = Field(default_factory=dict)
+
+
+class UnknownsSection(Section):
+    """What is to be identified, ``[unknowns]``.
+
+    Parameters
+    ----------
+    bodies : sequence of str
+        Links or loads whose ten inertial parameters are estimated; may be empty if only effects are.
+    spread : float or table of body to float, optional
+        Relative width of the prior in log-Cholesky coordinates; 1 for a body that the table leaves out.
+    prior : table of body to BodySection, optional
+        Centre of the prior where it is not the URDF's or the load's values.
+    """
+
+    bodies: Names
+    spread: Annotated[PerName, no_more_than(10.0, "A fraction, not a percentage: 0.05 is 5 %")] = 1.0
+    prior: Mapping[Name, BodySection] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _check_bodies(self) -> UnknownsSection:
+        tables = {"spread": self.spread if isinstance(self.spread, Mapping) else {}, "prior": self.prior}
+        for key, table in tables.items():
+            for body in table:
+                if body not in self.bodies:
+                    raise InputError(
+                        f"'{body}' is not among unknowns.bodies",
+                        place=key,
+                        remedy=suggest(body, self.bodies) or "Add it there or remove it here",
+                    )
+        for body, section in self.prior.items():
+            check_extended(section, place=f"prior.{body}")
+        return self
+
+    def spread_of(self, body: str) -> float:
+        """Relative width of one body's prior."""
+        return self.spread.get(body, 1.0) if isinstance(self.spread, Mapping) else self.spread
+
+
+class ModelSection(Section):
+    """What the simulation contains, ``[model]``.
+
+    Parameters
+    ----------
+    effects : sequence of str, optional
+        Names of the catalogue; ``payload:LINK`` and the like say where.
+    initial_rate : {"unknown", "zero"}, optional
+        Whether each recording's initial rate is estimated.
+    initial_rate_sigma : float, optional
+        Prior standard deviation of an unknown initial rate [rad/s]; left out, the default of the model applies.
+    plugins : sequence of Path, optional
+        Python files with effects of one's own.
+    priors : table of effect to table of key to float, optional
+        Prior standard deviations that replace an effect's own, in the unit of the key.
+    """
+
+    effects: Names = ()
+    initial_rate: Literal["unknown", "zero"] = "unknown"
+    initial_rate_sigma: Annotated[Positive, no_more_than(100.0, "Is it in rad/s?")] | None = None
+    plugins: tuple[File, ...] = ()
+    priors: Mapping[Name, Table] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _check_initial_rate(self) -> ModelSection:
+        if self.initial_rate == "zero" and self.initial_rate_sigma is not None:
+            raise InputError(
+                "initial_rate_sigma contradicts initial_rate = 'zero'",
+                remedy="Remove it, or set initial_rate = 'unknown'",
+            )
+        return self
+
+
+class DesignLimits(Section):
+    """What a designed manoeuvre must respect, ``[design.limits]``; a limit left out does not apply.
+
+    Parameters
+    ----------
+    tip_speed, tip_rate : float, optional
+        [m/s], [rad/s]
+    joint_speed : float, optional
+        [rad/s or m/s]
+    base_rotation : float, optional
+        [rad]
+    quiet_band : (2,), optional
+        Frequencies between which the motion must not excite anything [Hz].
+    """
+
+    tip_speed: Positive | None = None
+    tip_rate: Positive | None = None
+    joint_speed: Positive | None = None
+    base_rotation: Annotated[Positive, FULL_TURN] | None = None
+    quiet_band: Annotated[tuple[NonNegative, Positive], list_of(2)] | None = None
+
+    @field_validator("quiet_band")
+    @classmethod
+    def _ascending(cls, band: tuple[float, float] | None) -> tuple[float, float] | None:
+        if band is not None and band[0] >= band[1]:
+            raise InputError(f"{list(band)} does not ascend", remedy="Give the lower frequency first")
+        return band
+
+
+class DesignSection(Section):
+    """The manoeuvre to design, ``[design]``.
+
+    Parameters
+    ----------
+    duration : float, optional
+        [s]
+    tip_frame : str, optional
+        The frame of the URDF whose motion is limited.
+    joints : sequence of str, optional
+        Joints that move.
+    limits : DesignLimits
+        What the manoeuvre must respect.
+    """
+
+    duration: Positive | None = None
+    tip_frame: Name | None = None
+    joints: Names | None = None
+    limits: DesignLimits = DesignLimits()
