@@ -284,7 +284,7 @@ class _Problem:
         except np.linalg.LinAlgError:
             return -1e300, np.zeros((self.count, order)), band.reshape(2 * order, -1), np.inf
         states = np.zeros((self.count, order))
-        for _ in range(3):  # iterative refinement: positions of 1 rad carry noise of 1e-6
+        for _ in range(2):  # iterative refinement: positions of 1 rad carry noise of 1e-6
             gradient = self._gradient(states, weight, sigmas)
             states = states + sla.cho_solve_banded((factor, True), gradient.ravel(), check_finite=False).reshape(
                 states.shape
