@@ -17,7 +17,7 @@ from bayesid.motion import Motion
 from bayesid.orbit import Orbit, OrbitState
 from bayesid.recording import Recording
 from bayesid.robot import Robot
-from bayesid.tables import WIDTH, kinematics, link_table
+from bayesid.tables import WIDTH, composite_rows, kinematics, link_table
 
 __all__ = ["Actions", "build_grid", "pad_grids"]
 
@@ -143,10 +143,7 @@ def _instants(
     actions: Actions,
 ) -> Instants:
     moved = kinematics(robot, motion.evaluate(time))
-    known = np.zeros((len(time), WIDTH))
-    for name, link in robot.links.items():
-        if name not in unknown and link.inertial.mass > 0.0:
-            known += link_table(robot, name, moved) @ link.inertial.vector
+    known = composite_rows(robot, moved, leave_out=unknown)
     tables = [np.zeros((len(time), WIDTH, 0)), *(link_table(robot, name, moved) for name in unknown)]
     none = OrbitState(*(np.zeros((len(time), *shape)) for shape in ((3,), (), (3,), (3,), ())))
     state = none if orbit is None else orbit.state(time, latitude)

@@ -20,8 +20,9 @@ from bayesid.grid import Actions, build_grid, pad_grids
 from bayesid.inertia import InertialParameters
 from bayesid.model import Manoeuvre, Model
 from bayesid.motion import MeasuredMotion
+from bayesid.robot import Robot
+from bayesid.sensitivity import joint_sensitivity
 from bayesid.sensors import Kind, Sensor
-from bayesid.tables import joint_sensitivity
 from bayesid.unknowns import Unknowns, Values
 from bayesid.whitening import Channel, NoiseModel, Whitening
 
@@ -93,15 +94,14 @@ class Posterior:
             tilt_sigma=np.array([manoeuvre.attitude_sigma for manoeuvre in manoeuvres]),
         )
         self.step = self._choose_step() if step is None else step
-        self.whitenings = [self._whitening(index, None, None) for index in range(len(self._samples))]
+        self.whitenings = self._whiten(self.initial_point(), [None] * len(manoeuvres))
         self.data = self._stack(self._grids(self.step))
 
     def at(self, z: Floats) -> Posterior:
         """Return the posterior with the encoder noise carried through the robot at ``z`` in place of the prior's."""
         new = object.__new__(Posterior)
         new.__dict__.update({key: value for key, value in self.__dict__.items() if key != "data"})
-        inertials = self.inertials(z)
-        new.whitenings = [self._whitening(index, inertials, old.window) for index, old in enumerate(self.whitenings)]
+        new.whitenings = self._whiten(z, [old.window for old in self.whitenings])
         new.data = new._stack_noise(self.data)
         return new
 
@@ -264,28 +264,37 @@ class Posterior:
         return step
 
     def _step_error(self, step: float, z: Floats) -> float:
-        fine = self._grids(0.5 * step)
-        steps = max(len(grid.step) for grid in fine)
-        readings = []
-        for grids in (self._grids(step), fine):
-            stacked = pad_grids(grids, steps)
-            readings.append(self._compiled.simulated(jnp.asarray(z), stacked, self._attitudes()))
+        coarse, fine = self._simulated(step, z), self._simulated(0.5 * step, z, like=step)
         worst = 0.0
         for sensor in self.model.sensors:
             sigma = np.stack([item.sigma(sensor) for item in self._samples])
-            first, second = (np.asarray(getattr(item, sensor.kind.value)) for item in readings)
+            first, second = (np.asarray(getattr(item, sensor.kind.value)) for item in (coarse, fine))
             worst = max(worst, float((np.abs(first - second)[..., :3] / sigma[:, None]).max()))
         return worst * 16.0 / 15.0  # the error of a fourth-order step, from its difference to half the step
+
+    def _simulated(self, step: float, z: Floats, like: float | None = None) -> Readings:
+        """Simulate with a step; padded so that a step and its half share one compilation."""
+        steps = 2 * max(len(grid.step) for grid in self._grids(like or step))
+        return self._compiled.simulated(jnp.asarray(z), pad_grids(self._grids(step), steps), self._attitudes())
+
+    def _base_rates(self, z: Floats) -> list[Floats]:
+        """Angular velocity at the sample times of each recording, base axes, shape (T, 3)."""
+        turn = {sensor.kind: sensor.rotation for sensor in self.model.sensors}.get(Kind.RATE, np.eye(3))
+        rates = np.asarray(self._simulated(self.step, z).rate) @ turn.T
+        return [rate[: len(samples.time)] for rate, samples in zip(rates, self._samples, strict=True)]
 
     def _attitudes(self) -> Array:
         return jnp.asarray(np.stack([manoeuvre.attitude for manoeuvre in self.manoeuvres]))
 
-    def _whitening(self, index: int, inertials: list[InertialParameters] | None, window: int | None) -> Whitening:
+    def _whiten(self, z: Floats, windows: Sequence[int | None]) -> list[Whitening]:
+        """Build the whitening of every recording with the encoder noise seen through the robot at ``z``."""
         robot = self.model.robot
-        for prior, inertial in zip(self.model.priors, inertials or [p.centre for p in self.model.priors], strict=True):
+        for prior, inertial in zip(self.model.priors, self.inertials(z), strict=True):
             robot = robot.with_inertial(prior.name, inertial)
-        samples = self._samples[index]
-        return whitening.build(samples.noise_model(self.model, robot), window)
+        return [
+            whitening.build(samples.noise_model(self.model, robot, rate), window)
+            for samples, rate, window in zip(self._samples, self._base_rates(z), windows, strict=True)
+        ]
 
     def _stack(self, grids: list[Grid]) -> Data:
         grid = pad_grids(grids)
@@ -439,24 +448,20 @@ class _Samples:
         """Noise per axis, shape (3,)."""
         return sensor.noise.sigma(self.interval(sensor.kind))
 
-    def noise_model(self, model: Model, robot: Any) -> NoiseModel:
-        """Return the second moments of the errors, with the encoder noise seen through ``robot``."""
+    def noise_model(self, model: Model, robot: Robot, rate: Floats) -> NoiseModel:
+        """Return the second moments of the errors, the encoder noise seen through ``robot`` turning at ``rate``."""
         channels = [
             Channel(float(value), self.rows[sensor.kind], sensor.filter)
             for sensor in self.sensors
             for value in self.sigma(sensor)
         ]
-        if not isinstance(self.motion, MeasuredMotion):
+        if not isinstance(self.motion, MeasuredMotion) or not robot.joints:
             empty = np.zeros((0, 3, len(self.time), len(channels)))
             return NoiseModel(self.time, channels, empty, np.zeros((0, 1, len(self.time), 3, 3)))
-        response = joint_sensitivity(robot, self.motion.evaluate(self.time).position, model.point)
-        joints = len(robot.joints)
-        sensitivity = np.zeros((joints, 3, len(self.time), len(channels)))
+        response = joint_sensitivity(robot, self.motion.evaluate(self.time), rate, model.point)
+        sensitivity = np.zeros((len(robot.joints), 3, len(self.time), len(channels)))
         for slot, sensor in enumerate(self.sensors):
-            # the rate follows joint velocity, the acceleration joint acceleration, the attitude joint position
-            derivative = {Kind.RATE: 1, Kind.ACCEL: 2, Kind.ATTITUDE: 0}[sensor.kind]
-            source = response.acceleration if sensor.kind is Kind.ACCEL else response.rate
             turn = np.eye(3) if sensor.kind is Kind.ATTITUDE else sensor.rotation
-            sensitivity[:, derivative, :, 3 * slot : 3 * slot + 3] = np.swapaxes(source @ turn, 0, 1)
+            sensitivity[..., 3 * slot : 3 * slot + 3] = getattr(response, sensor.kind.value) @ turn
         covariance = self.motion.lag_covariance(self.time, min(max(whitening.WINDOWS), len(self.time) - 1))
         return NoiseModel(self.time, channels, sensitivity, covariance)

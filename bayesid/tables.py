@@ -7,6 +7,7 @@ recording is reduced once to coefficient tables, and a simulation costs one rigi
 
 from __future__ import annotations
 
+from collections.abc import Container
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from bayesid.inertia import BASIS
 from bayesid.motion import JointState
 from bayesid.robot import Robot
 
-__all__ = ["ENTRIES", "JointSensitivity", "Kinematics", "joint_sensitivity", "kinematics", "link_table"]
+__all__ = ["ENTRIES", "Kinematics", "composite_rows", "kinematics", "link_table"]
 
 
 ENTRIES = {
@@ -122,45 +123,10 @@ def _hat(twist: Floats) -> Floats:
     return matrix
 
 
-class JointSensitivity(NamedTuple):
-    """What the base does per unit of joint velocity or acceleration, momentum being conserved.
-
-    rate (T, joints, 3) [rad/s per joint unit/s]: of the angular velocity to joint velocity, and of its derivative to
-    joint acceleration; acceleration (T, joints, 3): of the accelerometer's point, to joint acceleration.
-    """
-
-    rate: Floats
-    acceleration: Floats
-
-
-def joint_sensitivity(robot: Robot, position: Floats, point: Floats) -> JointSensitivity:
-    """Linearise rate and accelerometer in the joints' derivatives, from Pinocchio's centroidal momentum matrix.
-
-    Parameters
-    ----------
-    position : (T, joints) array
-    point : (3,) array
-        Mounting point of the accelerometer in the base [m].
-    """
-    model = robot.model.copy()
-    for index in range(1, model.njoints):
-        model.inertias[index] = _joint_inertia(robot, index - 2)
-    data = model.createData()
-    count, joints = position.shape
-    rate, acceleration = np.zeros((count, joints, 3)), np.zeros((count, joints, 3))
-    v = np.zeros(model.nv)
-    for row in range(count):
-        matrix = pin.ccrba(model, data, configuration(robot, position[row]), v)
-        linear, angular = matrix[:3, 6:], matrix[3:, 6:]
-        rate[row] = -np.linalg.solve(matrix[3:, 3:6], angular).T
-        lever = point - data.com[0]
-        acceleration[row] = -linear.T / matrix[0, 0] + np.cross(rate[row], lever)
-    return JointSensitivity(rate, acceleration)
-
-
-def _joint_inertia(robot: Robot, joint: int) -> pin.Inertia:
-    total = np.zeros((4, 4))
-    for link in robot.links.values():
-        if link.joint == joint:
-            total += link.placement @ link.inertial.pseudo_inertia @ link.placement.T
-    return pin.PseudoInertia.FromMatrix(total).toInertia() if total[3, 3] > 0.0 else pin.Inertia.Zero()
+def composite_rows(robot: Robot, motion: Kinematics, leave_out: Container[str] = ()) -> Floats:
+    """Table rows of all links with mass but the named ones, summed, shape (T, 28)."""
+    rows = np.zeros((len(motion.pose), WIDTH))
+    for name, link in robot.links.items():
+        if name not in leave_out and link.inertial.mass > 0.0:
+            rows += link_table(robot, name, motion) @ link.inertial.vector
+    return rows

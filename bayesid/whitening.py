@@ -14,8 +14,11 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy.linalg as sla
 from jax import Array
 from numpy.typing import NDArray
+from scipy import sparse
+from threadpoolctl import threadpool_limits
 
 from bayesid.arrays import Floats, Integers
 from bayesid.errors import InputError
@@ -24,7 +27,7 @@ from bayesid.sensors import Filter
 __all__ = ["Channel", "NoiseModel", "Whitening", "apply", "build"]
 
 
-WINDOWS = (0, 2, 4, 8, 16, 32, 64)
+WINDOWS = (0, 2, 4, 8, 16, 32)
 """Earlier blocks to condition on; the first window that changes the log determinant little is taken."""
 
 TOLERANCE = 2e-4
@@ -87,8 +90,11 @@ def apply(weights: Array, start: Array, residual: Array) -> Array:
 def build(noise: NoiseModel, window: int | None = None) -> Whitening:
     """Build the whitening of one recording, with the shortest window that is accurate unless one is given."""
     outputs = _outputs(noise)
-    if window is not None:
-        return _whiten(noise, outputs, window)
+    with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
+        return _shortest(noise, outputs) if window is None else _whiten(noise, outputs, window)
+
+
+def _shortest(noise: NoiseModel, outputs: list[tuple[int, list[_Output]]]) -> Whitening:
     available = noise.joint_covariance.shape[1] - 1
     best = _whiten(noise, outputs, 0)
     for window in WINDOWS[1:]:
@@ -152,14 +158,13 @@ def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: 
     for number, (_, group) in enumerate(blocks):
         start, stop = starts[number], max(spans[k][1] for k in range(max(0, number - window), number + 1)) + 1
         local = [output for k in range(max(0, number - window), number + 1) for output in blocks[k][1]]
-        combine = np.zeros((len(local), stop - start, channels))
-        for row, output in enumerate(local):
-            combine[row, output.rows - start, output.channel] = output.taps
-        flat = combine.reshape(len(local), -1)
-        total = flat @ covariance.between(start, stop) @ flat.T + (flat * np.tile(sigma**2, stop - start)) @ flat.T
-        factor = np.linalg.cholesky(total)
-        last = np.linalg.inv(factor)[-len(group) :]
-        rows = (last @ flat).reshape(len(group), stop - start, channels)
+        raw = covariance.between(start, stop) + np.diag(np.tile(sigma**2, stop - start))
+        combine = _combination(local, start, stop, channels)
+        factor = np.linalg.cholesky(combine @ raw @ combine.T)
+        unit = np.eye(len(local))[:, -len(group) :]
+        # the last rows of the inverse factor: what is new in this block given those before it
+        last = sla.solve_triangular(factor, unit, lower=True, trans="T", check_finite=False).T
+        rows = (combine.T @ last.T).T.reshape(len(group), stop - start, channels)
         slots = [output.channel for output in group]
         weights[number, slots, : stop - start] = rows
         present[number, slots] = True
@@ -173,6 +178,14 @@ def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: 
         np.array([row for row, _ in blocks]),
         window,
     )
+
+
+def _combination(outputs: list[_Output], start: int, stop: int, channels: int) -> sparse.csr_array:
+    """Return the matrix that makes filtered scalars of the flattened residual rows start to stop."""
+    columns = np.concatenate([(output.rows - start) * channels + output.channel for output in outputs])
+    row = np.repeat(np.arange(len(outputs)), [len(output.rows) for output in outputs])
+    taps = np.concatenate([output.taps for output in outputs])
+    return sparse.csr_array((taps, (row, columns)), shape=(len(outputs), (stop - start) * channels))
 
 
 class _Band:

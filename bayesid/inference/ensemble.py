@@ -149,26 +149,30 @@ def sample(
         samplers.append((sampler, None if not fresh else _start(chart, proposal, walkers, state)))
     while True:
         steps = min(int(sampler.iteration) for sampler, _ in samplers)
-        if steps:
+        if steps and steps % BLOCK == 0:
             chains = _summary(chart, [sampler for sampler, _ in samplers], effective_samples)
             if progress is not None:
-                progress(
-                    Progress(
-                        steps,
-                        max_steps,
-                        chains.evaluations,
-                        chains.effective_samples,
-                        effective_samples,
-                        chains.r_hat,
-                        chains.acceptance,
-                    )
-                )
+                progress(_progress(chains, max_steps, effective_samples))
             if chains.converged or steps >= max_steps:
                 return chains
+        # after an interruption ensembles stand at different steps; all go on to the end of the block
+        target = (steps // BLOCK + 1) * BLOCK
         for number, (sampler, start) in enumerate(samplers):
-            if sampler.iteration == steps:  # after an interruption some ensembles are a block ahead
-                sampler.run_mcmc(start, BLOCK, skip_initial_state_check=True)
+            if sampler.iteration < target:
+                sampler.run_mcmc(start, target - sampler.iteration, skip_initial_state_check=True)
             samplers[number] = (sampler, None)
+
+
+def _progress(chains: Chains, limit: int, wanted: float) -> Progress:
+    return Progress(
+        steps=chains.steps,
+        limit=limit,
+        evaluations=chains.evaluations,
+        effective_samples=chains.effective_samples,
+        wanted=wanted,
+        r_hat=chains.r_hat,
+        acceptance=chains.acceptance,
+    )
 
 
 def _walkers(size: int) -> int:
