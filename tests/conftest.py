@@ -1,0 +1,104 @@
+"""What several test files need: joint motions given by a formula, and a small identification made by MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bayesid.effects import GravityGradient
+from bayesid.inertia import InertialParameters
+from bayesid.model import Manoeuvre, Model
+from bayesid.motion import JointState, MeasuredMotion
+from bayesid.orbit import Orbit
+from bayesid.posterior import Posterior
+from bayesid.recording import Recording
+from bayesid.robot import Robot
+from bayesid.sensors import Kind, Sensor, White
+from bayesid.unknowns import BodyPrior
+from tests import mujoco_truth as mj
+from tests.reference import moving_joints
+
+ROOT = Path(__file__).resolve().parents[1]
+PLANAR = ROOT / "bayesid" / "robots" / "planar.urdf"
+
+SIGMA = 1e-5
+"""Of the small case's rate [rad/s] and accelerometer [m/s2]."""
+ENCODER = 1e-6
+STEP = 0.5
+"""Its integration error is some 3e-3 of a sample's standard deviation."""
+POINT = (0.1, -0.15, 0.3)
+ORBIT = mj.Orbit(6.878e6)
+
+
+class FormulaMotion:
+    """A motion of the test generators (one time, joints in the URDF's order) as the package wants it."""
+
+    def __init__(self, formula: mj.Motion, urdf: Path, robot: Robot) -> None:
+        names = moving_joints(urdf)
+        self.formula, self.order = formula, [names.index(joint.name) for joint in robot.joints]
+
+    def evaluate(self, time: np.ndarray) -> JointState:
+        if not self.order:
+            return JointState(*np.zeros((3, len(time), 0)))
+        return JointState(*np.array([self.formula(float(t)) for t in time]).transpose(1, 0, 2)[:, :, self.order])
+
+
+@pytest.fixture(scope="session")
+def formula_motion() -> type[FormulaMotion]:
+    return FormulaMotion
+
+
+@pytest.fixture(scope="session")
+def planar_truth() -> mj.Truth:
+    """The planar robot in orbit for 40 s, tumbling slowly so that every moment of inertia shows; noise-free."""
+    motion = mj.smooth_motion(2, 40.0, seed=11, amplitude=0.3, frequencies=(0.03, 0.05), ramp=20.0)
+    model = mj.TruthModel(PLANAR, orbit=ORBIT, accel_position=POINT)
+    return model.run(motion, np.arange(0.0, 40.01, 0.5), rate0=(0.01, -0.02, 0.015), step=0.1)
+
+
+@pytest.fixture(scope="session")
+def noisy(planar_truth: mj.Truth) -> Callable[..., Recording]:
+    """Recording of the small case with fresh noise."""
+
+    def make(rng: np.random.Generator) -> Recording:
+        truth, channels = planar_truth, {}
+        for index in range(2):
+            error = ENCODER * rng.normal(size=len(truth.times))
+            channels[f"position.joint{index + 1}"] = truth.position[:, index] + error
+        for family, values in (("rate", truth.rate), ("accel", truth.accel)):
+            for index, axis in enumerate("xyz"):
+                channels[f"{family}.{axis}"] = values[:, index] + SIGMA * rng.normal(size=len(values))
+        return Recording("planar", None, truth.times, channels)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def planar_posterior(noisy: Callable[..., Recording]) -> Callable[..., Posterior]:
+    """Posterior of the small case; its guess of the base is wrong by about 20 % and its arm is right."""
+
+    def make(rng: np.random.Generator, *, spread: float = 0.3, guess: float = 0.1, **options) -> Posterior:
+        robot = Robot.from_urdf(PLANAR).perturbed("base_link", guess, np.random.default_rng(1))
+        recording = noisy(rng)
+        motion = MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODER})
+        model = Model(
+            robot,
+            (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT)),
+            (BodyPrior("base_link", robot.link("base_link").inertial, spread),),
+            Orbit(ORBIT.radius),
+            (GravityGradient(),),
+        )
+        return Posterior(model, [Manoeuvre(recording, motion)], **options)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def planar_case(planar_posterior: Callable[..., Posterior]) -> SimpleNamespace:
+    """One posterior of the small case, compiled once, and the true base."""
+    truth: InertialParameters = Robot.from_urdf(PLANAR).link("base_link").inertial
+    return SimpleNamespace(posterior=planar_posterior(np.random.default_rng(2), step=STEP), truth=truth)

@@ -1,0 +1,160 @@
+"""Coordinates of the unknowns: every value is a physical body, and the prior is as wide as it says."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from bayesid.effects.base import Effect, Parameter
+from bayesid.errors import InputError
+from bayesid.inertia import InertialParameters
+from bayesid.unknowns import LOG_CHOLESKY, BodyPrior, Unknowns, coordinates_of, draw_inertial
+
+CENTRE = InertialParameters(60.0, [0.05, -0.03, 0.1], [[2.4, 0.05, 0.1], [0.05, 2.6, -0.2], [0.1, -0.2, 2.8]])
+OTHER = InertialParameters(5.0, [0.5, 0.0, 0.02], [[0.1, 0.0, 0.0], [0.0, 0.44, 0.01], [0.0, 0.01, 0.46]])
+
+
+class Shared(Effect):
+    name = "shared"
+    parameters = (Parameter("x", "N", 2.0), Parameter("y", "N", 3.0, 7.0))
+
+
+class Own(Effect):
+    name = "own"
+    per_recording: ClassVar[bool] = True
+    parameters = (Parameter("delay", "s", 0.1),)
+
+
+def unknowns(**changes) -> Unknowns:
+    given = {
+        "bodies": (BodyPrior("base_link", CENTRE, 0.3), BodyPrior("load", OTHER, 0.1)),
+        "effects": (Shared(), Effect(), Own()),
+        "recordings": 2,
+        "rate_sigma": 0.01,
+        "tilt_sigma": np.array([0.0, 1e-3]),
+    }
+    return Unknowns(**{**given, **changes})
+
+
+def body_of(prior: BodyPrior, z: np.ndarray) -> InertialParameters:
+    layout = Unknowns((prior,), (), 1, 0.0, np.zeros(1))
+    return InertialParameters.from_vector(np.asarray(layout.values(z).inertial))
+
+
+# bodies ---------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("spread", [0.05, 1.0])
+def test_every_value_is_a_physical_body(spread):
+    """At a spread of one, z of 3 changes scales by e^3; the pseudo-inertia relative to the centre stays positive."""
+    rng = np.random.default_rng(1)
+    prior = BodyPrior("base_link", CENTRE, spread)
+    for z in rng.normal(size=(60, 10)) * 1.5:
+        body = body_of(prior, z)  # raises where no body has these values
+        assert body.mass > 0.0
+        assert np.linalg.eigvalsh(body.pseudo_inertia)[0] > 0.0
+
+
+def test_zero_is_the_centre():
+    body = body_of(BodyPrior("base_link", CENTRE, 0.7), np.zeros(10))
+    np.testing.assert_allclose(body.vector, CENTRE.vector, rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("spread", [0.05, 1.0])
+def test_coordinates_of_a_body_are_those_it_came_from(spread):
+    prior = BodyPrior("base_link", CENTRE, spread)
+    for z in np.random.default_rng(2).normal(size=(20, 10)):
+        np.testing.assert_allclose(coordinates_of(prior, body_of(prior, z)), z, atol=1e-8)
+
+
+def test_draws_have_the_stated_width():
+    """Each coordinate of a draw is normal with the spread: mean and sd within four of their standard errors."""
+    spread, count = 0.2, 800
+    rng = np.random.default_rng(3)
+    unit = BodyPrior("link", CENTRE, 1.0)
+    theta = np.array([coordinates_of(unit, draw_inertial(CENTRE, spread, rng)) for _ in range(count)])
+    assert np.abs(theta.mean(axis=0)).max() < 4.0 * spread / np.sqrt(count)
+    assert np.abs(theta.std(axis=0) / spread - 1.0).max() < 4.0 / np.sqrt(2.0 * count)
+    off_diagonal = np.corrcoef(theta.T)[~np.eye(10, dtype=bool)]
+    assert np.abs(off_diagonal).max() < 4.5 / np.sqrt(count)
+
+
+def test_the_mass_is_log_normal_with_twice_the_width():
+    prior = BodyPrior("link", CENTRE, 0.1)
+    z = np.zeros(10)
+    z[0] = 1.3
+    assert body_of(prior, z).mass == pytest.approx(CENTRE.mass * np.exp(2.0 * 0.1 * 1.3), rel=1e-12)
+
+
+@pytest.mark.parametrize(("spread", "message"), [(0.0, "spread 0 of base_link"), (-1.0, "spread -1 of base_link")])
+def test_a_prior_needs_a_width(spread, message):
+    with pytest.raises(InputError, match=message):
+        BodyPrior("base_link", CENTRE, spread)
+
+
+def test_a_prior_needs_a_body_with_volume():
+    rod = InertialParameters(2.0, np.zeros(3), np.diag([0.0, 1.0, 1.0]))
+    with pytest.raises(InputError, match=r"link rod: the prior of rod centres on a body without extent \(mass 2 kg\)"):
+        BodyPrior("rod", rod, 1.0)
+
+
+# layout ---------------------------------------------------------------------------------------------------------------
+
+
+def test_names_follow_the_layout():
+    names = unknowns().names
+    assert names[:10] == tuple(f"base_link.{key}" for key in LOG_CHOLESKY)
+    assert names[10:20] == tuple(f"load.{key}" for key in LOG_CHOLESKY)
+    assert names[20:26] == tuple(f"initial-rate[{i}].{axis}" for i in range(2) for axis in "xyz")
+    assert names[26:29] == tuple(f"initial-attitude[1].{axis}" for axis in "xyz")
+    assert names[29:] == ("shared.x", "shared.y", "own[0].delay", "own[1].delay")
+    assert unknowns().size == len(names)
+
+
+def test_each_coordinate_moves_only_what_its_name_says_by_one_sigma():
+    layout = unknowns()
+    zero = layout.values(np.zeros(layout.size))
+    flat = [*np.asarray(zero.inertial), *np.ravel(zero.rate), *np.ravel(zero.tilt)]
+    flat += [value for effect in zero.effects for value in np.ravel(effect)]
+    assert flat[-4:] == [0.0, 7.0, 0.0, 0.0]  # the priors' means
+    where = {  # coordinate -> (index in the flattened values, standard deviation)
+        "initial-rate[0].x": (20, 0.01),
+        "initial-rate[1].z": (25, 0.01),
+        "initial-attitude[1].y": (30, 1e-3),
+        "shared.y": (33, 3.0),
+        "own[1].delay": (35, 0.1),
+    }
+    for name, (index, sigma) in where.items():
+        z = np.zeros(layout.size)
+        z[layout.names.index(name)] = 1.0
+        moved = layout.values(z)
+        other = [*np.asarray(moved.inertial), *np.ravel(moved.rate), *np.ravel(moved.tilt)]
+        other += [value for effect in moved.effects for value in np.ravel(effect)]
+        change = np.array(other) - np.array(flat)
+        assert change[index] == pytest.approx(sigma, rel=1e-12), name
+        assert np.count_nonzero(change) == 1, name
+    for body in range(2):
+        z = np.zeros(layout.size)
+        z[10 * body : 10 * body + 10] = 0.5
+        change = np.asarray(layout.values(z).inertial) - np.asarray(zero.inertial)
+        assert (change[10 * body : 10 * body + 10] != 0.0).all()
+        assert np.count_nonzero(change) == 10
+
+
+def test_nothing_unknown_about_the_start_takes_no_coordinates():
+    names = unknowns(rate_sigma=0.0, tilt_sigma=np.zeros(2)).names
+    assert not [name for name in names if name.startswith("initial")]
+    assert unknowns(bodies=(), effects=(), rate_sigma=0.0, tilt_sigma=np.zeros(2)).size == 0
+
+
+def test_coordinates_invert_values():
+    layout = unknowns()
+    rate = np.array([[0.01, -0.02, 0.03], [0.0, 0.005, -0.01]])
+    bodies = [draw_inertial(centre, 0.1, np.random.default_rng(4)) for centre in (CENTRE, OTHER)]
+    values = layout.values(layout.coordinates(bodies, rate))
+    np.testing.assert_allclose(values.rate, rate, rtol=1e-12)
+    for (left, right), body in zip(pairwise((0, 10, 20)), bodies, strict=True):
+        np.testing.assert_allclose(values.inertial[left:right], body.vector, rtol=1e-9, atol=1e-9)
