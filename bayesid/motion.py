@@ -135,7 +135,6 @@ class MeasuredMotion:
         joints = tuple(
             smooth(
                 _samples(recording, joint.name, sigma or {}),
-                recording.time,
                 start=None if f"position.{joint.name}" in recording.channels else (start or {}).get(joint.name, 0.0),
             )
             for joint in robot.joints

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import jax
@@ -76,10 +75,18 @@ class Posterior:
         Integration step [s]; chosen from the sensors' noise where left out.
     flat_prior : bool
         Leave the prior out, for the noise-free comparisons of the paper.
+    like : Posterior, optional
+        Of the same model; its compiled functions are shared if the unknowns agree.
     """
 
     def __init__(
-        self, model: Model, manoeuvres: Sequence[Manoeuvre], *, step: float | None = None, flat_prior: bool = False
+        self,
+        model: Model,
+        manoeuvres: Sequence[Manoeuvre],
+        *,
+        step: float | None = None,
+        flat_prior: bool = False,
+        like: Posterior | None = None,
     ) -> None:
         if not manoeuvres:
             raise InputError("there is no recording", remedy="Give at least one")
@@ -91,8 +98,10 @@ class Posterior:
             effects=model.effects,
             recordings=len(manoeuvres),
             rate_sigma=self._rate_sigma(),
-            tilt_sigma=np.array([manoeuvre.attitude_sigma for manoeuvre in manoeuvres]),
+            tilt_sigma=tuple(manoeuvre.attitude_sigma for manoeuvre in manoeuvres),
         )
+        shared = None if like is None or like.model is not model or like.unknowns != self.unknowns else like._compiled
+        self._compiled: _Compiled = shared or _Compiled(model, self.unknowns)
         self.step = self._choose_step() if step is None else step
         self.whitenings = self._whiten(self.initial_point(), [None] * len(manoeuvres))
         self.data = self._stack(self._grids(self.step))
@@ -107,14 +116,7 @@ class Posterior:
 
     def with_manoeuvres(self, manoeuvres: Sequence[Manoeuvre]) -> Posterior:
         """Return the posterior of the same model given other manoeuvres, sharing compiled functions where they fit."""
-        new = Posterior(self.model, manoeuvres, step=self.step, flat_prior=self.flat_prior)
-        same = (new.unknowns.recordings, new.unknowns.rate_sigma) == (
-            self.unknowns.recordings,
-            self.unknowns.rate_sigma,
-        )
-        if same and np.array_equal(new.unknowns.tilt_sigma, self.unknowns.tilt_sigma):
-            new.__dict__["_compiled"] = self._compiled
-        return new
+        return Posterior(self.model, manoeuvres, step=self.step, flat_prior=self.flat_prior, like=self)
 
     # ---- sizes ----
 
@@ -326,10 +328,6 @@ class Posterior:
             np.asarray(function(jnp.asarray(padded[i : i + BATCH]), self.data)) for i in range(0, len(padded), BATCH)
         ]
         return np.concatenate(parts)[: len(z)]
-
-    @cached_property
-    def _compiled(self) -> _Compiled:
-        return _Compiled(self.model, self.unknowns)
 
 
 class _Compiled:

@@ -97,10 +97,11 @@ class SmoothedJoint:
     def lag_covariance(self, time: Floats, lags: int) -> Floats:
         """Covariance of the errors of position, velocity and acceleration with those of earlier times.
 
+        Between nodes the curve is a polynomial of the states on both sides, and so is its error.
+
         Parameters
         ----------
         time : (T,) array
-            Times that were given to `smooth`.
         lags : int
 
         Returns
@@ -109,42 +110,59 @@ class SmoothedJoint:
             ``[l, i]`` is the covariance of the three errors at ``time[i]`` with those at ``time[i - l]``; zero where
             there is no such time.
         """
-        node = _nearest(self.nodes, time)
-        size, units = self.states.size, self._units[:3]
-        result = np.zeros((lags + 1, len(time), 3, 3))
+        left, weights = self._interpolation(time)
+        # the states that a time draws on: those of the nodes left and right of it
+        states = left[:, None] * self.order + np.arange(2 * self.order)
+        size, count = self.states.size, len(time)
+        result = np.zeros((lags + 1, count, 3, 3))
         chunk = max(1, 4_000_000 // size)
-        for start in range(0, len(time), chunk):
-            rows = np.arange(start, min(start + chunk, len(time)))
+        for start in range(0, count, chunk):
+            rows = np.arange(start, min(start + chunk, count))
             right = np.zeros((size, len(rows), 3))
-            for derivative in range(3):
-                right[node[rows] * self.order + derivative, np.arange(len(rows)), derivative] = 1.0
+            for offset in range(2 * self.order):
+                right[states[rows, offset], np.arange(len(rows))] = weights[rows, :, offset]
             solved = sla.cho_solve_banded((self.factor, True), right.reshape(size, -1), check_finite=False)
-            solved = solved.reshape(-1, self.order, len(rows), 3)
+            solved = solved.reshape(size, len(rows), 3)
             for lag in range(min(lags, int(rows[-1])) + 1):
                 used = rows[rows >= lag]
-                # indexed [time, derivative at the earlier time, derivative at this time]
-                block = solved[node[used - lag], :3, used - start, :]
-                result[lag, used] = np.swapaxes(block, 1, 2) * np.outer(units, units)
+                earlier = solved[states[used - lag], (used - start)[:, None]]
+                result[lag, used] = np.einsum("tsk,tls->tkl", earlier, weights[used - lag])
         return result
+
+    def _interpolation(self, time: Floats) -> tuple[Integers, Floats]:
+        """Left node of each time, and weights (T, 3, 2 order) of both nodes' states on the curve's derivatives."""
+        left = np.clip(np.searchsorted(self.nodes, time, side="right") - 1, 0, len(self.nodes) - 2)
+        length = np.diff(self.nodes)[left]
+        s = (time - self.nodes[left]) / length
+        powers, order = np.arange(2 * self.order), np.arange(self.order)
+
+        def derivatives(at: Floats, which: Integers) -> Floats:
+            """Return derivatives of the monomials, (T, which, powers)."""
+            factor = np.array([[math.perm(int(j), int(r)) for j in powers] for r in which], dtype=float)
+            return factor * at[:, None, None] ** np.maximum(powers[None, :] - which[:, None], 0)
+
+        ends = np.concatenate([derivatives(np.zeros(1), order)[0], derivatives(np.ones(1), order)[0]])
+        curve = derivatives(s, np.arange(3)) @ np.linalg.inv(ends)
+        scaled = length / self.scale
+        curve *= (scaled[:, None] ** np.tile(order, 2))[:, None, :] / (length[:, None] ** np.arange(3))[:, :, None]
+        return left, curve
 
     def standard_deviation(self, time: Floats) -> Floats:
         """Return the standard deviation of position, velocity and acceleration, shape (3, T)."""
         return np.sqrt(np.diagonal(self.lag_covariance(time, 0)[0], axis1=1, axis2=2)).T
 
 
-def smooth(samples: list[JointSamples], extra_times: Floats, start: float | None = None) -> SmoothedJoint:
+def smooth(samples: list[JointSamples], start: float | None = None) -> SmoothedJoint:
     """Fit the smoothing spline of one joint.
 
     Parameters
     ----------
     samples : list of JointSamples
         At least one series of positions or velocities.
-    extra_times : (T,) array
-        Further times at which `SmoothedJoint.lag_covariance` will be asked for.
     start : float, optional
         Exact position at time 0, for a joint known by its speed only.
     """
-    nodes, scale = _nodes(np.concatenate([series.time for series in samples]), extra_times)
+    nodes, scale = _nodes(np.concatenate([series.time for series in samples]))
     best = None
     for order in ORDERS:
         fit = _fit(samples, nodes, scale, start, order)
@@ -208,14 +226,10 @@ def _fit(samples: list[JointSamples], nodes: Floats, scale: float, start: float 
     )
 
 
-def _nodes(own: Floats, extra: Floats) -> tuple[Floats, float]:
+def _nodes(own: Floats) -> tuple[Floats, float]:
     own = np.unique(own)
     scale = float(np.median(np.diff(own)))
-    kept = own[np.concatenate([[True], np.diff(own) > SNAP * scale])]
-    far = np.abs(extra - kept[_nearest(kept, extra)]) > SNAP * scale
-    nodes = np.sort(np.concatenate([kept, np.unique(extra[far])]))
-    nodes = nodes[np.concatenate([[True], np.diff(nodes) > 0.5 * SNAP * scale])]
-    return nodes, scale
+    return own[np.concatenate([[True], np.diff(own) > SNAP * scale])], scale
 
 
 def _nearest(nodes: Floats, time: Floats) -> Integers:

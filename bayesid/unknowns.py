@@ -83,7 +83,7 @@ class Unknowns:
     recordings : int
     rate_sigma : float
         Prior standard deviation of the initial rate [rad/s]; 0 for exactly zero.
-    tilt_sigma : (R,) array
+    tilt_sigma : (R,) tuple
         Of the initial attitude [rad]; 0 for exact.
     """
 
@@ -91,7 +91,7 @@ class Unknowns:
     effects: tuple[Effect, ...]
     recordings: int
     rate_sigma: float
-    tilt_sigma: Floats
+    tilt_sigma: tuple[float, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -136,7 +136,7 @@ class Unknowns:
         tilt = jnp.zeros((self.recordings, 3))
         if self._tilts:
             rows = np.array(self._tilts)
-            tilt = tilt.at[rows].set(self.tilt_sigma[rows][:, None] * take(len(rows), 3))
+            tilt = tilt.at[rows].set(np.array(self.tilt_sigma)[rows][:, None] * take(len(rows), 3))
         effects = []
         for effect in self.effects:
             count = len(effect.parameters)

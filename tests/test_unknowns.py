@@ -34,7 +34,7 @@ def unknowns(**changes) -> Unknowns:
         "effects": (Shared(), Effect(), Own()),
         "recordings": 2,
         "rate_sigma": 0.01,
-        "tilt_sigma": np.array([0.0, 1e-3]),
+        "tilt_sigma": (0.0, 1e-3),
     }
     return Unknowns(**{**given, **changes})
 
@@ -145,9 +145,9 @@ def test_each_coordinate_moves_only_what_its_name_says_by_one_sigma():
 
 
 def test_nothing_unknown_about_the_start_takes_no_coordinates():
-    names = unknowns(rate_sigma=0.0, tilt_sigma=np.zeros(2)).names
+    names = unknowns(rate_sigma=0.0, tilt_sigma=(0.0, 0.0)).names
     assert not [name for name in names if name.startswith("initial")]
-    assert unknowns(bodies=(), effects=(), rate_sigma=0.0, tilt_sigma=np.zeros(2)).size == 0
+    assert unknowns(bodies=(), effects=(), rate_sigma=0.0, tilt_sigma=(0.0, 0.0)).size == 0
 
 
 def test_coordinates_invert_values():

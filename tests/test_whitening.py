@@ -39,7 +39,7 @@ def noise_model(channels: list[Channel], time: np.ndarray = TIME, encoder: float
     joints = []
     for index in range(2):
         value = 0.3 * np.sin(0.4 * time + index) + encoder * rng.normal(size=len(time))
-        joints.append(smooth([JointSamples(0, time, value, encoder)], time).lag_covariance(time, len(time) - 1))
+        joints.append(smooth([JointSamples(0, time, value, encoder)]).lag_covariance(time, len(time) - 1))
     sensitivity = rng.normal(size=(2, 3, len(time), len(channels)))
     return NoiseModel(time, channels, sensitivity, np.stack(joints))
 

@@ -51,7 +51,7 @@ def _prior_sentences(posterior: Posterior) -> list[str]:
     rate = "exactly zero"
     if sigma > 0.0:
         rate = f"unknown in each recording, prior 0 ± {format_number(sigma)} rad/s per axis"
-    tilt = float(posterior.unknowns.tilt_sigma.max())
+    tilt = max(posterior.unknowns.tilt_sigma)
     attitude = f"uncertain by up to {format_number(tilt)} rad per axis" if tilt > 0.0 else "known exactly"
     return [*sentences, f"The initial rate is {rate}. The initial attitude is {attitude}."]
 

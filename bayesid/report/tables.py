@@ -70,7 +70,7 @@ def start_rows(result: Identification) -> Rows:
     rows = []
     for index, manoeuvre in enumerate(posterior.manoeuvres):
         unknown = [("initial rate", "rad/s", values.rate, posterior.unknowns.rate_sigma)]
-        unknown.append(("initial rotation", "rad", values.tilt, float(posterior.unknowns.tilt_sigma[index])))
+        unknown.append(("initial rotation", "rad", values.tilt, posterior.unknowns.tilt_sigma[index]))
         for label, unit, draws, sigma in unknown:
             if sigma > 0.0:
                 own = np.asarray(draws)[:, index]
