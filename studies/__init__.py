@@ -1,0 +1,1 @@
+"""Studies: each returns its numbers and figures, and writes its report."""

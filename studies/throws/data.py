@@ -1,0 +1,149 @@
+"""The measured throws, read from raw counts into recordings, and what is known of the bodies.
+
+Source of the data: Blaha, Kuijper, Pop, Smeur, "Rapid and Inexpensive Inertia Tensor Estimation from a Single Object
+Throw", arXiv:2503.13137. They are not part of the project; `DataFolder` says where they are expected.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+
+from bayesid import InputError, Recording
+
+__all__ = ["BODIES", "DEFAULT_FOLDER", "Timing", "Truth", "read_throws", "read_truth"]
+
+Floats = NDArray[np.floating]
+
+DEFAULT_FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "throws"
+"""Beside the checkout."""
+
+BODIES = ("cal_device", "cal_proof", "Empty", "A")
+"""The device alone, on a known box, on an empty grid plate, on the plate with four steel blocks."""
+
+SIGNS = np.array([-1.0, -1.0, 1.0])
+RATE_SCALE = np.pi / 180.0 / 16.384
+ACCEL_SCALE = 9.81 / 2048.0
+POLE_PAIRS = 6
+WHEEL_INERTIA = 1.45e-6
+"""Nominal inertia of the wheel [kg m2]; every inertia scales with it, and the known box gives its true value."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How a throw is cut and filtered; the values were found on these data (see the report on tuning).
+
+    Parameters
+    ----------
+    start, end : float
+        Free flight after the wheel's start [s].
+    interval : float
+        Between samples kept [s]; the wheel's momentum is kept at half of it.
+    smooth : float
+        Standard deviation of the zero-phase Gaussian filter, applied alike to gyro, accelerometer and wheel [s].
+    delay, delay_periods : float
+        A reported wheel speed is as old as this [s] plus this many electrical periods, over which it was averaged.
+    fast, margin : float
+        Wheel acceleration above which its delay is not known well enough [rad/s2]; gyro samples within ``margin``
+        seconds of it are left out.
+    """
+
+    start: float = 0.075
+    end: float = 0.557
+    interval: float = 0.002
+    smooth: float = 0.002
+    delay: float = -0.64e-3
+    delay_periods: float = 0.40
+    fast: float = 12000.0
+    margin: float = 0.004
+
+    @property
+    def duration(self) -> float:
+        """Length of a recording [s]."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What the authors state of the bodies: masses [kg] and principal moments about the own centre of mass [kg m2]."""
+
+    device_mass: float
+    mass: dict[str, float]
+    moments: dict[str, Floats]
+
+
+def read_truth(folder: Path) -> Truth:
+    """Read the authors' masses and geometry.
+
+    Raises
+    ------
+    InputError
+        If the folder lacks the file.
+    """
+    file = folder / "truth.json"
+    if not file.is_file():
+        raise InputError("the throws are not here: no truth.json", file=folder, remedy=_REMEDY)
+    content = json.loads(file.read_text(encoding="utf-8"))
+    proof, bodies = content["proof_body"], content["bodies"]
+    tensors = {"cal_proof": proof["I_com"], **{name: body["I_com_grid"] for name, body in bodies.items()}}
+    return Truth(
+        device_mass=content["device"]["mass"],
+        mass={"cal_proof": proof["mass"], **{name: body["mass"] for name, body in bodies.items()}},
+        moments={name: np.linalg.eigvalsh(np.array(tensor)) for name, tensor in tensors.items()},
+    )
+
+
+def read_throws(folder: Path, body: str, timing: Timing, count: int | None = None) -> list[Recording]:
+    """Read the throws of one body, the first ``count`` of them.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    files = sorted((folder / "throws").glob(f"{body}_LOG*.csv"))
+    if not files:
+        raise InputError(f"no throws of {body!r}", file=folder / "throws", remedy=_REMEDY)
+    return [_recording(file, timing) for file in files[:count]]
+
+
+_REMEDY = "Give the folder of the thrown-body measurements (SOURCE.txt, truth.json, throws/*.csv)"
+
+
+def _recording(file: Path, timing: Timing) -> Recording:
+    raw = np.genfromtxt(file, delimiter=",", names=True)
+    clock = raw["t_us"] * 1e-6
+    grid = timing.start + 0.5 * timing.interval * np.arange(2 * round(timing.duration / timing.interval) + 1)
+    kernel = np.exp(-0.5 * ((grid[:, None] - clock) / timing.smooth) ** 2)
+    kernel /= kernel.sum(axis=1, keepdims=True)
+    speed = _wheel_speed(clock, raw["erpm"], grid, timing)
+    acceleration = np.abs(np.gradient(speed, grid))
+    window = 2 * round(timing.margin / (0.5 * timing.interval)) + 1
+    fast = maximum_filter1d(acceleration, window) > timing.fast
+    skip = np.arange(len(grid)) % 2 == 1
+    channels: dict[str, Floats] = {"wheel_momentum.x": np.zeros(len(grid)), "wheel_momentum.y": np.zeros(len(grid))}
+    channels["wheel_momentum.z"] = WHEEL_INERTIA * speed
+    for axis, sign in zip("xyz", SIGNS, strict=True):
+        rate, accel = (
+            kernel @ (sign * scale * raw[f"{kind}{axis}"]) for kind, scale in (("g", RATE_SCALE), ("a", ACCEL_SCALE))
+        )
+        channels[f"rate.{axis}"] = np.where(skip | fast, np.nan, rate)
+        channels[f"accel.{axis}"] = np.where(skip, np.nan, accel)
+    return Recording(file.stem, None, grid - timing.start, channels)
+
+
+def _wheel_speed(clock: Floats, erpm: Floats, grid: Floats, timing: Timing) -> Floats:
+    """Wheel speed relative to the body [rad/s], from the instants at which the held reading changes."""
+    new = np.concatenate([[0], np.flatnonzero(np.diff(erpm)) + 1])
+    value, instant = erpm[new], clock[new]
+    period = np.minimum(np.where(value > 0.0, 60.0 / (100.0 * np.maximum(value, 1.0)), 0.0), 0.02)
+    speed = -value * 100.0 / POLE_PAIRS * 2.0 * np.pi / 60.0
+    fine = np.arange(grid[0] - 5.0 * timing.smooth, grid[-1] + 5.0 * timing.smooth, 0.25e-3)
+    held = np.interp(fine, instant - timing.delay - timing.delay_periods * period, speed)
+    kernel = np.exp(-0.5 * ((grid[:, None] - fine) / timing.smooth) ** 2)
+    return kernel @ held / kernel.sum(axis=1)

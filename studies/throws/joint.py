@@ -1,0 +1,231 @@
+"""One fit over many throws: what they share, with the unknowns of single throws eliminated.
+
+Every throw has a posterior of its own (`bayesid.Posterior`). The joint posterior is their product with each shared
+prior counted once. Its Gauss-Newton equations couple throws through the shared unknowns only, so that the unknowns of a
+throw are eliminated throw by throw (Schur complement): the same mode and Laplace approximation as one large fit, at a
+cost that grows linearly with the number of throws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid import Posterior
+from studies.throws.model import is_calibration, is_fitted, is_own
+
+__all__ = ["Joint", "Throw", "maximise_jointly"]
+
+Floats = NDArray[np.floating]
+
+ITERATIONS = 40
+HALVINGS = 12
+PRECISION = 1e-7
+"""Relative fall of the cost at which the fit ends."""
+
+
+@dataclass(frozen=True)
+class Throw:
+    """One throw of a body: its posterior, and a point to start from or that was found.
+
+    All throws share one compiled model; what differs between bodies besides the data is put on top of it.
+
+    Attributes
+    ----------
+    z : (size,) array
+    width : (size,) array
+        Factor on the prior standard deviation of each unknown of the throw's own.
+    noise : (6,) array
+        Factor on the noise of each axis of gyro and accelerometer.
+    """
+
+    body: str
+    posterior: Posterior
+    z: Floats
+    width: Floats
+    noise: Floats
+
+    def residuals(self, z: Floats) -> Floats:
+        """Return the whitened residuals, shape (samples, 6)."""
+        return self.posterior.residuals(z)[0] / self.noise
+
+    def jacobian(self, z: Floats) -> Floats:
+        """Return the derivative of the flattened residuals, shape (6 samples, size)."""
+        samples = self.posterior.whitenings[0].outputs.shape[0]
+        return self.posterior.jacobian(z)[: 6 * samples] / np.tile(self.noise, samples)[:, None]
+
+    @property
+    def name(self) -> str:
+        """Name of the recording."""
+        return self.posterior.manoeuvres[0].recording.name
+
+    def shared(self) -> dict[str, int]:
+        """Global names of the unknowns this throw shares, with their place in its own vector."""
+        names = enumerate(self.posterior.unknowns.names)
+        return {name if is_calibration(name) else f"{self.body}:{name}": i for i, name in names if not is_own(name)}
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Mode and Laplace approximation of a joint fit.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the free shared unknowns; those of a body are written ``body:name``.
+    covariance : (n, n) array
+        Of the shared unknowns, all others marginalised.
+    throws : tuple of Throw
+        With the unknowns found.
+    information : (throws, n, n) array
+    pull : (throws, n) array
+        Each throw's own part of the normal equations at the mode, its own unknowns eliminated.
+    converged : bool
+    """
+
+    names: tuple[str, ...]
+    value: Floats
+    covariance: Floats
+    throws: tuple[Throw, ...]
+    information: Floats
+    pull: Floats
+    converged: bool
+
+    def draw(self, count: int, rng: np.random.Generator) -> Floats:
+        """Draw shared unknowns from the Laplace approximation, shape (count, n)."""
+        factor = np.linalg.cholesky(self.covariance)
+        return self.value + rng.normal(size=(count, len(self.value))) @ factor.T
+
+    def without(self, index: int) -> Floats:
+        """Shared unknowns, shape (n,), had one throw not been made, to first order."""
+        precision = np.linalg.inv(self.covariance) - self.information[index]
+        return self.value + np.linalg.solve(precision, self.pull[index])
+
+    def body_coordinates(self, body: str, values: Floats) -> Floats:
+        """Log-Cholesky coordinates of one body among shared unknowns (m, n): shape (m, 10)."""
+        columns = [i for i, name in enumerate(self.names) if name.startswith(f"{body}:base_link.")]
+        mass = next(throw.z[0] for throw in self.throws if throw.body == body)
+        return np.column_stack([np.full(len(values), mass), values[:, columns]])
+
+
+class _Layout:
+    """Where the unknowns of each throw are in the vector of shared ones."""
+
+    def __init__(self, throws: Sequence[Throw], free: Callable[[str], bool]) -> None:
+        shared = [throw.shared() for throw in throws]
+        self.names = tuple(dict.fromkeys(name for names in shared for name in names if free(name)))
+        place = {name: i for i, name in enumerate(self.names)}
+        self.places = [np.array([place[name] for name in names if name in place]) for names in shared]
+        self.columns = [np.array([i for name, i in names.items() if name in place]) for names in shared]
+        self.own = [
+            np.array([i for i, name in enumerate(throw.posterior.unknowns.names) if is_own(name) and free(name)])
+            for throw in throws
+        ]
+
+
+def maximise_jointly(throws: Sequence[Throw], free: Callable[[str], bool] = is_fitted) -> Joint:
+    """Find the mode over all throws by Gauss-Newton steps with halving.
+
+    Parameters
+    ----------
+    free : callable
+        Which unknowns are fitted; the others stay where ``throws`` has them. Left out, all but the first
+        log-Cholesky coordinate, which is the mass: the scales know it and torque-free motion does not tell it.
+    """
+    layout = _Layout(throws, free)
+    points = [throw.z.copy() for throw in throws]
+    value: Floats = np.zeros(len(layout.names))
+    for z, places, columns in zip(points, layout.places, layout.columns, strict=True):
+        value[places] = z[columns]
+    _spread(points, layout, value)
+    cost, converged = _cost(throws, layout, points, value), False
+    for _ in range(ITERATIONS):
+        blocks = [_eliminate(throw, z, layout, i) for i, (throw, z) in enumerate(zip(throws, points, strict=True))]
+        hessian, gradient = _assemble(blocks, layout, value)
+        step = -np.linalg.solve(hessian, gradient)
+        points, value, lower = _search(throws, layout, points, value, blocks, step, cost)
+        converged, cost = cost - lower < PRECISION * cost, lower
+        if converged:
+            break
+    blocks = [_eliminate(throw, z, layout, i) for i, (throw, z) in enumerate(zip(throws, points, strict=True))]
+    hessian, _ = _assemble(blocks, layout, value)
+    found = tuple(replace(throw, z=z) for throw, z in zip(throws, points, strict=True))
+    information = np.stack(
+        [_scatter(block.information, layout.places[i], len(value)) for i, block in enumerate(blocks)]
+    )
+    pull = np.zeros((len(throws), len(value)))
+    for row, block, places in zip(pull, blocks, layout.places, strict=True):
+        row[places] = block.pull
+    return Joint(layout.names, value, np.linalg.inv(hessian), found, information, pull, converged)
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Normal equations of one throw with its own unknowns eliminated, and how those follow the shared ones."""
+
+    information: Floats
+    pull: Floats
+    own_step: Floats
+    own_response: Floats
+
+
+def _eliminate(throw: Throw, z: Floats, layout: _Layout, index: int) -> _Block:
+    own, columns = layout.own[index], layout.columns[index]
+    residual, jacobian, precision = throw.residuals(z).ravel(), throw.jacobian(z), throw.width[own] ** -2
+    a, b = jacobian[:, columns], jacobian[:, own]
+    factor = np.linalg.cholesky(b.T @ b + np.diag(precision))
+    half = np.linalg.solve(factor, np.column_stack([b.T @ a, b.T @ residual + precision * z[own]]))
+    mixed, pulled = half[:, :-1], half[:, -1]
+    back = np.linalg.solve(factor.T, half)
+    return _Block(a.T @ a - mixed.T @ mixed, a.T @ residual - mixed.T @ pulled, -back[:, -1], -back[:, :-1])
+
+
+def _assemble(blocks: Sequence[_Block], layout: _Layout, value: Floats) -> tuple[Floats, Floats]:
+    hessian, gradient = np.eye(len(value)), value.copy()
+    for block, places in zip(blocks, layout.places, strict=True):
+        hessian[np.ix_(places, places)] += block.information
+        gradient[places] += block.pull
+    return hessian, gradient
+
+
+def _search(
+    throws: Sequence[Throw],
+    layout: _Layout,
+    points: list[Floats],
+    value: Floats,
+    blocks: Sequence[_Block],
+    step: Floats,
+    cost: float,
+) -> tuple[list[Floats], Floats, float]:
+    """Halve the step until the cost falls; where it never does, stay."""
+    for halving in range(HALVINGS):
+        size = 0.5**halving
+        trial = [z.copy() for z in points]
+        for z, block, own, places in zip(trial, blocks, layout.own, layout.places, strict=True):
+            z[own] += size * (block.own_step + block.own_response @ step[places])
+        _spread(trial, layout, value + size * step)
+        lower = _cost(throws, layout, trial, value + size * step)
+        if lower < cost:
+            return trial, value + size * step, lower
+    return points, value, cost
+
+
+def _spread(points: Sequence[Floats], layout: _Layout, value: Floats) -> None:
+    for z, places, columns in zip(points, layout.places, layout.columns, strict=True):
+        z[columns] = value[places]
+
+
+def _cost(throws: Sequence[Throw], layout: _Layout, points: Sequence[Floats], value: Floats) -> float:
+    total = float(value @ value)
+    for throw, z, own in zip(throws, points, layout.own, strict=True):
+        total += float((throw.residuals(z) ** 2).sum() + ((z[own] / throw.width[own]) ** 2).sum())
+    return total if np.isfinite(total) else np.inf
+
+
+def _scatter(block: Floats, places: NDArray[np.intp], size: int) -> Floats:
+    full = np.zeros((size, size))
+    full[np.ix_(places, places)] = block
+    return full

@@ -1,0 +1,64 @@
+"""The study of thrown bodies, on real measurements that lie beside the checkout."""
+
+import os
+
+import numpy as np
+import pytest
+
+from bayesid import InputError
+from studies.throws import run
+from studies.throws.data import DEFAULT_FOLDER, Timing, read_throws
+from studies.throws.report import write_report
+
+PRESENT = (DEFAULT_FOLDER / "truth.json").is_file()
+
+
+@pytest.fixture(scope="module")
+def result():
+    if not PRESENT:
+        reason = f"the measured throws are not at {DEFAULT_FOLDER}"
+        (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
+    return run(throws=3)
+
+
+def test_the_wheel_and_the_bodies_jointly(result):
+    analysis = result.extended
+    assert analysis.converged
+    assert 1.43e-6 < analysis.wheel < 1.47e-6
+    for body in analysis.bodies.values():
+        assert np.abs(body.joint_errors).max() < 2.0
+        assert np.abs(body.joint_distance).max() < 3.0
+
+
+@pytest.mark.parametrize(("body", "mean", "largest"), [("Empty", 1.9, 6.0), ("A", 1.0, 3.0)])
+def test_single_throws(result, body, mean, largest):
+    found = result.extended.bodies[body]
+    assert found.moments.shape == (3, 3)
+    assert found.mean_error <= mean
+    assert found.largest_error <= largest
+
+
+def test_the_rigid_model_is_overconfident_and_the_extended_one_hardly(result):
+    for body in ("Empty", "A"):
+        plain, extended = result.plain.bodies[body], result.extended.bodies[body]
+        assert plain.inflation > 3.0
+        assert extended.inflation < 2.5
+        assert extended.coverage(0.95) > plain.coverage(0.95)
+        assert extended.coverage(0.95, with_truth=True) >= 0.9
+
+
+def test_the_blocks_need_no_cad(result):
+    analysis = result.extended
+    np.testing.assert_allclose(analysis.blocks, analysis.blocks_truth, rtol=0.04)
+
+
+def test_the_report_is_written(result, tmp_path):
+    write_report(result, tmp_path / "throws.pdf")
+    assert (tmp_path / "throws.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_absent_measurements_are_named(tmp_path):
+    with pytest.raises(InputError, match=r"the throws are not here: no truth.json. Give the folder"):
+        run(tmp_path)
+    with pytest.raises(InputError, match="no throws of 'A'"):
+        read_throws(tmp_path, "A", Timing())
