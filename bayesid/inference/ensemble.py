@@ -29,7 +29,7 @@ __all__ = ["Chains", "LaplaceMove", "Progress", "sample"]
 
 
 ENSEMBLES = 4
-BLOCK = 50
+BLOCK = 40
 """Steps between two looks at convergence."""
 
 LENGTHS = 50.0
@@ -149,14 +149,14 @@ def sample(
         samplers.append((sampler, None if not fresh else _start(chart, proposal, walkers, state)))
     while True:
         steps = min(int(sampler.iteration) for sampler, _ in samplers)
-        if steps and steps % BLOCK == 0:
+        if steps and (steps % BLOCK == 0 or steps >= max_steps):
             chains = _summary(chart, [sampler for sampler, _ in samplers], effective_samples)
             if progress is not None:
                 progress(_progress(chains, max_steps, effective_samples))
             if chains.converged or steps >= max_steps:
                 return chains
         # after an interruption ensembles stand at different steps; all go on to the end of the block
-        target = (steps // BLOCK + 1) * BLOCK
+        target = min((steps // BLOCK + 1) * BLOCK, max_steps)
         for number, (sampler, start) in enumerate(samplers):
             if sampler.iteration < target:
                 sampler.run_mcmc(start, target - sampler.iteration, skip_initial_state_check=True)

@@ -1,0 +1,65 @@
+"""All measurements of the benchmark."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bayesid import Robot
+from studies.benchmark.cases import chain, posterior_of
+from studies.benchmark.sampling import Sampling, compare_moves
+from studies.benchmark.timing import Rival, rivals, seconds_per_evaluation
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """What was measured; times in seconds.
+
+    ``links`` and ``samples`` map their number to the time of one evaluation; ``whitening`` holds the time with white
+    noise, with an encoder whose noise is negligible, and with one whose noise matters.
+    """
+
+    evaluation: float
+    error: float
+    rivals: list[Rival]
+    links: dict[int, float]
+    samples: dict[int, float]
+    whitening: dict[str, float]
+    windows: dict[str, int]
+    sampling: Sampling
+
+    @property
+    def speedups(self) -> dict[str, float]:
+        """How many times faster than each rival one evaluation is."""
+        return {rival.name: rival.seconds / self.evaluation for rival in self.rivals}
+
+
+def run(*, full: bool = False, seed: int = 0) -> Benchmark:
+    """Measure everything.
+
+    Parameters
+    ----------
+    full : bool
+        Longer chains of the default move and more repeats.
+    seed : int
+        Of the samplers.
+    """
+    robot = Robot.shipped("ets7")
+    single = posterior_of(robot)
+    whitening = {"white": 0.0, "encoder 1e-6 rad": 1e-6, "encoder 1e-4 rad": 1e-4}
+    posteriors = {name: posterior_of(robot, encoder_sigma=sigma) for name, sigma in whitening.items()}
+    repeats = 20 if full else 5
+    return Benchmark(
+        evaluation=seconds_per_evaluation(single, repeats),
+        error=single.integration_error(single.initial_point()),
+        rivals=rivals(robot, single),
+        links={count: seconds_per_evaluation(posterior_of(chain(count)), repeats) for count in (6, 20, 60)},
+        samples={
+            round(120.0 / interval) + 1: seconds_per_evaluation(posterior_of(robot, interval=interval), repeats)
+            for interval in (1.0, 0.5, 0.2, 0.1)
+        },
+        whitening={name: seconds_per_evaluation(posterior, repeats) for name, posterior in posteriors.items()},
+        windows={name: posterior.whitenings[0].window for name, posterior in posteriors.items()},
+        sampling=compare_moves(
+            posterior_of(robot, recordings=3), wanted=4000.0, default_steps=12000 if full else 600, seed=seed
+        ),
+    )
