@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from bayesid.arrays import Floats
 from bayesid.errors import InputError
@@ -65,7 +66,8 @@ class JointCheck:
 class SensorCheck:
     """A sensor's noise and clock.
 
-    ``measured_sigma`` (3,) is estimated from quiet stretches, None where there are too few quiet samples; ``delay`` is
+    ``measured_sigma`` (3,) is estimated from quiet stretches, with the relative standard error ``sigma_error``; None
+    where there are too few quiet samples. ``delay`` is
     how far the samples lag behind the joints' motion [s], with its standard deviation, None where the motion is too
     faint to tell.
     """
@@ -73,6 +75,7 @@ class SensorCheck:
     kind: Kind
     sigma: Floats
     measured_sigma: Floats | None
+    sigma_error: float
     delay: tuple[float, float] | None
 
 
@@ -85,6 +88,7 @@ class RecordingCheck:
     channels: tuple[Channel, ...]
     joints: tuple[JointCheck, ...]
     sensors: tuple[SensorCheck, ...]
+    rate_is_differenced: bool
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -101,8 +105,8 @@ class RecordingCheck:
         ]
         for sensor in self.sensors:
             if sensor.measured_sigma is not None:
-                ratio = sensor.measured_sigma / sensor.sigma
-                if (ratio > 1.3).any() or (ratio < 0.7).any():
+                off = np.abs(sensor.measured_sigma / sensor.sigma - 1.0)
+                if (off > max(0.3, 4.0 * sensor.sigma_error)).any():
                     found.append(
                         f"The noise of {sensor.kind.value} in quiet stretches is "
                         f"{', '.join(f'{value:.2g}' for value in sensor.measured_sigma)} {sensor.kind.unit}, declared "
@@ -113,6 +117,8 @@ class RecordingCheck:
                     f"The samples of {sensor.kind.value} seem {sensor.delay[0]:.3g} +- {sensor.delay[1]:.2g} s late "
                     "against the joints."
                 )
+        if self.rate_is_differenced:
+            found.append("The rate is the difference of the attitude, not a second sensor: declare one of them.")
         for channel in self.channels:
             if channel.longest_gap > 5.0 * channel.interval:
                 found.append(f"{channel.name} has a gap of {channel.longest_gap:.3g} s.")
@@ -130,6 +136,7 @@ def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
         channels=_channels(recording, model),
         joints=_joints(manoeuvre, model.robot),
         sensors=tuple(_sensor(sensor, manoeuvre, model, predicted) for sensor in model.sensors),
+        rate_is_differenced=_is_differenced(manoeuvre, model),
     )
 
 
@@ -256,25 +263,47 @@ def _joints(manoeuvre: Manoeuvre, robot: Robot) -> tuple[JointCheck, ...]:
 def _sensor(sensor: Sensor, manoeuvre: Manoeuvre, model: Model, predicted: Predictions) -> SensorCheck:
     if sensor.kind is Kind.ATTITUDE:
         time, _ = manoeuvre.recording.vector("attitude", ("x", "y", "z", "w"))
-        return SensorCheck(sensor.kind, sensor.noise.sigma(float(np.median(np.diff(time)))), None, None)
+        return SensorCheck(sensor.kind, sensor.noise.sigma(float(np.median(np.diff(time)))), None, 0.0, None)
     time, measured = manoeuvre.recording.vector(sensor.kind.value)
     expected = getattr(predicted, sensor.kind.value)[np.searchsorted(predicted.time, time)]
+    measured_sigma, sigma_error = _quiet_sigma(expected, measured)
     return SensorCheck(
         kind=sensor.kind,
         sigma=sensor.noise.sigma(float(np.median(np.diff(time)))),
-        measured_sigma=_quiet_sigma(expected, measured),
+        measured_sigma=measured_sigma,
+        sigma_error=sigma_error,
         delay=_delay(time, expected, measured),
     )
 
 
-def _quiet_sigma(expected: Floats, measured: Floats) -> Floats | None:
-    """Noise from third differences where the expected signal hardly changes from sample to sample."""
+def _is_differenced(manoeuvre: Manoeuvre, model: Model) -> bool:
+    """Whether the rate repeats the attitude's own noise, whichever neighbours it was differenced from."""
+    sensors = {sensor.kind: sensor for sensor in model.sensors}
+    if not {Kind.RATE, Kind.ATTITUDE} <= set(sensors):
+        return False
+    time, quaternion = manoeuvre.recording.vector("attitude", ("x", "y", "z", "w"))
+    rate_time, rate = manoeuvre.recording.vector("rate")
+    common, here, there = np.intersect1d(time, rate_time, return_indices=True)
+    if len(common) < 10:
+        return False
+    turned = Rotation.from_quat(quaternion[here])
+    step = np.diff(common)[:, None]
+    difference = (turned[:-1].inv() * turned[1:]).as_rotvec() / step
+    own = rate[there] @ sensors[Kind.RATE].rotation.T
+    candidates = (own[:-1] - difference, own[1:] - difference, own[1:-1] - 0.5 * (difference[1:] + difference[:-1]))
+    noise = np.sqrt(2.0) * sensors[Kind.ATTITUDE].noise.sigma(1.0).max() / float(np.median(step))
+    return min(float(np.sqrt((miss**2).mean())) for miss in candidates) < 0.3 * noise
+
+
+def _quiet_sigma(expected: Floats, measured: Floats) -> tuple[Floats | None, float]:
+    """Noise, and its relative error, from third differences where the expected signal hardly changes meanwhile."""
     rough = np.abs(np.diff(expected, n=3, axis=0)).max(axis=1)
     difference = np.diff(measured, n=3, axis=0)
     quiet = rough < 0.2 * np.median(np.abs(difference))
     if quiet.sum() < 30:
-        return None
-    return 1.4826 * np.median(np.abs(difference[quiet]), axis=0) / np.sqrt(20.0)
+        return None, 0.0
+    # third differences of white noise have 20 times its variance and are correlated over three samples
+    return np.sqrt((difference[quiet] ** 2).mean(axis=0) / 20.0), float(np.sqrt(2.31 / (2.0 * quiet.sum())))
 
 
 def _delay(time: Floats, expected: Floats, measured: Floats) -> tuple[float, float] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+
 from studies.benchmark.cases import chain, posterior_of
 from studies.benchmark.timing import seconds_per_evaluation
 
