@@ -1,0 +1,140 @@
+"""What sensors, priors and the knowledge of the arm make of the posterior's width: one Jacobian, many questions.
+
+With white noise the Fisher information is a sum over sensors, each divided by its variance. Computed once with
+everything unknown, it answers any sensor grade by rescaling, and any "if that were known" by striking out rows and
+columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid.effects import AccelBias, GravityGradient
+from bayesid.model import Manoeuvre, Model, spread_links
+from bayesid.motion import Excitation
+from bayesid.orbit import Orbit
+from bayesid.posterior import Posterior, Predictions
+from bayesid.sensors import ARCSEC, Kind, Sensor, White
+from bayesid.simulation import simulate_recordings
+from bayesid.unknowns import BodyPrior
+from studies.base_body import paper
+from studies.base_body.noise_free import ACCELEROMETER, STEP
+from studies.base_body.physical import physical_sd, physical_slope
+from studies.base_body.setting import BASE, blank, ship
+
+__all__ = ["ACCEL_BIAS", "ARM", "ARM_SPREAD", "BIAS", "RATE", "STAR", "TILT", "Information", "wide_model"]
+
+Floats = NDArray[np.floating]
+
+KINDS = (Kind.RATE, Kind.ACCEL, Kind.ATTITUDE)
+UNIT = 1e-5
+"""Sigma the information of each sensor is computed with [rad/s, m/s2, rad]."""
+
+ARM_SPREAD = 0.025
+"""Of a link's log-Cholesky coordinates: its mass is then known to 5 %, twice the coordinate's width."""
+
+BIAS = 1e-4
+"""Prior sd of the accelerometer's constant error [m/s2]."""
+
+STAR = 2.0 * ARCSEC
+"""Error of the star sensor per axis and sample [rad]."""
+
+ARM, RATE, TILT, ACCEL_BIAS = "arm", "initial rate", "initial attitude", "accelerometer bias"
+
+
+def wide_model() -> Model:
+    """Return the model with everything unknown that a question may fix: arm, initial rate, accelerometer bias."""
+    robot = ship()
+    base = BodyPrior(BASE, paper.body(paper.TRUTH), 1.0)
+    return Model(
+        robot=robot,
+        sensors=(
+            Sensor(Kind.RATE, White(UNIT)),
+            Sensor(Kind.ACCEL, White(UNIT), position=ACCELEROMETER),
+            Sensor(Kind.ATTITUDE, White(UNIT)),
+        ),
+        priors=(base, *spread_links(robot, ARM_SPREAD, (BASE,))),
+        orbit=Orbit(paper.RADIUS),
+        effects=(GravityGradient(), AccelBias(BIAS)),
+    )
+
+
+@dataclass(frozen=True)
+class Information:
+    """Fisher information of one manoeuvre at the truth.
+
+    Attributes
+    ----------
+    by_sensor : mapping of Kind to (n, n) array
+        With a noise of `UNIT` per sample.
+    slope : (10, n) array
+        Of the base's quantities.
+    names : tuple of str
+        Of the n unknowns.
+    truth : Predictions
+        What the sensors read.
+    """
+
+    by_sensor: Mapping[Kind, Floats]
+    slope: Floats
+    names: tuple[str, ...]
+    truth: Predictions
+
+    @classmethod
+    def of(cls, motion: Excitation, step: float = STEP) -> Information:
+        """Compute the information of a manoeuvre."""
+        model = wide_model()
+        planned = Manoeuvre(blank(motion, KINDS), motion, attitude_sigma=STAR)
+        simulator = Posterior(model, [planned], step=step, flat_prior=True)
+        z = np.zeros(simulator.size)
+        truth = simulator.predict(z)[0]
+        recording = simulate_recordings(simulator, z=z)[0]
+        posterior = simulator.with_manoeuvres([replace(planned, recording=recording)])
+        jacobian = posterior.jacobian(z).reshape(-1, len(KINDS), 3, posterior.size)
+        blocks = {
+            kind: np.einsum("tai,taj->ij", jacobian[:, index], jacobian[:, index]) for index, kind in enumerate(KINDS)
+        }
+        return cls(blocks, physical_slope(posterior, z), posterior.unknowns.names, truth)
+
+    def sd(self, sigma: Mapping[Kind, float], known: Collection[str] = ()) -> Floats:
+        """Posterior standard deviation of the base's ten quantities.
+
+        Parameters
+        ----------
+        sigma : mapping of Kind to float
+            Of the sensors used, per sample.
+        known : collection of str
+            Of `ARM`, `RATE`, `TILT`, `ACCEL_BIAS`: what is known exactly.
+        """
+        keep = np.array([_group(name) not in known for name in self.names])
+        total = np.eye(len(keep))  # the prior
+        for kind, value in sigma.items():
+            total = total + self.by_sensor[kind] * (UNIT / value) ** 2
+        return physical_sd(self.slope[:, keep], _inverse(total[np.ix_(keep, keep)]))
+
+    def relative_sd(self, sigma: Mapping[Kind, float], known: Collection[str] = ()) -> Floats:
+        """`sd` over the true values."""
+        return self.sd(sigma, known) / np.abs(paper.TRUTH)
+
+    @property
+    def peak(self) -> dict[Kind, float]:
+        """Largest rate [rad/s], acceleration [m/s2] and rotation since the start [rad] of any axis."""
+        vector = 2.0 * self.truth.attitude[:, :3]
+        values = {Kind.RATE: self.truth.rate, Kind.ACCEL: self.truth.accel, Kind.ATTITUDE: vector}
+        return {kind: float(np.abs(own).max()) for kind, own in values.items()}
+
+
+def _group(name: str) -> str:
+    for start, group in (("link", ARM), ("initial-rate", RATE), ("initial-attitude", TILT), ("accel-bias", ACCEL_BIAS)):
+        if name.startswith(start):
+            return group
+    return BASE
+
+
+def _inverse(information: Floats) -> Floats:
+    scale = 1.0 / np.sqrt(np.diag(information))
+    return np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)

@@ -1,0 +1,33 @@
+"""What the paper prints on problem 1 (section 4.1), and the order in which the study reports ten parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid.inertia import InertialParameters
+
+__all__ = ["EXCITATION", "GUESS", "LIMIT", "RADIUS", "RESULT_POOR", "RESULT_WELL", "TRUTH", "body"]
+
+Floats = NDArray[np.float64]
+
+# mass, centre of mass, inertia xx yy zz xy xz yz: the order of `bayesid.inference.identification.BODY_QUANTITIES`
+TRUTH = np.array([2645.9, -0.532, -0.281, 1.499, 5665.5, 3033.0, 7067.2, 54.2, 145.1, -123.2])
+GUESS = np.array([1000.0, 0.5, 0.5, 0.5, 1000.0, 1000.0, 1000.0, 10.0, 10.0, 10.0])
+RESULT_WELL = np.array([2645.7, -0.53, -0.28, 1.50, 5667.25, 3037.73, 7075.85, 50.98, 148.39, -124.13])
+RESULT_POOR = np.array([2655.99, -0.54, -0.23, 1.53, 5539.09, 3007.88, 7070.54, 42.70, 161.246, -57.47])
+
+EXCITATION = np.array([0.63, -1.87, -2.18, -0.15, 5.3e-2, -0.56])
+"""The optimum of (26): q1 and q2 of joint 1, of joint 2, of joint 3 [rad]."""
+
+LIMIT = np.pi / 2.0
+"""Joint limit the paper states [rad]."""
+
+RADIUS = 6.916e6
+"""Of the orbit [m]."""
+
+
+def body(quantities: Floats) -> InertialParameters:
+    """Return the body of ten quantities, the inertia taken about the centre of mass."""
+    xx, yy, zz, xy, xz, yz = quantities[4:]
+    return InertialParameters(quantities[0], quantities[1:4], [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -1,0 +1,119 @@
+"""The study of section 4.1 in its small version, and its noise-free case on data of an independent simulator."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayesid.model import Manoeuvre
+from bayesid.posterior import Posterior
+from bayesid.recording import Recording
+from bayesid.robot import Robot
+from bayesid.sensors import Kind
+from studies import base_body
+from studies.base_body import noise_free, paper, setting
+from studies.base_body.report import write
+from tests import reference
+
+GOAL = 1e-6
+REFERENCE_STEP = 0.125
+"""With twice that the reference's own error already reaches 3e-6 of a parameter [s]."""
+
+
+@pytest.fixture(scope="module")
+def result() -> base_body.BaseBody:
+    return base_body.run()
+
+
+def test_every_parameter_is_found_without_noise(result):
+    for name in ("well", "poor"):
+        assert result.noise_free[name].worst < GOAL, name
+    assert np.abs(paper.RESULT_WELL / paper.TRUTH - 1.0).max() > 1e4 * result.noise_free["well"].worst
+
+
+def test_data_of_an_independent_simulator_give_the_same(tmp_path: Path):
+    robot, motion = Robot.shipped("ets7"), setting.excitation(paper.EXCITATION)
+    robot.write_urdf(tmp_path / "ets7.urdf")
+    planned = setting.blank(motion, noise_free.KINDS, interval=2.0)
+
+    half = 0.5 * REFERENCE_STEP
+    states = np.array(motion.evaluate(np.arange(0.0, motion.duration + half, half)))
+
+    def at(time: float):
+        return states[:, round(time / half)]
+
+    truth = reference.simulate(
+        tmp_path / "ets7.urdf",
+        at,
+        planned.time,
+        REFERENCE_STEP,
+        accel_position=noise_free.ACCELEROMETER,
+        zenith=reference.circular_zenith(paper.RADIUS),
+    )
+    channels = {
+        f"{kind}.{axis}": values[:, index]
+        for kind, values in (("rate", truth.rate), ("accel", truth.accel))
+        for index, axis in enumerate("xyz")
+    }
+    recording = Recording("reference", None, planned.time, channels)
+    posterior = Posterior(noise_free.guess_model(), [Manoeuvre(recording, motion)], step=0.5, flat_prior=True)
+    assert noise_free.identify_exact(posterior).worst < GOAL
+
+
+def test_the_poor_manoeuvre_hardly_excites_the_third_axis_and_costs_when_there_is_noise(result):
+    well, poor = result.noise_free["well"], result.noise_free["poor"]
+    assert poor.peak[2] < 0.15 * min(poor.peak[:2])
+    assert well.peak[2] > 0.5 * min(well.peak[:2])
+    assert poor.uncertainty[6] > 3.0 * well.uncertainty[6]
+
+
+def test_the_base_turns_slower_than_a_hundredth_of_a_radian_per_second(result):
+    assert result.fast.peak[Kind.RATE] < 0.01
+    assert [joint for joint, _, _ in setting.limits_broken()] == [1, 2]
+
+
+def test_leaving_the_gravity_gradient_out_costs(result):
+    blind = result.noise_free["well, no gradient"]
+    assert 1e-3 < blind.worst < 0.1
+    assert blind.worst > 1e4 * result.noise_free["well"].worst
+
+
+def test_an_arm_known_to_five_percent_sets_the_scale(result):
+    assert result.arm_ratio > 5.0
+    floor = result.grades["5 %"][:, 0]
+    assert (floor > 0.015).all()
+    assert floor[-1] == pytest.approx(floor[0], rel=0.05), "no accelerometer mends it"
+
+
+def test_a_better_accelerometer_narrows_the_posterior_of_an_exact_arm(result):
+    mass = result.grades["exact"][:, 0]
+    assert (np.diff(mass) < 0.0).all()
+    assert mass[0] < 0.002
+    assert (result.grades["exact, differenced"][0] > result.grades["exact"][0]).all()
+
+
+def test_sigma_in_radians_per_second_exceeds_the_signal(result):
+    for sigma in (0.04, 0.009):
+        reading = next(item for item in result.readings if (item.sigma, item.unit) == (sigma, "rad/s"))
+        assert reading.fraction > 1.0
+        assert reading.manoeuvres > 1.0
+
+
+def test_a_slower_manoeuvre_keeps_the_limits_of_the_flight(result):
+    speed, rate = setting.tip_speed(setting.excitation(paper.EXCITATION, result.slowness))
+    assert speed == pytest.approx(0.05, rel=0.02) or rate == pytest.approx(np.radians(5.0), rel=0.02)
+    assert speed < 0.0505
+    assert rate < np.radians(5.05)
+
+
+def test_the_arm_is_scaled_to_a_seventh():
+    robot = setting.heavy_arm(setting.ship())
+    moving = sum(robot.link(f"link{index}").inertial.mass for index in range(2, 7))
+    assert moving / robot.link(setting.BASE).inertial.mass == pytest.approx(1.0 / 7.0)
+
+
+def test_the_report_is_written(result, tmp_path: Path):
+    write(result, tmp_path / "base_body.pdf")
+    assert (tmp_path / "base_body.pdf").stat().st_size > 30_000
