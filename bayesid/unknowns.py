@@ -195,11 +195,24 @@ def _relative(body: BodyPrior, z: Array) -> Array:
 def _absolute(body: BodyPrior, y: Array) -> Array:
     upper = jnp.zeros((4, 4)).at[_ROW, _COLUMN].set(body.spread * y)
     matrix = jnp.eye(4) + upper + upper.T - jnp.diag(jnp.diag(upper))
-    u = jnp.linalg.cholesky(matrix[::-1, ::-1])[::-1, ::-1]
+    u = _upper_factor(matrix)
     unit = u / u[3, 3]
     d = jnp.log(jnp.diag(unit)[:3])
     rest = jnp.stack([unit[0, 1], unit[1, 2], unit[0, 2], unit[0, 3], unit[1, 3], unit[2, 3]])
     return jnp.concatenate([jnp.log(u[3, 3])[None], d, rest]) / body.spread
+
+
+def _upper_factor(matrix: Array) -> Array:
+    """Upper-triangular U with ``U U' = matrix`` (4, 4), not a number where there is none.
+
+    Written out: thousands of factorisations of this size in one call to LAPACK can block the processor's threads.
+    """
+    u = [[jnp.zeros(()) for _ in range(4)] for _ in range(4)]
+    for k in (3, 2, 1, 0):
+        u[k][k] = jnp.sqrt(matrix[k, k] - sum(u[k][j] ** 2 for j in range(k + 1, 4)))
+        for i in range(k):
+            u[i][k] = (matrix[i, k] - sum(u[i][j] * u[k][j] for j in range(k + 1, 4))) / u[k][k]
+    return jnp.stack([jnp.stack(row) for row in u])
 
 
 def _log_volume(body: BodyPrior, z: Array) -> Array:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import arviz as az
@@ -72,8 +73,10 @@ class Chains:
 
     Attributes
     ----------
-    z : (ensembles, draws, n) array
-        Steps and walkers of an ensemble run along one axis, step-major.
+    chart : Chart
+        Coordinates the walkers moved in.
+    y : (ensembles, draws, n) array
+        Draws in those coordinates; steps and walkers of an ensemble run along one axis, step-major.
     log_density : (ensembles, draws) array
         Over the coordinates of the chart.
     effective_samples : float
@@ -86,7 +89,8 @@ class Chains:
         Whether length, r_hat and effective samples all reached their goals.
     """
 
-    z: Floats
+    chart: Chart
+    y: Floats
     log_density: Floats
     effective_samples: float
     r_hat: float
@@ -96,6 +100,11 @@ class Chains:
     steps: int
     walkers: int
     converged: bool
+
+    @cached_property
+    def z(self) -> Floats:
+        """Draws in the posterior's coordinates, shape (ensembles, draws, n)."""
+        return self.chart.to_z(self.y.reshape(-1, self.y.shape[-1])).reshape(self.y.shape)
 
     @property
     def flat(self) -> Floats:
@@ -236,7 +245,8 @@ def _summary(chart: Chart, samplers: list[emcee.EnsembleSampler], wanted: float)
     effective = y.shape[0] * y.shape[1] / tau
     r_hat = float(np.max([az.rhat(y[:, :, k]) for k in range(y.shape[2])]))
     return Chains(
-        z=np.stack([chart.to_z(own) for own in y]),
+        chart=chart,
+        y=y,
         log_density=np.stack([density[burn:].ravel() for density in densities]),
         effective_samples=effective,
         r_hat=r_hat,
