@@ -223,7 +223,9 @@ class Posterior:
         if self.unknowns.rate_sigma == 0.0:
             return np.zeros(self.size)
         rates = np.stack([samples.first_rate for samples in self._samples])
-        return self.unknowns.coordinates([body.centre for body in self.model.priors], rates)
+        z = self.unknowns.coordinates([body.centre for body in self.model.priors], rates)
+        z[: 10 * len(self.model.priors)] = 0.0  # exactly: steps are scaled to the start, and rounding is no scale
+        return z
 
     def integration_error(self, z: Floats) -> float:
         """Largest error of any sample from the integration step, in its standard deviations (Richardson)."""
