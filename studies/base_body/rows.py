@@ -190,7 +190,7 @@ def reading_sentences(result: BaseBody) -> list[str]:
         buried = [format_unit(reading.unit) for reading in own if reading.fraction > 1.0]
         sentences.append(
             f"{sigma:g}: in {' or '.join(buried) or 'no unit'} it exceeds the whole signal. An error of 2 % from one "
-            f"manoeuvre of this kind would allow {', '.join(map(format_unit, able)) or 'none of these readings'}."
+            f"manoeuvre of this kind would allow {'; '.join(map(format_unit, able)) or 'none of these readings'}."
         )
         fitting.append(set(able))
     both = [
@@ -198,7 +198,7 @@ def reading_sentences(result: BaseBody) -> list[str]:
         for unit in dict.fromkeys(reading.unit for reading in result.readings)
         if all(unit in own for own in fitting)
     ]
-    sentences.append(f"Readings that fit both: {', '.join(map(format_unit, both)) or 'none'}.")
+    sentences.append(f"Readings that fit both: {'; '.join(map(format_unit, both)) or 'none'}.")
     return sentences
 
 

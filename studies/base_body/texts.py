@@ -77,5 +77,6 @@ ARM = (
     "Six link masses with independent errors of 5 % leave their common scale known to about 2 %: the floor of mass "
     "and moments.",
     "Slow: the same path {slow} times slower, as the rules of ETS-VII demand. The base turns with {rate} mrad/s; "
-    "accelerations fall with the square of the speed.",
+    "accelerations fall with the square of the speed, and the mass, which needs them, is known less well. The rest is "
+    "not: the star sensor sees the same rotation in more samples, and the gravity gradient has longer to act.",
 )
