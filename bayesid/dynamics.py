@@ -8,16 +8,18 @@ axes, ``L = I w + spin + h`` and ``dL/dt = N - w x L``; the attitude quaternion 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
-from bayesid.effects.base import Composite, Effect, Environment, Moment, Readings, Wrench
+from bayesid.effects.base import Composite, Effect, Environment, Modes, Moment, Readings, Wrench
 from bayesid.tables import ENTRIES
 
-__all__ = ["Grid", "Instants", "Start", "composite", "simulate"]
+__all__ = ["Grid", "Instants", "Start", "composite", "simulate", "trace"]
 
 ATTITUDE, MOMENTUM, INNER = slice(0, 4), slice(4, 7), slice(7, None)
 
@@ -87,6 +89,7 @@ def simulate(
     Parameters
     ----------
     grid : Grid
+        With the tables of the effects after those of the unknown bodies.
     inertial : (p,) array
         Linear inertial parameters of the unknown bodies.
     start : Start
@@ -100,8 +103,55 @@ def simulate(
     Readings
         In base axes; faults of the sensors are not applied.
     """
+    system, loads, course = _integrate(grid, inertial, start, effects, values)
+    seen = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ loads)
+    sense = jax.vmap(system.sense, (0, 0, 0, None))
+    rate, accel, attitude = sense(
+        course.at(grid.step_of, grid.fraction), (seen, grid.sample.environment), grid.held[grid.step_of], point
+    )
+    return Readings(grid.sample.environment.time, rate, accel, attitude)
+
+
+def trace(
+    grid: Grid, inertial: Array, start: Start, effects: Sequence[Effect], values: Sequence[Array]
+) -> tuple[Moment, Moment]:
+    """Return the motion itself: every instant of the stages, then of the samples, as effects see them.
+
+    Arguments as for `simulate`; leading axes 2 K + 1 and T.
+    """
+    system, loads, course = _integrate(grid, inertial, start, effects, values)
+    steps = len(grid.step)
+    index = jnp.minimum(jnp.arange(2 * steps + 1) // 2, steps - 1)
+    fraction = jnp.concatenate([jnp.tile(jnp.array([0.0, 0.5]), steps), jnp.ones(1)])
+    motions = []
+    for instants, of, where in ((grid.stage, index, fraction), (grid.sample, grid.step_of, grid.fraction)):
+        bodies = jax.vmap(composite)(instants.known + instants.unknown @ loads)
+        motion = jax.vmap(system.motion)(course.at(of, where), (bodies, instants.environment), grid.held[of])
+        motions.append(motion[0])
+    return motions[0], motions[1]
+
+
+class _Course(NamedTuple):
+    """States at the start and end of every step, and their slopes times the step's length."""
+
+    left: Array
+    right: Array
+    left_slope: Array
+    right_slope: Array
+
+    def at(self, step: Array, fraction: Array) -> Array:
+        """Hermite interpolation."""
+        left, right, left_slope, right_slope = (part[step] for part in self)
+        return _hermite(left, right, left_slope, right_slope, fraction[:, None])
+
+
+def _integrate(
+    grid: Grid, inertial: Array, start: Start, effects: Sequence[Effect], values: Sequence[Array]
+) -> tuple[_System, Array, _Course]:
+    """Run the classical Runge-Kutta method over the grid; also return what multiplies its tables."""
     system = _System(tuple(effects), tuple(values))
-    bodies = jax.vmap(composite)(grid.stage.known + grid.stage.unknown @ inertial)
+    loads = jnp.concatenate([inertial, *(effect.loads(v) for effect, v in zip(effects, values, strict=True))])
+    bodies = jax.vmap(composite)(grid.stage.known + grid.stage.unknown @ loads)
     stages = (bodies, grid.stage.environment)
     first, middle, last = (
         jax.tree.map(lambda x, s=s: x[s], stages) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
@@ -119,14 +169,17 @@ def simulate(
         return new, (state, size * k1, size * system.derivative(new, there, held))
 
     final, (states, slopes, end_slopes) = jax.lax.scan(step, initial, (grid.step, grid.held, first, middle, last))
-    ends = jnp.concatenate([states[1:], final[None]])
-    index, s = grid.step_of, grid.fraction[:, None]
-    between = _hermite(states[index], ends[index], slopes[index], end_slopes[index], s)
-    seen = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ inertial)
-    rate, accel, attitude = jax.vmap(system.sense, (0, 0, 0, None))(
-        between, (seen, grid.sample.environment), grid.held[index], point
-    )
-    return Readings(grid.sample.environment.time, rate, accel, attitude)
+    return system, loads, _Course(states, jnp.concatenate([states[1:], final[None]]), slopes, end_slopes)
+
+
+class _Inner(NamedTuple):
+    """One effect with its values and what the state holds of it."""
+
+    effect: Effect
+    values: Array
+    own: Array  # its inner states
+    amplitude: Array  # of its modes
+    speed: Array  # derivative of the amplitudes
 
 
 class _System(NamedTuple):
@@ -137,71 +190,128 @@ class _System(NamedTuple):
 
     def initial(self, instant: tuple[Composite, Environment], start: Start) -> Array:
         body, environment = instant
-        inner = jnp.zeros(sum(effect.states for effect in self.effects))
-        moment = Moment(environment, body, rotation(start.attitude), jnp.zeros(3))
+        inner = jnp.zeros(sum(effect.states + 2 * effect.modes_count for effect in self.effects))
+        moment = Moment(environment, body, rotation(start.attitude), *jnp.zeros((3, 3)))
         momentum = body.inertia @ start.rate + body.spin + self.momentum(moment, inner)[0]
         return jnp.concatenate([start.attitude, momentum, inner])
 
     def derivative(self, state: Array, instant: tuple[Composite, Environment], held: Array) -> Array:
-        moment, _ = self.moment(state, instant)
+        if any(effect.modes_count for effect in self.effects):
+            moment, mode_changes = self.motion(state, instant, held)
+        else:  # the acceleration is not needed
+            moment, mode_changes = self.moment(state, instant)[0], jnp.zeros(0)
         wrench = self.wrench(moment, state[INNER], held)
         torque = wrench.torque - _cross(moment.body.com, wrench.force)
         parts = [_quaternion_rate(state[ATTITUDE], moment.rate), torque - _cross(moment.rate, state[MOMENTUM])]
-        parts += [
-            effect.derivative(values, moment, own) for effect, values, own in self.own(state[INNER]) if effect.states
-        ]
+        used = 0
+        for effect, values, own, _, speed in self.inner(state[INNER]):
+            if effect.states:
+                parts.append(effect.derivative(values, moment, own))
+            if effect.modes_count:
+                parts += [speed, mode_changes[used : used + effect.modes_count]]
+                used += effect.modes_count
         return jnp.concatenate(parts)
 
     def sense(
         self, state: Array, instant: tuple[Composite, Environment], held: Array, point: Array
     ) -> tuple[Array, Array, Array]:
+        moment, _ = self.motion(state, instant, held)
+        rate = moment.rate
+        accel = moment.acceleration + _cross(moment.rate_change, point) + _cross(rate, _cross(rate, point))
+        for effect, values, *_ in self.inner(state[INNER]):
+            if effect.uses("field"):
+                accel = accel + effect.field(values, moment, point - moment.body.com)
+        return rate, accel, state[ATTITUDE] / jnp.linalg.norm(state[ATTITUDE])
+
+    def motion(self, state: Array, instant: tuple[Composite, Environment], held: Array) -> tuple[Moment, Array]:
+        """Return the instant with its accelerations, and those of the modes' amplitudes."""
         moment, momentum_rate = self.moment(state, instant)
         body, rate = moment.body, moment.rate
         wrench = self.wrench(moment, state[INNER], held)
         torque = wrench.torque - _cross(body.com, wrench.force)
         change = torque - _cross(rate, state[MOMENTUM]) - body.inertia_rate @ rate - body.spin_rate - momentum_rate
+        force = wrench.force
+        moving = [item for item in self.inner(state[INNER]) if item.effect.modes_count]
+        for item in moving:
+            flow = item.effect.modes(item.values).linear.T @ item.speed
+            change = change + _cross(body.com_rate, flow)
+            force = force - 2.0 * _cross(rate, flow)
         rate_change = body.inverse @ change
-        lever = point - body.com
-        accel = (
-            wrench.force / body.mass
+        acceleration = (
+            force / body.mass
             - body.com_acceleration
             - 2.0 * _cross(rate, body.com_rate)
-            + _cross(rate_change, lever)
-            + _cross(rate, _cross(rate, lever))
+            - _cross(rate_change, body.com)
+            - _cross(rate, _cross(rate, body.com))
         )
-        for effect, values, _ in self.own(state[INNER]):
-            if effect.uses("field"):
-                accel = accel + effect.field(values, moment, lever)
-        return rate, accel, state[ATTITUDE] / jnp.linalg.norm(state[ATTITUDE])
+        if not moving:
+            return moment._replace(rate_change=rate_change, acceleration=acceleration), jnp.zeros(0)
+        modes = [item.effect.modes(item.values) for item in moving]
+        linear = jnp.concatenate([mode.linear for mode in modes])
+        central = jnp.concatenate([_about_com(mode, body.com) for mode in modes])
+        free = jnp.concatenate(
+            [
+                -2.0 * mode.damping * mode.omega * item.speed - mode.omega**2 * item.amplitude
+                for mode, item in zip(modes, moving, strict=True)
+            ]
+        )
+        drive = -linear @ (acceleration + _cross(rate_change, body.com)) - central @ rate_change
+        yielding = jnp.eye(len(linear)) - linear @ linear.T / body.mass - central @ body.inverse @ central.T
+        changes = _solve(yielding, free + drive)
+        recoil = body.inverse @ (central.T @ changes)
+        return moment._replace(
+            rate_change=rate_change - recoil,
+            acceleration=acceleration - linear.T @ changes / body.mass + _cross(recoil, body.com),
+        ), changes
 
     def moment(self, state: Array, instant: tuple[Composite, Environment]) -> tuple[Moment, Array]:
         body, environment = instant
-        still = Moment(environment, body, rotation(state[ATTITUDE]), jnp.zeros(3))
+        still = Moment(environment, body, rotation(state[ATTITUDE]), *jnp.zeros((3, 3)))
         momentum, momentum_rate = self.momentum(still, state[INNER])
         return still._replace(rate=body.inverse @ (state[MOMENTUM] - body.spin - momentum)), momentum_rate
 
     def momentum(self, moment: Moment, inner: Array) -> tuple[Array, Array]:
+        """Return momentum relative to the base, about the centre of mass, and its derivative but for the modes'."""
         momentum, rate = moment.environment.wheel_momentum, moment.environment.wheel_torque
-        for effect, values, own in self.own(inner):
+        for effect, values, own, _, speed in self.inner(inner):
             if effect.uses("momentum"):
                 more, more_rate = effect.momentum(values, moment, own)
                 momentum, rate = momentum + more, rate + more_rate
+            if effect.modes_count:
+                momentum = momentum + _about_com(effect.modes(values), moment.body.com).T @ speed
         return momentum, rate
 
     def wrench(self, moment: Moment, inner: Array, held: Array) -> Wrench:
-        total = Wrench(held[:3], held[3:])
-        for effect, values, own in self.own(inner):
+        given = held + moment.environment.wrench
+        total = Wrench(given[:3], given[3:])
+        for effect, values, own, *_ in self.inner(inner):
             if effect.uses("wrench"):
                 more = effect.wrench(values, moment, own)
                 total = Wrench(total.force + more.force, total.torque + more.torque)
         return total
 
-    def own(self, inner: Array) -> list[tuple[Effect, Array, Array]]:
+    def inner(self, inner: Array) -> list[_Inner]:
         parts, start = [], 0
         for effect, values in zip(self.effects, self.values, strict=True):
-            parts.append((effect, values, inner[start : start + effect.states]))
-            start += effect.states
+            ends = np.cumsum([start, effect.states, effect.modes_count, effect.modes_count])
+            parts.append(_Inner(effect, values, *(inner[a:b] for a, b in pairwise(ends))))
+            start = int(ends[-1])
         return parts
+
+
+def _about_com(modes: Modes, com: Array) -> Array:
+    """Angular momentum of unit modal speeds about the common centre of mass, shape (n, 3)."""
+    return modes.angular - jnp.cross(com[None], modes.linear)
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    """Solve a small positive-definite system by elimination, written out as `_inverse` is."""
+    size = len(right)
+    rows = [jnp.concatenate([matrix[i], right[i : i + 1]]) for i in range(size)]
+    for i in range(size):
+        rows[i] = rows[i] / rows[i][i]
+        rows = [row if j == i else row - row[i] * rows[i] for j, row in enumerate(rows)]
+    return jnp.stack([row[-1] for row in rows])
 
 
 def rotation(quaternion: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,14 +13,14 @@ from scipy.interpolate import Akima1DInterpolator
 
 from bayesid.arrays import Floats
 from bayesid.dynamics import Grid, Instants
-from bayesid.effects.base import Environment
+from bayesid.effects.base import Effect, Environment
 from bayesid.motion import Motion
 from bayesid.orbit import Orbit, OrbitState
 from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.tables import WIDTH, composite_rows, kinematics, link_table
 
-__all__ = ["Actions", "build_grid", "pad_grids"]
+__all__ = ["Actions", "build_grid", "pad_grids", "rounded"]
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,7 @@ def build_grid(
     orbit: Orbit | None = None,
     latitude: float = 0.0,
     actions: Actions | None = None,
+    effects: Sequence[Effect] = (),
 ) -> Grid:
     """Reduce one recording to a `Grid`.
 
@@ -106,11 +108,13 @@ def build_grid(
         Longest integration step [s]; steps end where a held action changes.
     latitude : float
         Argument of latitude at time 0 [rad].
+    effects : sequence of Effect
+        Whose tables follow those of the unknown links.
     """
     actions = Actions.none() if actions is None else actions
     nodes = _nodes(float(samples[-1]), step, actions.time)
     stage = np.sort(np.concatenate([nodes, 0.5 * (nodes[1:] + nodes[:-1])]))
-    instants = [_instants(robot, unknown, motion, time, orbit, latitude, actions) for time in (stage, samples)]
+    instants = [_instants(robot, unknown, effects, motion, time, orbit, latitude, actions) for time in (stage, samples)]
     index = np.clip(np.searchsorted(nodes, samples, side="right") - 1, 0, len(nodes) - 2)
     size = np.diff(nodes)
     return Grid(
@@ -136,6 +140,7 @@ def _nodes(end: float, step: float, changes: Floats) -> Floats:
 def _instants(
     robot: Robot,
     unknown: tuple[str, ...],
+    effects: Sequence[Effect],
     motion: Motion,
     time: Floats,
     orbit: Orbit | None,
@@ -145,7 +150,8 @@ def _instants(
     moved = kinematics(robot, motion.evaluate(time))
     known = composite_rows(robot, moved, leave_out=unknown)
     tables = [np.zeros((len(time), WIDTH, 0)), *(link_table(robot, name, moved) for name in unknown)]
-    none = OrbitState(*(np.zeros((len(time), *shape)) for shape in ((3,), (), (3,), (3,), ())))
+    tables += [effect.table(robot, motion, time) for effect in effects if effect.uses("table")]
+    none = OrbitState(*(np.zeros((len(time), *shape)) for shape in ((3,), (), (3,), (3,), (), (3,))))
     state = none if orbit is None else orbit.state(time, latitude)
     momentum, torque = actions.wheels(time)
     environment = Environment(
@@ -155,16 +161,27 @@ def _instants(
         velocity=jnp.asarray(state.velocity),
         sun=jnp.asarray(state.sun),
         latitude=jnp.asarray(state.latitude),
+        north=jnp.asarray(state.north),
         wheel_momentum=jnp.asarray(momentum),
         wheel_torque=jnp.asarray(torque),
+        wrench=jnp.zeros((len(time), 6)),
     )
     return Instants(jnp.asarray(known), jnp.asarray(np.concatenate(tables, axis=2)), environment)
 
 
-def pad_grids(grids: list[Grid], steps: int | None = None) -> Grid:
+ROUND = 16
+"""Lengths are padded to multiples of this, so that recordings of about one length share compiled functions."""
+
+
+def rounded(length: int) -> int:
+    """Round a length up."""
+    return -(-length // ROUND) * ROUND
+
+
+def pad_grids(grids: list[Grid], steps: int | None = None, samples: int | None = None) -> Grid:
     """Stack grids of different lengths, shape (R, ...); the padding is steps of no length and copies of a sample."""
     steps = max(len(grid.step) for grid in grids) if steps is None else steps
-    samples = max(len(grid.step_of) for grid in grids)
+    samples = max(len(grid.step_of) for grid in grids) if samples is None else samples
 
     def lengthen(array: jax.Array, length: int) -> jax.Array:
         values = np.asarray(array)

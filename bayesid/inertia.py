@@ -17,7 +17,18 @@ from numpy.typing import ArrayLike
 from bayesid.arrays import Floats
 from bayesid.errors import InputError
 
-__all__ = ["BASIS", "InertialParameters", "log_cholesky_factor", "parameters_from_pseudo_inertia", "upper_cholesky"]
+__all__ = [
+    "BASIS",
+    "LOG_CHOLESKY",
+    "InertialParameters",
+    "log_cholesky_factor",
+    "log_cholesky_vector",
+    "parameters_from_pseudo_inertia",
+    "upper_cholesky",
+]
+
+LOG_CHOLESKY = ("alpha", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3")
+"""Names of the log-Cholesky coordinates (Rucker & Wensing 2022)."""
 
 PARAMETERS = 10
 """Inertial parameters of a rigid body."""
@@ -149,6 +160,12 @@ def log_cholesky_factor(coordinates: Array) -> Array:
         [zero, zero, zero, one],
     ]
     return jnp.exp(alpha) * jnp.stack([jnp.stack(row) for row in rows])
+
+
+def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array:
+    """Ten linear parameters of the body with given log-Cholesky coordinates relative to a centre, shape (10,)."""
+    factor = jnp.asarray(upper_cholesky(centre.pseudo_inertia)) @ log_cholesky_factor(coordinates)
+    return parameters_from_pseudo_inertia(factor @ factor.T)
 
 
 def upper_cholesky(pseudo_inertia: Floats) -> Floats:

@@ -84,6 +84,7 @@ class Model:
                     f"effect {effect.label!r} exists only in orbit and the study has no [orbit]",
                     remedy="Give the orbit or leave the effect out",
                 )
+        object.__setattr__(self, "effects", tuple(effect.attach(self.robot) for effect in self.effects))
         labels = [effect.label for effect in self.effects]
         for label in labels:
             if labels.count(label) > 1:

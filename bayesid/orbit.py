@@ -29,6 +29,7 @@ class OrbitState(NamedTuple):
     velocity: Floats  # direction of motion
     sun: Floats
     latitude: Floats  # argument of latitude [rad]
+    north: Floats  # the Earth's north pole
 
 
 @dataclass(frozen=True)
@@ -93,6 +94,7 @@ class Orbit:
             velocity=velocity,
             sun=np.broadcast_to(self._sun(argument_of_latitude), zenith.shape),
             latitude=argument_of_latitude + angle,
+            north=np.broadcast_to(self._north(argument_of_latitude), zenith.shape),
         )
 
     def _true_anomaly(self, t: Floats, start: float) -> Floats:
@@ -113,8 +115,15 @@ class Orbit:
         return 2.0 * np.arctan(np.tan((eccentric - turns) / 2.0) / half) + turns
 
     def _sun(self, latitude: float) -> Floats:
-        if self.sun is None:
-            return np.zeros(3)
-        cos, sin = np.cos(latitude), np.sin(latitude)
-        node, along, normal = np.asarray(self.sun) / np.linalg.norm(self.sun)
-        return np.array([cos * node + sin * along, -sin * node + cos * along, normal])
+        return np.zeros(3) if self.sun is None else _from_node(np.asarray(self.sun), latitude)
+
+    def _north(self, latitude: float) -> Floats:
+        i = self.inclination
+        return np.zeros(3) if i is None else _from_node(np.array([0.0, np.sin(i), np.cos(i)]), latitude)
+
+
+def _from_node(vector: Floats, latitude: float) -> Floats:
+    """Turn a direction from axes (ascending node, along-orbit, normal) to orbit axes, as a unit vector."""
+    cos, sin = np.cos(latitude), np.sin(latitude)
+    node, along, normal = vector / np.linalg.norm(vector)
+    return np.array([cos * node + sin * along, -sin * node + cos * along, normal])

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from numpy.typing import NDArray
 
 from bayesid import whitening
 from bayesid.arrays import Floats
-from bayesid.dynamics import Grid, Start, quaternion_product, simulate
-from bayesid.effects.base import Readings
+from bayesid.dynamics import Grid, Start, quaternion_product, simulate, trace
+from bayesid.effects.base import Moment, Readings
 from bayesid.errors import InputError
-from bayesid.grid import Actions, build_grid, pad_grids
+from bayesid.grid import Actions, build_grid, pad_grids, rounded
 from bayesid.inertia import InertialParameters
 from bayesid.model import Manoeuvre, Model
 from bayesid.motion import MeasuredMotion
@@ -54,6 +56,37 @@ class Data(NamedTuple):
     quaternion: Array  # (R, T, 4)
     weights: Array  # (R, O, C, width, C)
     start: Array  # (R, O)
+
+
+class Push(NamedTuple):
+    """A change of the unknowns and of what acts on the robot, from outside the model; leading axis R but for ``z``.
+
+    z (size,); rows of the kinematic tables (R, S, 28) and (R, T, 28); wrench on the base (R, S, 6) and (R, T, 6); what
+    the sensors read (R, T, C), sensor axes; S instants of the integration, T samples.
+    """
+
+    z: Array | Floats
+    stage_rows: Array | Floats
+    sample_rows: Array | Floats
+    stage_wrench: Array | Floats
+    sample_wrench: Array | Floats
+    reading: Array | Floats
+
+
+def pushed(data: Data, push: Push) -> Data:
+    """Return the data with a push added to what is known."""
+    stage, sample = data.grid.stage, data.grid.sample
+    grid = data.grid._replace(
+        stage=stage._replace(
+            known=stage.known + push.stage_rows,
+            environment=stage.environment._replace(wrench=stage.environment.wrench + push.stage_wrench),
+        ),
+        sample=sample._replace(
+            known=sample.known + push.sample_rows,
+            environment=sample.environment._replace(wrench=sample.environment.wrench + push.sample_wrench),
+        ),
+    )
+    return data._replace(grid=grid, measured=data.measured - push.reading)
 
 
 class Predictions(NamedTuple):
@@ -96,6 +129,7 @@ class Posterior:
         self.model, self.manoeuvres, self.flat_prior = model, tuple(manoeuvres), flat_prior
         self._samples = [_Samples(model, manoeuvre) for manoeuvre in manoeuvres]
         self._built: dict[float, list[Grid]] = {}
+        self._left_out: list[NDArray[np.bool_]] = []
         self.unknowns = Unknowns(
             bodies=model.priors,
             effects=model.effects,
@@ -116,6 +150,39 @@ class Posterior:
         new.whitenings = self._whiten(z, [old.window for old in self.whitenings])
         new.data = new._stack_noise(self.data)
         return new
+
+    def with_sensors(self, sensors: Sequence[Sensor], z: Floats) -> Posterior:
+        """Return the posterior with other noise of the same sensors, the encoder noise carried through at ``z``."""
+        new = object.__new__(Posterior)
+        new.__dict__.update({key: value for key, value in self.__dict__.items() if key != "data"})
+        new.model = replace(self.model, sensors=tuple(sensors))
+        new._samples = [samples.with_sensors(sensors) for samples in self._samples]
+        coloured = any(sensor.coloured is not None for sensor in sensors)
+        new.whitenings = new._whiten(z, [None if coloured else old.window for old in self.whitenings])
+        new.data = new._stack_noise(self.data)
+        return new
+
+    def without(self, left_out: Sequence[NDArray[np.bool_]]) -> Posterior:
+        """Return the posterior with some whitened scalars left out: per recording a mask (O, C)."""
+        new = object.__new__(Posterior)
+        new.__dict__.update({key: value for key, value in self.__dict__.items() if key != "data"})
+        new.whitenings = [item.without(mask) for item, mask in zip(self.whitenings, left_out, strict=True)]
+        new.data = new._stack_noise(self.data)
+        before = self._left_out or [np.zeros_like(mask) for mask in left_out]
+        new._left_out = [np.logical_or(mask, old) for mask, old in zip(left_out, before, strict=True)]
+        return new
+
+    def left_out(self, index: int) -> dict[Kind, Floats]:
+        """Return the times of one recording's samples that were left out (`without`), by sensor."""
+        if not self._left_out:
+            return {}
+        mask, rows = self._left_out[index], self.whitenings[index].rows
+        found = {}
+        for slot, sensor in enumerate(self.model.sensors):
+            gone = mask[:, 3 * slot : 3 * slot + 3].any(axis=1)
+            if gone.any():
+                found[sensor.kind] = self._samples[index].time[rows[gone]]
+        return found
 
     def with_manoeuvres(self, manoeuvres: Sequence[Manoeuvre]) -> Posterior:
         """Return the posterior of the same model given other manoeuvres, sharing compiled functions where they fit."""
@@ -218,6 +285,33 @@ class Posterior:
         sensor = next(sensor for sensor in self.model.sensors if sensor.kind is kind)
         return self._samples[index].sigma(sensor)
 
+    # ---- responses to what the model does not have ----
+
+    def trace(self, z: Floats, data: Data) -> tuple[Moment, Moment, Readings]:
+        """Return the motion at stages and samples and the readings, with `pushed` data; leading axes (R, S), (R, T)."""
+        return self._compiled.traced(jnp.asarray(z), data)
+
+    def residuals_of(self, z: Floats, data: Data) -> Floats:
+        """Whitened residuals with `pushed` data, shape (R, O, C)."""
+        return np.asarray(self._compiled.residuals(jnp.asarray(z), data))
+
+    def responses(self, z: Floats, data: Data, pushes: Push) -> Floats:
+        """Return derivatives of the whitened residual along many pushes (leading axis n), shape (n, R, O, C)."""
+        count = len(pushes.z)
+        padded = jax.tree.map(lambda x: np.concatenate([x, np.zeros((-count % BATCH, *x.shape[1:]))]), pushes)
+        parts = [
+            np.asarray(
+                self._compiled.responses(jnp.asarray(z), data, jax.tree.map(lambda x, i=i: x[i : i + BATCH], padded))
+            )
+            for i in range(0, count, BATCH)
+        ]
+        return np.concatenate(parts)[:count] if parts else np.zeros((0, *self.residual_shape))
+
+    @property
+    def residual_shape(self) -> tuple[int, int, int]:
+        """Shape (R, O, C) of the whitened residual."""
+        return (len(self.manoeuvres), self.data.start.shape[1], self.data.weights.shape[2])
+
     def initial_point(self) -> Floats:
         """Return the prior's centre, with initial rates from the first rate samples."""
         if self.unknowns.rate_sigma == 0.0:
@@ -255,12 +349,13 @@ class Posterior:
                 orbit=self.model.orbit,
                 latitude=manoeuvre.latitude,
                 actions=Actions.from_recording(manoeuvre.recording),
+                effects=self.model.effects,
             )
             for manoeuvre, samples in zip(self.manoeuvres, self._samples, strict=True)
         ]
 
     def _choose_step(self) -> float:
-        step, z = LONGEST_STEP, self.initial_point()
+        step, z = min([LONGEST_STEP, *(e.longest_step for e in self.model.effects)]), self.initial_point()
         while self._step_error(step, z) > STEP_TOLERANCE:
             step *= 0.5
             if step < 1e-4 * LONGEST_STEP:
@@ -304,7 +399,8 @@ class Posterior:
         ]
 
     def _stack(self, grids: list[Grid]) -> Data:
-        grid = pad_grids(grids)
+        lengths = (max(len(grid.step) for grid in grids), max(len(grid.step_of) for grid in grids))
+        grid = pad_grids(grids, *(rounded(length) for length in lengths))
         count = grid.step_of.shape[1]
         measured = np.stack([_lengthen(item.measured, count) for item in self._samples])
         quaternion = np.stack([_lengthen(item.quaternion, count) for item in self._samples])
@@ -312,7 +408,7 @@ class Posterior:
         return self._stack_noise(bare)
 
     def _stack_noise(self, data: Data) -> Data:
-        outputs = max(len(item.start) for item in self.whitenings)
+        outputs = rounded(max(len(item.start) for item in self.whitenings))
         width = max(item.weights.shape[2] for item in self.whitenings)
         channels = self.whitenings[0].weights.shape[1]
         weights = np.zeros((len(self.whitenings), outputs, channels, width, channels))
@@ -344,10 +440,12 @@ class _Compiled:
         turn = {sensor.kind: jnp.asarray(sensor.rotation) for sensor in model.sensors}
         kinds = [sensor.kind for sensor in model.sensors]
 
-        def one(grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Readings:
+        def start(attitude: Array, rate: Array, tilt: Array) -> Start:
             small = jnp.concatenate([0.5 * tilt, jnp.ones(1)])
-            start = Start(quaternion_product(attitude, small / jnp.linalg.norm(small)), rate)
-            readings = simulate(grid, inertial, start, model.effects, effects, point)
+            return Start(quaternion_product(attitude, small / jnp.linalg.norm(small)), rate)
+
+        def one(grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Readings:
+            readings = simulate(grid, inertial, start(attitude, rate, tilt), model.effects, effects, point)
             readings = readings._replace(
                 rate=readings.rate @ turn.get(Kind.RATE, jnp.eye(3)),
                 accel=readings.accel @ turn.get(Kind.ACCEL, jnp.eye(3)),
@@ -379,6 +477,26 @@ class _Compiled:
         def chi2(z: Array, data: Data) -> Array:
             return jnp.sum(residuals(z, data) ** 2, axis=(1, 2))
 
+        def traced(z: Array, data: Data) -> tuple[Moment, Moment, Readings]:
+            values = unknowns.values(z)
+            axes = tuple(0 if effect.per_recording else None for effect in model.effects)
+
+            def motion(grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Any:
+                return trace(grid, inertial, start(attitude, rate, tilt), model.effects, effects)
+
+            given = (data.grid, data.attitude, values.inertial, values.rate, values.tilt, values.effects)
+            stage, sample = jax.vmap(motion, (0, 0, None, 0, 0, axes))(*given)
+            return stage, sample, simulated(z, data.grid, data.attitude)
+
+        def responses(z: Array, data: Data, along: Push) -> Array:
+            def shifted(z: Array, push: Push) -> Array:
+                return residuals(z, pushed(data, push))
+
+            at = jax.tree.map(lambda x: jnp.zeros(x.shape[1:]), along)
+            return jax.vmap(lambda push: jax.jvp(shifted, (z, at), (push.z, push))[1])(along)
+
+        self.traced = jax.jit(traced)
+        self.responses = jax.jit(responses)
         self.simulated = jax.jit(simulated)
         self.readings = jax.jit(lambda z, data: simulated(z, data.grid, data.attitude))
         self.residuals = jax.jit(residuals)
@@ -400,6 +518,11 @@ def _rotation_between(predicted: Array, measured: Array) -> Array:
 
 def _lengthen(array: Floats, length: int) -> Floats:
     return np.concatenate([array, np.repeat(array[-1:], length - len(array), axis=0)])
+
+
+def _coloured(sensor: Sensor) -> list[tuple[float, float]]:
+    noise = sensor.coloured
+    return [(0.0, 1.0)] * 3 if noise is None else [(level, noise.time) for level in noise.sigma]
 
 
 class _Samples:
@@ -436,6 +559,13 @@ class _Samples:
             else:
                 self.measured[self.rows[sensor.kind], 3 * slot : 3 * slot + 3] = values
 
+    def with_sensors(self, sensors: Sequence[Sensor]) -> _Samples:
+        """Return the samples of the same sensors with other noise."""
+        new = object.__new__(_Samples)
+        new.__dict__.update(self.__dict__)
+        new.sensors = tuple(sensors)
+        return new
+
     @property
     def first_rate(self) -> Floats:
         """Rate at the start in base axes, from the first samples."""
@@ -455,9 +585,9 @@ class _Samples:
     def noise_model(self, model: Model, robot: Robot, rate: Floats) -> NoiseModel:
         """Return the second moments of the errors, the encoder noise seen through ``robot`` turning at ``rate``."""
         channels = [
-            Channel(float(value), self.rows[sensor.kind], sensor.filter)
+            Channel(float(value), self.rows[sensor.kind], sensor.filter, coloured)
             for sensor in self.sensors
-            for value in self.sigma(sensor)
+            for value, coloured in zip(self.sigma(sensor), _coloured(sensor), strict=True)
         ]
         if not isinstance(self.motion, MeasuredMotion) or not robot.joints:
             empty = np.zeros((0, 3, len(self.time), len(channels)))

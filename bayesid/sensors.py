@@ -13,7 +13,18 @@ from scipy.spatial.transform import Rotation
 from bayesid.arrays import Floats
 from bayesid.errors import InputError
 
-__all__ = ["AngleRandomWalk", "Filter", "Kind", "Noise", "NoiseDensity", "Sensor", "StarTracker", "White"]
+__all__ = [
+    "AngleRandomWalk",
+    "Coloured",
+    "Filter",
+    "Kind",
+    "Noise",
+    "NoiseDensity",
+    "Scaled",
+    "Sensor",
+    "StarTracker",
+    "White",
+]
 
 
 ARCSEC = np.pi / 180.0 / 3600.0
@@ -86,6 +97,34 @@ class StarTracker:
 
 
 @dataclass(frozen=True)
+class Scaled:
+    """Another noise, times a factor per axis: an understated data sheet."""
+
+    noise: Noise
+    factor: tuple[float, float, float]
+
+    def sigma(self, interval: float) -> Floats:
+        """Return the scaled noise."""
+        return self.noise.sigma(interval) * np.asarray(self.factor)
+
+
+@dataclass(frozen=True)
+class Coloured:
+    """Exponentially correlated noise (Ornstein-Uhlenbeck) beside the white one.
+
+    Parameters
+    ----------
+    sigma : (3,)
+        Standard deviation per axis, in the sensor's unit.
+    time : float
+        Correlation time [s].
+    """
+
+    sigma: tuple[float, float, float]
+    time: float
+
+
+@dataclass(frozen=True)
 class Filter:
     """Zero-phase low-pass and decimation, applied alike to measurement and prediction.
 
@@ -129,6 +168,8 @@ class Sensor:
     position : (3,) array_like
         Mounting point of an accelerometer in the base [m].
     filter : Filter
+    coloured : Coloured, optional
+        Correlated noise beside the white one.
     """
 
     kind: Kind
@@ -136,6 +177,7 @@ class Sensor:
     mounting: ArrayLike = (0.0, 0.0, 0.0, 1.0)
     position: ArrayLike = (0.0, 0.0, 0.0)
     filter: Filter = field(default_factory=Filter)
+    coloured: Coloured | None = None
 
     @property
     def rotation(self) -> Floats:

@@ -9,7 +9,7 @@ import arviz as az
 import numpy as np
 
 from bayesid.arrays import Floats
-from bayesid.inference.identification import BODY_QUANTITIES, Identification, bodies_of
+from bayesid.inference.identification import BODY_QUANTITIES, Identification, bodies_of, reported_effect
 from bayesid.sensors import Kind
 
 __all__ = ["to_arviz", "write_netcdf"]
@@ -87,10 +87,11 @@ def _posterior_group(
             units[f"{name}.{key}"] = unit
     values = result.posterior.values_of(flat)
     for effect, parameters in zip(result.posterior.model.effects, values.effects, strict=True):
-        for column, parameter in enumerate(effect.parameters):
-            name = f"{effect.label}.{parameter.name}"
-            group[name] = np.asarray(parameters)[..., column].reshape(chains, draws, *parameters.shape[1:-1])
-            units[name] = parameter.unit
+        reported = reported_effect(effect, np.asarray(parameters)) if effect.parameters else np.zeros((0, 0))
+        for column, (key, unit) in enumerate(effect.quantities):
+            name = f"{effect.label}.{key}"
+            group[name] = reported[..., column].reshape(chains, draws, *reported.shape[1:-1])
+            units[name] = unit
             if effect.per_recording:
                 dims[name] = ["recording"]
     group["initial-rate"] = np.asarray(values.rate).reshape(chains, draws, -1, 3)

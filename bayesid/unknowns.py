@@ -17,11 +17,15 @@ from jax import Array
 from bayesid.arrays import Floats
 from bayesid.effects.base import Effect
 from bayesid.errors import InputError
-from bayesid.inertia import InertialParameters, log_cholesky_factor, parameters_from_pseudo_inertia, upper_cholesky
+from bayesid.inertia import (
+    LOG_CHOLESKY,
+    InertialParameters,
+    log_cholesky_factor,
+    log_cholesky_vector,
+    upper_cholesky,
+)
 
 __all__ = ["BodyPrior", "Unknowns", "Values", "draw_inertial"]
-
-LOG_CHOLESKY = ("alpha", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3")
 
 
 @dataclass(frozen=True)
@@ -140,10 +144,9 @@ class Unknowns:
         effects = []
         for effect in self.effects:
             count = len(effect.parameters)
-            scale = jnp.array([parameter.sigma for parameter in effect.parameters])
-            mean = jnp.array([parameter.mean for parameter in effect.parameters])
             own = take(self.recordings, count) if effect.per_recording else take(count)
-            effects.append(mean + scale * own if count else own)
+            columns = [parameter.value(own[..., k]) for k, parameter in enumerate(effect.parameters)]
+            effects.append(jnp.stack(columns, axis=-1) if count else own)
         return Values(jnp.concatenate(inertial) if inertial else jnp.zeros(0), rate, tilt, tuple(effects))
 
     def to_linear(self, z: Array) -> Array:
@@ -180,8 +183,7 @@ class Unknowns:
 
 
 def _inertial(body: BodyPrior, z: Array) -> Array:
-    factor = jnp.asarray(upper_cholesky(body.centre.pseudo_inertia)) @ log_cholesky_factor(body.spread * z)
-    return parameters_from_pseudo_inertia(factor @ factor.T)
+    return log_cholesky_vector(body.centre, body.spread * z)
 
 
 _ROW, _COLUMN = np.triu_indices(4)

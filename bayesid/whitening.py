@@ -35,11 +35,15 @@ TOLERANCE = 2e-4
 
 
 class Channel(NamedTuple):
-    """One sensor axis: its white noise, the rows of the sample grid where it was sampled, and its filter."""
+    """One sensor axis: its white noise, the rows of the sample grid where it was sampled, its filter.
+
+    ``coloured`` is the standard deviation and correlation time [s] of exponentially correlated noise beside it.
+    """
 
     sigma: float
     rows: Integers
     filter: Filter
+    coloured: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,22 @@ class Whitening(NamedTuple):
     rows: Integers  # (O,): row of the sample grid an output block belongs to
     window: int
 
+    def without(self, left_out: NDArray[np.bool_]) -> Whitening:
+        """Leave out some outputs, (O, C), and the part of the others that was predicted from their samples.
+
+        Their share of ``log_sigma`` stays: comparisons of evidence are between fits that leave out the same samples.
+        """
+        weights = self.weights.copy()
+        gone = {(int(self.rows[o]), int(c)) for o, c in zip(*np.nonzero(left_out), strict=True)}
+        for block, first in enumerate(self.start):
+            for offset in range(weights.shape[2]):
+                for channel in range(weights.shape[3]):
+                    if (int(first) + offset, channel) in gone:
+                        weights[block, :, offset, channel] = 0.0
+        weights[left_out] = 0.0
+        outputs = self.outputs & ~left_out
+        return self._replace(weights=weights, outputs=outputs, samples=int(outputs.sum()))
+
 
 def apply(weights: Array, start: Array, residual: Array) -> Array:
     """Whiten a residual (T, C), padded with at least one window of zeros; returns (O, C)."""
@@ -95,7 +115,7 @@ def build(noise: NoiseModel, window: int | None = None) -> Whitening:
 
 
 def _shortest(noise: NoiseModel, outputs: list[tuple[int, list[_Output]]]) -> Whitening:
-    available = noise.joint_covariance.shape[1] - 1
+    available = max(WINDOWS) if _is_coloured(noise) else noise.joint_covariance.shape[1] - 1
     best = _whiten(noise, outputs, 0)
     for window in WINDOWS[1:]:
         if window > available:
@@ -153,12 +173,14 @@ def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: 
     width = max(spans[number][1] - starts[number] + 1 for number in range(len(blocks)))
     weights = np.zeros((len(blocks), channels, width, channels))
     present = np.zeros((len(blocks), channels), dtype=bool)
-    covariance = _Band(noise)
+    covariance, coloured = _Band(noise), _is_coloured(noise)
     log_sigma = 0.0
     for number, (_, group) in enumerate(blocks):
         start, stop = starts[number], max(spans[k][1] for k in range(max(0, number - window), number + 1)) + 1
         local = [output for k in range(max(0, number - window), number + 1) for output in blocks[k][1]]
         raw = covariance.between(start, stop) + np.diag(np.tile(sigma**2, stop - start))
+        if coloured:
+            raw = raw + _correlated(noise, start, stop)
         combine = _combination(local, start, stop, channels)
         factor = np.linalg.cholesky(combine @ raw @ combine.T)
         unit = np.eye(len(local))[:, -len(group) :]
@@ -178,6 +200,22 @@ def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: 
         np.array([row for row, _ in blocks]),
         window,
     )
+
+
+def _is_coloured(noise: NoiseModel) -> bool:
+    return any(channel.coloured[0] > 0.0 for channel in noise.channels)
+
+
+def _correlated(noise: NoiseModel, start: int, stop: int) -> Floats:
+    """Covariance of the channels' exponentially correlated noise, rows start to stop."""
+    time = noise.time[start:stop]
+    apart = np.abs(time[:, None] - time[None, :])
+    count = len(noise.channels)
+    result = np.zeros((len(time), count, len(time), count))
+    for index, channel in enumerate(noise.channels):
+        level, memory = channel.coloured
+        result[:, index, :, index] = level**2 * np.exp(-apart / memory)
+    return result.reshape(len(time) * count, -1)
 
 
 def _combination(outputs: list[_Output], start: int, stop: int, channels: int) -> sparse.csr_array:

@@ -61,10 +61,19 @@ def moment() -> Moment:
     )
     unit = jnp.asarray([0.6, 0.0, 0.8])
     environment = Environment(
-        jnp.asarray(7.0), unit, jnp.asarray(1.2e-6), unit[::-1], unit, jnp.asarray(0.4), vector(), vector()
+        jnp.asarray(7.0),
+        unit,
+        jnp.asarray(1.2e-6),
+        unit[::-1],
+        unit,
+        jnp.asarray(0.4),
+        unit,
+        vector(),
+        vector(),
+        jnp.zeros(6),
     )
     attitude = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    return Moment(environment, body, jnp.asarray(attitude * np.linalg.det(attitude)), vector() * 0.01)
+    return Moment(environment, body, jnp.asarray(attitude * np.linalg.det(attitude)), *(vector() * 0.01,) * 3)
 
 
 def readings() -> Readings:
@@ -168,7 +177,7 @@ def test_zero_values_change_nothing(effect):
         for leaf in jax.tree.leaves(call(effect, hook, values)):
             np.testing.assert_array_equal(leaf, 0.0)
     for left, right in zip(call(effect, "read", values), readings(), strict=True):
-        np.testing.assert_array_equal(left, right)
+        np.testing.assert_allclose(left, right, rtol=1e-14, atol=1e-15)
 
 
 def test_hooks_that_are_not_overridden_do_nothing():

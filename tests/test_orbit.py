@@ -111,8 +111,9 @@ def base_moment(radius: float, quaternion: np.ndarray) -> Moment:
     still = JointState(*np.zeros((3, 1, len(robot.joints))))
     row = link_table(robot, "base_link", kinematics(robot, still))[0] @ robot.link("base_link").inertial.vector
     state = Orbit(radius).state(np.zeros(1))
-    environment = Environment(jnp.zeros(()), *(jnp.asarray(field[0]) for field in state), jnp.zeros(3), jnp.zeros(3))
-    return Moment(environment, composite(jnp.asarray(row)), rotation(jnp.asarray(quaternion)), jnp.zeros(3))
+    known = (jnp.zeros(3), jnp.zeros(3), jnp.zeros(6))
+    environment = Environment(jnp.zeros(()), *(jnp.asarray(field[0]) for field in state), *known)
+    return Moment(environment, composite(jnp.asarray(row)), rotation(jnp.asarray(quaternion)), *jnp.zeros((3, 3)))
 
 
 def reference_torque(radius: float, quaternion: np.ndarray, file) -> np.ndarray:

@@ -1,20 +1,79 @@
 """Effects a model can carry; see `bayesid.effects.base.Effect` for writing one's own."""
 
-from bayesid.effects.base import Effect, Moment, Parameter, Readings, Wrench, create, register
-from bayesid.effects.environment import GravityGradient
-from bayesid.effects.internal import WheelMomentum
-from bayesid.effects.sensor import AccelBias, RateBias
+from bayesid.effects.arm import EncoderOffset, JointFlexibility, JointLatency, LinkInertia, Payload
+from bayesid.effects.base import (
+    Effect,
+    Modes,
+    Moment,
+    Parameter,
+    Prior,
+    Quantity,
+    Readings,
+    Wrench,
+    create,
+    known_effects,
+    register,
+)
+from bayesid.effects.environment import (
+    AerodynamicDrag,
+    GravityGradient,
+    MagneticDipole,
+    RotationalDrag,
+    SolarPressure,
+    ThrusterLeak,
+)
+from bayesid.effects.internal import FlexibleAppendage, FuelSlosh, WheelMomentum
+from bayesid.effects.sensor import (
+    AccelBias,
+    AccelDrift,
+    AccelLatency,
+    AccelMisalignment,
+    AccelPosition,
+    AccelScale,
+    RateBias,
+    RateDrift,
+    RateLatency,
+    RateMisalignment,
+    RateScale,
+    SensorFault,
+)
 
 __all__ = [
     "AccelBias",
+    "AccelDrift",
+    "AccelLatency",
+    "AccelMisalignment",
+    "AccelPosition",
+    "AccelScale",
+    "AerodynamicDrag",
     "Effect",
+    "EncoderOffset",
+    "FlexibleAppendage",
+    "FuelSlosh",
     "GravityGradient",
+    "JointFlexibility",
+    "JointLatency",
+    "LinkInertia",
+    "MagneticDipole",
+    "Modes",
     "Moment",
     "Parameter",
+    "Payload",
+    "Prior",
+    "Quantity",
     "RateBias",
+    "RateDrift",
+    "RateLatency",
+    "RateMisalignment",
+    "RateScale",
     "Readings",
+    "RotationalDrag",
+    "SensorFault",
+    "SolarPressure",
+    "ThrusterLeak",
     "WheelMomentum",
     "Wrench",
     "create",
+    "known_effects",
     "register",
 ]

@@ -7,27 +7,73 @@ are its own states. Vectors are in base axes unless said otherwise.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from collections.abc import Callable, Sequence
+from enum import Enum
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
+from jax.scipy.special import erf
 
+from bayesid.arrays import Floats
 from bayesid.errors import InputError
 
-__all__ = ["Composite", "Effect", "Environment", "Moment", "Parameter", "Readings", "Wrench", "create", "register"]
+if TYPE_CHECKING:
+    from bayesid.motion import Motion
+    from bayesid.robot import Robot
+
+__all__ = [
+    "Composite",
+    "Effect",
+    "Environment",
+    "Modes",
+    "Moment",
+    "Parameter",
+    "Prior",
+    "Quantity",
+    "Readings",
+    "Wrench",
+    "create",
+    "known_effects",
+    "register",
+]
+
+
+class Prior(Enum):
+    """Shape of a parameter's prior, and what its mean and sigma then are."""
+
+    NORMAL = "normal"
+    LOG_NORMAL = "log-normal"  # mean is the median, sigma the standard deviation of the logarithm
+    UNIFORM = "uniform"  # within sigma of the mean
+
+
+class Quantity(NamedTuple):
+    """A name and a unit."""
+
+    name: str
+    unit: str
 
 
 class Parameter(NamedTuple):
-    """One parameter of an effect, with a normal prior.
+    """One parameter of an effect, with its prior.
 
-    ``sigma`` is the prior's standard deviation; ``mean`` its centre.
+    ``sigma`` is the prior's standard deviation and ``mean`` its centre; see `Prior` for other shapes.
     """
 
     name: str
     unit: str
     sigma: float
     mean: float = 0.0
+    prior: Prior = Prior.NORMAL
+
+    def value(self, z: Array) -> Array:
+        """Physical value of a coordinate with a standard-normal prior."""
+        if self.prior is Prior.LOG_NORMAL:
+            return self.mean * jnp.exp(self.sigma * z)
+        if self.prior is Prior.UNIFORM:
+            return self.mean + self.sigma * erf(z / jnp.sqrt(2.0))
+        return self.mean + self.sigma * z
 
 
 class Composite(NamedTuple):
@@ -58,21 +104,25 @@ class Environment(NamedTuple):
     velocity: Array
     sun: Array
     latitude: Array  # argument of latitude [rad]
+    north: Array  # direction of the Earth's north pole
     wheel_momentum: Array  # recorded [N m s]
     wheel_torque: Array  # its derivative
+    wrench: Array  # known force and torque about the base origin, base axes (6,)
 
 
 class Moment(NamedTuple):
     """One instant of a simulation, as an effect sees it.
 
-    ``attitude`` rotates base axes to orbit axes. ``rate`` is zero while momenta are being summed:
-    it follows from them.
+    ``attitude`` rotates base axes to orbit axes. ``rate`` is zero while momenta are being summed: it follows from
+    them. ``rate_change`` and ``acceleration`` (of the base origin, non-gravitational) are known to `Effect.field` only.
     """
 
     environment: Environment
     body: Composite
     attitude: Array
     rate: Array
+    rate_change: Array
+    acceleration: Array
 
     def to_base(self, vector: Array) -> Array:
         """Rotate a vector from orbit axes to base axes."""
@@ -84,6 +134,20 @@ class Wrench(NamedTuple):
 
     force: Array
     torque: Array
+
+
+class Modes(NamedTuple):
+    """Vibration modes of parts that move in the base, in mass-normalised (hybrid) coordinates (Likins 1970).
+
+    Mode i follows ``q'' + 2 damping omega q' + omega^2 q = -linear . a - angular . dw/dt`` with ``a`` the acceleration
+    of the base origin, and has the momentum ``linear q'`` and, about the base origin, ``angular q'``.
+    omega (n,) [rad/s], damping (n,), linear (n, 3) [sqrt(kg)], angular (n, 3) [sqrt(kg) m].
+    """
+
+    omega: Array
+    damping: Array
+    linear: Array
+    angular: Array
 
 
 class Readings(NamedTuple):
@@ -109,6 +173,8 @@ class Effect:
         Whether the effect exists only in orbit.
     states : int
         Number of inner states, zero at time 0.
+    modes_count : int
+        Number of vibration modes that `modes` returns.
     """
 
     name: ClassVar[str] = ""
@@ -117,6 +183,33 @@ class Effect:
     per_recording: ClassVar[bool] = False
     needs_orbit: ClassVar[bool] = False
     states: ClassVar[int] = 0
+    modes_count: ClassVar[int] = 0
+
+    @property
+    def longest_step(self) -> float:
+        """Longest integration step the effect allows [s]."""
+        return float("inf")
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """What is reported of the effect; by default its parameters."""
+        return [Quantity(parameter.name, parameter.unit) for parameter in self.parameters]
+
+    def report(self, values: Array) -> Array:
+        """Turn values of the parameters into those of `quantities`, shape (n,) -> (m,)."""
+        return values
+
+    def attach(self, robot: Robot) -> Self:
+        """Return the effect as it is on a robot; an `InputError` where it has no such place."""
+        return self
+
+    @property
+    def starts(self) -> Sequence[Floats]:
+        """Coordinates, with a standard-normal prior, from which a fit of the effect is started; by default zero.
+
+        Effects with an inner frequency give a range of them.
+        """
+        return [np.zeros(len(self.parameters))]
 
     @property
     def label(self) -> str:
@@ -139,6 +232,18 @@ class Effect:
         """Return what an accelerometer at ``lever`` from the centre of mass reads beyond wrench and motion [m/s2]."""
         return jnp.zeros(3)
 
+    def modes(self, values: Array) -> Modes:
+        """Return the vibration modes."""
+        raise NotImplementedError
+
+    def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
+        """Return coefficients of changes of the kinematic tables, shape (T, 28, m), see `bayesid.tables`."""
+        return np.zeros((len(time), 28, 0))
+
+    def loads(self, values: Array) -> Array:
+        """Return what multiplies the coefficients of `table`, shape (m,)."""
+        return jnp.zeros(0)
+
     def read(self, values: Array, readings: Readings) -> Readings:
         """Return what faulty sensors make of the true readings, in sensor axes."""
         return readings
@@ -159,6 +264,11 @@ def register(effect: E) -> E:
         raise InputError(f"effect {effect.__name__} has no name", remedy="Set the class attribute `name`")
     _REGISTER[effect.name] = effect
     return effect
+
+
+def known_effects() -> dict[str, Callable[..., Effect]]:
+    """Every registered effect by its name."""
+    return dict(_REGISTER)
 
 
 def create(label: str, **options: Any) -> Effect:

@@ -10,9 +10,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from bayesid.arrays import Floats
+from bayesid.effects.base import Effect
 from bayesid.inference.ensemble import Chains, Progress, sample
 from bayesid.inference.importance import Evidence, choose_chart, importance_sample
 from bayesid.inference.optimum import Optimum, maximise
@@ -88,7 +91,7 @@ class Identification:
         """Draws of every effect with parameters, (draws, n) or, per recording, (draws, R, n)."""
         values = self.posterior.values_of(self.chains.flat)
         return {
-            effect.label: np.asarray(draws)
+            effect.label: reported_effect(effect, np.asarray(draws))
             for effect, draws in zip(self.posterior.model.effects, values.effects, strict=True)
             if effect.parameters
         }
@@ -185,8 +188,7 @@ class Identification:
                 ]
             for label, centre, width in rows:
                 result[label] = {
-                    parameter.name: quantity(centre[k], width[k], parameter.unit)
-                    for k, parameter in enumerate(effect.parameters)
+                    key: quantity(centre[k], width[k], unit) for k, (key, unit) in enumerate(effect.quantities)
                 }
         return result
 
@@ -195,6 +197,7 @@ def identify(
     posterior: Posterior,
     seed: int = 0,
     *,
+    start: Floats | None = None,
     effective_samples: float = 4000.0,
     max_steps: int = 5000,
     file: Path | None = None,
@@ -206,11 +209,13 @@ def identify(
     ----------
     seed : int
         Every random number follows from it.
+    start : (n,) array, optional
+        Where the search for the mode begins; the prior's centre where left out.
     effective_samples, max_steps, file, progress
         See `bayesid.inference.sample`.
     """
     starts, weights, walkers = np.random.SeedSequence(seed).spawn(3)
-    refined, optimum = maximise(posterior, np.random.default_rng(starts))
+    refined, optimum = maximise(posterior, np.random.default_rng(starts), start)
     rng = np.random.default_rng(weights)
     chart = choose_chart(refined, optimum, rng)
     evidence = importance_sample(chart, optimum, rng)
@@ -246,6 +251,12 @@ def reported(vectors: Floats) -> Floats:
         yz + m * y * z,
     ]
     return np.concatenate([mass, com, np.stack(tensor, axis=-1)], axis=-1)
+
+
+def reported_effect(effect: Effect, values: Floats) -> Floats:
+    """Values of an effect's parameters (..., n) to what is reported of it (..., m)."""
+    flat = jnp.asarray(values.reshape(-1, values.shape[-1]))
+    return np.asarray(jax.vmap(effect.report)(flat)).reshape(*values.shape[:-1], len(effect.quantities))
 
 
 def quantity(mean: float, sd: float, unit: str) -> dict[str, Any]:

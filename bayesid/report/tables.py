@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import jax.numpy as jnp
 import numpy as np
 
-from bayesid.inference.identification import BODY_QUANTITIES, Identification, reported
+from bayesid.arrays import Floats
+from bayesid.effects import Effect
+from bayesid.inference.identification import BODY_QUANTITIES, Identification, reported, reported_effect
 from bayesid.motion import MeasuredMotion
 from bayesid.posterior import Posterior
 from bayesid.report.fit import SensorFit
@@ -38,7 +41,7 @@ def parameter_rows(result: Identification) -> Rows:
 
 
 def effect_rows(result: Identification) -> Rows:
-    """Parameter, unit, prior, posterior and distance from zero of every effect that has parameters."""
+    """Quantity, unit, prior (central 68 %), posterior and distance from zero of every effect that has parameters."""
     rows = []
     for effect in result.posterior.model.effects:
         if not effect.parameters:
@@ -48,19 +51,28 @@ def effect_rows(result: Identification) -> Rows:
         if effect.per_recording:
             names = [manoeuvre.recording.name for manoeuvre in result.posterior.manoeuvres]
             copies = [(f"{effect.label}[{name}]", draws[:, index]) for index, name in enumerate(names)]
+        prior = prior_range(effect)
         for label, values in copies:
-            for index, parameter in enumerate(effect.parameters):
+            for index, (key, unit) in enumerate(effect.quantities):
                 mean, sd = float(values[:, index].mean()), float(values[:, index].std(ddof=1))
                 rows.append(
                     [
-                        f"{label}.{parameter.name}",
-                        format_unit(parameter.unit),
-                        f"{format_number(parameter.mean)} ± {format_number(parameter.sigma)}",
+                        f"{label}.{key}",
+                        format_unit(unit),
+                        f"{format_number(prior[0][index])} to {format_number(prior[1][index])}",
                         format_quantity(mean, sd),
                         f"{abs(mean) / sd:.1f} sd" if sd > 0.0 else "",
                     ]
                 )
     return rows
+
+
+def prior_range(effect: Effect) -> tuple[Floats, Floats]:
+    """Return the ends of the central 68 % of the prior of an effect's quantities."""
+    z = jnp.asarray(np.random.default_rng(0).normal(size=(2001, len(effect.parameters))))
+    values = np.stack([np.asarray(p.value(z[:, k])) for k, p in enumerate(effect.parameters)], axis=-1)
+    low, high = np.percentile(reported_effect(effect, values), [16.0, 84.0], axis=0)
+    return low, high
 
 
 def start_rows(result: Identification) -> Rows:

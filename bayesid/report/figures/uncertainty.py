@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
 from bayesid.arrays import Floats
-from bayesid.inference.identification import BODY_QUANTITIES, BodyDraws, Identification, bodies_of
+from bayesid.inference.identification import BODY_QUANTITIES, BodyDraws, Identification, bodies_of, reported_effect
 from bayesid.report.figures.style import COLOURS, WIDTH, styled, wide_figure
 from bayesid.report.numbers import format_number, format_quantity, format_unit
 
@@ -165,7 +165,7 @@ def widths(result: Identification, seed: int = 0) -> tuple[dict[str, float], dic
     posterior = _half_ranges(result.bodies)
     for effect, draws in zip(result.posterior.model.effects, values.effects, strict=True):
         if effect.parameters:
-            prior |= _effect_ranges(result, effect.label, np.asarray(draws))
+            prior |= _effect_ranges(result, effect.label, reported_effect(effect, np.asarray(draws)))
             posterior |= _effect_ranges(result, effect.label, result.effects[effect.label])
     return prior, posterior
 
@@ -183,7 +183,7 @@ def _effect_ranges(result: Identification, label: str, draws: Floats) -> dict[st
     copies = (
         [f"{label}[{item.recording.name}]" for item in result.posterior.manoeuvres] if effect.per_recording else [label]
     )
-    names = [f"{copy}.{parameter.name}" for copy in copies for parameter in effect.parameters]
+    names = [f"{copy}.{key}" for copy in copies for key, _ in effect.quantities]
     return dict(zip(names, _half_range(draws.reshape(len(draws), -1)), strict=True))
 
 
