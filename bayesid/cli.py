@@ -1,4 +1,4 @@
-"""The command line: ``bayesid check|identify|simulate STUDY.toml --output DIR`` and ``bayesid demo --output DIR``."""
+"""The command line: ``bayesid check|identify|diagnose|simulate STUDY.toml --output DIR``, ``bayesid demo``."""
 
 from __future__ import annotations
 
@@ -48,6 +48,24 @@ def identify(study: StudyFile, output: Output, seed: Seed = 0, samples: Samples 
 
     with _reported(), _progress() as show:
         for line in run_identify(study, output, seed=seed, effective_samples=samples, progress=show):
+            console.print(line)
+
+
+@app.command()
+def diagnose(
+    study: StudyFile,
+    output: Output,
+    seed: Seed = 0,
+    samples: Samples = 4000.0,
+    sample: Annotated[bool, typer.Option(help="Sample the extended model with emcee at the end.")] = True,
+) -> None:
+    """Show what the simulation gets wrong, name the cause, extend the model by it and measure the gain."""
+    from bayesid.commands import run_diagnose
+    from bayesid.compiled import keep_compiled
+
+    keep_compiled()
+    with _reported(), _progress() as show:
+        for line in run_diagnose(study, output, seed=seed, effective_samples=samples, sample=sample, progress=show):
             console.print(line)
 
 

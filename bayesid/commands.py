@@ -16,21 +16,23 @@ from typing import Any
 
 import numpy as np
 
-from bayesid.assemble import load_posterior
+from bayesid.assemble import load_manoeuvres, load_model, load_posterior
 from bayesid.checks import RecordingCheck, check_recording, refuse_wrong_units
 from bayesid.demo import write_demo
+from bayesid.diagnosis import diagnose, identify_extended
 from bayesid.errors import InputError
 from bayesid.inference import Identification
 from bayesid.inference import identify as identify_posterior
 from bayesid.inference.ensemble import Progress
 from bayesid.posterior import Posterior
-from bayesid.report import check_report, identification_report, simulation_report
+from bayesid.report import check_report, diagnosis_report, identification_report, simulation_report
+from bayesid.report.diagnosis import diagnosis_sentences
 from bayesid.sensors import Kind
 from bayesid.simulation import simulate_recordings
 from bayesid.storage import write_netcdf
 from bayesid.study import Study
 
-__all__ = ["run_check", "run_demo", "run_identify", "run_simulate"]
+__all__ = ["run_check", "run_demo", "run_diagnose", "run_identify", "run_simulate"]
 
 Show = Callable[[float, str], None]
 
@@ -60,6 +62,30 @@ def run_identify(file: Path, output: Path, *, seed: int, effective_samples: floa
     result = _identify(posterior, output, seed, effective_samples, progress)
     _write_identification(result, study.title, output, seed)
     yield from _summary(result)
+    yield f"Wrote {output / 'report.pdf'}."
+
+
+def run_diagnose(
+    file: Path, output: Path, *, seed: int, effective_samples: float, sample: bool, progress: Show
+) -> Iterator[str]:
+    """Write diagnosis.json, unexplained.csv, posterior.nc of the extended model and report.pdf of a study."""
+    study = Study.load(file)
+    model = load_model(study)
+    manoeuvres = load_manoeuvres(study, model.robot)
+    refuse_wrong_units(Posterior(model, manoeuvres))
+    knows = all(section.argument_of_latitude is not None for section in study.recordings)
+    result = diagnose(model, manoeuvres, seed, knows_latitude=knows, progress=progress)
+    yield from diagnosis_sentences(result)
+    identification = None
+    if sample and result.posterior.size:
+        progress(0.9, "sampling the extended model")
+        identification = identify_extended(result, seed, effective_samples=effective_samples)
+    with _complete(output) as folder:
+        _write_json(folder / "diagnosis.json", result.to_dict(identification))
+        result.unexplained.write(folder / "unexplained.csv")
+        if identification is not None:
+            write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
+        diagnosis_report(result, identification, study.title, folder / "report.pdf")
     yield f"Wrote {output / 'report.pdf'}."
 
 

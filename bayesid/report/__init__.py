@@ -1,9 +1,17 @@
 """Reports as PDF."""
 
 from bayesid.report.check import check_report
+from bayesid.report.diagnosis import diagnosis_report
 from bayesid.report.document import Document
 from bayesid.report.identification import identification_report
 from bayesid.report.numbers import format_quantity
 from bayesid.report.simulation import simulation_report
 
-__all__ = ["Document", "check_report", "format_quantity", "identification_report", "simulation_report"]
+__all__ = [
+    "Document",
+    "check_report",
+    "diagnosis_report",
+    "format_quantity",
+    "identification_report",
+    "simulation_report",
+]

@@ -1,17 +1,29 @@
 """Figures of reports. Every function returns a new matplotlib Figure; none touches pyplot."""
 
 from bayesid.report.figures.agreement import measured_against_simulated, residual_spectrum
+from bayesid.report.figures.diagnosis import (
+    candidate_strengths,
+    residual_histories,
+    residual_spectra,
+    wrench_histories,
+    wrench_spectrum,
+)
 from bayesid.report.figures.robot import manoeuvre, robot_pose
 from bayesid.report.figures.sampler import convergence
 from bayesid.report.figures.uncertainty import corner, correlations, prior_to_posterior
 
 __all__ = [
+    "candidate_strengths",
     "convergence",
     "corner",
     "correlations",
     "manoeuvre",
     "measured_against_simulated",
     "prior_to_posterior",
+    "residual_histories",
+    "residual_spectra",
     "residual_spectrum",
     "robot_pose",
+    "wrench_histories",
+    "wrench_spectrum",
 ]

@@ -1,0 +1,289 @@
+"""Fits of any set of effects through one compiled simulation.
+
+The simulation of the present model is compiled once. Effects that it lacks act on it as pushes (`drive`), evaluated
+along the motion of the last fit; a few iterations make motion and pushes agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.linalg as sla
+
+from bayesid.arrays import Floats
+from bayesid.diagnosis.drive import (
+    Situation,
+    Table,
+    coordinates_shape,
+    drive,
+    linear_drive,
+    physical,
+    situation_of,
+    tables_of,
+)
+from bayesid.effects.base import Effect
+from bayesid.posterior import Data, Posterior, Push, pushed
+
+__all__ = ["Engine", "Fit"]
+
+ITERATIONS = 25
+CLOSE = 0.02
+"""Change of the cost at which a fit has converged."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A mode of the posterior with some effects added.
+
+    Attributes
+    ----------
+    posterior : Posterior
+        Whose noise whitened the residual.
+    effects : tuple of Effect
+    coordinates : tuple of arrays
+        Of each effect, prior standard deviations.
+    z : (size,) array
+        The model's own unknowns.
+    residual : (N,) array
+        Whitened, all recordings.
+    own : (N, n) array
+        Derivatives of the residual in the model's free unknowns.
+    added : tuple of (N, m) arrays
+        And in each effect's coordinates.
+    cost : float
+        Half of chi-square and squared coordinates.
+    situation : Situation
+    """
+
+    posterior: Posterior
+    effects: tuple[Effect, ...]
+    coordinates: tuple[Floats, ...]
+    z: Floats
+    residual: Floats
+    own: Floats
+    added: tuple[Floats, ...]
+    cost: float
+    situation: Situation
+    converged: bool
+
+    @property
+    def chi2(self) -> float:
+        """Chi-square of the data."""
+        return float(self.residual @ self.residual)
+
+    @cached_property
+    def known(self) -> Floats:
+        """Every fitted column, (N, n + m), each with a unit prior."""
+        return np.concatenate([self.own, *self.added], axis=1)
+
+    @cached_property
+    def hessian(self) -> tuple[Floats, bool]:
+        """Cholesky factor of the Gauss-Newton Hessian of all that is fitted."""
+        return sla.cho_factor(self.known.T @ self.known + np.eye(self.known.shape[1]))
+
+    @property
+    def covariance(self) -> Floats:
+        """Of all that is fitted, in the order of `known`."""
+        return sla.cho_solve(self.hessian, np.eye(self.known.shape[1]))
+
+    @property
+    def log_evidence(self) -> float:
+        """Laplace approximation of the log evidence."""
+        half_logdet = float(np.log(np.diag(self.hessian[0])).sum())
+        return -self.cost - half_logdet + float(self.posterior.log_normalisation.sum())
+
+    def project(self, columns: Floats) -> Floats:
+        """Inner products of columns after all that is fitted has taken its share, shape (n, n)."""
+        cross = self.known.T @ columns
+        return columns.T @ columns - cross.T @ sla.cho_solve(self.hessian, cross)
+
+    def values(self, index: int) -> Floats:
+        """Physical values of one effect's parameters."""
+        effect = self.effects[index]
+        shape = coordinates_shape(effect, len(self.posterior.manoeuvres))
+        return np.asarray(physical(effect, jnp.asarray(self.coordinates[index]).reshape(shape)))
+
+
+class Engine:
+    """Fits and responses for one model and its recordings.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        The present model, with initial rates free.
+    frozen : iterable of int
+        Coordinates of the model that stay at zero: initial rates that the study takes to be zero.
+    """
+
+    def __init__(self, posterior: Posterior, frozen: Iterable[int] = ()) -> None:
+        self.posterior = posterior
+        self.frozen = np.array(sorted(frozen), dtype=int)
+        self._tables: dict[str, Table] = {}
+
+    def with_posterior(self, posterior: Posterior) -> Engine:
+        """Return an engine for the same data under another noise; tables are shared."""
+        new = Engine(posterior, self.frozen)
+        new._tables = self._tables
+        return new
+
+    @property
+    def free(self) -> Floats:
+        """Indices of the model's free coordinates."""
+        return np.setdiff1d(np.arange(self.posterior.size), self.frozen)
+
+    def released(self) -> Engine:
+        """Return the engine with nothing frozen."""
+        new = Engine(self.posterior)
+        new._tables = self._tables
+        return new
+
+    def start(self) -> Floats:
+        """Return the model's starting point."""
+        z = self.posterior.initial_point()
+        z[self.frozen] = 0.0
+        return z
+
+    def fit(
+        self,
+        effects: Sequence[Effect] = (),
+        coordinates: Sequence[Floats] | None = None,
+        z: Floats | None = None,
+        situation: Situation | None = None,
+        iterations: int = ITERATIONS,
+    ) -> Fit:
+        """Fit the model with effects added (Levenberg-Marquardt).
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+        coordinates : sequence of arrays, optional
+            To start from; by default the first of each effect's `Effect.starts`.
+        z : (size,) array, optional
+            To start from.
+        situation : Situation, optional
+            Of an earlier fit nearby.
+        """
+        z = self.start() if z is None else np.array(z)
+        chosen = [np.array(effect.starts[0]) for effect in effects] if coordinates is None else list(coordinates)
+        chosen = [
+            np.broadcast_to(c, coordinates_shape(e, len(self.posterior.manoeuvres))).ravel()
+            if np.ndim(c) == 1 and e.per_recording and len(c) == len(e.parameters)
+            else np.ravel(c)
+            for c, e in zip(chosen, effects, strict=True)
+        ]
+        situation = self.situation(z, ()) if situation is None else situation
+        sizes = [len(c) for c in chosen]
+        ends = np.cumsum([len(self.free), *sizes])
+        damping, cost, converged = 1e-3, np.inf, False
+        own: Floats = np.zeros((0, 0))
+        added: list[Floats] = []
+        residual: Floats
+        for _ in range(iterations):
+            pushes = self._pushes(effects, chosen, situation)
+            data = self._pushed(pushes)
+            residual = self.posterior.residuals_of(z, data).ravel()
+            here = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in chosen))
+            own = self.own_columns(z, data)
+            added = [
+                self.columns(effect, c, situation, z, data) if len(c) else np.zeros((len(residual), 0))
+                for effect, c in zip(effects, chosen, strict=True)
+            ]
+            jacobian = np.concatenate([own, *added], axis=1)
+            parameters = np.concatenate([z[self.free], *chosen])
+            hessian = jacobian.T @ jacobian + np.eye(len(parameters))
+            gradient = jacobian.T @ residual + parameters
+            taken = False
+            for _ in range(8):
+                step = -sla.solve(hessian + damping * np.diag(np.diag(hessian)), gradient, assume_a="pos")
+                trial = parameters + step
+                new_z = z.copy()
+                new_z[self.free] = trial[: ends[0]]
+                new = [trial[a:b] for a, b in pairwise(ends)]
+                with np.errstate(all="ignore"):
+                    r = self.posterior.residuals_of(new_z, self._pushed(self._pushes(effects, new, situation))).ravel()
+                    there = 0.5 * float(r @ r + new_z @ new_z + sum(c @ c for c in new))
+                if np.isfinite(there) and there <= here + 1e-9 * abs(here):
+                    taken = True
+                    break
+                damping = max(damping, 1e-6) * 10.0
+            if not taken:
+                converged, cost = True, here
+                break
+            z, chosen, damping = new_z, new, damping * 0.1
+            situation = self.situation(z, self._pushes(effects, chosen, situation, vibrations=False))
+            if abs(cost - there) < CLOSE and here - there < CLOSE:
+                converged, cost = True, there
+                break
+            cost = there
+        else:
+            converged = False
+        data = self._pushed(self._pushes(effects, chosen, situation))
+        residual = self.posterior.residuals_of(z, data).ravel()
+        cost = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in chosen))
+        return Fit(
+            self.posterior, tuple(effects), tuple(chosen), z, residual, own, tuple(added), cost, situation, converged
+        )
+
+    def situation(self, z: Floats, pushes: Sequence[Push]) -> Situation:
+        """Return the motion with the given pushes."""
+        return situation_of(self.posterior, *self.posterior.trace(z, self._pushed(pushes)))
+
+    def own_columns(self, z: Floats, data: Data) -> Floats:
+        """Return derivatives of the residual in the model's free coordinates, (N, n)."""
+        free = self.free
+        unit = np.zeros((len(free), self.posterior.size))
+        unit[np.arange(len(free)), free] = 1.0
+        return self.posterior.responses(z, data, self.push(len(free), z=unit)).reshape(len(free), -1).T
+
+    def columns(self, effect: Effect, coordinates: Floats, situation: Situation, z: Floats, data: Data) -> Floats:
+        """Return derivatives of the residual in an effect's coordinates, (N, n)."""
+        pushes = linear_drive(effect, coordinates, situation, self._table(effect))
+        return self.respond(pushes, z, data)
+
+    def respond(self, pushes: Push, z: Floats, data: Data) -> Floats:
+        """Return derivatives of the residual along pushes with leading axis n, (N, n)."""
+        return self.posterior.responses(z, data, pushes).reshape(len(pushes.z), -1).T
+
+    def push(self, count: int, **parts: Floats) -> Push:
+        """Return ``count`` pushes with the named parts, the others zero."""
+        empty = Push(
+            np.zeros((count, self.posterior.size)), *(np.zeros((count, *shape)) for shape in self._push_shapes())
+        )
+        return empty._replace(**parts)
+
+    def data_of(self, fit: Fit) -> Data:
+        """Return the data with a fit's effects pushed."""
+        return self._pushed(self._pushes(fit.effects, fit.coordinates, fit.situation))
+
+    def _pushes(
+        self, effects: Sequence[Effect], coordinates: Sequence[Floats], situation: Situation, vibrations: bool = True
+    ) -> list[Push]:
+        return [
+            drive(effect, c, situation, self._table(effect))
+            for effect, c in zip(effects, coordinates, strict=True)
+            if vibrations or not effect.modes_count
+        ]
+
+    def _pushed(self, pushes: Sequence[Push]) -> Data:
+        data = self.posterior.data
+        if not pushes:
+            return data
+        return pushed(data, jax.tree.map(lambda *parts: jnp.asarray(sum(parts)), *pushes))
+
+    def _push_shapes(self) -> list[tuple[int, ...]]:
+        grid, data = self.posterior.data.grid, self.posterior.data
+        stage, sample = grid.stage.known.shape, grid.sample.known.shape
+        return [stage, sample, (*stage[:2], 6), (*sample[:2], 6), data.measured.shape]
+
+    def _table(self, effect: Effect) -> Table | None:
+        if not effect.uses("table"):
+            return None
+        if effect.label not in self._tables:
+            self._tables[effect.label] = tables_of(effect, self.posterior)
+        return self._tables[effect.label]

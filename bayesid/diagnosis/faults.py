@@ -1,0 +1,176 @@
+"""Noise faults as extensions of a model: their size from the residual, and the posterior that has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from bayesid.arrays import Floats
+from bayesid.diagnosis.engine import Fit
+from bayesid.diagnosis.noise import lattice, leverage
+from bayesid.effects.base import Quantity
+from bayesid.posterior import Posterior
+from bayesid.sensors import Coloured, Kind, Scaled, Sensor
+
+__all__ = ["SUMMARIES", "NoiseFault", "noise_fault"]
+
+OUTLYING = 4.5
+"""Whitened residual from which a sample counts as an outlier."""
+
+LONGEST = 0.1
+"""Longest correlation time of coloured noise, in lengths of a recording; beyond it is drift."""
+
+SUMMARIES = {
+    "noise": "The sensor is noisier than its data sheet: every sample's error is larger by one factor.",
+    "coloured-noise": "The sensor's error at one sample resembles that at the next: it wanders beside its white noise.",
+    "outliers": "Some samples are far off, more than noise allows: lost or garbled readings.",
+    "quantisation": "The sensor reports multiples of a coarse step.",
+}
+
+
+@dataclass(frozen=True)
+class NoiseFault:
+    """A fault of a sensor's noise, with its size estimated from a residual.
+
+    Attributes
+    ----------
+    label : str
+        Name of the catalogue: ``rate-noise``, ``outliers:accel``.
+    quantities : tuple of Quantity
+    mean, sd : arrays
+        Of the quantities.
+    posterior : Posterior
+        With the fault in its noise.
+    """
+
+    label: str
+    quantities: tuple[Quantity, ...]
+    mean: Floats
+    sd: Floats
+    posterior: Posterior
+
+    @property
+    def summary(self) -> str:
+        """What it is, for reports."""
+        return next(text for key, text in SUMMARIES.items() if key in self.label)
+
+
+def noise_fault(label: str, fit: Fit) -> NoiseFault:
+    """Estimate a noise fault from the residual of a fit and put it into the fit's posterior."""
+    name, _, place = label.partition(":")
+    if name == "coloured-noise":
+        return _coloured(label, Kind(place), fit)
+    if name == "outliers":
+        return _outliers(label, Kind(place), fit)
+    if name == "quantisation":
+        return _quantisation(label, Kind(place), fit)
+    return _understated(label, Kind(name.removesuffix("-noise")), fit)
+
+
+def _understated(label: str, kind: Kind, fit: Fit) -> NoiseFault:
+    slot = _slot(fit.posterior, kind)
+    whole, taken = _shaped(fit)
+    padded = _present(fit, slot)
+    energy = float((whole[..., slot][padded] ** 2).sum())
+    degrees = float(padded.sum() - taken[..., slot][padded].sum())
+    factor = float(np.sqrt(energy / degrees))
+    posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Scaled(s.noise, (factor,) * 3)))
+    return NoiseFault(
+        label, (Quantity("factor", "1"),), np.array([factor]), np.array([factor / np.sqrt(2.0 * degrees)]), posterior
+    )
+
+
+def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
+    slot = _slot(fit.posterior, kind)
+    whole, _ = _shaped(fit)
+    powers, angles, interval = [], [], 1.0
+    for r, item in enumerate(fit.posterior.whitenings):
+        interval = float(np.median(np.diff(fit.posterior.measured(r, kind)[0])))
+        for c in range(slot.start, slot.stop):
+            own = whole[r, np.flatnonzero(item.outputs[:, c]), c]
+            spectrum = np.abs(np.fft.rfft(own)) ** 2 / len(own)
+            keep = slice(4, None)  # the slowest waves may have gone into the fit
+            powers.append(spectrum[keep])
+            angles.append(2.0 * np.pi * np.fft.rfftfreq(len(own))[keep])
+    times = [fit.posterior.measured(r, kind)[0] for r in range(len(fit.posterior.manoeuvres))]
+    longest = LONGEST * max(float(np.ptp(own)) for own in times)
+    power, angle = np.concatenate(powers), np.concatenate(angles)
+
+    def whittle(x: Floats) -> float:
+        level, rho = np.exp(2.0 * x[0]), np.exp(-interval / np.clip(np.exp(x[1]), 0.2 * interval, longest))
+        density = 1.0 + level * (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(angle) + rho**2)
+        return float((np.log(density) + power / density).sum())
+
+    starts = [np.array([a, np.log(b * interval)]) for a in (-1.0, 0.5) for b in (3.0, 12.0)]
+    best = min((minimize(whittle, start, method="Nelder-Mead") for start in starts), key=lambda found: float(found.fun))
+    x = best.x
+    curvature = np.array(
+        [
+            (whittle(x + h) - 2.0 * best.fun + whittle(x - h)) / 0.01
+            for h in (np.array([0.1, 0.0]), np.array([0.0, 0.1]))
+        ]
+    )
+    level = np.exp(x[0]) * fit.posterior.sigma(0, kind)
+    time = float(np.clip(np.exp(x[1]), 0.2 * interval, longest))
+    noise = Coloured((float(level[0]), float(level[1]), float(level[2])), time)
+    posterior = _with_sensor(fit, kind, lambda s: replace(s, coloured=noise))
+    mean = np.array([float(level.mean()), time])
+    relative = 1.0 / np.sqrt(np.maximum(curvature, 1e-6))
+    return NoiseFault(label, (Quantity("sigma", kind.unit), Quantity("time", "s")), mean, mean * relative, posterior)
+
+
+def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault:
+    slot = _slot(fit.posterior, kind)
+    whole, _ = _shaped(fit)
+    masks, count, total = [], 0, 0
+    for r, item in enumerate(fit.posterior.whitenings):
+        mask = np.zeros_like(item.outputs)
+        own = whole[r, : len(mask), slot]
+        scale = max(1.0, float(np.median(np.abs(own[item.outputs[:, slot]])) / 0.6745))
+        mask[:, slot] = item.outputs[:, slot] & (np.abs(own) > OUTLYING * scale)
+        masks.append(mask)
+        count += int(mask.sum())
+        total += int(item.outputs[:, slot].sum())
+    fraction = count / max(total, 1)
+    sd = np.sqrt(max(fraction * (1.0 - fraction), 1.0 / max(total, 1)) / max(total, 1))
+    return NoiseFault(
+        label, (Quantity("fraction", "1"),), np.array([fraction]), np.array([sd]), fit.posterior.without(masks)
+    )
+
+
+def _quantisation(label: str, kind: Kind, fit: Fit) -> NoiseFault:
+    step = lattice(fit.posterior, kind)
+    if step is None:
+        raise ValueError(f"{label}: the values lie on no lattice")
+    sigma = fit.posterior.sigma(0, kind)
+    factor = np.sqrt(1.0 + step**2 / 12.0 / sigma**2)
+    scaled = (float(factor[0]), float(factor[1]), float(factor[2]))
+    posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Scaled(s.noise, scaled)))
+    return NoiseFault(label, (Quantity("step", kind.unit),), np.array([float(step.mean())]), np.zeros(1), posterior)
+
+
+def _with_sensor(fit: Fit, kind: Kind, change: Callable[[Sensor], Sensor]) -> Posterior:
+    sensors = [change(sensor) if sensor.kind is kind else sensor for sensor in fit.posterior.model.sensors]
+    return fit.posterior.with_sensors(sensors, fit.z)
+
+
+def _slot(posterior: Posterior, kind: Kind) -> slice:
+    index = [sensor.kind for sensor in posterior.model.sensors].index(kind)
+    return slice(3 * index, 3 * index + 3)
+
+
+def _shaped(fit: Fit) -> tuple[Floats, Floats]:
+    shape = fit.posterior.residual_shape
+    return fit.residual.reshape(shape), leverage(fit).reshape(shape)
+
+
+def _present(fit: Fit, slot: slice) -> NDArray[np.bool_]:
+    recordings, outputs, _ = fit.posterior.residual_shape
+    mask = np.zeros((recordings, outputs, 3), dtype=bool)
+    for r, item in enumerate(fit.posterior.whitenings):
+        mask[r, : len(item.outputs)] = item.outputs[:, slot]
+    return mask

@@ -1,0 +1,140 @@
+"""What an extension is worth: prediction of recordings left out, residuals, shift of the parameters, calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bayesid.arrays import Floats
+from bayesid.diagnosis.search import Hypothesis
+from bayesid.inference.identification import BODY_QUANTITIES, reported
+
+__all__ = ["BodyFigures", "Gain", "body_figures", "measure_gain"]
+
+
+@dataclass(frozen=True)
+class BodyFigures:
+    """Laplace approximation of the reported quantities of all identified bodies: names, means, standard deviations."""
+
+    names: tuple[str, ...]
+    mean: Floats
+    sd: Floats
+
+
+@dataclass(frozen=True)
+class Side:
+    """The figures of one model: before or after.
+
+    Attributes
+    ----------
+    chi2_per_sample : float
+    held_out : (R,) array or None
+        Log predictive density of each recording given the others; None with a single recording.
+    rms : dict of str to float
+        Root mean square of the residual in sigma, by sensor channel.
+    inside : float
+        Share of the whitened residual within one sigma; 0.683 if all is well.
+    bodies : BodyFigures
+    """
+
+    chi2_per_sample: float
+    held_out: Floats | None
+    rms: dict[str, float]
+    inside: float
+    bodies: BodyFigures
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Before and after an extension."""
+
+    before: Side
+    after: Side
+
+    @property
+    def shift(self) -> Floats:
+        """Shift of every reported quantity, in the standard deviations believed before."""
+        return (self.after.bodies.mean - self.before.bodies.mean) / self.before.bodies.sd
+
+
+def measure_gain(before: Hypothesis, after: Hypothesis) -> Gain:
+    """Compare two hypotheses on the same recordings."""
+    first = _side(before)
+    return Gain(first, first if after is before else _side(after))
+
+
+def _side(hypothesis: Hypothesis) -> Side:
+    fit = hypothesis.fit
+    posterior = fit.posterior
+    whole = fit.residual.reshape(posterior.residual_shape)
+    names = [f"{sensor.kind.value}.{axis}" for sensor in posterior.model.sensors for axis in "xyz"]
+    there = np.zeros(posterior.residual_shape, dtype=bool)
+    for r, item in enumerate(posterior.whitenings):
+        there[r, : len(item.outputs)] = item.outputs
+    rms = {
+        name: float(np.sqrt((whole[..., c][there[..., c]] ** 2).mean()))
+        for c, name in enumerate(names)
+        if there[..., c].any()
+    }
+    return Side(
+        fit.chi2 / posterior.samples,
+        _held_out(hypothesis) if len(posterior.manoeuvres) > 1 else None,
+        rms,
+        float((np.abs(whole[there]) < 1.0).mean()),
+        body_figures(hypothesis),
+    )
+
+
+def _held_out(hypothesis: Hypothesis) -> Floats:
+    """Log density of each recording given the others: the ratio of evidences with and without it (Laplace)."""
+    fit, engine = hypothesis.fit, hypothesis.engine
+    constant = fit.posterior.log_normalisation
+    scores = []
+    for r in range(len(fit.posterior.manoeuvres)):
+        outputs = [item.outputs for item in fit.posterior.whitenings]
+        masks = [own if i == r else np.zeros_like(own) for i, own in enumerate(outputs)]
+        without = engine.with_posterior(fit.posterior.without(masks))
+        rest = without.fit(fit.effects, fit.coordinates, z=fit.z, situation=fit.situation)
+        scores.append(_bare(hypothesis) - _bare_fit(rest.cost, rest.hessian[0]) + constant[r])
+    return np.array(scores)
+
+
+def _bare(hypothesis: Hypothesis) -> float:
+    return _bare_fit(hypothesis.fit.cost, hypothesis.fit.hessian[0])
+
+
+def _bare_fit(cost: float, factor: Floats) -> float:
+    return -cost - float(np.log(np.diag(factor)).sum())
+
+
+def body_figures(hypothesis: Hypothesis) -> BodyFigures:
+    """Means and standard deviations of what is reported of the identified bodies."""
+    fit = hypothesis.fit
+    posterior = fit.posterior
+    free = hypothesis.engine.free
+    inertial = posterior.unknowns.values
+
+    def vectors(z: jax.Array) -> jax.Array:
+        return inertial(z).inertial
+
+    point = jnp.asarray(fit.z)
+    vector = np.asarray(vectors(point)).reshape(-1, 10)
+    slope = np.asarray(jax.jacfwd(vectors)(point)).reshape(-1, 10, len(fit.z))[..., free]
+    covariance = fit.covariance[: len(free), : len(free)]
+    names, mean, sd = [], [], []
+    for index, prior in enumerate(posterior.model.priors):
+        if prior.nuisance:
+            continue
+        here = reported(vector[index])
+        step = 1e-6 * np.maximum(np.abs(vector[index]), 1e-3 * np.abs(vector[index]).max())
+        stepped = reported(vector[index] + np.diag(step))
+        turn = ((stepped - here) / step[:, None]).T
+        own = turn @ slope[index]
+        names += [f"{prior.name}.{key}" for key in BODY_QUANTITIES]
+        mean.append(here)
+        sd.append(np.sqrt(np.einsum("ij,jk,ik->i", own, covariance, own)))
+    empty = np.zeros(0)
+    return BodyFigures(tuple(names), np.concatenate(mean) if mean else empty, np.concatenate(sd) if sd else empty)

@@ -1,0 +1,248 @@
+"""The search for causes: which sets of effects and noise faults leave nothing but noise.
+
+From the present model outwards: every candidate alone, then the best of them with one more, then with two more. The
+gate is the calibrated test of what a fit leaves (`Battery`); evidence ranks what passes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from bayesid.diagnosis.battery import FALSE_ALARM, Battery, Outcome
+from bayesid.diagnosis.engine import Engine, Fit
+from bayesid.diagnosis.faults import NoiseFault, noise_fault
+from bayesid.diagnosis.starts import starts_of
+from bayesid.effects.base import Effect
+from bayesid.posterior import Posterior
+
+__all__ = ["Hypothesis", "Search"]
+
+MOST_CAUSES = 3
+BEAM = (4, 3)
+"""Hypotheses carried on from one cause to two, and from two to three."""
+
+TRIED = (12, 7, 5)
+"""Additions tried to each hypothesis, by its number of causes."""
+
+NEAR = 0.75
+"""A candidate is worth a fit if it takes this share of what the best takes: what is left is significant otherwise."""
+
+SPARE = 60.0
+"""And whatever it takes, if less than this is left."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """The present model with some causes added, fitted and tested.
+
+    Attributes
+    ----------
+    engine : Engine
+        Whose noise has the faults.
+    fit : Fit
+    faults : tuple of NoiseFault
+    outcome : Outcome
+    """
+
+    engine: Engine
+    fit: Fit
+    faults: tuple[NoiseFault, ...]
+    outcome: Outcome
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of its causes."""
+        return tuple(effect.label for effect in self.fit.effects) + tuple(fault.label for fault in self.faults)
+
+    @property
+    def log_evidence(self) -> float:
+        """Laplace approximation."""
+        return self.fit.log_evidence
+
+    @property
+    def adequate(self) -> bool:
+        """Whether it leaves nothing but noise."""
+        return self.outcome.adequate
+
+
+class Search:
+    """Fits and tests of hypotheses for one study.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        The present model, with initial rates free.
+    frozen : sequence of int
+        Coordinates held at zero (`Engine`).
+    candidates : sequence of Effect
+    seed : int
+    progress : callable, optional
+        Told a fraction and a sentence.
+    """
+
+    def __init__(
+        self,
+        posterior: Posterior,
+        frozen: Sequence[int],
+        candidates: Sequence[Effect],
+        seed: int,
+        progress: Callable[[float, str], None] | None = None,
+    ) -> None:
+        self.candidates = {effect.label: effect for effect in candidates}
+        self.seed = seed
+        self._tell = progress or (lambda fraction, text: None)
+        self._batteries: dict[tuple[str, ...], Battery] = {}
+        self._done: dict[frozenset[str], Hypothesis] = {}
+        engine = Engine(posterior, frozen)
+        self._tell(0.0, "fitting the present model")
+        first = engine.fit()
+        engine = engine.with_posterior(posterior.at(first.z))
+        fit = engine.fit(z=first.z)
+        self._tell(0.1, "testing what it leaves")
+        self.battery = self._battery_of(engine, fit, ())
+        self.base = Hypothesis(engine, fit, (), self.battery.outcome(fit))
+
+    def run(self) -> list[Hypothesis]:
+        """Return the adequate hypotheses with fewest causes, best first; empty where none is found."""
+        if self.base.adequate:
+            return [self.base]
+        beam = [self.base]
+        for count in range(1, MOST_CAUSES + 1):
+            found: list[Hypothesis] = []
+            for parent, faulty in [(parent, faulty) for faulty in (False, True) for parent in beam]:
+                if faulty and any(hypothesis.adequate for hypothesis in found):
+                    break  # noise is blamed only where no physical cause explains the residual
+                additions = self._noise_additions(parent) if faulty else self._additions(parent, TRIED[count - 1])
+                for number, label in enumerate(additions):
+                    key = frozenset((*parent.labels, label))
+                    if key in self._done:
+                        continue
+                    share = (beam.index(parent) + number / len(additions)) / len(beam)
+                    self._tell(0.1 + 0.6 * (count - 1 + share) / MOST_CAUSES, f"trying {' + '.join(sorted(key))}")
+                    hypothesis = self.extend(parent, label)
+                    if hypothesis is not None:
+                        self._done[key] = hypothesis
+                        found.append(hypothesis)
+            found.sort(key=lambda h: -h.log_evidence)
+            adequate = [hypothesis for hypothesis in found if hypothesis.adequate]
+            if adequate:
+                return adequate
+            if not found or count == MOST_CAUSES:
+                return []
+            beam = found[: BEAM[count - 1]]
+        return []
+
+    @property
+    def tried(self) -> list[Hypothesis]:
+        """Every hypothesis fitted, the present model first, then best first."""
+        return [self.base, *sorted(self._done.values(), key=lambda h: -h.log_evidence)]
+
+    def extend(self, parent: Hypothesis, label: str) -> Hypothesis | None:
+        """Fit and test a hypothesis with one more cause."""
+        if label in self.candidates:
+            return self._with_effect(parent, self.candidates[label])
+        if label == "initial-rate":
+            return self._released(parent)
+        return self._with_fault(parent, label)
+
+    def predicted(self, parent: Hypothesis) -> dict[str, float]:
+        """Chi-square that each candidate would take from a hypothesis, to first order; vibrations at their best."""
+        taken = {
+            label: item.statistic - item.degrees
+            for label, item in parent.outcome.scores.items()
+            if label in self.candidates
+        }
+        shaking = [item for name, item in parent.outcome.scores.items() if name.startswith("vibration")]
+        best = max((item.statistic - item.degrees for item in shaking), default=0.0)
+        for label, effect in self.candidates.items():
+            if effect.modes_count and label not in parent.labels and shaking:
+                taken[label] = best
+        return taken
+
+    def _additions(self, parent: Hypothesis, most: int) -> list[str]:
+        """Candidates worth adding, most promising first."""
+        taken = self.predicted(parent)
+        best = max(taken.values(), default=0.0)
+        worth = [
+            label
+            for label, gain in sorted(taken.items(), key=lambda item: -item[1])
+            if gain > 6.0 and (gain > NEAR * best or best - gain < SPARE or (parent.labels and gain > 0.3 * best))
+        ]
+        shaking = [label for label in worth if self.candidates[label].modes_count]
+        worth = [label for label in worth if label not in shaking][:most] + shaking
+        if self.base.engine.frozen.size and "initial-rate" not in parent.labels:
+            worth.insert(0, "initial-rate")
+        return worth
+
+    def _noise_additions(self, parent: Hypothesis) -> list[str]:
+        """Noise faults whose test raises the alarm."""
+        return [
+            label
+            for label, log_p in parent.outcome.log_p.items()
+            if ("noise" in label or label.startswith(("outliers", "quantisation")))
+            and self.battery.calibration.adjusted(log_p) < FALSE_ALARM
+            and label not in parent.labels
+        ]
+
+    def _with_effect(self, parent: Hypothesis, effect: Effect) -> Hypothesis | None:
+        best: Fit | None = None
+        for start in starts_of(effect, parent.engine, parent.fit, self._battery(parent)):
+            fit = parent.engine.fit(
+                (*parent.fit.effects, effect),
+                (*parent.fit.coordinates, start),
+                z=parent.fit.z,
+                situation=parent.fit.situation,
+            )
+            if best is None or fit.cost < best.cost:
+                best = fit
+        if best is None:
+            return None
+        return Hypothesis(parent.engine, best, parent.faults, self._battery(parent).outcome(best))
+
+    def _released(self, parent: Hypothesis) -> Hypothesis:
+        """Free the initial rates."""
+        engine = parent.engine.released()
+        z = parent.fit.z.copy()
+        measured = engine.posterior.initial_point()
+        z[parent.engine.frozen] = measured[parent.engine.frozen]
+        fit = engine.fit(parent.fit.effects, parent.fit.coordinates, z=z)
+        marker = NoiseFault("initial-rate", (), np.zeros(0), np.zeros(0), engine.posterior)
+        faults = (*parent.faults, marker)
+        return Hypothesis(engine, fit, faults, self._battery_of(engine, fit, ("initial-rate",)).outcome(fit))
+
+    def _with_fault(self, parent: Hypothesis, label: str) -> Hypothesis:
+        fit, engine = parent.fit, parent.engine
+        fault = noise_fault(label, fit)
+        engine = engine.with_posterior(fault.posterior)
+        fit = engine.fit(fit.effects, fit.coordinates, z=fit.z)
+        if label.startswith("outliers"):  # those that the first fit hid
+            fault = noise_fault(label, fit)
+            again = engine.with_posterior(fault.posterior)
+            fit, engine = again.fit(fit.effects, fit.coordinates, z=fit.z), again
+        faults = (*parent.faults, fault)
+        labels = tuple(sorted(item.label for item in faults))
+        return Hypothesis(engine, fit, faults, self._battery_of(engine, fit, labels).outcome(fit))
+
+    def _battery(self, hypothesis: Hypothesis) -> Battery:
+        return self._battery_of(hypothesis.engine, hypothesis.fit, tuple(sorted(f.label for f in hypothesis.faults)))
+
+    def _battery_of(self, engine: Engine, fit: Fit, faults: tuple[str, ...]) -> Battery:
+        if faults not in self._batteries:
+            self._batteries[faults] = Battery(engine, fit, list(self.candidates.values()), self.seed)
+        return self._batteries[faults]
+
+
+def log_bayes_factor(hypothesis: Hypothesis, base: Hypothesis) -> float:
+    """Logarithm of the Bayes factor against another hypothesis."""
+    return hypothesis.log_evidence - base.log_evidence
+
+
+def significance(hypothesis: Hypothesis, parent: Hypothesis) -> tuple[float, float]:
+    """Return signal-to-noise ratio and log p-value of the improvement over a hypothesis with fewer causes, refitted."""
+    improvement = 2.0 * (parent.fit.cost - hypothesis.fit.cost)
+    degrees = max(hypothesis.fit.known.shape[1] - parent.fit.known.shape[1], 1)
+    return float(np.sqrt(max(improvement - degrees, 0.0))), float(stats.chi2.logsf(max(improvement, 0.0), degrees))

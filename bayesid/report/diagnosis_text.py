@@ -1,0 +1,166 @@
+"""Sentences of a diagnosis' report: verdict, causes, gain, how it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, Status, Unexplained
+from bayesid.diagnosis.battery import FALSE_ALARM
+from bayesid.diagnosis.faults import SUMMARIES
+from bayesid.diagnosis.verdict import RIVALRY
+from bayesid.report.advice import advice, differing
+from bayesid.report.diagnosis_tables import amplitude_text, amplitudes_of, format_p, largest_shift, signed
+from bayesid.report.numbers import format_number
+
+__all__ = [
+    "advice_sentences",
+    "cause_sentences",
+    "gain_sentence",
+    "made_sentences",
+    "rest_sentence",
+    "verdict_sentence",
+    "wrench_sentence",
+]
+
+AT_MOST = 6
+"""Quantities of one cause that a sentence holds."""
+
+RELEASED = "The base was already turning when the recordings began, although the study takes it to be at rest."
+
+FIXED = {
+    Frame.BASE: "It keeps its direction in base axes: its source is on board.",
+    Frame.ORBIT: "It keeps its direction in orbit axes, which turn with the orbit: its source follows the Earth or the "
+    "flight.",
+    Frame.INERTIAL: "It keeps its direction in inertial space: its source lies outside the orbit, as the Sun does.",
+}
+
+
+def verdict_sentence(result: Diagnosis) -> str:
+    """Say what the verdict is and what it means."""
+    causes = joined(result.verdict.causes)
+    one = len(result.verdict.causes) == 1
+    return {
+        Status.ADEQUATE: "Adequate: the simulation leaves nothing but the declared noise.",
+        Status.EXPLAINED: f"Explained by {causes}: with {'it' if one else 'them'} the simulation leaves nothing but "
+        "noise, and nothing else in the catalogue does so as well.",
+        Status.AMBIGUOUS: f"Ambiguous: {causes} {'explains' if one else 'explain'} what the simulation leaves, and so "
+        f"do other causes, about as well. These recordings cannot tell them apart.",
+        Status.UNRESOLVED: "Unresolved: the simulation leaves more than noise, but too faintly to name the cause.",
+        Status.UNKNOWN: "Unknown: the simulation leaves more than noise, and no set of up to three causes of the "
+        "catalogue explains it.",
+    }[result.verdict.status]
+
+
+def rest_sentence(result: Diagnosis) -> str:
+    """Say what the tests find before and after."""
+    before, after = result.before.outcome, result.after.outcome
+    first = (
+        f"Of {len(before.log_p)} tests of what the present simulation leaves, the most significant is "
+        f"that for {before.worst} (p {_p(before.p_value)}, all tests counted)"
+    )
+    if not result.verdict.causes:
+        return f"{first}; an alarm is raised below {FALSE_ALARM:g}."
+    return (
+        f"{first}. With the named cause{'s' if len(result.verdict.causes) > 1 else ''} it is that for {after.worst} "
+        f"(p {_p(after.p_value)}); an alarm is raised below {FALSE_ALARM:g}."
+    )
+
+
+def cause_sentences(result: Diagnosis) -> Iterator[str]:
+    """Describe every named cause: what it is, how large, and under which other names it goes."""
+    best = result.verdict.best
+    for label in result.verdict.causes:
+        parts = [f"{label}. {_summary(result, label)}"]
+        amplitude = amplitudes_of(best, label)
+        if amplitude:
+            rest = "; all are in the table of the named causes" if len(amplitude) > AT_MOST else ""
+            parts.append(f"Its size: {amplitude_text(amplitude, AT_MOST)}{rest}.")
+        if others := result.verdict.equivalents.get(label):
+            parts.append(f"Other names for the same change: {joined(others)}.")
+        yield " ".join(parts)
+
+
+def _p(value: float) -> str:
+    text = format_p(value)
+    return text if text.startswith("<") else f"= {text}"
+
+
+def _summary(result: Diagnosis, label: str) -> str:
+    best = result.verdict.best
+    for effect in best.fit.effects:
+        if effect.label == label:
+            return effect.summary
+    if label == "initial-rate":
+        return RELEASED
+    return next((text for key, text in reversed(SUMMARIES.items()) if key in label), "")
+
+
+def gain_sentence(result: Diagnosis) -> str:
+    """Say in one sentence what the extension gains; of the present model, how it stands where nothing is named."""
+    before, after = result.gain.before, result.gain.after
+    if not result.verdict.causes:
+        return (
+            f"Chi-square per sample is {before.chi2_per_sample:.3f}, and {100.0 * before.inside:.1f} % of the "
+            "residuals lie within one σ, where noise alone gives 1 and 68.3 %."
+        )
+    parts = [f"chi-square per sample goes from {before.chi2_per_sample:.3f} to {after.chi2_per_sample:.3f}"]
+    if before.held_out is not None and after.held_out is not None:
+        change = float(after.held_out.sum() - before.held_out.sum())
+        verb = "rises" if change >= 0.0 else "falls"
+        parts.append(f"the log score of recordings predicted from the others {verb} by {format_number(abs(change), 4)}")
+    if shift := largest_shift(before.bodies.names, result.gain.shift):
+        parts.append(
+            f"the inertial parameter that moves most is {shift[0]}, by {signed(shift[1])} of the standard deviations "
+            "that would have been believed without it"
+        )
+    text = f"{', '.join(parts[:-1])}, and {parts[-1]}" if len(parts) > 1 else parts[0]
+    return f"What it gains: {text}."
+
+
+def wrench_sentence(wrench: Unexplained) -> str:
+    """Say how strong a reconstructed disturbance is and in which axes it keeps its direction."""
+    if wrench.signal_to_noise == 0.0:
+        return "A free torque and force on the base would explain no more than noise does."
+    where = FIXED[wrench.fixed_in] if wrench.fixed_in else "In which axes it keeps its direction is not decided."
+    strength = f"{wrench.signal_to_noise:.1f}"
+    return f"As a free torque and force on the base it has a signal-to-noise ratio of {strength}. {where}"
+
+
+def advice_sentences(result: Diagnosis, rivals: Sequence[Hypothesis]) -> Iterator[str]:
+    """Say what to fly next for each cause in which the best and its rivals differ."""
+    if not rivals:
+        return
+    leader = result.verdict.best if result.verdict.best.labels else rivals[0]
+    names: list[str] = []
+    for rival in rivals:
+        mine, theirs = differing(leader, rival)
+        names += [name for name in (*mine, *theirs) if name not in names]
+    for name in names:
+        yield f"{name}: {advice(name)}"
+
+
+def made_sentences(result: Diagnosis) -> Iterator[str]:
+    """Say how the verdict was reached."""
+    search = result.search
+    yield (
+        f"An alarm is raised where the smallest p-value of the whole family of {len(search.base.outcome.log_p)} tests "
+        f"is one that noise alone gives in less than {100.0 * FALSE_ALARM:g} % of cases. The family holds every "
+        "candidate, smooth disturbing torques and forces, vibrations, the residual of each channel, and the sensors' "
+        "noise. How small the smallest p-value comes out by chance was simulated, with all dependence between tests."
+    )
+    yield (
+        f"{len(search.candidates)} causes of the catalogue could exist here: {', '.join(search.candidates)}. Others "
+        "were not considered."
+    )
+    yield (
+        "Causes are tried one at a time, then the best in pairs, then in threes. The smallest set that leaves nothing "
+        "but noise is named; sets of one size are ranked by their evidence, from the Laplace approximation. Rivals "
+        f"are within {RIVALRY:g} of the best in the logarithm of the Bayes factor."
+    )
+    yield "Faults of noise are blamed only where no physical cause explains what is left."
+    yield f"Seed of all random numbers: {search.seed}."
+
+
+def joined(names: tuple[str, ...] | list[str]) -> str:
+    """Join names with commas and an 'and'."""
+    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)
