@@ -86,8 +86,11 @@ def simulate(
 
 @app.command()
 def demo(output: Output, seed: Seed = 0, samples: Samples = 4000.0) -> None:
-    """Simulate the ETS-VII base with sensor noise, identify it and write the report; needs no file."""
+    """Diagnose shipped recordings with a hidden cause, say what was hidden and write the report; needs no file."""
     from bayesid.commands import run_demo
+    from bayesid.compiled import keep_compiled
+
+    keep_compiled()
 
     with _reported(), _progress() as show:
         for line in run_demo(output, seed=seed, effective_samples=samples, progress=show):

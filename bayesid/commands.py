@@ -18,8 +18,8 @@ import numpy as np
 
 from bayesid.assemble import load_manoeuvres, load_model, load_posterior
 from bayesid.checks import RecordingCheck, check_recording, refuse_wrong_units
-from bayesid.demo import write_demo
-from bayesid.diagnosis import diagnose, identify_extended
+from bayesid.demo import copy_demonstration
+from bayesid.diagnosis import Diagnosis, diagnose, identify_extended
 from bayesid.errors import InputError
 from bayesid.inference import Identification
 from bayesid.inference import identify as identify_posterior
@@ -66,15 +66,27 @@ def run_identify(file: Path, output: Path, *, seed: int, effective_samples: floa
 
 
 def run_diagnose(
-    file: Path, output: Path, *, seed: int, effective_samples: float, sample: bool, progress: Show
+    file: Path,
+    output: Path,
+    *,
+    seed: int,
+    effective_samples: float,
+    sample: bool,
+    progress: Show,
+    keep: Callable[[Diagnosis], None] | None = None,
 ) -> Iterator[str]:
-    """Write diagnosis.json, unexplained.csv, posterior.nc of the extended model and report.pdf of a study."""
+    """Write diagnosis.json, unexplained.csv, posterior.nc of the extended model and report.pdf of a study.
+
+    ``keep`` is handed the result.
+    """
     study = Study.load(file)
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
     refuse_wrong_units(Posterior(model, manoeuvres))
     knows = all(section.argument_of_latitude is not None for section in study.recordings)
     result = diagnose(model, manoeuvres, seed, knows_latitude=knows, progress=progress)
+    if keep is not None:
+        keep(result)
     yield from diagnosis_sentences(result)
     identification = None
     if sample and result.posterior.size:
@@ -121,17 +133,23 @@ def run_simulate(file: Path, output: Path, *, seed: int, noise: bool) -> Iterato
 
 
 def run_demo(output: Path, *, seed: int, effective_samples: float, progress: Show) -> Iterator[str]:
-    """Simulate ETS-VII, identify its base and write the report, beside the study that was made."""
-    output.mkdir(parents=True, exist_ok=True)
-    truth = write_demo(output / "study", seed)
-    yield f"Simulated three manoeuvres of ETS-VII into {output / 'study'}."
-    study, posterior = _read(output / "study" / "study.toml")
-    result = _identify(posterior, output, seed, effective_samples, progress)
-    _write_identification(result, study.title, output, seed)
-    yield from _summary(result)
-    draws = result.bodies[posterior.model.robot.base]
-    yield f"True mass {truth.mass:.1f} kg: {(draws.mean[0] - truth.mass) / draws.sd[0]:+.1f} sd from it."
-    yield f"Wrote {output / 'report.pdf'}."
+    """Diagnose the shipped recordings, say what was hidden in them, and write the report."""
+    answer = copy_demonstration(output / "study")
+    yield f"Recordings of an independent simulator, with something hidden in them: {output / 'study'}."
+    result: list[Diagnosis] = []
+    yield from run_diagnose(
+        output / "study" / "study.toml",
+        output,
+        seed=seed,
+        effective_samples=effective_samples,
+        sample=True,
+        progress=progress,
+        keep=result.append,
+    )
+    named = result[0].verdict.causes
+    for cause, values in answer.items():
+        parts = ", ".join(f"{key} {value:.4g}" for key, value in values.items())
+        yield f"Hidden was {cause}: {parts}. {'It was found.' if cause in named else 'It was not found.'}"
 
 
 def _read(file: Path) -> tuple[Study, Posterior]:

@@ -1,7 +1,9 @@
-"""The demonstration: three manoeuvres of ETS-VII, simulated with sensor noise, written as a study."""
+"""The demonstration: recordings shipped with the package in which MuJoCo hid a cause; and ETS-VII, simulated."""
 
 from __future__ import annotations
 
+import json
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +18,7 @@ from bayesid.sensors import Kind, Sensor, White
 from bayesid.simulation import simulate_manoeuvre
 from bayesid.unknowns import BodyPrior
 
-__all__ = ["write_demo"]
+__all__ = ["copy_demonstration", "write_demo"]
 
 RATE_SIGMA, ACCEL_SIGMA, ENCODER_SIGMA = 1.0e-5, 1.0e-5, 1.0e-6
 ACCELEROMETER = (0.4, 0.3, 0.8)
@@ -60,6 +62,26 @@ RECORDING = """
 file = "{file}"
 attitude = {attitude}
 """
+
+
+def copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
+    """Copy the shipped study into a folder.
+
+    Returns
+    -------
+    dict
+        What is hidden in its recordings: effect -> key -> true value, in SI units.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    shipped = files("bayesid") / "demonstration"
+    answer: dict[str, dict[str, float]] = {}
+    for item in shipped.iterdir():
+        text = item.read_text(encoding="utf-8")
+        if item.name == "hidden.json":
+            answer = json.loads(text)
+        else:
+            (folder / item.name).write_text(text, encoding="utf-8")
+    return answer
 
 
 def write_demo(folder: Path, seed: int) -> InertialParameters:

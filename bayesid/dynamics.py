@@ -19,7 +19,7 @@ from jax import Array
 from bayesid.effects.base import Composite, Effect, Environment, Modes, Moment, Readings, Wrench
 from bayesid.tables import ENTRIES
 
-__all__ = ["Grid", "Instants", "Start", "composite", "simulate", "trace"]
+__all__ = ["Grid", "Instants", "Start", "composite", "simulate", "solve_small", "trace"]
 
 ATTITUDE, MOMENTUM, INNER = slice(0, 4), slice(4, 7), slice(7, None)
 
@@ -255,9 +255,15 @@ class _System(NamedTuple):
                 for mode, item in zip(modes, moving, strict=True)
             ]
         )
-        drive = -linear @ (acceleration + _cross(rate_change, body.com)) - central @ rate_change
+        spread = jnp.outer(rate, rate) - (rate @ rate) * jnp.eye(3)  # w x (w x r) as a matrix
+        moments = jnp.concatenate([mode.moment for mode in modes])
+        drive = (
+            -linear @ (acceleration + _cross(rate_change, body.com))
+            - central @ rate_change
+            - jnp.einsum("nij,ij->n", moments, spread)
+        )
         yielding = jnp.eye(len(linear)) - linear @ linear.T / body.mass - central @ body.inverse @ central.T
-        changes = _solve(yielding, free + drive)
+        changes = solve_small(yielding, free + drive)
         recoil = body.inverse @ (central.T @ changes)
         return moment._replace(
             rate_change=rate_change - recoil,
@@ -304,7 +310,7 @@ def _about_com(modes: Modes, com: Array) -> Array:
     return modes.angular - jnp.cross(com[None], modes.linear)
 
 
-def _solve(matrix: Array, right: Array) -> Array:
+def solve_small(matrix: Array, right: Array) -> Array:
     """Solve a small positive-definite system by elimination, written out as `_inverse` is."""
     size = len(right)
     rows = [jnp.concatenate([matrix[i], right[i : i + 1]]) for i in range(size)]

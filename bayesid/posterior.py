@@ -172,6 +172,10 @@ class Posterior:
         new._left_out = [np.logical_or(mask, old) for mask, old in zip(left_out, before, strict=True)]
         return new
 
+    def gone(self, index: int) -> NDArray[np.bool_]:
+        """Return which whitened scalars of one recording were left out (`without`), shape (O, C)."""
+        return self._left_out[index] if self._left_out else np.zeros_like(self.whitenings[index].outputs)
+
     def left_out(self, index: int) -> dict[Kind, Floats]:
         """Return the times of one recording's samples that were left out (`without`), by sensor."""
         if not self._left_out:

@@ -20,6 +20,7 @@ __all__ = [
     "Kind",
     "Noise",
     "NoiseDensity",
+    "Quantised",
     "Scaled",
     "Sensor",
     "StarTracker",
@@ -106,6 +107,18 @@ class Scaled:
     def sigma(self, interval: float) -> Floats:
         """Return the scaled noise."""
         return self.noise.sigma(interval) * np.asarray(self.factor)
+
+
+@dataclass(frozen=True)
+class Quantised:
+    """Another noise, rounded to multiples of a step per axis: rounding adds a twelfth of the step's square."""
+
+    noise: Noise
+    step: tuple[float, float, float]
+
+    def sigma(self, interval: float) -> Floats:
+        """Return the noise with that of rounding."""
+        return np.hypot(self.noise.sigma(interval), np.asarray(self.step) / np.sqrt(12.0))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ __all__ = ["candidates"]
 
 ON_LINKS = ("payload", "link-inertia")
 ON_JOINTS = ("encoder-offset", "joint-flexibility")
-LABORATORY = ("rotational-drag",)
 
 
 def candidates(model: Model, *, knows_latitude: bool = True) -> list[Effect]:
@@ -25,9 +24,9 @@ def candidates(model: Model, *, knows_latitude: bool = True) -> list[Effect]:
 
     Notes
     -----
-    Left out, because nothing could be said of them: environment effects away from orbit, the laboratory's air in
-    orbit, the Sun's pressure where no Sun is given, the magnetic field without inclination and argument of latitude,
-    faults of sensors that do not exist, changes of links that are unknown anyway.
+    Left out, because nothing could be said of them: environment effects away from orbit, the Sun's pressure where no
+    Sun is given, the magnetic field without inclination and argument of latitude, faults of sensors that do not exist,
+    changes of links that are unknown anyway.
     """
     present = {effect.label for effect in model.effects}
     kinds = {sensor.kind for sensor in model.sensors}
@@ -48,8 +47,6 @@ def candidates(model: Model, *, knows_latitude: bool = True) -> list[Effect]:
             except (InputError, TypeError):  # a user's effect that needs a place of its own cannot be guessed
                 continue
             if effect.needs_orbit and orbit is None:
-                continue
-            if name in LABORATORY and orbit is not None:
                 continue
             if isinstance(effect, SensorFault) and effect.sensor not in kinds:
                 continue

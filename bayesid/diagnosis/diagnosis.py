@@ -28,6 +28,10 @@ from bayesid.posterior import Posterior
 __all__ = ["Diagnosis", "diagnose", "extended_posterior", "identify_extended"]
 
 
+INNER = ("frequency", "damping")
+"""Quantities that are no amplitude, of which no upper limit is given."""
+
+
 @dataclass(frozen=True)
 class Diagnosis:
     """Result of `diagnose`.
@@ -154,7 +158,8 @@ def _diagnose(
     gain = measure_gain(search.base, best)
     tell(0.9, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
-    return Diagnosis(search, verdict, candidate_table(search), gain, unexplained_wrench(best, open_question))
+    unexplained = unexplained_wrench(best, open_question) if verdict.causes or open_question else verdict.disturbance
+    return Diagnosis(search, verdict, candidate_table(search), gain, unexplained)
 
 
 def extended_posterior(hypothesis: Hypothesis) -> Posterior:
@@ -224,6 +229,7 @@ def _candidate_dict(row: Candidate) -> dict[str, Any]:
         "upper_limit_95": {
             key: float(limit)
             for (key, _), limit in (zip(row.quantities, row.upper_limit, strict=False) if len(row.mean) else ())
+            if key not in INNER
         },
         "power": row.power,
         "refitted": row.refitted,

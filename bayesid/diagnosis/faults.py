@@ -14,19 +14,20 @@ from bayesid.diagnosis.engine import Fit
 from bayesid.diagnosis.noise import lattice, leverage
 from bayesid.effects.base import Quantity
 from bayesid.posterior import Posterior
-from bayesid.sensors import Coloured, Kind, Scaled, Sensor
+from bayesid.sensors import Coloured, Kind, Quantised, Scaled, Sensor
 
 __all__ = ["SUMMARIES", "NoiseFault", "noise_fault"]
 
 OUTLYING = 4.5
 """Whitened residual from which a sample counts as an outlier."""
 
-LONGEST = 0.1
+LONGEST = 0.05
 """Longest correlation time of coloured noise, in lengths of a recording; beyond it is drift."""
 
 SUMMARIES = {
     "noise": "The sensor is noisier than its data sheet: every sample's error is larger by one factor.",
     "coloured-noise": "The sensor's error at one sample resembles that at the next: it wanders beside its white noise.",
+    "initial-rate": "The base was already turning when the recording began; the model lets it start from rest.",
     "outliers": "Some samples are far off, more than noise allows: lost or garbled readings.",
     "quantisation": "The sensor reports multiples of a coarse step.",
 }
@@ -56,7 +57,8 @@ class NoiseFault:
     @property
     def summary(self) -> str:
         """What it is, for reports."""
-        return next(text for key, text in SUMMARIES.items() if key in self.label)
+        name = self.label.partition(":")[0]
+        return SUMMARIES.get(name, SUMMARIES["noise"])
 
 
 def noise_fault(label: str, fit: Fit) -> NoiseFault:
@@ -132,9 +134,10 @@ def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault:
         own = whole[r, : len(mask), slot]
         scale = max(1.0, float(np.median(np.abs(own[item.outputs[:, slot]])) / 0.6745))
         mask[:, slot] = item.outputs[:, slot] & (np.abs(own) > OUTLYING * scale)
+        mask |= fit.posterior.gone(r)
         masks.append(mask)
-        count += int(mask.sum())
-        total += int(item.outputs[:, slot].sum())
+        count += int(mask[:, slot].any(axis=1).sum())
+        total += int((item.outputs | mask)[:, slot].any(axis=1).sum())
     fraction = count / max(total, 1)
     sd = np.sqrt(max(fraction * (1.0 - fraction), 1.0 / max(total, 1)) / max(total, 1))
     return NoiseFault(
@@ -146,10 +149,8 @@ def _quantisation(label: str, kind: Kind, fit: Fit) -> NoiseFault:
     step = lattice(fit.posterior, kind)
     if step is None:
         raise ValueError(f"{label}: the values lie on no lattice")
-    sigma = fit.posterior.sigma(0, kind)
-    factor = np.sqrt(1.0 + step**2 / 12.0 / sigma**2)
-    scaled = (float(factor[0]), float(factor[1]), float(factor[2]))
-    posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Scaled(s.noise, scaled)))
+    steps = (float(step[0]), float(step[1]), float(step[2]))
+    posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Quantised(s.noise, steps)))
     return NoiseFault(label, (Quantity("step", kind.unit),), np.array([float(step.mean())]), np.zeros(1), posterior)
 
 

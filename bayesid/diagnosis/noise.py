@@ -9,12 +9,15 @@ from scipy import stats
 from bayesid.arrays import Floats
 from bayesid.diagnosis.engine import Fit
 from bayesid.posterior import Posterior
-from bayesid.sensors import Kind
+from bayesid.sensors import Kind, Quantised
 
 __all__ = ["lattice", "leverage", "noise_tests"]
 
 CORRELATION = (2.0, 6.0, 20.0)
 """Correlation times that coloured noise is looked for at, in samples."""
+
+CERTAIN = -1e3
+"""Logarithm of a p-value that stands for zero: noise never falls on a lattice."""
 
 COARSE = 0.4
 """Steps of a lattice, in sigma, below which rounding does no harm."""
@@ -47,8 +50,8 @@ def noise_tests(posterior: Posterior, fit: Fit) -> dict[str, float]:
         count = sum(len(piece) for piece in pieces)
         tail = np.log(2.0) + stats.norm.logsf(largest / scale)
         found[f"outliers:{name}"] = float(min(0.0, np.log(count) + tail))
-        if lattice(posterior, sensor.kind) is not None:
-            found[f"quantisation:{name}"] = -1e3
+        if not isinstance(sensor.noise, Quantised) and lattice(posterior, sensor.kind) is not None:
+            found[f"quantisation:{name}"] = CERTAIN
     return found
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from scipy import stats
@@ -33,6 +34,14 @@ NEAR = 0.75
 
 SPARE = 60.0
 """And whatever it takes, if less than this is left."""
+
+
+class Kind(Enum):
+    """Kinds of causes in the order in which they are tried: noise is blamed last."""
+
+    FORCE = "effect without inner motion"
+    VIBRATION = "hidden vibration"
+    NOISE = "fault of the noise"
 
 
 @dataclass(frozen=True)
@@ -113,10 +122,10 @@ class Search:
         beam = [self.base]
         for count in range(1, MOST_CAUSES + 1):
             found: list[Hypothesis] = []
-            for parent, faulty in [(parent, faulty) for faulty in (False, True) for parent in beam]:
-                if faulty and any(hypothesis.adequate for hypothesis in found):
-                    break  # noise is blamed only where no physical cause explains the residual
-                additions = self._noise_additions(parent) if faulty else self._additions(parent, TRIED[count - 1])
+            for parent, kind in [(parent, kind) for kind in Kind for parent in beam]:
+                if kind is not Kind.FORCE and any(hypothesis.adequate for hypothesis in found):
+                    break  # the simplest that explains the residual is taken
+                additions = self._additions(parent, kind, TRIED[count - 1])
                 for number, label in enumerate(additions):
                     key = frozenset((*parent.labels, label))
                     if key in self._done:
@@ -163,8 +172,21 @@ class Search:
                 taken[label] = best
         return taken
 
-    def _additions(self, parent: Hypothesis, most: int) -> list[str]:
-        """Candidates worth adding, most promising first."""
+    def _additions(self, parent: Hypothesis, kind: Kind, most: int) -> list[str]:
+        """Candidates of one kind that are worth adding, most promising first."""
+        noisy = any(fault.label != "initial-rate" for fault in parent.faults)
+        if kind is Kind.NOISE and (noisy or len(parent.labels) > 1):
+            return []  # noise explains anything if it may be combined at will
+        if kind is not Kind.NOISE and noisy and len(parent.labels) > 1:
+            return []
+        if kind is Kind.NOISE:
+            return [
+                label
+                for label, log_p in parent.outcome.log_p.items()
+                if ("noise" in label or label.startswith(("outliers", "quantisation")))
+                and self.battery.calibration.adjusted(log_p) < FALSE_ALARM
+                and label not in parent.labels
+            ]
         taken = self.predicted(parent)
         best = max(taken.values(), default=0.0)
         worth = [
@@ -172,21 +194,10 @@ class Search:
             for label, gain in sorted(taken.items(), key=lambda item: -item[1])
             if gain > 6.0 and (gain > NEAR * best or best - gain < SPARE or (parent.labels and gain > 0.3 * best))
         ]
-        shaking = [label for label in worth if self.candidates[label].modes_count]
-        worth = [label for label in worth if label not in shaking][:most] + shaking
-        if self.base.engine.frozen.size and "initial-rate" not in parent.labels:
-            worth.insert(0, "initial-rate")
-        return worth
-
-    def _noise_additions(self, parent: Hypothesis) -> list[str]:
-        """Noise faults whose test raises the alarm."""
-        return [
-            label
-            for label, log_p in parent.outcome.log_p.items()
-            if ("noise" in label or label.startswith(("outliers", "quantisation")))
-            and self.battery.calibration.adjusted(log_p) < FALSE_ALARM
-            and label not in parent.labels
-        ]
+        chosen = [label for label in worth if (self.candidates[label].modes_count > 0) == (kind is Kind.VIBRATION)]
+        if kind is Kind.FORCE and self.base.engine.frozen.size and "initial-rate" not in parent.labels:
+            chosen.insert(0, "initial-rate")
+        return chosen[:most]
 
     def _with_effect(self, parent: Hypothesis, effect: Effect) -> Hypothesis | None:
         best: Fit | None = None

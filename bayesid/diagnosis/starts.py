@@ -16,8 +16,14 @@ from bayesid.effects.internal import FlexibleAppendage, FuelSlosh
 
 __all__ = ["starts_of"]
 
-BEST = 3
+BEST = 2
 """Frequencies tried."""
+
+TANK = (0.06, 0.25)
+"""Frequencies that the fit of slosh starts from [Hz]."""
+
+SLOSHING = 5.0
+"""And its mass [kg]."""
 
 RIDGE = 1.0
 """Prior information on the entries of the coupling matrix, at its scale."""
@@ -41,8 +47,9 @@ def starts_of(effect: Effect, engine: Engine, fit: Fit, battery: Battery) -> Seq
             matrix[i, j] = matrix[j, i] = MODAL**2 * value
         if isinstance(effect, FlexibleAppendage):
             chosen.append(_appendage(effect, frequency, matrix))
-        else:
-            chosen.append(_slosh(effect, frequency, matrix))
+    if isinstance(effect, FuelSlosh):  # the fit converges from afar
+        middle = [parameter.mean for parameter in effect.parameters[3:]]
+        chosen = [_coordinates(effect.parameters, [SLOSHING, frequency, LIGHT, *middle]) for frequency in TANK]
     return chosen
 
 
@@ -51,14 +58,6 @@ def _appendage(effect: FlexibleAppendage, frequency: float, matrix: Floats) -> F
     values, vectors = np.linalg.eigh(-matrix)
     coupling = vectors[:, -1] * np.sqrt(max(values[-1], 0.1))
     return _coordinates(effect.parameters, [frequency, LIGHT, *coupling])
-
-
-def _slosh(effect: FuelSlosh, frequency: float, matrix: Floats) -> Floats:
-    """Return a point mass: its mass from the linear part, its place from the mixed part."""
-    mass = float(np.clip(-np.trace(matrix[:3, :3]) / 3.0, 1.0, 60.0))
-    mixed = -matrix[3:, :3] / mass
-    place = 0.5 * np.array([mixed[2, 1] - mixed[1, 2], mixed[0, 2] - mixed[2, 0], mixed[1, 0] - mixed[0, 1]])
-    return _coordinates(effect.parameters, [mass, frequency, LIGHT, *place])
 
 
 def _coordinates(parameters: Sequence[Parameter], values: Sequence[float]) -> Floats:

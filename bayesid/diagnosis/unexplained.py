@@ -51,6 +51,8 @@ class Unexplained:
     torque_sd, force_sd : list of (S, 3) arrays
         Base axes.
     fixed_in : Frame or None
+    log_bayes_factor : float
+        Of a free torque and force in every recording against none: what a named cause has to beat.
     """
 
     signal_to_noise: float
@@ -61,6 +63,7 @@ class Unexplained:
     torque_sd: list[Floats]
     force_sd: list[Floats]
     fixed_in: Frame | None
+    log_bayes_factor: float
 
     def write(self, file: Path) -> None:
         """Write the wrench as CSV."""
@@ -136,6 +139,7 @@ def unexplained_wrench(hypothesis: Hypothesis, name_frame: bool = True) -> Unexp
         torque_sd,
         force_sd,
         _fixed_in(hypothesis, rotations, scale) if name_frame and snr > 0.0 else None,
+        float(max(fits)),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bayesid.arrays import Floats
 from bayesid.diagnosis.search import Hypothesis, Search
+from bayesid.diagnosis.unexplained import Unexplained, unexplained_wrench
 
 __all__ = ["Status", "Verdict", "judge"]
 
@@ -49,12 +50,15 @@ class Verdict:
         Other names for the same change of the model, by cause.
     rivals : tuple of Hypothesis
         Other sets of causes that do as well.
+    disturbance : Unexplained
+        What it would take in the present model.
     """
 
     status: Status
     best: Hypothesis
     equivalents: dict[str, tuple[str, ...]]
     rivals: tuple[Hypothesis, ...]
+    disturbance: Unexplained
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -63,12 +67,18 @@ class Verdict:
 
 
 def judge(search: Search) -> Verdict:
-    """Run a search and judge what it found."""
+    """Run a search and judge what it found.
+
+    A set of causes must also be more probable than a free disturbance, or it only imitates something unknown.
+    """
     found = search.run()
+    disturbance = unexplained_wrench(search.base, name_frame=False)
     if search.base.adequate:
-        return Verdict(Status.ADEQUATE, search.base, {}, ())
+        return Verdict(Status.ADEQUATE, search.base, {}, (), disturbance)
+    free = search.base.log_evidence + disturbance.log_bayes_factor
+    found = [hypothesis for hypothesis in found if hypothesis.log_evidence > free]
     if not found:
-        return Verdict(_unnamed(search), search.base, {}, ())
+        return Verdict(_unnamed(search), search.base, {}, (), disturbance)
     best = found[0]
     same: dict[str, list[str]] = {}
     rivals: list[Hypothesis] = []
@@ -80,8 +90,8 @@ def judge(search: Search) -> Verdict:
             rivals.append(other)
     equivalents = {cause: tuple(names) for cause, names in same.items()}
     if len(rivals) > CROWD:
-        return Verdict(Status.UNRESOLVED, search.base, {}, tuple(rivals))
-    return Verdict(Status.AMBIGUOUS if rivals else Status.EXPLAINED, best, equivalents, tuple(rivals))
+        return Verdict(Status.UNRESOLVED, search.base, {}, tuple(rivals), disturbance)
+    return Verdict(Status.AMBIGUOUS if rivals else Status.EXPLAINED, best, equivalents, tuple(rivals), disturbance)
 
 
 def _contains(best: Hypothesis, other: Hypothesis, rivals: Sequence[Hypothesis], search: Search) -> bool:

@@ -15,24 +15,25 @@ from jax import Array
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from bayesid.arrays import Floats
+from bayesid.dynamics import solve_small
 from bayesid.effects.base import Effect, Moment
 from bayesid.tables import ENTRIES, WIDTH
 
 __all__ = ["Vibration"]
 
-FINE = 0.05
+FINE = 0.1
 """Integration step of the oscillators [s]."""
 
-BATCH = 16
-"""Sets of oscillators integrated together."""
+BATCHES = (1, 16)
+"""Sets of oscillators integrated together, whichever fits."""
 
 
 class Vibration(NamedTuple):
     """What drives oscillators in the base, of all recordings, on a fine grid of N times.
 
-    forcing (R, N, 6): acceleration of the base origin and angular acceleration; yielding (R, N, 6, 6): the base's
-    acceleration under unit force and torque at its origin; times (R, S) and (R, T) where results are wanted, the
-    centre of mass there.
+    forcing (R, N, 15): acceleration of the base origin, angular acceleration and ``w w' - w^2 1``; yielding
+    (R, N, 6, 6): the base's acceleration under unit force and torque at its origin; times (R, S) and (R, T) where
+    results are wanted, and the centre of mass there.
     """
 
     forcing: Floats
@@ -46,16 +47,19 @@ class Vibration(NamedTuple):
         times = np.asarray(stage.environment.time)
         end = float(times.max())
         fine = FINE * np.arange(int(np.ceil(end / FINE)) + 2)
-        drive = np.concatenate([np.asarray(stage.acceleration), np.asarray(stage.rate_change)], axis=-1)
+        rate = np.asarray(stage.rate)
+        spread = rate[..., :, None] * rate[..., None, :] - (rate**2).sum(axis=-1)[..., None, None] * np.eye(3)
+        parts = [np.asarray(stage.acceleration), np.asarray(stage.rate_change), spread.reshape(*rate.shape[:2], 9)]
+        drive = np.concatenate(parts, axis=-1)
         forcing, yielding = [], []
         for index in range(len(times)):
             own = np.concatenate([[True], np.diff(times[index]) > 0.0])  # padding repeats the last instant
             inside = np.minimum(fine, times[index].max())
             forcing.append(CubicSpline(times[index][own], drive[index][own])(inside))
-            parts = _yielding(
+            soft = _yielding(
                 *(np.asarray(x)[index][own] for x in (stage.body.mass, stage.body.com, stage.body.inverse))
             )
-            flat = parts.reshape(len(parts), -1)
+            flat = soft.reshape(len(soft), -1)
             yielding.append(
                 np.stack([np.interp(inside, times[index][own], column) for column in flat.T], axis=-1).reshape(-1, 6, 6)
             )
@@ -68,11 +72,15 @@ class Vibration(NamedTuple):
         modes = jax.vmap(effect.modes)(jnp.asarray(values))
         coupling = np.concatenate([np.asarray(modes.linear), np.asarray(modes.angular)], axis=-1)
         omega, damping = np.asarray(modes.omega), np.asarray(modes.damping)
+        moments = np.asarray(modes.moment).reshape(*coupling.shape[:2], 9)
+        load = np.concatenate([coupling, moments], axis=-1)
         pieces = []
-        for first in range(0, len(values), BATCH):
-            chosen = np.minimum(np.arange(first, first + BATCH), len(values) - 1)
+        batch = BATCHES[0] if len(values) == 1 else BATCHES[1]
+        for first in range(0, len(values), batch):
+            chosen = np.minimum(np.arange(first, first + batch), len(values) - 1)
             found = _oscillate(
                 jnp.asarray(coupling[chosen]),
+                jnp.asarray(load[chosen]),
                 jnp.asarray(omega[chosen]),
                 jnp.asarray(damping[chosen]),
                 jnp.asarray(self.forcing),
@@ -92,7 +100,8 @@ class Vibration(NamedTuple):
         coupling = np.eye(6)
         omega = 2.0 * np.pi * frequency
         found = _oscillate(
-            jnp.asarray(np.tile(coupling[:, None], (1, 1, 1))),
+            jnp.asarray(coupling[:, None]),
+            jnp.asarray(np.eye(6, 15)[:, None]),
             jnp.full((6, 1), omega),
             jnp.full((6, 1), damping),
             jnp.asarray(self.forcing),
@@ -111,6 +120,8 @@ class Vibration(NamedTuple):
     def _at(self, times: Floats, com: Floats, flow: Floats, flow_rate: Floats) -> Floats:
         fine = FINE * np.arange(flow.shape[2])
         rows = np.zeros((len(flow), *times.shape, WIDTH))
+        if not np.isfinite(flow).all():  # more swings than there is: the fit refuses such a step
+            return np.full_like(rows, np.nan)
         for r in range(len(times)):
             curve = CubicHermiteSpline(fine, flow[:, r], flow_rate[:, r], axis=1)
             p, q = curve(times[r]), curve.derivative()(times[r])
@@ -138,17 +149,22 @@ def _yielding(mass: Floats, com: Floats, inverse: Floats) -> Floats:
 
 
 @jax.jit
-def _oscillate(coupling: Array, omega: Array, damping: Array, forcing: Array, yielding: Array) -> Array:
+def _oscillate(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, yielding: Array) -> Array:
     """Speeds and accelerations of modal amplitudes, shape (n, R, N, 2, m)."""
-    one = jax.vmap(jax.vmap(_run, (None, None, None, 0, 0)), (0, 0, 0, None, None))
-    return one(coupling, omega, damping, forcing, yielding)
+    one = jax.vmap(jax.vmap(_run, (None, None, None, None, 0, 0)), (0, 0, 0, 0, None, None))
+    return one(coupling, load, omega, damping, forcing, yielding)
 
 
-def _run(coupling: Array, omega: Array, damping: Array, forcing: Array, yielding: Array) -> Array:
+def _inverse(mass: Array) -> Array:
+    """Inverse of a small positive-definite matrix, column by column."""
+    return jnp.stack([solve_small(mass, unit) for unit in jnp.eye(len(mass))], axis=1)
+
+
+def _run(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, yielding: Array) -> Array:
     count = len(omega)
-    push = -forcing @ coupling.T
+    push = -forcing @ load.T
     mass = jnp.eye(count) - jnp.einsum("ia,tab,jb->tij", coupling, yielding, coupling)
-    soft = jnp.linalg.inv(mass) if count > 1 else 1.0 / mass
+    soft = jax.vmap(_inverse)(mass)
 
     def change(state: Array, push: Array, soft: Array) -> Array:
         amplitude, speed = state

@@ -139,15 +139,18 @@ class Wrench(NamedTuple):
 class Modes(NamedTuple):
     """Vibration modes of parts that move in the base, in mass-normalised (hybrid) coordinates (Likins 1970).
 
-    Mode i follows ``q'' + 2 damping omega q' + omega^2 q = -linear . a - angular . dw/dt`` with ``a`` the acceleration
-    of the base origin, and has the momentum ``linear q'`` and, about the base origin, ``angular q'``.
-    omega (n,) [rad/s], damping (n,), linear (n, 3) [sqrt(kg)], angular (n, 3) [sqrt(kg) m].
+    Mode i follows ``q'' + 2 damping omega q' + omega^2 q = -linear . a - angular . dw/dt - moment : (w w' - w^2 1)``
+    with ``a`` the acceleration of the base origin, and has the momentum ``linear q'`` and, about the base origin,
+    ``angular q'``. With ``phi(r)`` the displacement of unit amplitude, ``linear`` is the integral of phi over the mass,
+    ``angular`` that of r x phi and ``moment`` that of the outer product of phi and r.
+    omega (n,) [rad/s], damping (n,), linear (n, 3) [sqrt(kg)], angular (n, 3) and moment (n, 3, 3) [sqrt(kg) m].
     """
 
     omega: Array
     damping: Array
     linear: Array
     angular: Array
+    moment: Array
 
 
 class Readings(NamedTuple):

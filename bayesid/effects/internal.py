@@ -68,7 +68,8 @@ class FlexibleAppendage(_Vibration):
 
     The momentum of unit modal speed has a linear part [sqrt(kg)] and an angular one about the base origin
     [sqrt(kg) m]; ``participation`` is the length of the angular one, whose square is the inertia that swings. The prior
-    of 5 sqrt(kg) m per axis is 25 kg m2, a pair of small panels; of 3 sqrt(kg), 9 kg.
+    of 5 sqrt(kg) m per axis is 25 kg m2, a pair of small panels; of 3 sqrt(kg), 9 kg. The centrifugal load on the mode
+    is left out.
     """
 
     name = "flexible-appendage"
@@ -100,7 +101,7 @@ class FlexibleAppendage(_Vibration):
 
     def modes(self, values: Array) -> Modes:
         """Return the one mode."""
-        return Modes(2.0 * jnp.pi * values[:1], values[1:2], values[None, 2:5], values[None, 5:8])
+        return Modes(2.0 * jnp.pi * values[:1], values[1:2], values[None, 2:5], values[None, 5:8], jnp.zeros((1, 3, 3)))
 
 
 @register
@@ -142,7 +143,11 @@ class FuelSlosh(_Vibration):
         root, position = jnp.sqrt(values[0]), values[3:]
         linear = root * jnp.eye(3)
         return Modes(
-            jnp.full(3, 2.0 * jnp.pi * values[1]), jnp.full(3, values[2]), linear, jnp.cross(position[None], linear)
+            jnp.full(3, 2.0 * jnp.pi * values[1]),
+            jnp.full(3, values[2]),
+            linear,
+            jnp.cross(position[None], linear),
+            linear[:, :, None] * position,
         )
 
 

@@ -157,8 +157,8 @@ def _add_advice(document: Document, result: Diagnosis) -> None:
         document.paragraph("Record longer, or repeat the manoeuvres: the signal grows with the root of their number.")
     if verdict.status is Status.EXPLAINED and not improbable:
         document.paragraph(
-            "Nothing is ambiguous: these manoeuvres tell what was named from every other cause of the catalogue"
-            + (", up to the other names given." if verdict.equivalents else ".")
+            "No other causes that were tried leave nothing but noise"
+            + (", but for the other names given under 'Verdict'." if verdict.equivalents else ".")
         )
     if hidden := unseen(result.candidates):
         document.paragraph(

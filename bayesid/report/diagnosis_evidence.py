@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bayesid.diagnosis import Diagnosis, Frame, Status, Unexplained
 from bayesid.diagnosis.battery import FALSE_ALARM
-from bayesid.diagnosis.unexplained import unexplained_wrench
 from bayesid.report import diagnosis_tables as rows
 from bayesid.report import diagnosis_text as text
 from bayesid.report import figures
@@ -126,17 +125,18 @@ def add_causes(document: Document, result: Diagnosis) -> None:
         document.paragraph("The named causes have no free parameter: their size is physics.")
 
 
-def _acts_on_motion(result: Diagnosis) -> bool:
+def _may_be_disturbance(result: Diagnosis) -> bool:
+    """Whether a named cause acts on the motion, or is blamed on noise, behind which a disturbance could hide."""
     hooks = ("wrench", "momentum", "table", "modes")
-    return any(effect.uses(hook) for effect in result.after.fit.effects for hook in hooks)
+    return bool(result.after.faults) or any(effect.uses(hook) for effect in result.after.fit.effects for hook in hooks)
 
 
 def add_disturbance(document: Document, result: Diagnosis) -> None:
-    """Show the torque and force that the residual would take; nothing where only readings or noise are at fault."""
-    if result.verdict.status is Status.ADEQUATE or (result.verdict.causes and not _acts_on_motion(result)):
+    """Show the torque and force that the residual would take; nothing where only readings are at fault."""
+    if result.verdict.status is Status.ADEQUATE or (result.verdict.causes and not _may_be_disturbance(result)):
         return
     named = bool(result.verdict.causes)
-    wrench = unexplained_wrench(result.before) if named else result.unexplained
+    wrench = result.verdict.disturbance if named else result.unexplained
     document.section("The disturbance, reconstructed")
     document.paragraph(
         ("Without the named causes, the residual would take this disturbance of the base" if named else "The residual")
