@@ -1,0 +1,5 @@
+"""Write the report: ``python -m studies.throws_drag --full``."""
+
+from studies.throws_drag import main
+
+main()
