@@ -359,7 +359,9 @@ class Posterior:
         ]
 
     def _choose_step(self) -> float:
-        step, z = min([LONGEST_STEP, *(e.longest_step for e in self.model.effects)]), self.initial_point()
+        shortest = min(float(samples.time[-1]) for samples in self._samples)
+        step = min([LONGEST_STEP, shortest / 10.0, *(effect.longest_step for effect in self.model.effects)])
+        z = self.initial_point()
         while self._step_error(step, z) > STEP_TOLERANCE:
             step *= 0.5
             if step < 1e-4 * LONGEST_STEP:

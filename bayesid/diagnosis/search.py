@@ -18,6 +18,7 @@ from bayesid.diagnosis.engine import Engine, Fit
 from bayesid.diagnosis.faults import NoiseFault, noise_fault
 from bayesid.diagnosis.starts import starts_of
 from bayesid.effects.base import Effect
+from bayesid.errors import InputError
 from bayesid.posterior import Posterior
 
 __all__ = ["Hypothesis", "Search"]
@@ -202,12 +203,15 @@ class Search:
     def _with_effect(self, parent: Hypothesis, effect: Effect) -> Hypothesis | None:
         best: Fit | None = None
         for start in starts_of(effect, parent.engine, parent.fit, self._battery(parent)):
-            fit = parent.engine.fit(
-                (*parent.fit.effects, effect),
-                (*parent.fit.coordinates, start),
-                z=parent.fit.z,
-                situation=parent.fit.situation,
-            )
+            try:
+                fit = parent.engine.fit(
+                    (*parent.fit.effects, effect),
+                    (*parent.fit.coordinates, start),
+                    z=parent.fit.z,
+                    situation=parent.fit.situation,
+                )
+            except InputError:  # no motion from this start
+                continue
             if best is None or fit.cost < best.cost:
                 best = fit
         if best is None:
