@@ -11,17 +11,13 @@ import pytest
 from bayesid.assemble import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
 from bayesid.diagnosis.diagnosis import extended_start
-from bayesid.diagnosis.engine import Engine
-from bayesid.effects import create
-from bayesid.posterior import Posterior
 from bayesid.study import Study
 from tests import hidden
-from tests.basilisk_truth import BasiliskHidden, Slosh, write_basilisk_study
 
 CASES = {case.name: case for case in hidden.CASES}
 
-FOUND = ("rate-drift", "payload:link3", "flexible-appendage", "accel-noise")
-"""Hidden one by one here; all of the catalogue in studies/blind_injections."""
+FOUND = ("rate-drift", "payload:link3")
+"""Hidden one by one here; the catalogue is in studies/blind_injections."""
 
 
 def run(file: Path) -> Diagnosis:
@@ -89,23 +85,11 @@ def test_the_contract_of_the_json(wheel):
     assert set(content["gain"]["chi2_per_sample"]) == {"before", "after"}
 
 
-@pytest.mark.parametrize("name", ["null, gaps", "null, star sensor"])
+@pytest.mark.parametrize("name", ["null, gaps"])
 def test_nothing_hidden_raises_no_alarm(name, tmp_path):
     result = run(CASES[name].make(tmp_path, 6))
     assert result.verdict.status is Status.ADEQUATE, result.before.outcome.worst
     assert result.verdict.causes == ()
-
-
-@pytest.mark.parametrize("name", ["thermal-snap"])
-def test_an_effect_outside_the_catalogue_is_not_misnamed(name, tmp_path):
-    result = run(CASES[name].make(tmp_path, 5, 3.0))
-    assert result.verdict.status is Status.UNKNOWN, result.verdict.causes
-
-
-def test_slosh_in_basilisk_is_found(tmp_path):
-    result = run(write_basilisk_study(tmp_path, 3, hidden=BasiliskHidden(slosh=Slosh())))
-    names = {result.verdict.causes, *(rival.labels for rival in result.verdict.rivals)}
-    assert ("fuel-slosh",) in names
 
 
 def test_an_effect_of_the_user_becomes_a_candidate(tmp_path):
@@ -115,28 +99,3 @@ def test_an_effect_of_the_user_becomes_a_candidate(tmp_path):
     assert "gravity-gradient" not in names  # it is in the model
     assert not any(name.endswith(":base_link") for name in names)  # unknown anyway
     assert any(name.startswith("payload:") for name in names)
-
-
-@pytest.mark.parametrize("label", ["aerodynamic-drag", "encoder-offset:joint1", "accel-position"])
-def test_responses_are_those_of_the_full_simulation(label, tmp_path_factory, shared_engine):
-    """A push on the model and the effect in the simulation give one residual, to 1 % of what the effect does."""
-    engine, fit = shared_engine
-    effect = create(label).attach(engine.posterior.model.robot)
-    coordinates = 0.3 * np.ones(len(effect.parameters))
-    pushed = engine.fit((effect,), (coordinates,), z=fit.z, situation=fit.situation, iterations=0)
-    model = engine.posterior.model.extend(effect)
-    posterior = Posterior(model, engine.posterior.manoeuvres)
-    full = posterior.residuals(np.concatenate([fit.z, coordinates])).ravel()
-    plain = engine.posterior.residuals(fit.z).ravel()
-    change = full - plain
-    assert np.linalg.norm(change) > 1.0
-    assert np.linalg.norm(pushed.residual - full) < 0.02 * np.linalg.norm(change) + 0.5
-
-
-@pytest.fixture(scope="module")
-def shared_engine(tmp_path_factory):
-    study = Study.load(CASES["null, three joints"].make(tmp_path_factory.mktemp("null"), 8))
-    model = load_model(study)
-    posterior = Posterior(model, load_manoeuvres(study, model.robot))
-    engine = Engine(posterior)
-    return engine, engine.fit()

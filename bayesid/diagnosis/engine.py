@@ -28,15 +28,11 @@ from bayesid.diagnosis.drive import (
     tables_of,
 )
 from bayesid.effects.base import Effect
-from bayesid.errors import InputError
 from bayesid.posterior import Data, Posterior, Push, pushed
 
 __all__ = ["Engine", "Fit"]
 
 ITERATIONS = 25
-STRAY = 1e-3
-"""Relative rise of the cost that bringing the motion up to date may cause."""
-
 CLOSE = 0.02
 """Change of the cost at which a fit has converged."""
 
@@ -188,7 +184,6 @@ class Engine:
         own: Floats = np.zeros((0, 0))
         added: list[Floats] = []
         residual: Floats
-        good: Fit | None = None
         for _ in range(iterations):
             pushes = self._pushes(effects, chosen, situation)
             data = self._pushed(pushes)
@@ -200,20 +195,6 @@ class Engine:
                 for effect, c in zip(effects, chosen, strict=True)
             ]
             jacobian = np.concatenate([own, *added], axis=1)
-            sound = bool(np.isfinite(jacobian).all() and np.isfinite(here))
-            if good is not None and (not sound or here > good.cost + max(CLOSE, STRAY * good.cost)):
-                # with the motion brought up to date the step was too far: back, and a shorter one
-                z, chosen, situation, residual = good.z, list(good.coordinates), good.situation, good.residual
-                own, added, here, damping = good.own, list(good.added), good.cost, 100.0 * max(damping, 1e-4)
-                jacobian = np.concatenate([own, *added], axis=1)
-            elif not sound:
-                raise InputError(
-                    f"no motion can be simulated with {', '.join(e.label for e in effects) or 'the present model'}",
-                    remedy="Check units and magnitudes of the recordings",
-                )
-            good = Fit(
-                self.posterior, tuple(effects), tuple(chosen), z, residual, own, tuple(added), here, situation, False
-            )
             parameters = np.concatenate([z[self.free], *chosen])
             hessian = jacobian.T @ jacobian + np.eye(len(parameters))
             gradient = jacobian.T @ residual + parameters
