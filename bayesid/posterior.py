@@ -359,8 +359,7 @@ class Posterior:
         ]
 
     def _choose_step(self) -> float:
-        shortest = min(float(samples.time[-1]) for samples in self._samples)
-        step = min([LONGEST_STEP, shortest / 10.0, *(effect.longest_step for effect in self.model.effects)])
+        step = min([LONGEST_STEP, *(effect.longest_step for effect in self.model.effects)])
         z = self.initial_point()
         while self._step_error(step, z) > STEP_TOLERANCE:
             step *= 0.5
