@@ -46,7 +46,7 @@ def clean(biased):
     """As if the present model had passed every test."""
     search = copy.copy(biased.search)
     search._done = {}
-    verdict = Verdict(Status.ADEQUATE, biased.before, {}, ())
+    verdict = Verdict(Status.ADEQUATE, biased.before, {}, (), biased.verdict.disturbance)
     return replace(biased, search=search, verdict=verdict, gain=Gain(biased.gain.before, biased.gain.before))
 
 
@@ -59,7 +59,7 @@ def disturbance(biased) -> Unexplained:
     torque = np.stack([1e-3 * position, 0.0 * time, 0.0 * time], axis=1)
     same = {frame: [torque] for frame in Frame}
     sd = [np.full_like(torque, 1e-4)]
-    return Unexplained(12.0, ("planar",), [time], same, same, sd, sd, Frame.BASE)
+    return Unexplained(12.0, ("planar",), [time], same, same, sd, sd, Frame.BASE, 50.0)
 
 
 def candidate(**changes) -> Candidate:
@@ -79,7 +79,7 @@ def candidate(**changes) -> Candidate:
 
 
 def judged(result, status: Status, rivals: tuple[Hypothesis, ...] = ()):
-    return replace(result, verdict=Verdict(status, result.verdict.best, {}, rivals))
+    return replace(result, verdict=replace(result.verdict, status=status, equivalents={}, rivals=rivals))
 
 
 def pages(file) -> int:
@@ -107,7 +107,7 @@ def test_every_status_is_said(biased, clean, status):
 
 
 def test_equivalents_are_other_names(biased):
-    verdict = Verdict(Status.EXPLAINED, biased.verdict.best, {"accel-bias": ("a", "b")}, ())
+    verdict = replace(biased.verdict, equivalents={"accel-bias": ("a", "b")}, rivals=())
     assert "Other names for the same change: a and b." in next(text.cause_sentences(replace(biased, verdict=verdict)))
 
 
@@ -181,7 +181,8 @@ def test_the_spectrum_of_a_wave_is_its_amplitude():
     wave = 0.3 * np.cos(2.0 * np.pi * 0.05 * time)
     torque = [np.stack([wave, 0.0 * time, 0.0 * time], axis=1)]
     same = dict.fromkeys(Frame, torque)
-    frequency, amplitude = torque_amplitudes(Unexplained(1.0, ("a",), [time], same, same, torque, torque, None), 0)
+    disturbance = Unexplained(1.0, ("a",), [time], same, same, torque, torque, None, 0.0)
+    frequency, amplitude = torque_amplitudes(disturbance, 0)
     assert frequency[np.argmax(amplitude[:, 0])] == pytest.approx(0.05, rel=0.01)
     assert amplitude[:, 0].max() == pytest.approx(0.3, rel=0.02)
 

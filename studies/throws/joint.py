@@ -50,7 +50,7 @@ class Throw:
 
     def residuals(self, z: Floats) -> Floats:
         """Return the whitened residuals, shape (samples, 6)."""
-        return self.posterior.residuals(z)[0] / self.noise
+        return self.posterior.residuals(z)[0, : self.posterior.whitenings[0].outputs.shape[0]] / self.noise
 
     def jacobian(self, z: Floats) -> Floats:
         """Return the derivative of the flattened residuals, shape (6 samples, size)."""
