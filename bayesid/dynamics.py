@@ -103,21 +103,20 @@ def simulate(
     Readings
         In base axes; faults of the sensors are not applied.
     """
-    system, loads, course = _integrate(grid, inertial, start, effects, values)
-    seen = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ loads)
-    sense = jax.vmap(system.sense, (0, 0, 0, None))
-    rate, accel, attitude = sense(
-        course.at(grid.step_of, grid.fraction), (seen, grid.sample.environment), grid.held[grid.step_of], point
-    )
-    return Readings(grid.sample.environment.time, rate, accel, attitude)
+    return _sense(grid, point, *_integrate(grid, inertial, start, effects, values))
 
 
 def trace(
-    grid: Grid, inertial: Array, start: Start, effects: Sequence[Effect], values: Sequence[Array]
-) -> tuple[Moment, Moment]:
-    """Return the motion itself: every instant of the stages, then of the samples, as effects see them.
+    grid: Grid,
+    inertial: Array,
+    start: Start,
+    effects: Sequence[Effect],
+    values: Sequence[Array],
+    point: Array,
+) -> tuple[Moment, Moment, Readings]:
+    """Return the motion as effects see it at every instant of the stages, then of the samples, and the readings.
 
-    Arguments as for `simulate`; leading axes 2 K + 1 and T.
+    Arguments and readings as for `simulate`; leading axes 2 K + 1 and T.
     """
     system, loads, course = _integrate(grid, inertial, start, effects, values)
     steps = len(grid.step)
@@ -128,7 +127,7 @@ def trace(
         bodies = jax.vmap(composite)(instants.known + instants.unknown @ loads)
         motion = jax.vmap(system.motion)(course.at(of, where), (bodies, instants.environment), grid.held[of])
         motions.append(motion[0])
-    return motions[0], motions[1]
+    return motions[0], motions[1], _sense(grid, point, system, loads, course)
 
 
 class _Course(NamedTuple):
@@ -170,6 +169,16 @@ def _integrate(
 
     final, (states, slopes, end_slopes) = jax.lax.scan(step, initial, (grid.step, grid.held, first, middle, last))
     return system, loads, _Course(states, jnp.concatenate([states[1:], final[None]]), slopes, end_slopes)
+
+
+def _sense(grid: Grid, point: Array, system: _System, loads: Array, course: _Course) -> Readings:
+    """Return what the sensors read along a course."""
+    seen = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ loads)
+    sense = jax.vmap(system.sense, (0, 0, 0, None))
+    rate, accel, attitude = sense(
+        course.at(grid.step_of, grid.fraction), (seen, grid.sample.environment), grid.held[grid.step_of], point
+    )
+    return Readings(grid.sample.environment.time, rate, accel, attitude)
 
 
 class _Inner(NamedTuple):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -164,7 +165,12 @@ def log_cholesky_factor(coordinates: Array) -> Array:
 
 def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array:
     """Ten linear parameters of the body with given log-Cholesky coordinates relative to a centre, shape (10,)."""
-    factor = jnp.asarray(upper_cholesky(centre.pseudo_inertia)) @ log_cholesky_factor(coordinates)
+    return _vector(jnp.asarray(upper_cholesky(centre.pseudo_inertia)), coordinates)
+
+
+@jax.jit  # traced once for all bodies
+def _vector(centre: Array, coordinates: Array) -> Array:
+    factor = centre @ log_cholesky_factor(coordinates)
     return parameters_from_pseudo_inertia(factor @ factor.T)
 
 

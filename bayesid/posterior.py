@@ -36,6 +36,9 @@ LONGEST_STEP = 2.0
 STEP_TOLERANCE = 0.01
 """Largest integration error allowed, in standard deviations of a sample."""
 
+FEWEST_STEPS = 512
+"""Steps that simulations which choose the step are padded to at least, and to a power of two."""
+
 BATCH = 8
 """Points evaluated together: what fits the processor cache is three times faster than 64 at once."""
 
@@ -87,6 +90,15 @@ def pushed(data: Data, push: Push) -> Data:
         ),
     )
     return data._replace(grid=grid, measured=data.measured - push.reading)
+
+
+class Traced(NamedTuple):
+    """A simulation: motion at stages (R, S) and samples (R, T), readings (R, T), whitened residual (R, O, C)."""
+
+    stage: Moment
+    sample: Moment
+    readings: Readings
+    residual: Array
 
 
 class Predictions(NamedTuple):
@@ -291,13 +303,9 @@ class Posterior:
 
     # ---- responses to what the model does not have ----
 
-    def trace(self, z: Floats, data: Data) -> tuple[Moment, Moment, Readings]:
-        """Return the motion at stages and samples and the readings, with `pushed` data; leading axes (R, S), (R, T)."""
+    def trace(self, z: Floats, data: Data) -> Traced:
+        """Simulate with `pushed` data."""
         return self._compiled.traced(jnp.asarray(z), data)
-
-    def residuals_of(self, z: Floats, data: Data) -> Floats:
-        """Whitened residuals with `pushed` data, shape (R, O, C)."""
-        return np.asarray(self._compiled.residuals(jnp.asarray(z), data))
 
     def responses(self, z: Floats, data: Data, pushes: Push) -> Floats:
         """Return derivatives of the whitened residual along many pushes (leading axis n), shape (n, R, O, C)."""
@@ -359,7 +367,8 @@ class Posterior:
         ]
 
     def _choose_step(self) -> float:
-        step = min([LONGEST_STEP, *(effect.longest_step for effect in self.model.effects)])
+        shortest = min(float(samples.time[-1]) for samples in self._samples)
+        step = min([LONGEST_STEP, 0.25 * shortest, *(effect.longest_step for effect in self.model.effects)])
         z = self.initial_point()
         while self._step_error(step, z) > STEP_TOLERANCE:
             step *= 0.5
@@ -380,8 +389,9 @@ class Posterior:
         return worst * 16.0 / 15.0  # the error of a fourth-order step, from its difference to half the step
 
     def _simulated(self, step: float, z: Floats, like: float | None = None) -> Readings:
-        """Simulate with a step; padded so that a step and its half share one compilation."""
+        """Simulate with a step; padded so that it shares one compilation with shorter steps."""
         steps = 2 * max(len(grid.step) for grid in self._grids(like or step))
+        steps = max(FEWEST_STEPS, 1 << (steps - 1).bit_length())
         return self._compiled.simulated(jnp.asarray(z), pad_grids(self._grids(step), steps), self._attitudes())
 
     def _base_rates(self, z: Floats) -> list[Floats]:
@@ -449,8 +459,7 @@ class _Compiled:
             small = jnp.concatenate([0.5 * tilt, jnp.ones(1)])
             return Start(quaternion_product(attitude, small / jnp.linalg.norm(small)), rate)
 
-        def one(grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Readings:
-            readings = simulate(grid, inertial, start(attitude, rate, tilt), model.effects, effects, point)
+        def distorted(readings: Readings, effects: Any) -> Readings:
             readings = readings._replace(
                 rate=readings.rate @ turn.get(Kind.RATE, jnp.eye(3)),
                 accel=readings.accel @ turn.get(Kind.ACCEL, jnp.eye(3)),
@@ -459,15 +468,23 @@ class _Compiled:
                 readings = effect.read(values, readings)
             return readings
 
-        def simulated(z: Array, grid: Grid, attitude: Array) -> Readings:
+        def sensed(grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Readings:
+            readings = simulate(grid, inertial, start(attitude, rate, tilt), model.effects, effects, point)
+            return distorted(readings, effects)
+
+        def moved(grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Any:
+            begin = start(attitude, rate, tilt)
+            stage, sample, readings = trace(grid, inertial, begin, model.effects, effects, point)
+            return stage, sample, distorted(readings, effects)
+
+        def each(run: Callable[..., Any], z: Array, grid: Grid, attitude: Array) -> Any:
             values = unknowns.values(z)
             axes = tuple(0 if effect.per_recording else None for effect in model.effects)
-            return jax.vmap(one, (0, 0, None, 0, 0, axes))(
+            return jax.vmap(run, (0, 0, None, 0, 0, axes))(
                 grid, attitude, values.inertial, values.rate, values.tilt, values.effects
             )
 
-        def residuals(z: Array, data: Data) -> Array:
-            readings = simulated(z, data.grid, data.attitude)
+        def whitened(readings: Readings, data: Data) -> Array:
             parts = []
             for kind in kinds:
                 if kind is Kind.ATTITUDE:
@@ -479,19 +496,18 @@ class _Compiled:
             padded = jnp.pad(residual, ((0, 0), (0, data.weights.shape[3]), (0, 0)))
             return jax.vmap(whitening.apply)(data.weights, data.start, padded)
 
+        def simulated(z: Array, grid: Grid, attitude: Array) -> Readings:
+            return each(sensed, z, grid, attitude)
+
+        def residuals(z: Array, data: Data) -> Array:
+            return whitened(simulated(z, data.grid, data.attitude), data)
+
+        def traced(z: Array, data: Data) -> Traced:
+            stage, sample, readings = each(moved, z, data.grid, data.attitude)
+            return Traced(stage, sample, readings, whitened(readings, data))
+
         def chi2(z: Array, data: Data) -> Array:
             return jnp.sum(residuals(z, data) ** 2, axis=(1, 2))
-
-        def traced(z: Array, data: Data) -> tuple[Moment, Moment, Readings]:
-            values = unknowns.values(z)
-            axes = tuple(0 if effect.per_recording else None for effect in model.effects)
-
-            def motion(grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Any:
-                return trace(grid, inertial, start(attitude, rate, tilt), model.effects, effects)
-
-            given = (data.grid, data.attitude, values.inertial, values.rate, values.tilt, values.effects)
-            stage, sample = jax.vmap(motion, (0, 0, None, 0, 0, axes))(*given)
-            return stage, sample, simulated(z, data.grid, data.attitude)
 
         def responses(z: Array, data: Data, along: Push) -> Array:
             def shifted(z: Array, push: Push) -> Array:

@@ -87,29 +87,37 @@ def configuration(robot: Robot, position: Floats) -> Floats:
 def link_table(robot: Robot, name: str, motion: Kinematics) -> Floats:
     """Coefficients of one link's ten parameters, shape (T, 28, 10)."""
     link = robot.link(name)
-    count = len(motion.pose)
-    if link.joint < 0:
-        pose = np.broadcast_to(link.placement, (count, 4, 4))
-        rate = acceleration = np.zeros((count, 4, 4))
-    else:
-        pose = motion.pose[:, link.joint] @ link.placement
-        twist, twist_rate = _hat(motion.twist[:, link.joint]), _hat(motion.twist_rate[:, link.joint])
-        rate = twist @ pose
-        acceleration = (twist_rate + twist @ twist) @ pose
-    left = np.einsum("tab,pbc->tpac", pose, BASIS)
+    pose, rate, acceleration = (change @ link.placement for change in _joint(motion, link.joint))
+    table = np.swapaxes(_moments(pose, rate, acceleration, BASIS), 1, 2)
+    return np.ascontiguousarray(table)
+
+
+def _joint(motion: Kinematics, joint: int) -> tuple[Floats, Floats, Floats]:
+    """Pose of a joint's frame and its two derivatives, each (T, 4, 4); of the base's where ``joint`` is negative."""
+    if joint < 0:
+        still = np.zeros((len(motion.pose), 4, 4))
+        return still + np.eye(4), still, still
+    twist, twist_rate = _hat(motion.twist[:, joint]), _hat(motion.twist_rate[:, joint])
+    pose = motion.pose[:, joint]
+    return pose, twist @ pose, (twist_rate + twist @ twist) @ pose
+
+
+def _moments(pose: Floats, rate: Floats, acceleration: Floats, bodies: Floats) -> Floats:
+    """Table rows of pseudo-inertias (p, 4, 4) moving with a pose, shape (T, p, 28)."""
+    left = pose[:, None] @ bodies
     composite, flow, surge = (left @ np.swapaxes(other, 1, 2)[:, None] for other in (pose, rate, acceleration))
-    table = np.zeros((count, 10, WIDTH))
-    table[..., ENTRIES["mass"]] = composite[..., 3, 3:]
-    table[..., ENTRIES["first"]] = composite[..., 3, :3]
-    table[..., ENTRIES["first_rate"]] = flow[..., 3, :3]
-    table[..., ENTRIES["first_acceleration"]] = surge[..., 3, :3]
-    table[..., ENTRIES["second"]] = composite[..., _UPPER[0], _UPPER[1]]
-    table[..., ENTRIES["second_rate"]] = (flow + np.swapaxes(flow, -1, -2))[..., _UPPER[0], _UPPER[1]]
+    rows = np.zeros((*composite.shape[:2], WIDTH))
+    rows[..., ENTRIES["mass"]] = composite[..., 3, 3:]
+    rows[..., ENTRIES["first"]] = composite[..., 3, :3]
+    rows[..., ENTRIES["first_rate"]] = flow[..., 3, :3]
+    rows[..., ENTRIES["first_acceleration"]] = surge[..., 3, :3]
+    rows[..., ENTRIES["second"]] = composite[..., _UPPER[0], _UPPER[1]]
+    rows[..., ENTRIES["second_rate"]] = (flow + np.swapaxes(flow, -1, -2))[..., _UPPER[0], _UPPER[1]]
     for entry, matrix in (("spin", flow), ("spin_rate", surge)):
-        table[..., ENTRIES[entry]] = np.stack(
+        rows[..., ENTRIES[entry]] = np.stack(
             [matrix[..., a, b] - matrix[..., b, a] for a, b in ((1, 2), (2, 0), (0, 1))], axis=-1
         )
-    return np.swapaxes(table, 1, 2)
+    return rows
 
 
 def _hat(twist: Floats) -> Floats:
@@ -125,8 +133,12 @@ def _hat(twist: Floats) -> Floats:
 
 def composite_rows(robot: Robot, motion: Kinematics, leave_out: Container[str] = ()) -> Floats:
     """Table rows of all links with mass but the named ones, summed, shape (T, 28)."""
-    rows = np.zeros((len(motion.pose), WIDTH))
+    carried: dict[int, Floats] = {}
     for name, link in robot.links.items():
         if name not in leave_out and link.inertial.mass > 0.0:
-            rows += link_table(robot, name, motion) @ link.inertial.vector
+            body = link.placement @ link.inertial.pseudo_inertia @ link.placement.T
+            carried[link.joint] = carried.get(link.joint, np.zeros((4, 4))) + body
+    rows: Floats = np.zeros((len(motion.pose), WIDTH))
+    for joint, moments in carried.items():
+        rows = rows + _moments(*_joint(motion, joint), moments[None])[:, 0]
     return rows

@@ -7,6 +7,7 @@ along the motion of the last fit; a few iterations make motion and pushes agree.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -149,6 +150,14 @@ class Engine:
         z[self.frozen] = 0.0
         return z
 
+    def compile(self) -> None:
+        """Compile simulation and derivatives, side by side."""
+        z, data = self.start(), self.posterior.data
+        with ThreadPoolExecutor(1) as other:
+            derivatives = other.submit(self.posterior.responses, z, data, self.push(1))
+            self.posterior.trace(z, data)
+            derivatives.result()
+
     def fit(
         self,
         effects: Sequence[Effect] = (),
@@ -187,7 +196,7 @@ class Engine:
         for _ in range(iterations):
             pushes = self._pushes(effects, chosen, situation)
             data = self._pushed(pushes)
-            residual = self.posterior.residuals_of(z, data).ravel()
+            residual = self.residual(z, data)
             here = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in chosen))
             own = self.own_columns(z, data)
             added = [
@@ -206,7 +215,7 @@ class Engine:
                 new_z[self.free] = trial[: ends[0]]
                 new = [trial[a:b] for a, b in pairwise(ends)]
                 with np.errstate(all="ignore"):
-                    r = self.posterior.residuals_of(new_z, self._pushed(self._pushes(effects, new, situation))).ravel()
+                    r = self.residual(new_z, self._pushed(self._pushes(effects, new, situation)))
                     there = 0.5 * float(r @ r + new_z @ new_z + sum(c @ c for c in new))
                 if np.isfinite(there) and there <= here + 1e-9 * abs(here):
                     taken = True
@@ -224,7 +233,7 @@ class Engine:
         else:
             converged = False
         data = self._pushed(self._pushes(effects, chosen, situation))
-        residual = self.posterior.residuals_of(z, data).ravel()
+        residual = self.residual(z, data)
         cost = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in chosen))
         return Fit(
             self.posterior, tuple(effects), tuple(chosen), z, residual, own, tuple(added), cost, situation, converged
@@ -232,7 +241,12 @@ class Engine:
 
     def situation(self, z: Floats, pushes: Sequence[Push]) -> Situation:
         """Return the motion with the given pushes."""
-        return situation_of(self.posterior, *self.posterior.trace(z, self._pushed(pushes)))
+        traced = self.posterior.trace(z, self._pushed(pushes))
+        return situation_of(self.posterior, traced.stage, traced.sample, traced.readings)
+
+    def residual(self, z: Floats, data: Data) -> Floats:
+        """Return the whitened residual, (N,)."""
+        return np.asarray(self.posterior.trace(z, data).residual).ravel()
 
     def own_columns(self, z: Floats, data: Data) -> Floats:
         """Return derivatives of the residual in the model's free coordinates, (N, n)."""

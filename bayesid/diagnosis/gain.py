@@ -122,7 +122,7 @@ def body_figures(hypothesis: Hypothesis) -> BodyFigures:
 
     point = jnp.asarray(fit.z)
     vector = np.asarray(vectors(point)).reshape(-1, 10)
-    slope = np.asarray(jax.jacfwd(vectors)(point)).reshape(-1, 10, len(fit.z))[..., free]
+    slope = np.asarray(jax.jit(jax.jacfwd(vectors))(point)).reshape(-1, 10, len(fit.z))[..., free]
     covariance = fit.covariance[: len(free), : len(free)]
     names, mean, sd = [], [], []
     for index, prior in enumerate(posterior.model.priors):

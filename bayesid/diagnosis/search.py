@@ -108,7 +108,9 @@ class Search:
         self._batteries: dict[tuple[str, ...], Battery] = {}
         self._done: dict[frozenset[str], Hypothesis] = {}
         engine = Engine(posterior, frozen)
-        self._tell(0.0, "fitting the present model")
+        self._tell(0.0, "compiling the simulation")
+        engine.compile()
+        self._tell(0.02, "fitting the present model")
         first = engine.fit()
         engine = engine.with_posterior(posterior.at(first.z))
         fit = engine.fit(z=first.z)

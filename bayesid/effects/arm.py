@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Self
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pinocchio as pin
@@ -299,6 +300,7 @@ def _quadratic(rows: list[Floats], step: float) -> Floats:
     return np.stack([(after - before) / (2.0 * step), (after - 2.0 * here + before) / (2.0 * step**2)], axis=2)
 
 
+@jax.jit
 def _described(vector: Array) -> Array:
     """Mass, centre of mass and inertia about it (xx, yy, zz, xy, xz, yz) of ten linear parameters."""
     mass, com = vector[0], vector[1:4] / vector[0]
