@@ -163,14 +163,19 @@ class Posterior:
         new.data = new._stack_noise(self.data)
         return new
 
-    def with_sensors(self, sensors: Sequence[Sensor], z: Floats) -> Posterior:
-        """Return the posterior with other noise of the same sensors, the encoder noise carried through at ``z``."""
+    def with_sensors(self, sensors: Sequence[Sensor], z: Floats, like: Posterior | None = None) -> Posterior:
+        """Return the posterior with other noise of the same sensors, the encoder noise carried through at ``z``.
+
+        Whitening windows are searched for where noise is coloured, or are those of ``like``.
+        """
         new = object.__new__(Posterior)
         new.__dict__.update({key: value for key, value in self.__dict__.items() if key != "data"})
         new.model = replace(self.model, sensors=tuple(sensors))
         new._samples = [samples.with_sensors(sensors) for samples in self._samples]
         coloured = any(sensor.coloured is not None for sensor in sensors)
-        new.whitenings = new._whiten(z, [None if coloured else old.window for old in self.whitenings])
+        known = self.whitenings if like is None else like.whitenings
+        search = coloured and like is None
+        new.whitenings = new._whiten(z, [None if search else old.window for old in known])
         new.data = new._stack_noise(self.data)
         return new
 

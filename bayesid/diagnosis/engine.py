@@ -11,11 +11,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import scipy.linalg as sla
+from numpy.typing import NDArray
 
 from bayesid.arrays import Floats
 from bayesid.diagnosis.drive import (
@@ -28,6 +30,7 @@ from bayesid.diagnosis.drive import (
     situation_of,
     tables_of,
 )
+from bayesid.diagnosis.scale import effect_mixture, log_mixture
 from bayesid.effects.base import Effect
 from bayesid.posterior import Data, Posterior, Push, pushed
 
@@ -60,6 +63,9 @@ class Fit:
     cost : float
         Half of chi-square and squared coordinates.
     situation : Situation
+    converged : bool
+    released : (k,) array of int
+        Which of the model's unknowns the study takes to be zero and this fit does not.
     """
 
     posterior: Posterior
@@ -72,6 +78,7 @@ class Fit:
     cost: float
     situation: Situation
     converged: bool
+    released: NDArray[np.intp]
 
     @property
     def chi2(self) -> float:
@@ -93,11 +100,23 @@ class Fit:
         """Of all that is fitted, in the order of `known`."""
         return sla.cho_solve(self.hessian, np.eye(self.known.shape[1]))
 
-    @property
+    @cached_property
     def log_evidence(self) -> float:
-        """Laplace approximation of the log evidence."""
+        """Laplace approximation of the log evidence; the scale of every group of amplitudes is unknown (`scale`)."""
         half_logdet = float(np.log(np.diag(self.hessian[0])).sum())
-        return -self.cost - half_logdet + float(self.posterior.log_normalisation.sum())
+        unit = -self.cost - half_logdet + float(self.posterior.log_normalisation.sum())
+        return unit + self._mixtures
+
+    @property
+    def _mixtures(self) -> float:
+        covariance, total, first = self.covariance, 0.0, self.own.shape[1]
+        if len(self.released):
+            total += log_mixture(self.z[self.released], covariance[np.ix_(self.released, self.released)])
+        for effect, coordinates in zip(self.effects, self.coordinates, strict=True):
+            own = slice(first, first + len(coordinates))
+            total += effect_mixture(effect, coordinates, covariance[own, own])
+            first += len(coordinates)
+        return total
 
     def project(self, columns: Floats) -> Floats:
         """Inner products of columns after all that is fitted has taken its share, shape (n, n)."""
@@ -111,6 +130,17 @@ class Fit:
         return np.asarray(physical(effect, jnp.asarray(self.coordinates[index]).reshape(shape)))
 
 
+class _Point(NamedTuple):
+    """One point of a fit."""
+
+    z: Floats
+    coordinates: list[Floats]
+    situation: Situation
+    residual: Floats
+    jacobian: Floats
+    cost: float
+
+
 class Engine:
     """Fits and responses for one model and its recordings.
 
@@ -120,16 +150,19 @@ class Engine:
         The present model, with initial rates free.
     frozen : iterable of int
         Coordinates of the model that stay at zero: initial rates that the study takes to be zero.
+    released : iterable of int
+        Coordinates that the study takes to be zero, but that are free here.
     """
 
-    def __init__(self, posterior: Posterior, frozen: Iterable[int] = ()) -> None:
+    def __init__(self, posterior: Posterior, frozen: Iterable[int] = (), released: Iterable[int] = ()) -> None:
         self.posterior = posterior
         self.frozen = np.array(sorted(frozen), dtype=int)
+        self._released = np.array(sorted(released), dtype=int)
         self._tables: dict[str, Table] = {}
 
     def with_posterior(self, posterior: Posterior) -> Engine:
         """Return an engine for the same data under another noise; tables are shared."""
-        new = Engine(posterior, self.frozen)
+        new = Engine(posterior, self.frozen, self._released)
         new._tables = self._tables
         return new
 
@@ -140,7 +173,7 @@ class Engine:
 
     def released(self) -> Engine:
         """Return the engine with nothing frozen."""
-        new = Engine(self.posterior)
+        new = Engine(self.posterior, released=self.frozen)
         new._tables = self._tables
         return new
 
@@ -190,23 +223,16 @@ class Engine:
         sizes = [len(c) for c in chosen]
         ends = np.cumsum([len(self.free), *sizes])
         damping, cost, converged = 1e-3, np.inf, False
-        own: Floats = np.zeros((0, 0))
-        added: list[Floats] = []
-        residual: Floats
+        best: _Point | None = None
         for _ in range(iterations):
-            pushes = self._pushes(effects, chosen, situation)
-            data = self._pushed(pushes)
-            residual = self.residual(z, data)
-            here = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in chosen))
-            own = self.own_columns(z, data)
-            added = [
-                self.columns(effect, c, situation, z, data) if len(c) else np.zeros((len(residual), 0))
-                for effect, c in zip(effects, chosen, strict=True)
-            ]
-            jacobian = np.concatenate([own, *added], axis=1)
+            here = self._point(effects, chosen, z, situation)
+            if not np.isfinite(here.jacobian).all() or not np.isfinite(here.cost):
+                break
+            if best is None or here.cost < best.cost:
+                best = here
             parameters = np.concatenate([z[self.free], *chosen])
-            hessian = jacobian.T @ jacobian + np.eye(len(parameters))
-            gradient = jacobian.T @ residual + parameters
+            hessian = here.jacobian.T @ here.jacobian + np.eye(len(parameters))
+            gradient = here.jacobian.T @ here.residual + parameters
             taken = False
             for _ in range(8):
                 step = -sla.solve(hessian + damping * np.diag(np.diag(hessian)), gradient, assume_a="pos")
@@ -215,29 +241,55 @@ class Engine:
                 new_z[self.free] = trial[: ends[0]]
                 new = [trial[a:b] for a, b in pairwise(ends)]
                 with np.errstate(all="ignore"):
-                    r = self.residual(new_z, self._pushed(self._pushes(effects, new, situation)))
-                    there = 0.5 * float(r @ r + new_z @ new_z + sum(c @ c for c in new))
-                if np.isfinite(there) and there <= here + 1e-9 * abs(here):
+                    there = self._cost(effects, new, new_z, situation)
+                if np.isfinite(there) and there <= here.cost + 1e-9 * abs(here.cost):
                     taken = True
                     break
                 damping = max(damping, 1e-6) * 10.0
             if not taken:
-                converged, cost = True, here
+                converged = True
                 break
             z, chosen, damping = new_z, new, damping * 0.1
             situation = self.situation(z, self._pushes(effects, chosen, situation, vibrations=False))
-            if abs(cost - there) < CLOSE and here - there < CLOSE:
-                converged, cost = True, there
+            if abs(cost - there) < CLOSE and here.cost - there < CLOSE:
+                converged = True
                 break
             cost = there
-        else:
-            converged = False
-        data = self._pushed(self._pushes(effects, chosen, situation))
-        residual = self.residual(z, data)
-        cost = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in chosen))
+        last = self._point(effects, chosen, z, situation)
+        if best is None or (np.isfinite(last.jacobian).all() and last.cost < best.cost + CLOSE):
+            best = last  # unless motion and pushes came apart on the way
+        counts = np.cumsum([len(self.free), *sizes])[:-1]
+        own, *added = np.split(best.jacobian, counts, axis=1)
         return Fit(
-            self.posterior, tuple(effects), tuple(chosen), z, residual, own, tuple(added), cost, situation, converged
+            self.posterior,
+            tuple(effects),
+            tuple(best.coordinates),
+            best.z,
+            best.residual,
+            own,
+            tuple(added),
+            best.cost,
+            best.situation,
+            converged,
+            self._released,
         )
+
+    def _point(
+        self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, situation: Situation
+    ) -> _Point:
+        """Residual and derivatives at one point."""
+        data = self._pushed(self._pushes(effects, coordinates, situation))
+        residual = self.residual(z, data)
+        columns = [self.own_columns(z, data)]
+        for effect, c in zip(effects, coordinates, strict=True):
+            empty = np.zeros((len(residual), 0))
+            columns.append(self.columns(effect, c, situation, z, data) if len(c) else empty)
+        cost = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in coordinates))
+        return _Point(z, list(coordinates), situation, residual, np.concatenate(columns, axis=1), cost)
+
+    def _cost(self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, situation: Situation) -> float:
+        r = self.residual(z, self._pushed(self._pushes(effects, coordinates, situation)))
+        return 0.5 * float(r @ r + z @ z + sum(c @ c for c in coordinates))
 
     def situation(self, z: Floats, pushes: Sequence[Push]) -> Situation:
         """Return the motion with the given pushes."""

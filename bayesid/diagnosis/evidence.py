@@ -12,6 +12,7 @@ from scipy import stats
 from bayesid.arrays import Floats
 from bayesid.diagnosis.battery import FALSE_ALARM
 from bayesid.diagnosis.drive import physical
+from bayesid.diagnosis.scale import effect_mixture
 from bayesid.diagnosis.scores import DRAWS
 from bayesid.diagnosis.search import Hypothesis, Search, significance
 from bayesid.effects.base import Effect, Quantity
@@ -131,9 +132,10 @@ def _linear(effect: Effect, search: Search) -> Candidate:
     if effect.parameters:
         hessian = information + np.eye(len(information))
         covariance = np.linalg.inv(hessian)
-        start = np.resize(effect.starts[0], len(information))
-        mean, sd = _reported(effect, start - covariance @ gradient, covariance)
+        point = np.resize(effect.starts[0], len(information)) - covariance @ gradient
+        mean, sd = _reported(effect, point, covariance)
         gain = 0.5 * float(gradient @ covariance @ gradient) - 0.5 * float(np.linalg.slogdet(hessian)[1])
+        gain += effect_mixture(effect, point, covariance)
     else:
         mean = sd = np.zeros(0)
         gain = float(-gradient[0] - 0.5 * information[0, 0])  # there at full size, or not

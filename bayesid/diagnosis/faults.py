@@ -7,22 +7,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 from scipy.optimize import minimize
 
 from bayesid.arrays import Floats
-from bayesid.diagnosis.engine import Fit
+from bayesid.diagnosis.engine import Engine, Fit
 from bayesid.diagnosis.noise import lattice, leverage
 from bayesid.effects.base import Quantity
 from bayesid.posterior import Posterior
 from bayesid.sensors import Coloured, Kind, Quantised, Scaled, Sensor
 
-__all__ = ["SUMMARIES", "NoiseFault", "noise_fault"]
+__all__ = ["SUMMARIES", "NoiseFault", "noise_fault", "refined"]
 
 OUTLYING = 4.5
 """Whitened residual from which a sample counts as an outlier."""
 
+NEIGHBOURS, CLUSTERED = 3, 1e-4
+"""Outliers within so many samples of each other more often than with this probability by chance are an event."""
+
 LONGEST = 0.05
 """Longest correlation time of coloured noise, in lengths of a recording; beyond it is drift."""
+
+TRIALS = 20
+"""Evaluations of the evidence in the search for the size of coloured noise."""
+
+REFITS = 2
+"""Iterations of the fit at each of them."""
 
 SUMMARIES = {
     "noise": "The sensor is noisier than its data sheet: every sample's error is larger by one factor.",
@@ -61,8 +71,8 @@ class NoiseFault:
         return SUMMARIES.get(name, SUMMARIES["noise"])
 
 
-def noise_fault(label: str, fit: Fit) -> NoiseFault:
-    """Estimate a noise fault from the residual of a fit and put it into the fit's posterior."""
+def noise_fault(label: str, fit: Fit) -> NoiseFault | None:
+    """Estimate a noise fault from the residual of a fit and put it into the fit's posterior; None if it is no such."""
     name, _, place = label.partition(":")
     if name == "coloured-noise":
         return _coloured(label, Kind(place), fit)
@@ -98,8 +108,7 @@ def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
             keep = slice(4, None)  # the slowest waves may have gone into the fit
             powers.append(spectrum[keep])
             angles.append(2.0 * np.pi * np.fft.rfftfreq(len(own))[keep])
-    times = [fit.posterior.measured(r, kind)[0] for r in range(len(fit.posterior.manoeuvres))]
-    longest = LONGEST * max(float(np.ptp(own)) for own in times)
+    longest = _longest(fit, kind)
     power, angle = np.concatenate(powers), np.concatenate(angles)
 
     def whittle(x: Floats) -> float:
@@ -109,26 +118,73 @@ def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
 
     starts = [np.array([a, np.log(b * interval)]) for a in (-1.0, 0.5) for b in (3.0, 12.0)]
     best = min((minimize(whittle, start, method="Nelder-Mead") for start in starts), key=lambda found: float(found.fun))
-    x = best.x
-    curvature = np.array(
-        [
-            (whittle(x + h) - 2.0 * best.fun + whittle(x - h)) / 0.01
-            for h in (np.array([0.1, 0.0]), np.array([0.0, 0.1]))
-        ]
+    level, time = best.x[0], np.log(np.clip(np.exp(best.x[1]), 0.2 * interval, longest))
+    return _coloured_at(label, kind, fit, np.array([level, time]), np.full(2, np.nan))
+
+
+def _longest(fit: Fit, kind: Kind) -> float:
+    """Longest correlation time looked for [s]."""
+    return LONGEST * max(
+        float(np.ptp(fit.posterior.measured(r, kind)[0])) for r in range(len(fit.posterior.manoeuvres))
     )
-    level = np.exp(x[0]) * fit.posterior.sigma(0, kind)
-    time = float(np.clip(np.exp(x[1]), 0.2 * interval, longest))
+
+
+def _coloured_at(
+    label: str, kind: Kind, fit: Fit, logs: Floats, relative: Floats, like: Posterior | None = None
+) -> NoiseFault:
+    """Coloured noise with the logarithms of its level, in sigma, and of its correlation time."""
+    level, time = np.exp(logs[0]) * fit.posterior.sigma(0, kind), float(np.exp(logs[1]))
     noise = Coloured((float(level[0]), float(level[1]), float(level[2])), time)
-    posterior = _with_sensor(fit, kind, lambda s: replace(s, coloured=noise))
+    posterior = _with_sensor(fit, kind, lambda s: replace(s, coloured=noise), like)
     mean = np.array([float(level.mean()), time])
-    relative = 1.0 / np.sqrt(np.maximum(curvature, 1e-6))
     return NoiseFault(label, (Quantity("sigma", kind.unit), Quantity("time", "s")), mean, mean * relative, posterior)
 
 
-def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault:
+def refined(fault: NoiseFault, engine: Engine, fit: Fit) -> NoiseFault:
+    """Maximise the evidence over the size of coloured noise; other faults are returned as they are.
+
+    The first estimate comes from a residual out of which the fit has taken slow waves, and is too small.
+    """
+    name, _, place = fault.label.partition(":")
+    if name != "coloured-noise":
+        return fault
+    kind = Kind(place)
+    sigma = fit.posterior.sigma(0, kind)
+    first = np.log([fault.mean[0] / sigma.mean(), fault.mean[1]])
+    longest = np.log(_longest(fit, kind))
+    points, values = [], []
+
+    def loss(logs: Floats) -> float:
+        logs = np.array([logs[0], min(logs[1], longest)])
+        posterior = _coloured_at(fault.label, kind, fit, logs, np.zeros(2), fault.posterior).posterior
+        again = engine.with_posterior(posterior).fit(fit.effects, fit.coordinates, z=fit.z, iterations=REFITS)
+        points.append(logs)
+        values.append(-again.log_evidence)
+        return values[-1]
+
+    simplex = first + np.array([[0.0, 0.0], [0.15, 0.0], [0.0, 0.3]])
+    options = {"initial_simplex": simplex, "maxfev": TRIALS, "xatol": 0.02, "fatol": 0.05}
+    minimize(loss, first, method="Nelder-Mead", options=options)  # type: ignore[call-overload]
+    best = points[int(np.argmin(values))]
+    spread = _spread(np.array(points), np.array(values))
+    return _coloured_at(fault.label, kind, fit, best, spread, fault.posterior)
+
+
+def _spread(points: Floats, values: Floats) -> Floats:
+    """Return standard deviations from a paraboloid through points (n, 2) of a loss, (n,); NaN where it has no bowl."""
+    x, y = (points - points[np.argmin(values)]).T
+    terms = np.stack([np.ones_like(x), x, y, 0.5 * x**2, x * y, 0.5 * y**2], axis=1)
+    _, _, _, xx, xy, yy = np.linalg.lstsq(terms, values, rcond=None)[0]
+    hessian = np.array([[xx, xy], [xy, yy]])
+    if np.linalg.eigvalsh(hessian).min() <= 0.0:
+        return np.array([np.nan, np.nan])
+    return np.sqrt(np.diag(np.linalg.inv(hessian)))
+
+
+def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault | None:
     slot = _slot(fit.posterior, kind)
     whole, _ = _shaped(fit)
-    masks, count, total = [], 0, 0
+    masks, count, total, near, chance = [], 0, 0, 0, 0.0
     for r, item in enumerate(fit.posterior.whitenings):
         mask = np.zeros_like(item.outputs)
         own = whole[r, : len(mask), slot]
@@ -137,7 +193,13 @@ def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault:
         mask |= fit.posterior.gone(r)
         masks.append(mask)
         count += int(mask[:, slot].any(axis=1).sum())
-        total += int((item.outputs | mask)[:, slot].any(axis=1).sum())
+        instants = np.flatnonzero(mask[:, slot].any(axis=1))
+        length = int((item.outputs | mask)[:, slot].any(axis=1).sum())
+        total += length
+        near += int((np.diff(instants) <= NEIGHBOURS).sum())
+        chance += NEIGHBOURS * len(instants) ** 2 / max(length, 1)
+    if stats.poisson.sf(near - 1, chance) < CLUSTERED:
+        return None  # something lasted
     fraction = count / max(total, 1)
     sd = np.sqrt(max(fraction * (1.0 - fraction), 1.0 / max(total, 1)) / max(total, 1))
     return NoiseFault(
@@ -154,9 +216,9 @@ def _quantisation(label: str, kind: Kind, fit: Fit) -> NoiseFault:
     return NoiseFault(label, (Quantity("step", kind.unit),), np.array([float(step.mean())]), np.zeros(1), posterior)
 
 
-def _with_sensor(fit: Fit, kind: Kind, change: Callable[[Sensor], Sensor]) -> Posterior:
+def _with_sensor(fit: Fit, kind: Kind, change: Callable[[Sensor], Sensor], like: Posterior | None = None) -> Posterior:
     sensors = [change(sensor) if sensor.kind is kind else sensor for sensor in fit.posterior.model.sensors]
-    return fit.posterior.with_sensors(sensors, fit.z)
+    return fit.posterior.with_sensors(sensors, fit.z, like)
 
 
 def _slot(posterior: Posterior, kind: Kind) -> slice:

@@ -8,6 +8,7 @@ from scipy import stats
 
 from bayesid.arrays import Floats
 from bayesid.diagnosis.engine import Fit
+from bayesid.diagnosis.scores import chi2_log_sf
 from bayesid.posterior import Posterior
 from bayesid.sensors import Kind, Quantised
 
@@ -43,7 +44,7 @@ def noise_tests(posterior: Posterior, fit: Fit) -> dict[str, float]:
                 pieces.append(own / np.sqrt(np.maximum(1.0 - taken[r, there, c], 0.05)))
         if degrees <= 0.0:
             continue
-        found[f"{name}-noise"] = float(stats.chi2.logsf(energy, degrees))
+        found[f"{name}-noise"] = chi2_log_sf(energy, degrees)
         scale = np.sqrt(max(energy / degrees, 1.0))
         found[f"coloured-noise:{name}"] = _coloured([piece / scale for piece in pieces])
         largest = max(float(np.abs(piece).max()) for piece in pieces)

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
+from scipy.special import gammaln
 
 from bayesid.arrays import Floats
 from bayesid.diagnosis.engine import Fit
 
-__all__ = ["Calibration", "Score", "score"]
+__all__ = ["Calibration", "Score", "chi2_log_sf", "score"]
 
 VISIBLE = 1.0
 """Information at the prior's scale from which on a direction counts."""
@@ -56,7 +57,7 @@ class Score:
     @property
     def log_p(self) -> float:
         """Logarithm of the p-value."""
-        return float(stats.chi2.logsf(self.statistic, self.degrees)) if self.degrees else 0.0
+        return chi2_log_sf(self.statistic, self.degrees) if self.degrees else 0.0
 
     @property
     def signal_to_noise(self) -> float:
@@ -78,6 +79,15 @@ def score(name: str, columns: Floats, fit: Fit, most: int | None = None) -> Scor
     basis = columns @ (vectors[:, kept] / np.sqrt(values[kept]))
     found = basis.T @ fit.residual
     return Score(name, basis, float(found @ found), float(values[kept].sum()))
+
+
+def chi2_log_sf(statistic: float, degrees: float) -> float:
+    """Logarithm of the upper tail of chi-square; far out by a continued fraction, where it underflows."""
+    value = float(stats.chi2.logsf(statistic, degrees))
+    if np.isfinite(value):
+        return value
+    a, x = 0.5 * degrees, 0.5 * statistic
+    return float(a * np.log(x) - x - np.log(x - a + 1.0) - gammaln(a))  # the first term of the continued fraction
 
 
 class Calibration:

@@ -9,13 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import product
 
 import numpy as np
-from scipy import stats
 
+from bayesid.arrays import Floats
 from bayesid.diagnosis.battery import FALSE_ALARM, Battery, Outcome
+from bayesid.diagnosis.drive import Situation
 from bayesid.diagnosis.engine import Engine, Fit
-from bayesid.diagnosis.faults import NoiseFault, noise_fault
+from bayesid.diagnosis.faults import NoiseFault, noise_fault, refined
+from bayesid.diagnosis.scores import chi2_log_sf
 from bayesid.diagnosis.starts import starts_of
 from bayesid.effects.base import Effect
 from bayesid.errors import InputError
@@ -32,6 +35,15 @@ TRIED = (12, 7, 5)
 
 NEAR = 0.75
 """A candidate is worth a fit if it takes this share of what the best takes: what is left is significant otherwise."""
+
+FAR = 2.5
+"""Prior standard deviations from which a body's unknown may be imitating something; fits then also start at zero."""
+
+BARELY, DECISIVE = 1e-3, 2.7
+"""Causes that leave this much are given one more only if that makes them more probable by this logarithm."""
+
+HOPELESS = -60.0
+"""Logarithm of the p-value of what coloured noise leaves, below which its size is not refined."""
 
 SPARE = 60.0
 """And whatever it takes, if less than this is left."""
@@ -122,7 +134,7 @@ class Search:
         """Return the adequate hypotheses with fewest causes, best first; empty where none is found."""
         if self.base.adequate:
             return [self.base]
-        beam = [self.base]
+        beam, simpler = [self.base], list[Hypothesis]()
         for count in range(1, MOST_CAUSES + 1):
             found: list[Hypothesis] = []
             for parent, kind in [(parent, kind) for kind in Kind for parent in beam]:
@@ -142,7 +154,10 @@ class Search:
             found.sort(key=lambda h: -h.log_evidence)
             adequate = [hypothesis for hypothesis in found if hypothesis.adequate]
             if adequate:
-                return adequate
+                return (
+                    simpler if simpler and adequate[0].log_evidence - simpler[0].log_evidence < DECISIVE else adequate
+                )
+            simpler = [hypothesis for hypothesis in found if hypothesis.outcome.p_value >= BARELY]
             if not found or count == MOST_CAUSES:
                 return []
             beam = found[: BEAM[count - 1]]
@@ -200,17 +215,21 @@ class Search:
         chosen = [label for label in worth if (self.candidates[label].modes_count > 0) == (kind is Kind.VIBRATION)]
         if kind is Kind.FORCE and self.base.engine.frozen.size and "initial-rate" not in parent.labels:
             chosen.insert(0, "initial-rate")
+        if kind is Kind.FORCE and _strayed(parent.fit):  # a score at the wrong place says little of an effect's size
+            sure = [label for label, effect in self.candidates.items() if not effect.parameters]
+            chosen = [label for label in sure if label not in (*chosen, *parent.labels)] + chosen
         return chosen[:most]
 
     def _with_effect(self, parent: Hypothesis, effect: Effect) -> Hypothesis | None:
         best: Fit | None = None
-        for start in starts_of(effect, parent.engine, parent.fit, self._battery(parent)):
+        places: list[tuple[Floats | None, Situation | None]] = [(parent.fit.z, parent.fit.situation)]
+        if _strayed(parent.fit):
+            places.append((None, None))
+        starts = starts_of(effect, parent.engine, parent.fit, self._battery(parent))
+        for (z, situation), start in product(places, starts):
             try:
                 fit = parent.engine.fit(
-                    (*parent.fit.effects, effect),
-                    (*parent.fit.coordinates, start),
-                    z=parent.fit.z,
-                    situation=parent.fit.situation,
+                    (*parent.fit.effects, effect), (*parent.fit.coordinates, start), z=z, situation=situation
                 )
             except InputError:  # no motion from this start
                 continue
@@ -231,17 +250,27 @@ class Search:
         faults = (*parent.faults, marker)
         return Hypothesis(engine, fit, faults, self._battery_of(engine, fit, ("initial-rate",)).outcome(fit))
 
-    def _with_fault(self, parent: Hypothesis, label: str) -> Hypothesis:
+    def _with_fault(self, parent: Hypothesis, label: str) -> Hypothesis | None:
         fit, engine = parent.fit, parent.engine
         fault = noise_fault(label, fit)
+        if fault is None:
+            return None
+        labels = tuple(sorted((*(item.label for item in parent.faults), label)))
         engine = engine.with_posterior(fault.posterior)
         fit = engine.fit(fit.effects, fit.coordinates, z=fit.z)
+        if label.startswith("coloured-noise"):
+            outcome = self._battery_of(engine, fit, labels).outcome(fit)
+            if outcome.log_p[outcome.worst] > HOPELESS and not outcome.adequate:
+                fault = refined(fault, engine, fit)
+                engine = engine.with_posterior(fault.posterior)
+                fit = engine.fit(fit.effects, fit.coordinates, z=fit.z)
         if label.startswith("outliers"):  # those that the first fit hid
             fault = noise_fault(label, fit)
+            if fault is None:
+                return None
             again = engine.with_posterior(fault.posterior)
             fit, engine = again.fit(fit.effects, fit.coordinates, z=fit.z), again
         faults = (*parent.faults, fault)
-        labels = tuple(sorted(item.label for item in faults))
         return Hypothesis(engine, fit, faults, self._battery_of(engine, fit, labels).outcome(fit))
 
     def _battery(self, hypothesis: Hypothesis) -> Battery:
@@ -253,6 +282,11 @@ class Search:
         return self._batteries[faults]
 
 
+def _strayed(fit: Fit) -> bool:
+    """Whether the model's own unknowns went so far from their prior that they may imitate what is missing."""
+    return bool(np.abs(fit.z[: 10 * len(fit.posterior.model.priors)]).max(initial=0.0) > FAR)
+
+
 def log_bayes_factor(hypothesis: Hypothesis, base: Hypothesis) -> float:
     """Logarithm of the Bayes factor against another hypothesis."""
     return hypothesis.log_evidence - base.log_evidence
@@ -262,4 +296,4 @@ def significance(hypothesis: Hypothesis, parent: Hypothesis) -> tuple[float, flo
     """Return signal-to-noise ratio and log p-value of the improvement over a hypothesis with fewer causes, refitted."""
     improvement = 2.0 * (parent.fit.cost - hypothesis.fit.cost)
     degrees = max(hypothesis.fit.known.shape[1] - parent.fit.known.shape[1], 1)
-    return float(np.sqrt(max(improvement - degrees, 0.0))), float(stats.chi2.logsf(max(improvement, 0.0), degrees))
+    return float(np.sqrt(max(improvement - degrees, 0.0))), chi2_log_sf(max(improvement, 0.0), degrees)

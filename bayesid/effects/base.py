@@ -67,6 +67,11 @@ class Parameter(NamedTuple):
     mean: float = 0.0
     prior: Prior = Prior.NORMAL
 
+    @property
+    def is_amplitude(self) -> bool:
+        """Whether zero means that nothing is there."""
+        return self.prior is Prior.NORMAL and self.mean == 0.0
+
     def value(self, z: Array) -> Array:
         """Physical value of a coordinate with a standard-normal prior."""
         if self.prior is Prior.LOG_NORMAL:
