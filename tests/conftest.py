@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bayesid.compiled import keep_compiled
 from bayesid.effects import GravityGradient
 from bayesid.inertia import InertialParameters
 from bayesid.model import Manoeuvre, Model
@@ -21,6 +24,22 @@ from bayesid.sensors import Kind, Sensor, White
 from bayesid.unknowns import BodyPrior
 from tests import mujoco_truth as mj
 from tests.reference import moving_joints
+
+COMPILED = "BAYESID_TEST_COMPILED"
+"""Names the folder in which the processes of one run share compiled functions."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--catalogue", action="store_true", help="hide every cause of the catalogue (half an hour)")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if COMPILED not in os.environ:
+        folder = tempfile.TemporaryDirectory()
+        os.environ[COMPILED] = folder.name
+        config.add_cleanup(folder.cleanup)
+    keep_compiled(Path(os.environ[COMPILED]))
+
 
 ROOT = Path(__file__).resolve().parents[1]
 PLANAR = ROOT / "bayesid" / "robots" / "planar.urdf"

@@ -119,6 +119,9 @@ class Quantisation:
 # Studies --------------------------------------------------------------------------------------------------------------
 
 
+Build = Callable[[Generator, float], Options]
+
+
 @dataclass(frozen=True)
 class Case:
     """A study that can be written, and the answer.
@@ -130,20 +133,61 @@ class Case:
         The contract's names for what is hidden; empty for nulls and for outside effects.
     status : str
         "effect", "adequate" or "unknown" (outside the catalogue).
-    make : callable
-        (folder, seed, strength=1.0) -> path of study.toml.
+    builds : tuple of callable
+        (draw, strength) -> keywords of `mujoco_truth.write_study`, one for each thing hidden.
+    urdf : path
+    fixed : dict
+        Further keywords.
     accept : tuple of str
         Names that are as right as one of the causes, since they change the model alike.
+    frame : str, optional
+        Axes in which an outside wrench is fixed.
     """
 
     name: str
     causes: tuple[str, ...]
     status: str
-    make: Callable[..., Path]
+    builds: tuple[Build, ...]
+    urdf: Path
+    fixed: Options
     accept: tuple[str, ...] = ()
+    frame: str | None = None
 
+    def write(self, folder: str | Path, seed: int, strength: float = 1.0) -> mj.Study:
+        """Write the study; the same seed draws the same circumstances, motions and noise whatever the strength."""
+        return _write(self.urdf, self._causes(seed, strength), self.fixed, folder, seed)
 
-Build = Callable[[Generator, float], Options]
+    def make(self, folder: str | Path, seed: int, strength: float = 1.0) -> Path:
+        """Write the study and return its file."""
+        return self.write(folder, seed, strength).file
+
+    def amplitudes(self, seed: int, strength: float = 1.0) -> dict[str, Array]:
+        """Return the true sizes of what is hidden, by cause, for causes that are a vector or a number."""
+        found: dict[str, Array] = {}
+        for options in self._causes(seed, strength):
+            rotor = options["hidden"].rotor if "hidden" in options else None
+            if rotor is not None:
+                found["wheel-momentum"] = np.asarray(rotor.momentum)
+            fault = options.get("distort")
+            if isinstance(fault, VectorFault):
+                sizes = {key: np.asarray(value) for key, value in vars(fault).items() if key != "sensor"}
+                found |= {f"{fault.sensor}-{key}": value for key, value in sizes.items() if value.any()}
+            if isinstance(fault, EncoderOffset):
+                found[f"encoder-offset:{fault.joint}"] = np.array([fault.offset])
+            for key, value in options.get("sensors", {}).items():
+                name = key.removesuffix("_delay").replace("encoder", "joint")
+                found[f"{name}-latency"] = np.array([value])
+        return found
+
+    def torque(self, seed: int, strength: float, truth: mj.Truth) -> Array:
+        """Return the torque of hidden fields along a motion, base axes, (n, 3) [N m]."""
+        fields = [field for options in self._causes(seed, strength) for field in options["hidden"].fields]
+        turns = Rotation.from_quat(truth.attitude).as_matrix()
+        rows = zip(truth.times, turns, truth.rate, strict=True)
+        return np.array([sum((field(*row)[1] for field in fields), np.zeros(3)) for row in rows])
+
+    def _causes(self, seed: int, strength: float) -> list[Options]:
+        return [build(np.random.default_rng([seed, 2 + i]), strength) for i, build in enumerate(self.builds)]
 
 
 def direction(draw: Generator, size: float = 1.0) -> Array:
@@ -196,13 +240,11 @@ def in_turn(*distortions: mj.Distortion) -> mj.Distortion:
     return both
 
 
-def _make(
-    urdf: Path, builds: Sequence[Build], fixed: Options, folder: str | Path, seed: int, strength: float = 1.0
-) -> Path:
+def _write(urdf: Path, builds: Sequence[Options], fixed: Options, folder: str | Path, seed: int) -> mj.Study:
     options = circumstances(np.random.default_rng([seed, 1]))
     causes: Options = {}
-    for index, build in enumerate(builds):
-        causes = merge(causes, build(np.random.default_rng([seed, 2 + index]), strength))
+    for build in builds:
+        causes = merge(causes, build)
     for changes in (fixed, causes):
         for key, value in changes.items():
             # a mapping changes some fields of what the circumstances are
@@ -213,7 +255,7 @@ def _make(
         options["declared"] = replace(options["sensors"], **declared)
     if "declared_offset" in options:
         options["declared_accel_position"] = np.add(options["sensors"].accel_position, options.pop("declared_offset"))
-    return mj.write_study(folder, urdf, np.random.default_rng(seed), title="Free-flyer", **options).file
+    return mj.write_study(folder, urdf, np.random.default_rng(seed), title="Free-flyer", **options)
 
 
 # Causes: (draw, strength) -> keywords of write_study ------------------------------------------------------------------
@@ -357,10 +399,11 @@ def _case(
     urdf: Path = SERVICER3,
     accept: Sequence[str] = (),
     status: str = "effect",
+    frame: str | None = None,
     **fixed: Any,
 ) -> Case:
     others = tuple(other for other in accept if other not in causes)
-    return Case(name, tuple(causes), status, partial(_make, urdf, builds, fixed), others)
+    return Case(name, tuple(causes), status, builds, urdf, fixed, others, frame)
 
 
 def _effect(name: str, build: Build, **options: Any) -> Case:
@@ -452,10 +495,10 @@ CASES: tuple[Case, ...] = (
         leak,
         partial(vector_fault, "accel", "scale", 2e-2),
     ),
-    _outside("pulse-train", pulse_train),
-    _outside("thermal-snap", thermal_snap, urdf=SERVICER4),
-    _outside("growing-torque", growing_torque),
-    _outside("swinging-torque", swinging_torque, urdf=SERVICER4),
+    _outside("pulse-train", pulse_train, frame="base"),
+    _outside("thermal-snap", thermal_snap, urdf=SERVICER4, frame="base"),
+    _outside("growing-torque", growing_torque, frame="inertial"),
+    _outside("swinging-torque", swinging_torque, urdf=SERVICER4, frame="inertial"),
     _outside("shifting-mass", shifting_mass),
     _null("null, three joints"),
     _null("null, four joints, own sampling rates", urdf=SERVICER4, sensors={"rate_period": 1.0, "accel_period": 0.25}),

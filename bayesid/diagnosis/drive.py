@@ -81,7 +81,7 @@ def drive(effect: Effect, coordinates: Floats, situation: Situation, table: Tabl
     shaped = jnp.asarray(coordinates).reshape(coordinates_shape(effect, _recordings(situation)))
     push = _nothing(situation)
     if _acts(effect):
-        hooks = _evaluate(effect, _setting(situation))(shaped.ravel(), *situation[1:4], _steps(situation))
+        hooks = _evaluate(_Alike(effect), _setting(situation))(shaped.ravel(), *situation[1:4], _steps(situation))
         push = push._replace(**{key: np.asarray(value) for key, value in hooks.items()})
     if table is not None:
         loads = np.asarray(effect.loads(physical(effect, shaped)))
@@ -108,7 +108,7 @@ def linear_drive(effect: Effect, coordinates: Floats, situation: Situation, tabl
         return _nothing(situation, (count,))._replace(stage_rows=rows[0], sample_rows=rows[1])
     slopes = _nothing(situation, (len(flat),))
     if _acts(effect):
-        hooks = _differentiate(effect, _setting(situation))(flat, *situation[1:4], _steps(situation))
+        hooks = _differentiate(_Alike(effect), _setting(situation))(flat, *situation[1:4], _steps(situation))
         slopes = slopes._replace(**{key: np.moveaxis(np.asarray(value), -1, 0) for key, value in hooks.items()})
     if table is not None:
         loads = np.asarray(jax.jacfwd(lambda c: effect.loads(physical(effect, c.reshape(shape))))(flat)).T
@@ -164,14 +164,33 @@ def _acts(effect: Effect) -> bool:
     return any(effect.uses(hook) for hook in ("momentum", "wrench", "field", "read"))
 
 
-@lru_cache(maxsize=256)
-def _evaluate(effect: Effect, setting: Setting) -> Callable[..., dict[str, Array]]:
-    return jax.jit(partial(_hooks, effect, setting))
+class _Alike:
+    """An effect as a key: equal to others of its class with equal attributes, which share compiled functions."""
+
+    def __init__(self, effect: Effect) -> None:
+        self.effect = effect
+        own = tuple(sorted(vars(effect).items()))
+        try:
+            hash(own)
+        except TypeError:  # arrays: every such effect is its own
+            own = (("id", id(effect)),)
+        self._key = (type(effect), own)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Alike) and self._key == other._key
+
+    def __hash__(self) -> int:
+        return hash(self._key)
 
 
-@lru_cache(maxsize=256)
-def _differentiate(effect: Effect, setting: Setting) -> Callable[..., dict[str, Array]]:
-    return jax.jit(jax.jacfwd(partial(_hooks, effect, setting)))
+@lru_cache(maxsize=128)
+def _evaluate(alike: _Alike, setting: Setting) -> Callable[..., dict[str, Array]]:
+    return jax.jit(partial(_hooks, alike.effect, setting))
+
+
+@lru_cache(maxsize=128)
+def _differentiate(alike: _Alike, setting: Setting) -> Callable[..., dict[str, Array]]:
+    return jax.jit(jax.jacfwd(partial(_hooks, alike.effect, setting)))
 
 
 def _hooks(

@@ -17,7 +17,7 @@ from bayesid.diagnosis.scores import DRAWS
 from bayesid.diagnosis.search import Hypothesis, Search, significance
 from bayesid.effects.base import Effect, Quantity
 
-__all__ = ["Candidate", "candidate_table"]
+__all__ = ["Candidate", "candidate_table", "detection_power", "effect_amplitude"]
 
 ONE_SIDED_95 = 1.645
 
@@ -118,7 +118,7 @@ def _fitted(hypothesis: Hypothesis, search: Search, effect: Effect) -> Candidate
         tuple(effect.quantities),
         mean,
         sd,
-        None if item is None else _power(item.degrees, item.information, search),
+        None if item is None else detection_power(item.degrees, item.information, search),
         True,
     )
 
@@ -148,7 +148,7 @@ def _linear(effect: Effect, search: Search) -> Candidate:
         tuple(effect.quantities),
         mean,
         sd,
-        _power(item.degrees, item.information, search),
+        detection_power(item.degrees, item.information, search),
         False,
     )
 
@@ -157,7 +157,7 @@ def _vibrating(effect: Effect, search: Search) -> Candidate:
     items = [item for name, item in search.base.outcome.scores.items() if name.startswith("vibration")]
     best = min(items, key=lambda item: item.log_p)
     log_p = min(0.0, best.log_p + float(np.log(len(items))))
-    power = float(np.mean([_power(item.degrees, item.information, search) for item in items]))
+    power = float(np.mean([detection_power(item.degrees, item.information, search) for item in items]))
     nothing = np.zeros(0)
     return Candidate(
         effect.label,
@@ -190,8 +190,8 @@ def _noise(label: str, log_p: float, hypothesis: Hypothesis | None, search: Sear
     )
 
 
-def _power(degrees: int, information: float, search: Search) -> float:
-    """Probability of an alarm by an effect of the prior's size."""
+def detection_power(degrees: int, information: float, search: Search) -> float:
+    """Probability of an alarm by an effect with this noncentrality and so many degrees of freedom."""
     if degrees == 0:
         return FALSE_ALARM
     threshold = np.exp(search.battery.calibration.smallest[DRAWS // 100])

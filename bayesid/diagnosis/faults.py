@@ -118,8 +118,11 @@ def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
 
     starts = [np.array([a, np.log(b * interval)]) for a in (-1.0, 0.5) for b in (3.0, 12.0)]
     best = min((minimize(whittle, start, method="Nelder-Mead") for start in starts), key=lambda found: float(found.fun))
+    steps = 0.1 * np.eye(2)
+    curvature = np.array([(whittle(best.x + h) - 2.0 * best.fun + whittle(best.x - h)) / 0.01 for h in steps])
     level, time = best.x[0], np.log(np.clip(np.exp(best.x[1]), 0.2 * interval, longest))
-    return _coloured_at(label, kind, fit, np.array([level, time]), np.full(2, np.nan))
+    relative = 1.0 / np.sqrt(np.maximum(curvature, 1.0))
+    return _coloured_at(label, kind, fit, np.array([level, time]), relative)
 
 
 def _longest(fit: Fit, kind: Kind) -> float:
@@ -166,18 +169,18 @@ def refined(fault: NoiseFault, engine: Engine, fit: Fit) -> NoiseFault:
     options = {"initial_simplex": simplex, "maxfev": TRIALS, "xatol": 0.02, "fatol": 0.05}
     minimize(loss, first, method="Nelder-Mead", options=options)  # type: ignore[call-overload]
     best = points[int(np.argmin(values))]
-    spread = _spread(np.array(points), np.array(values))
+    spread = _spread(np.array(points), np.array(values), fault.sd / fault.mean)
     return _coloured_at(fault.label, kind, fit, best, spread, fault.posterior)
 
 
-def _spread(points: Floats, values: Floats) -> Floats:
-    """Return standard deviations from a paraboloid through points (n, 2) of a loss, (n,); NaN where it has no bowl."""
+def _spread(points: Floats, values: Floats, otherwise: Floats) -> Floats:
+    """Return standard deviations from a paraboloid through points (n, 2) of a loss, (n,), if it has a bowl."""
     x, y = (points - points[np.argmin(values)]).T
     terms = np.stack([np.ones_like(x), x, y, 0.5 * x**2, x * y, 0.5 * y**2], axis=1)
     _, _, _, xx, xy, yy = np.linalg.lstsq(terms, values, rcond=None)[0]
     hessian = np.array([[xx, xy], [xy, yy]])
     if np.linalg.eigvalsh(hessian).min() <= 0.0:
-        return np.array([np.nan, np.nan])
+        return otherwise
     return np.sqrt(np.diag(np.linalg.inv(hessian)))
 
 

@@ -260,7 +260,7 @@ class Search:
         fit = engine.fit(fit.effects, fit.coordinates, z=fit.z)
         if label.startswith("coloured-noise"):
             outcome = self._battery_of(engine, fit, labels).outcome(fit)
-            if outcome.log_p[outcome.worst] > HOPELESS and not outcome.adequate:
+            if outcome.log_p[outcome.worst] > HOPELESS:
                 fault = refined(fault, engine, fit)
                 engine = engine.with_posterior(fault.posterior)
                 fit = engine.fit(fit.effects, fit.coordinates, z=fit.z)

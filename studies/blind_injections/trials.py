@@ -5,17 +5,28 @@ from __future__ import annotations
 import json
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import numpy as np
+from scipy import stats
+
+from bayesid.arrays import Floats
 from bayesid.assemble import load_manoeuvres, load_model
-from bayesid.diagnosis import Diagnosis, diagnose
-from bayesid.diagnosis.search import significance
+from bayesid.diagnosis import Diagnosis, Frame, diagnose
+from bayesid.diagnosis.engine import Fit
+from bayesid.diagnosis.evidence import detection_power, effect_amplitude
 from bayesid.study import Study
-from tests import hidden
+from tests import hidden, mujoco_truth
 
 __all__ = ["Plan", "Trial", "make", "plan", "read", "run"]
+
+WEAKER = 0.1
+"""Share of the strength in the data that a hidden effect's size is measured against."""
+
+SPOILT = ("outliers", "quantisation")
+"""Causes that change no mean."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +54,22 @@ class Trial:
     causes : tuple of str
     sets : tuple of tuple of str
         The causes named and all rivals, equivalents included.
-    signal_to_noise : float
-        Of the best hypothesis against the present model.
+    signal_to_noise : float or None
+        Root of the noncentrality of what is hidden, after the model's own unknowns have taken their share; None for
+        faults of the noise, which change no mean. For outside effects what the best set of causes leaves of it.
+    detection, naming : float or None
+        Theory's limits: probability of an alarm by the test of the hidden effect alone, and of a larger likelihood than
+        the effect of another name that comes closest.
     p_value : float
         Family-wise, of what the present model leaves.
+    amplitude_errors : tuple of float
+        Of the amplitudes of causes named rightly, in the standard deviations stated.
+    body_errors : tuple of float
+        Of the base's ten parameters after the extension, in the standard deviations stated.
+    frame, true_frame : str or None
+        Axes that an outside wrench was said to be fixed in, and is.
+    correlation : float or None
+        Of the outside torque that was reconstructed with the true one.
     seconds : float
     """
 
@@ -59,8 +82,15 @@ class Trial:
     status: str
     causes: tuple[str, ...]
     sets: tuple[tuple[str, ...], ...]
-    signal_to_noise: float
+    signal_to_noise: float | None
+    detection: float | None
+    naming: float | None
     p_value: float
+    amplitude_errors: tuple[float, ...]
+    body_errors: tuple[float, ...]
+    frame: str | None
+    true_frame: str | None
+    correlation: float | None
     seconds: float
 
     @property
@@ -89,18 +119,22 @@ class Trial:
 
 
 def plan(full: bool) -> list[Plan]:
-    """Return the trials: every case once; with ``full`` at five strengths and four seeds, and a thousand nulls."""
-    if not full:
-        return [Plan(case.name, 100 + number) for number, case in enumerate(hidden.CASES)]
+    """Return the trials.
+
+    Every effect and pair at two strengths, outside effects at two, every null three times (about an hour on two cores);
+    with ``full`` at five strengths and four seeds, and a thousand nulls.
+    """
+    strengths, seeds, nulls = ((0.1, 0.2, 0.4, 0.7, 1.5), 4, 1000) if full else ((0.2, 0.6), 1, 30)
+    outside = (0.5, 1.0, 2.0) if full else (0.5, 1.0)
     plans = [
-        Plan(case.name, seed, strength)
-        for seed in range(4)
-        for strength in (0.15, 0.3, 0.5, 1.0, 2.0)
-        for case in hidden.CASES
+        Plan(case.name, 200 + 100 * seed + number, strength)
+        for seed in range(seeds)
+        for number, case in enumerate(hidden.CASES)
         if case.status != "adequate"
+        for strength in (outside if case.status == "unknown" else strengths)
     ]
-    nulls = [case.name for case in hidden.CASES if case.status == "adequate"]
-    return plans + [Plan(nulls[seed % len(nulls)], 1000 + seed) for seed in range(1000)]
+    quiet = [case.name for case in hidden.CASES if case.status == "adequate"]
+    return plans + [Plan(quiet[index % len(quiet)], 1000 + index) for index in range(nulls)]
 
 
 def run(plans: Sequence[Plan], kept: Path, progress: Callable[[int, int, Trial], None] | None = None) -> list[Trial]:
@@ -119,7 +153,9 @@ def run(plans: Sequence[Plan], kept: Path, progress: Callable[[int, int, Trial],
         if key not in done:
             done[key] = make(item)
             kept.parent.mkdir(parents=True, exist_ok=True)
+            whole = not kept.is_file() or kept.read_text(encoding="utf-8")[-1:] in ("", "\n")
             with kept.open("a", encoding="utf-8") as file:
+                file.write("" if whole else "\n")  # after a line cut off
                 file.write(json.dumps(asdict(done[key])) + "\n")
         trials.append(done[key])
         if progress is not None:
@@ -137,7 +173,7 @@ def read(kept: Path) -> list[Trial]:
             content = json.loads(line)
         except json.JSONDecodeError:
             continue
-        for key in ("hidden", "accept", "causes"):
+        for key in ("hidden", "accept", "causes", "amplitude_errors", "body_errors"):
             content[key] = tuple(content[key])
         content["sets"] = tuple(tuple(labels) for labels in content["sets"])
         trials.append(Trial(**content))
@@ -149,26 +185,100 @@ def make(item: Plan) -> Trial:
     case = next(case for case in hidden.CASES if case.name == item.case)
     began = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        study = Study.load(case.make(Path(folder), item.seed, item.strength))
+        written = case.write(Path(folder) / "study", item.seed, item.strength)
+        study = Study.load(written.file)
         model = load_model(study)
         knows = all(section.argument_of_latitude is not None for section in study.recordings)
         result = diagnose(model, load_manoeuvres(study, model.robot), item.seed, knows_latitude=knows)
-    tried = result.search.tried
-    best = result.after if result.verdict.causes else (tried[1] if len(tried) > 1 else tried[0])
+        seconds = time.perf_counter() - began
+        weaker = case.make(Path(folder) / "weaker", item.seed, WEAKER * item.strength) if _visible(case) else None
+        size = (None, None, None) if weaker is None else _limits(result, case, Study.load(weaker))
     return Trial(
-        item.case,
-        item.seed,
-        item.strength,
-        case.status,
-        tuple(case.causes),
-        tuple(case.accept),
-        result.verdict.status.value,
-        result.verdict.causes,
-        _sets(result),
-        significance(best, result.before)[0],
-        result.before.outcome.p_value,
-        time.perf_counter() - began,
+        case=item.case,
+        seed=item.seed,
+        strength=item.strength,
+        kind=case.status,
+        hidden=case.causes,
+        accept=case.accept,
+        status=result.verdict.status.value,
+        causes=result.verdict.causes,
+        sets=_sets(result),
+        signal_to_noise=size[0],
+        detection=size[1],
+        naming=size[2],
+        p_value=result.before.outcome.p_value,
+        amplitude_errors=_amplitude_errors(result, case.amplitudes(item.seed, item.strength)),
+        body_errors=_body_errors(result, written),
+        frame=None if result.unexplained.fixed_in is None else result.unexplained.fixed_in.value,
+        true_frame=case.frame,
+        correlation=None if case.frame is None else _correlation(result, case, item, written),
+        seconds=seconds,
     )
+
+
+def _visible(case: hidden.Case) -> bool:
+    """Whether what is hidden changes the mean of the data."""
+    return case.status != "adequate" and not any("noise" in c or c.startswith(SPOILT) for c in case.causes)
+
+
+def _limits(result: Diagnosis, case: hidden.Case, weaker: Study) -> tuple[float, float | None, float | None]:
+    """Signal-to-noise ratio of what is hidden and theory's limits, from the same noise with less hidden."""
+    fit, engine = result.before.fit, result.before.engine
+    like = fit.posterior.with_manoeuvres(load_manoeuvres(weaker, fit.posterior.model.robot))
+    other = like.data._replace(weights=fit.posterior.data.weights, start=fit.posterior.data.start)
+    change = (engine.residual(fit.z, fit.posterior.data) - engine.residual(fit.z, other)) / (1.0 - WEAKER)
+    if case.status == "unknown":
+        tried = result.search.tried
+        left = tried[min(1, len(tried) - 1)].fit
+        return float(np.sqrt(left.project(change[:, None])[0, 0])), None, None
+    noncentrality = float(fit.project(change[:, None])[0, 0])
+    search = result.search
+    degrees = sum(max(len(search.candidates[c].parameters), 1) if c in search.candidates else 3 for c in case.causes)
+    closest = noncentrality
+    names = set(case.causes) | set(case.accept)
+    for label, columns in search.battery.effects.items():
+        if label not in names and len(case.causes) == 1:
+            closest = min(closest, _left(fit, columns, change))
+    return (
+        float(np.sqrt(noncentrality)),
+        detection_power(degrees, noncentrality, search),
+        float(stats.norm.cdf(0.5 * np.sqrt(max(closest, 0.0)))),
+    )
+
+
+def _left(fit: Fit, columns: Floats, change: Floats) -> float:
+    """Noncentrality that a rival effect leaves."""
+    both = fit.project(np.column_stack([change, columns]))
+    inner = both[1:, 1:] + np.eye(columns.shape[1])
+    return float(both[0, 0] - both[0, 1:] @ np.linalg.solve(inner, both[1:, 0]))
+
+
+def _amplitude_errors(result: Diagnosis, truth: Mapping[str, Floats]) -> tuple[float, ...]:
+    errors: list[float] = []
+    for index, effect in enumerate(result.after.fit.effects if result.verdict.causes else ()):
+        if effect.label in truth:
+            mean, sd = effect_amplitude(result.after, index)
+            errors += ((mean - truth[effect.label]) / sd).tolist()
+    return tuple(errors)
+
+
+def _body_errors(result: Diagnosis, written: mujoco_truth.Study) -> tuple[float, ...]:
+    base = written.base
+    truth = np.array([base.mass, *base.com, *base.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
+    bodies = result.gain.after.bodies
+    return tuple(((bodies.mean[:10] - truth) / bodies.sd[:10]).tolist())
+
+
+def _correlation(result: Diagnosis, case: hidden.Case, item: Plan, written: mujoco_truth.Study) -> float:
+    """Correlation of the reconstructed with the true torque, all axes and recordings together."""
+    found, true = [], []
+    for time_, torque, truth in zip(
+        result.unexplained.time, result.unexplained.torque[Frame.BASE], written.truths, strict=True
+    ):
+        there = case.torque(item.seed, item.strength, truth)
+        true += [np.interp(time_, truth.times, there[:, axis]) for axis in range(3)]
+        found += list(torque.T)
+    return float(np.corrcoef(np.concatenate(found), np.concatenate(true))[0, 1])
 
 
 def _sets(result: Diagnosis) -> tuple[tuple[str, ...], ...]:

@@ -1,0 +1,78 @@
+"""The campaign on two trials: kept, resumed, reported."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from studies.blind_injections import Trial, plan, run, write_report
+from studies.blind_injections.report import confusion, rates
+from studies.blind_injections.trials import Plan, read
+
+PLANS = [Plan("rate-bias", 5, 0.3), Plan("null, three joints", 5)]
+
+
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    return tmp_path_factory.mktemp("campaign") / "trials.jsonl"
+
+
+@pytest.fixture(scope="module")
+def trials(kept):
+    return run(PLANS, kept)
+
+
+def test_what_was_hidden_is_compared_with_what_is_said(trials):
+    bias, null = trials
+    assert bias.named_rightly
+    assert bias.in_set
+    assert not bias.misnamed
+    assert bias.signal_to_noise > 5.0
+    assert 0.9 < bias.detection <= 1.0
+    assert 0.5 <= bias.naming <= 1.0
+    assert len(bias.amplitude_errors) == 3
+    assert max(map(abs, bias.amplitude_errors)) < 5.0
+    assert not null.alarmed
+    assert null.signal_to_noise is None
+    assert len(null.body_errors) == 10
+
+
+def test_a_run_goes_on_where_it_was_cut_off(trials, kept, monkeypatch):
+    lines = kept.read_text(encoding="utf-8").splitlines()
+    kept.write_text(lines[0] + "\n" + lines[1][:40], encoding="utf-8")
+    assert read(kept) == [trials[0]]
+    made = []
+    monkeypatch.setattr("studies.blind_injections.trials.make", lambda item: made.append(item) or trials[1])
+    assert run(PLANS, kept) == trials
+    assert made == PLANS[1:]
+    assert [json.loads(line)["case"] for line in kept.read_text(encoding="utf-8").splitlines() if line[-1] == "}"]
+
+
+def test_wrong_names_are_counted(trials):
+    bias = trials[0]
+    wrong = replace(bias, causes=("rate-drift",), sets=(("rate-drift",),))
+    rival = replace(bias, status="ambiguous", causes=("rate-drift",), sets=(("rate-drift",), ("rate-bias",)))
+    assert wrong.misnamed
+    assert not wrong.in_set
+    assert rival.in_set
+    assert not rival.named_rightly
+    assert not rival.misnamed
+    (row,) = rates([bias, wrong, rival])
+    assert row[1] == "3"
+    assert row[4:6] == ["2", "1"]
+    assert row[7] == "1"
+    assert confusion([bias, wrong, wrong])[0] == ["rate-bias", "rate-drift (2), rate-bias"]
+
+
+def test_the_plans_hide_everything_and_nothing():
+    for full in (False, True):
+        plans = plan(full)
+        assert len({(item.case, item.seed, item.strength) for item in plans}) == len(plans)
+        assert len({item.case for item in plans}) == 57
+    assert sum(item.case.startswith("null") for item in plans) == 1000
+
+
+def test_the_report_is_written(trials, tmp_path):
+    outside = Trial(**{**vars(trials[0]), "kind": "unknown", "hidden": (), "true_frame": "base", "correlation": 0.9})
+    write_report([*trials, outside], tmp_path / "blind.pdf")
+    assert (tmp_path / "blind.pdf").read_bytes().startswith(b"%PDF")
