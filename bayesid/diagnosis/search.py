@@ -86,6 +86,11 @@ class Hypothesis:
         return self.fit.log_evidence
 
     @property
+    def noisy(self) -> bool:
+        """Whether the noise has a fault."""
+        return any(fault.label != "initial-rate" for fault in self.faults)
+
+    @property
     def adequate(self) -> bool:
         """Whether it leaves nothing but noise."""
         return self.outcome.adequate
@@ -192,10 +197,9 @@ class Search:
 
     def _additions(self, parent: Hypothesis, kind: Kind, most: int) -> list[str]:
         """Candidates of one kind that are worth adding, most promising first."""
-        noisy = any(fault.label != "initial-rate" for fault in parent.faults)
-        if kind is Kind.NOISE and (noisy or len(parent.labels) > 1):
+        if kind is Kind.NOISE and (parent.noisy or len(parent.labels) > 1):
             return []  # noise explains anything if it may be combined at will
-        if kind is not Kind.NOISE and noisy and len(parent.labels) > 1:
+        if kind is not Kind.NOISE and parent.noisy and len(parent.labels) > 1:
             return []
         if kind is Kind.NOISE:
             return [

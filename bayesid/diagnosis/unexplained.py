@@ -7,6 +7,7 @@ from enum import Enum
 from pathlib import Path
 
 import numpy as np
+from scipy.special import logsumexp
 
 from bayesid.arrays import Floats
 from bayesid.diagnosis.omnibus import FORCE, TORQUE
@@ -139,7 +140,7 @@ def unexplained_wrench(hypothesis: Hypothesis, name_frame: bool = True) -> Unexp
         torque_sd,
         force_sd,
         _fixed_in(hypothesis, rotations, scale) if name_frame and snr > 0.0 else None,
-        float(max(fits)),
+        float(logsumexp(fits) - np.log(len(SCALES))),
     )
 
 

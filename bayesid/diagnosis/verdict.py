@@ -69,14 +69,17 @@ class Verdict:
 def judge(search: Search) -> Verdict:
     """Run a search and judge what it found.
 
-    A set of causes must also be more probable than a free disturbance, or it only imitates something unknown.
+    A set of causes must also not be much less probable than a free disturbance, or it only imitates something unknown;
+    one with faults of the noise, which can imitate more, not at all.
     """
     found = search.run()
     disturbance = unexplained_wrench(search.base, name_frame=False)
     if search.base.adequate:
         return Verdict(Status.ADEQUATE, search.base, {}, (), disturbance)
     free = search.base.log_evidence + disturbance.log_bayes_factor
-    found = [hypothesis for hypothesis in found if hypothesis.log_evidence > free]
+    found = [
+        hypothesis for hypothesis in found if hypothesis.log_evidence > free - (0.0 if hypothesis.noisy else RIVALRY)
+    ]
     if not found:
         return Verdict(_unnamed(search), search.base, {}, (), disturbance)
     best = found[0]

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, Status, Unexplained
 from bayesid.diagnosis.battery import FALSE_ALARM
 from bayesid.diagnosis.faults import SUMMARIES
+from bayesid.diagnosis.scale import SCALES
 from bayesid.diagnosis.verdict import RIVALRY
 from bayesid.report.advice import advice, differing
 from bayesid.report.diagnosis_tables import amplitude_text, amplitudes_of, format_p, largest_shift, signed
@@ -155,7 +156,9 @@ def made_sentences(result: Diagnosis) -> Iterator[str]:
     yield (
         "Causes are tried one at a time, then the best in pairs, then in threes. The smallest set that leaves nothing "
         "but noise is named; sets of one size are ranked by their evidence, from the Laplace approximation. Rivals "
-        f"are within {RIVALRY:g} of the best in the logarithm of the Bayes factor."
+        f"are within {RIVALRY:g} of the best in the logarithm of the Bayes factor. The scale of a cause's amplitudes "
+        f"of one unit is unknown: the priors shown, or one of {len(SCALES) - 1} down to {SCALES[-1]:g} of them, all "
+        "equally probable."
     )
     yield "Faults of noise are blamed only where no physical cause explains what is left."
     yield f"Seed of all random numbers: {search.seed}."
