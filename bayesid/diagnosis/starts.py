@@ -25,6 +25,9 @@ TANK = (0.06, 0.25)
 SLOSHING = 5.0
 """And its mass [kg]."""
 
+APART, CORNERS = 0.4, np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+"""And how far from the middle of the spacecraft its tank may be, along axes [m]."""
+
 RIDGE = 1.0
 """Prior information on the entries of the coupling matrix, at its scale."""
 
@@ -48,8 +51,11 @@ def starts_of(effect: Effect, engine: Engine, fit: Fit, battery: Battery) -> Seq
         if isinstance(effect, FlexibleAppendage):
             chosen.append(_appendage(effect, frequency, matrix))
     if isinstance(effect, FuelSlosh):  # the fit converges from afar
-        middle = [parameter.mean for parameter in effect.parameters[3:]]
-        chosen = [_coordinates(effect.parameters, [SLOSHING, frequency, LIGHT, *middle]) for frequency in TANK]
+        middle = np.array([parameter.mean for parameter in effect.parameters[3:]])
+        places = [(frequency, middle) for frequency in TANK]
+        if not fit.effects:  # the place may have several optima
+            places += [(ranked[0][1], middle + APART * corner) for corner in CORNERS]
+        chosen = [_coordinates(effect.parameters, [SLOSHING, frequency, LIGHT, *place]) for frequency, place in places]
     return chosen
 
 
