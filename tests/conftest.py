@@ -30,7 +30,11 @@ COMPILED = "BAYESID_TEST_COMPILED"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--catalogue", action="store_true", help="hide every cause of the catalogue (half an hour)")
+    parser.addoption(
+        "--catalogue",
+        action="store_true",
+        help="hide every cause of the catalogue, and run slow studies (half an hour)",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -11,11 +11,13 @@ from studies.throws_drag import run
 from studies.throws_drag.report import write_report
 
 PRESENT = (DEFAULT_FOLDER / "truth.json").is_file()
-NAMES = ("rotational-drag", "rate-scale", "rate-misalignment")
+NAMES = ("rate-scale",)
 
 
 @pytest.fixture(scope="module")
-def result():
+def result(request):
+    if not request.config.getoption("--catalogue"):
+        pytest.skip("takes minutes: pytest --catalogue")
     if not PRESENT:
         reason = f"the measured throws are not at {DEFAULT_FOLDER}"
         (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
