@@ -13,6 +13,7 @@ from bayesid.assemble import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
 from bayesid.diagnosis.diagnosis import extended_start
 from bayesid.diagnosis.engine import Engine
+from bayesid.diagnosis.faults import noise_fault
 from bayesid.diagnosis.scale import SCALES, log_mixture
 from bayesid.diagnosis.scores import chi2_log_sf
 from bayesid.effects import create
@@ -132,3 +133,11 @@ def test_the_far_tail_of_chi_square_goes_on_smoothly(statistic, degrees):
     assert (np.diff(slopes) < 1e-4).all()
     assert (np.abs(np.diff(slopes)) < 0.02).all()
     assert chi2_log_sf(1e5, degrees) < chi2_log_sf(5e4, degrees)
+
+
+def test_an_event_is_no_outlier(tmp_path):
+    """A mass that moves inside the base for two seconds leaves a few large residuals side by side."""
+    study = Study.load(CASES["shifting-mass"].make(tmp_path, 246))
+    model = load_model(study)
+    fit = Engine(Posterior(model, load_manoeuvres(study, model.robot))).fit()
+    assert noise_fault("outliers:accel", fit) is None

@@ -22,7 +22,7 @@ __all__ = ["SUMMARIES", "NoiseFault", "noise_fault", "refined"]
 OUTLYING = 4.5
 """Whitened residual from which a sample counts as an outlier."""
 
-NEIGHBOURS, CLUSTERED = 3, 1e-4
+NEIGHBOURS, CLUSTERED = 3, 1e-3
 """Outliers within so many samples of each other more often than with this probability by chance are an event."""
 
 LONGEST = 0.05
@@ -200,7 +200,7 @@ def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault | None:
         length = int((item.outputs | mask)[:, slot].any(axis=1).sum())
         total += length
         near += int((np.diff(instants) <= NEIGHBOURS).sum())
-        chance += NEIGHBOURS * len(instants) ** 2 / max(length, 1)
+        chance += NEIGHBOURS * len(instants) * (len(instants) - 1) / max(length, 1)
     if stats.poisson.sf(near - 1, chance) < CLUSTERED:
         return None  # something lasted
     fraction = count / max(total, 1)
