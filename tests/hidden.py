@@ -141,7 +141,7 @@ class Case:
     accept : tuple of str
         Names that are as right as one of the causes, since they change the model alike.
     frame : str, optional
-        Axes in which an outside wrench is fixed.
+        Axes in which an outside wrench is fixed; "orbit" are those of each recording's start.
     """
 
     name: str
@@ -497,8 +497,8 @@ CASES: tuple[Case, ...] = (
     ),
     _outside("pulse-train", pulse_train, frame="base"),
     _outside("thermal-snap", thermal_snap, urdf=SERVICER4, frame="base"),
-    _outside("growing-torque", growing_torque, frame="inertial"),
-    _outside("swinging-torque", swinging_torque, urdf=SERVICER4, frame="inertial"),
+    _outside("growing-torque", growing_torque, frame="orbit"),
+    _outside("swinging-torque", swinging_torque, urdf=SERVICER4, frame="orbit"),
     _outside("shifting-mass", shifting_mass),
     _null("null, three joints"),
     _null("null, four joints, own sampling rates", urdf=SERVICER4, sensors={"rate_period": 1.0, "accel_period": 0.25}),

@@ -140,8 +140,9 @@ def write_report(trials: Sequence[Trial], file: Path) -> None:
             for trial in outside
         ],
         "What was said of causes that the catalogue does not have. Left: signal-to-noise ratio after the best set of "
-        "causes tried has taken its share. Correlation of the torque reconstructed with the true one, base axes. Orbit "
-        "axes turn by ten degrees in a recording.",
+        "causes tried has taken its share. Correlation of the torque reconstructed with the true one, base axes. "
+        "'Orbit' torques are fixed in the orbit axes of each recording's start, from which orbit axes turn by ten "
+        "degrees.",
     )
     document.section("Confusion")
     document.table(
