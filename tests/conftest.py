@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
+import jax
 import numpy as np
 import pytest
 
@@ -55,6 +56,13 @@ STEP = 0.5
 """Its integration error is some 3e-3 of a sample's standard deviation."""
 POINT = (0.1, -0.15, 0.3)
 ORBIT = mj.Orbit(6.878e6)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _forget_compiled() -> Iterator[None]:
+    """Compiled functions of past files would fill the memory; those on disk stay."""
+    yield
+    jax.clear_caches()
 
 
 class FormulaMotion:

@@ -187,5 +187,4 @@ def _svg(fig: Figure) -> bytes:
     content = io.BytesIO()
     with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": "bayesid"}):
         fig.savefig(content, format="svg", dpi=RESOLUTION, metadata={"Date": None})
-    fig.clear()
     return content.getvalue()
