@@ -121,7 +121,7 @@ class Document:
         self._parts.append(numbered if caption is not None else f"#{table}\n")
 
     def figure(self, fig: Figure, caption: str, width: str = "100%") -> None:
-        """Add a numbered figure and clear it.
+        """Add a numbered figure.
 
         Parameters
         ----------
