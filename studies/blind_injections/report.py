@@ -15,7 +15,7 @@ from scipy import stats
 
 from bayesid.report import Document
 from bayesid.report.figures.style import COLOURS, styled, wide_figure
-from studies.blind_injections.trials import Trial, plan, run
+from studies.blind_injections.trials import Trial, plan, read, run
 
 __all__ = ["confusion", "main", "rates", "write_report"]
 
@@ -30,13 +30,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--full", action="store_true", help="hundreds of injections and a thousand nulls (many hours)")
     parser.add_argument("--output", type=Path, default=Path("reports/blind_injections.pdf"))
     parser.add_argument("--trials", type=Path, default=Path("out/blind_injections.jsonl"), help="kept between runs")
+    parser.add_argument("--made", action="store_true", help="report the trials made so far, make no more")
     given = parser.parse_args(arguments)
 
     def show(number: int, total: int, trial: Trial) -> None:
         print(f"{number}/{total} {trial.case}: {trial.status} {list(trial.causes)}", file=sys.stderr)
 
-    trials = run(plan(given.full), given.trials, show)
-    write_report(trials, given.output)
+    plans = plan(given.full)
+    trials = read(given.trials) if given.made else run(plans, given.trials, show)
+    write_report(trials, given.output, planned=len(plans))
     print(f"Wrote {given.output}.")
 
 
@@ -84,8 +86,8 @@ def confusion(trials: Iterable[Trial]) -> list[list[str]]:
     ]
 
 
-def write_report(trials: Sequence[Trial], file: Path) -> None:
-    """Write the report as PDF."""
+def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None) -> None:
+    """Write the report as PDF; ``planned`` trials of which these are some."""
     document = Document("Blind injections", "What the diagnosis says of hidden causes")
     nulls = [trial for trial in trials if trial.kind == "adequate"]
     outside = [trial for trial in trials if trial.kind == "unknown"]
@@ -97,6 +99,11 @@ def write_report(trials: Sequence[Trial], file: Path) -> None:
         f"hidden, {len(outside)} with something outside it, {len(nulls)} with nothing. Three robots, three recordings "
         f"of 120 to 170 s each. Intervals are 95 % Clopper-Pearson."
     )
+    if planned is not None and planned > len(trials):
+        document.paragraph(
+            f"Incomplete: {planned} trials are planned, and these were made first, in random order. Read the rates "
+            "with their intervals."
+        )
     document.items(_findings(injected, outside, nulls))
     document.section("By signal-to-noise ratio")
     document.table(
