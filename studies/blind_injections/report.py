@@ -20,6 +20,8 @@ from studies.blind_injections.trials import Trial, plan, read, run
 __all__ = ["confusion", "main", "rates", "write_report"]
 
 BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, np.inf)
+TICKS = (3, 5, 7, 10, 20, 50)
+
 CLEAR = 7.0
 """Signal-to-noise ratio from which the hidden causes should be in the reported set."""
 
@@ -240,6 +242,8 @@ def _figure(injected: Sequence[Trial]) -> Figure:
     axes.set_yticks(range(len(kinds)), kinds)
     axes.set_ylim(-0.6, len(kinds) - 0.4)
     axes.set_xscale("log")
+    axes.set_xticks(TICKS, [str(tick) for tick in TICKS])
+    axes.minorticks_off()
     axes.set_xlabel("signal-to-noise ratio of what is hidden")
     return figure
 
