@@ -166,7 +166,7 @@ def _instants(
         wheel_torque=jnp.asarray(torque),
         wrench=jnp.zeros((len(time), 6)),
     )
-    return Instants(jnp.asarray(known), jnp.asarray(np.concatenate(tables, axis=2)), environment)
+    return Instants(jnp.asarray(known), jnp.concatenate([jnp.asarray(table) for table in tables], axis=2), environment)
 
 
 ROUND = 16

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bayesid import whitening
 from bayesid.arrays import Floats
-from bayesid.dynamics import Grid, Start, quaternion_product, simulate, trace
+from bayesid.dynamics import Grid
 from bayesid.effects.base import Moment, Readings
 from bayesid.errors import InputError
 from bayesid.grid import Actions, build_grid, pad_grids, rounded
@@ -24,6 +24,7 @@ from bayesid.motion import MeasuredMotion
 from bayesid.robot import Robot
 from bayesid.sensitivity import joint_sensitivity
 from bayesid.sensors import Kind, Sensor
+from bayesid.simulator import Simulator
 from bayesid.unknowns import Unknowns, Values
 from bayesid.whitening import Channel, NoiseModel, Whitening
 
@@ -456,59 +457,20 @@ class _Compiled:
     """Compiled functions of a model; data are arguments, so that a change of the noise compiles nothing anew."""
 
     def __init__(self, model: Model, unknowns: Unknowns) -> None:
-        point = jnp.asarray(model.point)
-        turn = {sensor.kind: jnp.asarray(sensor.rotation) for sensor in model.sensors}
-        kinds = [sensor.kind for sensor in model.sensors]
-
-        def start(attitude: Array, rate: Array, tilt: Array) -> Start:
-            small = jnp.concatenate([0.5 * tilt, jnp.ones(1)])
-            return Start(quaternion_product(attitude, small / jnp.linalg.norm(small)), rate)
-
-        def distorted(readings: Readings, effects: Any) -> Readings:
-            readings = readings._replace(
-                rate=readings.rate @ turn.get(Kind.RATE, jnp.eye(3)),
-                accel=readings.accel @ turn.get(Kind.ACCEL, jnp.eye(3)),
-            )
-            for effect, values in zip(model.effects, effects, strict=True):
-                readings = effect.read(values, readings)
-            return readings
-
-        def sensed(grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Readings:
-            readings = simulate(grid, inertial, start(attitude, rate, tilt), model.effects, effects, point)
-            return distorted(readings, effects)
-
-        def moved(grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Any:
-            begin = start(attitude, rate, tilt)
-            stage, sample, readings = trace(grid, inertial, begin, model.effects, effects, point)
-            return stage, sample, distorted(readings, effects)
-
-        def each(run: Callable[..., Any], z: Array, grid: Grid, attitude: Array) -> Any:
-            values = unknowns.values(z)
-            axes = tuple(0 if effect.per_recording else None for effect in model.effects)
-            return jax.vmap(run, (0, 0, None, 0, 0, axes))(
-                grid, attitude, values.inertial, values.rate, values.tilt, values.effects
-            )
+        simulator = Simulator(model, unknowns)
 
         def whitened(readings: Readings, data: Data) -> Array:
-            parts = []
-            for kind in kinds:
-                if kind is Kind.ATTITUDE:
-                    parts.append(jax.vmap(jax.vmap(_rotation_between))(readings.attitude, data.quaternion))
-                else:
-                    first = 3 * kinds.index(kind)
-                    parts.append(data.measured[..., first : first + 3] - getattr(readings, kind.value))
-            residual = jnp.concatenate(parts, axis=-1)
+            residual = simulator.misfit(readings, data.measured, data.quaternion)
             padded = jnp.pad(residual, ((0, 0), (0, data.weights.shape[3]), (0, 0)))
             return jax.vmap(whitening.apply)(data.weights, data.start, padded)
 
-        def simulated(z: Array, grid: Grid, attitude: Array) -> Readings:
-            return each(sensed, z, grid, attitude)
+        simulated = simulator.readings
 
         def residuals(z: Array, data: Data) -> Array:
             return whitened(simulated(z, data.grid, data.attitude), data)
 
         def traced(z: Array, data: Data) -> Traced:
-            stage, sample, readings = each(moved, z, data.grid, data.attitude)
+            stage, sample, readings = simulator.trace(z, data.grid, data.attitude)
             return Traced(stage, sample, readings, whitened(readings, data))
 
         def chi2(z: Array, data: Data) -> Array:
@@ -534,12 +496,6 @@ class _Compiled:
         self.linear_slope = jax.jit(jax.jacfwd(unknowns.to_linear))
         self.values = jax.jit(unknowns.values)
         self.many_values = jax.jit(jax.vmap(unknowns.values))
-
-
-def _rotation_between(predicted: Array, measured: Array) -> Array:
-    """Small rotation, base axes, from the predicted to the measured attitude."""
-    difference = quaternion_product(predicted * jnp.array([-1.0, -1.0, -1.0, 1.0]), measured)
-    return 2.0 * difference[:3] * jnp.sign(difference[3])
 
 
 def _lengthen(array: Floats, length: int) -> Floats:

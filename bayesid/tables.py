@@ -8,17 +8,19 @@ recording is reduced once to coefficient tables, and a simulation costs one rigi
 from __future__ import annotations
 
 from collections.abc import Container
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
+import jax.numpy as jnp
 import numpy as np
 import pinocchio as pin
+from jax import Array
 
-from bayesid.arrays import Floats
+from bayesid.arrays import Floats, namespace
 from bayesid.inertia import BASIS
 from bayesid.motion import JointState
 from bayesid.robot import Robot
 
-__all__ = ["ENTRIES", "Kinematics", "composite_rows", "kinematics", "link_table"]
+__all__ = ["ENTRIES", "Kinematics", "composite_rows", "joint_motion", "kinematics", "link_table"]
 
 
 ENTRIES = {
@@ -39,17 +41,19 @@ _UPPER = ((0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2))
 
 
 class Kinematics(NamedTuple):
-    """Motion of the joint frames relative to the base, in base axes.
-
-    pose (T, joints, 4, 4); twist and its derivative (T, joints, 6), linear part first, spatial (at the base origin).
-    """
+    """Poses of the joint frames relative to the base and their first two derivatives, each (T, joints, 4, 4)."""
 
     pose: Floats
-    twist: Floats
-    twist_rate: Floats
+    rate: Floats
+    acceleration: Floats
 
 
 def kinematics(robot: Robot, state: JointState) -> Kinematics:
+    """Return the motion of the joint frames: by Pinocchio, or for traced arrays of JAX by `traced_kinematics`."""
+    return _kinematics(robot, state) if isinstance(state.position, np.ndarray) else traced_kinematics(robot, state)
+
+
+def _kinematics(robot: Robot, state: JointState) -> Kinematics:
     """Run Pinocchio's second-order forward kinematics with the base at rest."""
     model, data = robot.model, robot.model.createData()
     count, joints = state.position.shape
@@ -64,12 +68,44 @@ def kinematics(robot: Robot, state: JointState) -> Kinematics:
             placement = data.oMi[joint + 2]
             pose[row, joint, :3, :3], pose[row, joint, :3, 3] = placement.rotation, placement.translation
             motion[0, row, joint], motion[1, row, joint] = data.v[joint + 2].vector, data.a[joint + 2].vector
-    rotation, offset = pose[..., :3, :3], pose[..., :3, 3]
-    linear = np.einsum("tjab,otjb->otja", rotation, motion[..., :3])
-    angular = np.einsum("tjab,otjb->otja", rotation, motion[..., 3:])
-    linear += np.cross(np.broadcast_to(offset, angular.shape), angular)
-    spatial = np.concatenate([linear, angular], axis=-1)
-    return Kinematics(pose, spatial[0], spatial[1])
+    twist, twist_rate = _hat(motion)  # in the joint's own axes
+    return Kinematics(pose, pose @ twist, pose @ (twist_rate + twist @ twist))
+
+
+def traced_kinematics(robot: Robot, state: JointState) -> Kinematics:
+    """Do the same by products of exponentials in JAX, for derivatives in the motion's parameters.
+
+    Each joint's pose is its parent's, times a constant placement, times the exponential of its axis (Lynch & Park 2017,
+    section 4.1); the derivatives follow by the product rule.
+    """
+    frames: list[tuple[Array, ...]] = []
+    still = jnp.zeros((len(state.position), 4, 4))
+    for index in range(len(robot.joints)):
+        joint = robot.model.joints[index + 2]
+        own = joint.createData()
+        joint.calc(own, pin.neutral(robot.model), np.zeros(robot.model.nv))
+        axis = jnp.asarray(_hat(np.asarray(own.S).ravel()))
+        q, speed, change = (part[:, index, None, None] for part in state)
+        turn = jnp.eye(4) + jnp.sin(q) * axis + (1.0 - jnp.cos(q)) * (axis @ axis)
+        if robot.joints[index].kind == "prismatic":
+            turn = jnp.eye(4) + q * axis
+        turn_rate = turn @ axis * speed
+        turn_acceleration = turn @ axis @ axis * speed**2 + turn @ axis * change
+        parent = robot.model.parents[index + 2] - 2
+        pose, rate, acceleration = frames[parent] if parent >= 0 else (still + jnp.eye(4), still, still)
+        pose, rate, acceleration = (
+            part @ jnp.asarray(robot.model.jointPlacements[index + 2].homogeneous)
+            for part in (pose, rate, acceleration)
+        )
+        frames.append(
+            (
+                pose @ turn,
+                rate @ turn + pose @ turn_rate,
+                acceleration @ turn + 2.0 * rate @ turn_rate + pose @ turn_acceleration,
+            )
+        )
+    pose, rate, acceleration = (jnp.stack(parts, axis=1) for parts in zip(*frames, strict=True))
+    return Kinematics(*cast("tuple[Floats, Floats, Floats]", (pose, rate, acceleration)))
 
 
 def configuration(robot: Robot, position: Floats) -> Floats:
@@ -87,37 +123,43 @@ def configuration(robot: Robot, position: Floats) -> Floats:
 def link_table(robot: Robot, name: str, motion: Kinematics) -> Floats:
     """Coefficients of one link's ten parameters, shape (T, 28, 10)."""
     link = robot.link(name)
-    pose, rate, acceleration = (change @ link.placement for change in _joint(motion, link.joint))
-    table = np.swapaxes(_moments(pose, rate, acceleration, BASIS), 1, 2)
-    return np.ascontiguousarray(table)
+    pose, rate, acceleration = (change @ link.placement for change in joint_motion(motion, link.joint))
+    table = _moments(pose, rate, acceleration, BASIS)
+    xp = namespace(table)
+    return cast("Floats", xp.ascontiguousarray(table.swapaxes(1, 2)) if xp is np else table.swapaxes(1, 2))
 
 
-def _joint(motion: Kinematics, joint: int) -> tuple[Floats, Floats, Floats]:
+def joint_motion(motion: Kinematics, joint: int) -> tuple[Floats, Floats, Floats]:
     """Pose of a joint's frame and its two derivatives, each (T, 4, 4); of the base's where ``joint`` is negative."""
     if joint < 0:
         still = np.zeros((len(motion.pose), 4, 4))
         return still + np.eye(4), still, still
-    twist, twist_rate = _hat(motion.twist[:, joint]), _hat(motion.twist_rate[:, joint])
-    pose = motion.pose[:, joint]
-    return pose, twist @ pose, (twist_rate + twist @ twist) @ pose
+    return motion.pose[:, joint], motion.rate[:, joint], motion.acceleration[:, joint]
 
 
 def _moments(pose: Floats, rate: Floats, acceleration: Floats, bodies: Floats) -> Floats:
-    """Table rows of pseudo-inertias (p, 4, 4) moving with a pose, shape (T, p, 28)."""
+    """Table rows of pseudo-inertias (p, 4, 4) moving with a pose, shape (T, p, 28), in the order of `ENTRIES`."""
     left = pose[:, None] @ bodies
-    composite, flow, surge = (left @ np.swapaxes(other, 1, 2)[:, None] for other in (pose, rate, acceleration))
-    rows = np.zeros((*composite.shape[:2], WIDTH))
-    rows[..., ENTRIES["mass"]] = composite[..., 3, 3:]
-    rows[..., ENTRIES["first"]] = composite[..., 3, :3]
-    rows[..., ENTRIES["first_rate"]] = flow[..., 3, :3]
-    rows[..., ENTRIES["first_acceleration"]] = surge[..., 3, :3]
-    rows[..., ENTRIES["second"]] = composite[..., _UPPER[0], _UPPER[1]]
-    rows[..., ENTRIES["second_rate"]] = (flow + np.swapaxes(flow, -1, -2))[..., _UPPER[0], _UPPER[1]]
-    for entry, matrix in (("spin", flow), ("spin_rate", surge)):
-        rows[..., ENTRIES[entry]] = np.stack(
-            [matrix[..., a, b] - matrix[..., b, a] for a, b in ((1, 2), (2, 0), (0, 1))], axis=-1
-        )
-    return rows
+    xp = namespace(left)
+    composite, flow, surge = (left @ xp.swapaxes(other, 1, 2)[:, None] for other in (pose, rate, acceleration))
+    spin, spin_rate = (
+        xp.stack([matrix[..., a, b] - matrix[..., b, a] for a, b in ((1, 2), (2, 0), (0, 1))], axis=-1)
+        for matrix in (flow, surge)
+    )
+    rows = xp.concatenate(
+        [
+            composite[..., 3, 3:],
+            composite[..., 3, :3],
+            flow[..., 3, :3],
+            surge[..., 3, :3],
+            composite[..., _UPPER[0], _UPPER[1]],
+            (flow + xp.swapaxes(flow, -1, -2))[..., _UPPER[0], _UPPER[1]],
+            spin,
+            spin_rate,
+        ],
+        axis=-1,
+    )
+    return cast("Floats", rows)
 
 
 def _hat(twist: Floats) -> Floats:
@@ -140,5 +182,5 @@ def composite_rows(robot: Robot, motion: Kinematics, leave_out: Container[str] =
             carried[link.joint] = carried.get(link.joint, np.zeros((4, 4))) + body
     rows: Floats = np.zeros((len(motion.pose), WIDTH))
     for joint, moments in carried.items():
-        rows = rows + _moments(*_joint(motion, joint), moments[None])[:, 0]
+        rows = rows + _moments(*joint_motion(motion, joint), moments[None])[:, 0]
     return rows

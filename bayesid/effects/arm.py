@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Self
+from typing import Self, cast
 
 import jax
 import jax.numpy as jnp
@@ -12,7 +12,7 @@ import pinocchio as pin
 from jax import Array
 from scipy.interpolate import make_interp_spline
 
-from bayesid.arrays import Floats
+from bayesid.arrays import Floats, namespace
 from bayesid.effects.base import Effect, Parameter, Prior, Quantity, register
 from bayesid.errors import InputError
 from bayesid.inertia import LOG_CHOLESKY, InertialParameters, log_cholesky_vector
@@ -163,8 +163,7 @@ class EncoderOffset(_OnJoint):
         state = motion.evaluate(time)
         rows = []
         for step in (-OFFSET_STEP, 0.0, OFFSET_STEP):
-            position = np.array(state.position)
-            position[:, index] += step
+            position = state.position + step * np.eye(len(robot.joints))[index]
             rows.append(composite_rows(robot, kinematics(robot, state._replace(position=position))))
         return _quadratic(rows, OFFSET_STEP)
 
@@ -195,7 +194,8 @@ class JointLatency(Effect):
         shifts = LATENCY_STEP * np.arange(-2, 3)
         rows = [composite_rows(robot, kinematics(robot, motion.evaluate(time + shift))) for shift in shifts]
         powers = np.linalg.inv(np.vander(shifts, increasing=True))[1:]
-        return np.einsum("ps,std->tdp", powers, np.stack(rows))
+        xp = namespace(rows[0])
+        return cast("Floats", xp.einsum("ps,std->tdp", powers, xp.stack(rows)))
 
     def loads(self, values: Array) -> Array:
         """Return the powers of the delay, after which the record will show the arm."""
@@ -297,7 +297,9 @@ def _loaded(robot: Robot) -> pin.Model:
 
 def _quadratic(rows: list[Floats], step: float) -> Floats:
     before, here, after = rows
-    return np.stack([(after - before) / (2.0 * step), (after - 2.0 * here + before) / (2.0 * step**2)], axis=2)
+    xp = namespace(here)
+    slopes = [(after - before) / (2.0 * step), (after - 2.0 * here + before) / (2.0 * step**2)]
+    return cast("Floats", xp.stack(slopes, axis=2))
 
 
 @jax.jit

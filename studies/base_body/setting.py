@@ -102,9 +102,11 @@ def tip_speed(motion: Excitation) -> tuple[float, float]:
     """Largest speed [m/s] and turning rate [rad/s] of the tip relative to the base."""
     state = motion.evaluate(np.linspace(0.0, motion.duration, 400))
     moving = kinematics(ship(), state)
-    twist, tip = moving.twist[:, -1], _tip(moving.pose)
-    speed = twist[:, :3] + np.cross(twist[:, 3:], tip)
-    return float(np.linalg.norm(speed, axis=1).max()), float(np.linalg.norm(twist[:, 3:], axis=1).max())
+    turning = moving.rate[:, -1, :3, :3]
+    # two entries of the matrix w x R for each of w's in its norm
+    return float(np.linalg.norm(_tip(moving.rate), axis=1).max()), float(
+        np.linalg.norm(turning, axis=(1, 2)).max() / np.sqrt(2.0)
+    )
 
 
 def slowest(q: Floats) -> float:

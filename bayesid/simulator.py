@@ -1,0 +1,88 @@
+"""A model as a function of its unknowns: from coordinates with a standard-normal prior to what the sensors read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from bayesid.dynamics import Grid, Start, quaternion_product, simulate, trace
+from bayesid.effects.base import Moment, Readings
+from bayesid.model import Model
+from bayesid.sensors import Kind
+from bayesid.unknowns import Unknowns
+
+__all__ = ["Simulator"]
+
+
+class Simulator:
+    """Simulate a model; every method can be traced, batched and differentiated by JAX.
+
+    Grids and initial attitudes have a leading axis R of recordings.
+    """
+
+    def __init__(self, model: Model, unknowns: Unknowns) -> None:
+        self.model, self.unknowns = model, unknowns
+        self.point = jnp.asarray(model.point)
+        self.kinds = [sensor.kind for sensor in model.sensors]
+        self.turn = {sensor.kind: jnp.asarray(sensor.rotation) for sensor in model.sensors}
+
+    def readings(self, z: Array, grid: Grid, attitude: Array) -> Readings:
+        """Return what the sensors read, in sensor axes, (R, T, ...)."""
+        return self._each(self._sensed, z, grid, attitude)
+
+    def trace(self, z: Array, grid: Grid, attitude: Array) -> tuple[Moment, Moment, Readings]:
+        """Return the motion at the stages and at the samples, and the readings."""
+        return self._each(self._moved, z, grid, attitude)
+
+    def misfit(self, readings: Readings, measured: Array, quaternion: Array) -> Array:
+        """Measured less predicted, sensor after sensor, (R, T, 3 sensors); of an attitude the small rotation between.
+
+        ``measured`` (R, T, 3 sensors) holds no attitudes: they are in ``quaternion``, (R, T, 4).
+        """
+        parts = []
+        for slot, kind in enumerate(self.kinds):
+            if kind is Kind.ATTITUDE:
+                parts.append(jax.vmap(jax.vmap(_rotation_between))(readings.attitude, quaternion))
+            else:
+                parts.append(measured[..., 3 * slot : 3 * slot + 3] - getattr(readings, kind.value))
+        return jnp.concatenate(parts, axis=-1)
+
+    def _each(self, run: Callable[..., Any], z: Array, grid: Grid, attitude: Array) -> Any:
+        values = self.unknowns.values(z)
+        axes = tuple(0 if effect.per_recording else None for effect in self.model.effects)
+        return jax.vmap(run, (0, 0, None, 0, 0, axes))(
+            grid, attitude, values.inertial, values.rate, values.tilt, values.effects
+        )
+
+    def _sensed(self, grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Readings:
+        readings = simulate(grid, inertial, _start(attitude, rate, tilt), self.model.effects, effects, self.point)
+        return self._distorted(readings, effects)
+
+    def _moved(self, grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Any:
+        start = _start(attitude, rate, tilt)
+        stage, sample, readings = trace(grid, inertial, start, self.model.effects, effects, self.point)
+        return stage, sample, self._distorted(readings, effects)
+
+    def _distorted(self, readings: Readings, effects: Any) -> Readings:
+        readings = readings._replace(
+            rate=readings.rate @ self.turn.get(Kind.RATE, jnp.eye(3)),
+            accel=readings.accel @ self.turn.get(Kind.ACCEL, jnp.eye(3)),
+        )
+        for effect, values in zip(self.model.effects, effects, strict=True):
+            readings = effect.read(values, readings)
+        return readings
+
+
+def _start(attitude: Array, rate: Array, tilt: Array) -> Start:
+    small = jnp.concatenate([0.5 * tilt, jnp.ones(1)])
+    return Start(quaternion_product(attitude, small / jnp.linalg.norm(small)), rate)
+
+
+def _rotation_between(predicted: Array, measured: Array) -> Array:
+    """Small rotation, base axes, from the predicted to the measured attitude."""
+    difference = quaternion_product(predicted * jnp.array([-1.0, -1.0, -1.0, 1.0]), measured)
+    return 2.0 * difference[:3] * jnp.sign(difference[3])
