@@ -8,6 +8,7 @@ Rucker and Wensing (RA-L 2022) in Pinocchio's order: ``alpha, d1, d2, d3, s12, s
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar, cast
 
 import jax
 import jax.numpy as jnp
@@ -15,7 +16,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import ArrayLike
 
-from bayesid.arrays import Floats
+from bayesid.arrays import Floats, namespace
 from bayesid.errors import InputError
 
 __all__ = [
@@ -24,9 +25,12 @@ __all__ = [
     "InertialParameters",
     "log_cholesky_factor",
     "log_cholesky_vector",
+    "mass_com_inertia",
     "parameters_from_pseudo_inertia",
     "upper_cholesky",
 ]
+
+A = TypeVar("A", Floats, Array)
 
 LOG_CHOLESKY = ("alpha", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3")
 """Names of the log-Cholesky coordinates (Rucker & Wensing 2022)."""
@@ -186,3 +190,24 @@ def parameters_from_pseudo_inertia(pseudo_inertia: Array) -> Array:
     tensor = jnp.trace(sigma) * jnp.eye(3) - sigma
     lower = jnp.stack([tensor[0, 0], tensor[1, 0], tensor[1, 1], tensor[2, 0], tensor[2, 1], tensor[2, 2]])
     return jnp.concatenate([pseudo_inertia[3, 3][None], pseudo_inertia[:3, 3], lower])
+
+
+def mass_com_inertia(vectors: A) -> A:
+    """Mass, centre of mass and inertia about it (xx, yy, zz, xy, xz, yz) of linear parameters, (..., 10) -> (..., 10).
+
+    Of NumPy arrays as of JAX's.
+    """
+    xp = namespace(vectors)
+    mass, first = vectors[..., :1], vectors[..., 1:4]
+    com = first / mass
+    xx, xy, yy, xz, yz, zz = xp.moveaxis(vectors[..., 4:], -1, 0)
+    m, (x, y, z) = mass[..., 0], xp.moveaxis(com, -1, 0)
+    tensor = [
+        xx - m * (y * y + z * z),
+        yy - m * (x * x + z * z),
+        zz - m * (x * x + y * y),
+        xy + m * x * y,
+        xz + m * x * z,
+        yz + m * y * z,
+    ]
+    return cast("A", xp.concatenate([mass, com, xp.stack(tensor, axis=-1)], axis=-1))

@@ -7,6 +7,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from bayesid.dynamics import Grid, Start, quaternion_product, simulate, trace
@@ -26,9 +27,9 @@ class Simulator:
 
     def __init__(self, model: Model, unknowns: Unknowns) -> None:
         self.model, self.unknowns = model, unknowns
-        self.point = jnp.asarray(model.point)
+        self.point = np.asarray(model.point)
         self.kinds = [sensor.kind for sensor in model.sensors]
-        self.turn = {sensor.kind: jnp.asarray(sensor.rotation) for sensor in model.sensors}
+        self.turn = {sensor.kind: sensor.rotation for sensor in model.sensors}
 
     def readings(self, z: Array, grid: Grid, attitude: Array) -> Readings:
         """Return what the sensors read, in sensor axes, (R, T, ...)."""
@@ -59,18 +60,20 @@ class Simulator:
         )
 
     def _sensed(self, grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Readings:
-        readings = simulate(grid, inertial, _start(attitude, rate, tilt), self.model.effects, effects, self.point)
+        readings = simulate(
+            grid, inertial, _start(attitude, rate, tilt), self.model.effects, effects, jnp.asarray(self.point)
+        )
         return self._distorted(readings, effects)
 
     def _moved(self, grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Any:
         start = _start(attitude, rate, tilt)
-        stage, sample, readings = trace(grid, inertial, start, self.model.effects, effects, self.point)
+        stage, sample, readings = trace(grid, inertial, start, self.model.effects, effects, jnp.asarray(self.point))
         return stage, sample, self._distorted(readings, effects)
 
     def _distorted(self, readings: Readings, effects: Any) -> Readings:
         readings = readings._replace(
-            rate=readings.rate @ self.turn.get(Kind.RATE, jnp.eye(3)),
-            accel=readings.accel @ self.turn.get(Kind.ACCEL, jnp.eye(3)),
+            rate=readings.rate @ self.turn.get(Kind.RATE, np.eye(3)),
+            accel=readings.accel @ self.turn.get(Kind.ACCEL, np.eye(3)),
         )
         for effect, values in zip(self.model.effects, effects, strict=True):
             readings = effect.read(values, readings)

@@ -10,7 +10,8 @@ import numpy as np
 
 from bayesid.arrays import Floats
 from bayesid.diagnosis.search import Hypothesis
-from bayesid.inference.identification import BODY_QUANTITIES, reported
+from bayesid.inertia import mass_com_inertia
+from bayesid.inference.identification import BODY_QUANTITIES
 
 __all__ = ["BodyFigures", "Gain", "body_figures", "measure_gain"]
 
@@ -128,9 +129,9 @@ def body_figures(hypothesis: Hypothesis) -> BodyFigures:
     for index, prior in enumerate(posterior.model.priors):
         if prior.nuisance:
             continue
-        here = reported(vector[index])
+        here = mass_com_inertia(vector[index])
         step = 1e-6 * np.maximum(np.abs(vector[index]), 1e-3 * np.abs(vector[index]).max())
-        stepped = reported(vector[index] + np.diag(step))
+        stepped = mass_com_inertia(vector[index] + np.diag(step))
         turn = ((stepped - here) / step[:, None]).T
         own = turn @ slope[index]
         names += [f"{prior.name}.{key}" for key in BODY_QUANTITIES]

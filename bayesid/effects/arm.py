@@ -15,7 +15,7 @@ from scipy.interpolate import make_interp_spline
 from bayesid.arrays import Floats, namespace
 from bayesid.effects.base import Effect, Parameter, Prior, Quantity, register
 from bayesid.errors import InputError
-from bayesid.inertia import LOG_CHOLESKY, InertialParameters, log_cholesky_vector
+from bayesid.inertia import LOG_CHOLESKY, InertialParameters, log_cholesky_vector, mass_com_inertia
 from bayesid.motion import JointState, Motion
 from bayesid.robot import Robot
 from bayesid.tables import composite_rows, configuration, kinematics, link_table
@@ -85,7 +85,8 @@ class _OnLink(_Placed):
     def report(self, values: Array) -> Array:
         """Return the link less the nominal link."""
         nominal = self._attached
-        return _described(log_cholesky_vector(nominal, values)) - _described(jnp.asarray(nominal.vector))
+        described = jax.jit(mass_com_inertia)
+        return jnp.asarray(described(log_cholesky_vector(nominal, values)) - mass_com_inertia(nominal.vector))
 
     def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
         """Return the link's own table."""
@@ -300,20 +301,3 @@ def _quadratic(rows: list[Floats], step: float) -> Floats:
     xp = namespace(here)
     slopes = [(after - before) / (2.0 * step), (after - 2.0 * here + before) / (2.0 * step**2)]
     return cast("Floats", xp.stack(slopes, axis=2))
-
-
-@jax.jit
-def _described(vector: Array) -> Array:
-    """Mass, centre of mass and inertia about it (xx, yy, zz, xy, xz, yz) of ten linear parameters."""
-    mass, com = vector[0], vector[1:4] / vector[0]
-    x, y, z = com
-    xx, xy, yy, xz, yz, zz = vector[4:]
-    tensor = [
-        xx - mass * (y * y + z * z),
-        yy - mass * (x * x + z * z),
-        zz - mass * (x * x + y * y),
-        xy + mass * x * y,
-        xz + mass * x * z,
-        yz + mass * y * z,
-    ]
-    return jnp.concatenate([mass[None], com, jnp.stack(tensor)])

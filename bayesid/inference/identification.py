@@ -16,6 +16,7 @@ import numpy as np
 
 from bayesid.arrays import Floats
 from bayesid.effects.base import Effect
+from bayesid.inertia import mass_com_inertia
 from bayesid.inference.ensemble import Chains, Progress, sample
 from bayesid.inference.importance import Evidence, choose_chart, importance_sample
 from bayesid.inference.optimum import Optimum, maximise
@@ -230,27 +231,10 @@ def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
     """Return the reported quantities of the identified bodies at many points, shape (draws, size)."""
     inertial = np.asarray(posterior.values_of(z).inertial).reshape(len(z), -1, 10)
     return {
-        prior.name: BodyDraws(prior.name, reported(inertial[:, index]))
+        prior.name: BodyDraws(prior.name, mass_com_inertia(inertial[:, index]))
         for index, prior in enumerate(posterior.model.priors)
         if not prior.nuisance
     }
-
-
-def reported(vectors: Floats) -> Floats:
-    """Linear inertial parameters (..., 10) to `BODY_QUANTITIES` (..., 10)."""
-    mass, first = vectors[..., :1], vectors[..., 1:4]
-    com = first / mass
-    xx, xy, yy, xz, yz, zz = np.moveaxis(vectors[..., 4:], -1, 0)
-    m, (x, y, z) = mass[..., 0], np.moveaxis(com, -1, 0)
-    tensor = [
-        xx - m * (y * y + z * z),
-        yy - m * (x * x + z * z),
-        zz - m * (x * x + y * y),
-        xy + m * x * y,
-        xz + m * x * z,
-        yz + m * y * z,
-    ]
-    return np.concatenate([mass, com, np.stack(tensor, axis=-1)], axis=-1)
 
 
 def reported_effect(effect: Effect, values: Floats) -> Floats:

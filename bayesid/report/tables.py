@@ -7,7 +7,8 @@ import numpy as np
 
 from bayesid.arrays import Floats
 from bayesid.effects import Effect
-from bayesid.inference.identification import BODY_QUANTITIES, Identification, reported, reported_effect
+from bayesid.inertia import mass_com_inertia
+from bayesid.inference.identification import BODY_QUANTITIES, Identification, reported_effect
 from bayesid.motion import MeasuredMotion
 from bayesid.posterior import Posterior
 from bayesid.report.fit import SensorFit
@@ -25,7 +26,7 @@ def parameter_rows(result: Identification) -> Rows:
     """Quantity, unit, prior centre, posterior, relative sd of every identified body."""
     rows = []
     for prior in result.posterior.model.bodies:
-        body, centre = result.bodies[prior.name], reported(prior.centre.vector)
+        body, centre = result.bodies[prior.name], mass_com_inertia(prior.centre.vector)
         for index, (key, unit) in enumerate(BODY_QUANTITIES.items()):
             mean, sd = float(body.mean[index]), float(body.sd[index])
             rows.append(

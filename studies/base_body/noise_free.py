@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid.effects import GravityGradient
-from bayesid.inference.identification import reported
+from bayesid.inertia import mass_com_inertia
 from bayesid.inference.optimum import fit
 from bayesid.model import Manoeuvre, Model
 from bayesid.motion import Excitation
@@ -93,7 +93,7 @@ def record(model: Model, motions: Sequence[Excitation], step: float = TRUTH_STEP
 def identify_exact(posterior: Posterior) -> NoiseFree:
     """Identify the base by least squares alone, from the paper's initial guess."""
     optimum = fit(posterior, posterior.initial_point())
-    estimate = reported(np.asarray(posterior.values(optimum.z).inertial))
+    estimate = mass_com_inertia(np.asarray(posterior.values(optimum.z).inertial))
     slope = physical_slope(posterior, optimum.z)
     recording = posterior.manoeuvres[0].recording
     return NoiseFree(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.inference.identification import reported
+from bayesid.inertia import mass_com_inertia
 from bayesid.posterior import Posterior
 
 __all__ = ["physical_sd", "physical_slope"]
@@ -20,7 +20,7 @@ def physical_slope(posterior: Posterior, z: Floats) -> Floats:
     """Return the derivative of the first body's quantities, in the order of `BODY_QUANTITIES`, shape (10, size)."""
     shifts = DIFFERENCE * np.eye(posterior.size)
     inertial = posterior.values_of(np.concatenate([z + shifts, z - shifts])).inertial[:, :10]
-    ahead, behind = np.split(reported(np.asarray(inertial)), 2)
+    ahead, behind = np.split(mass_com_inertia(np.asarray(inertial)), 2)
     return (ahead - behind).T / (2.0 * DIFFERENCE)
 
 

@@ -1,0 +1,225 @@
+"""What makes a manoeuvre good. Every criterion is a cost, to be minimised, of what a plan would bring.
+
+The paper's (26) looks at the motion of the base, the condition number at the regressor, the others at the posterior
+covariance that the sensors' noise leaves, with everything that is not a body to identify marginalised.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import ClassVar, Protocol
+
+import jax.numpy as jnp
+from jax import Array
+
+from bayesid.design.planned import Outcome, Plan
+from bayesid.errors import InputError
+
+__all__ = [
+    "AOptimal",
+    "ConditionNumber",
+    "Criterion",
+    "DOptimal",
+    "EOptimal",
+    "InformationGain",
+    "Paper26",
+    "Paper26Intended",
+    "Separation",
+    "covariance",
+]
+
+
+class Criterion(Protocol):
+    """What a criterion must offer.
+
+    Attributes
+    ----------
+    name : str
+        As in design.json.
+    draws : int
+        Points of the prior to average over; 0 for its centre alone.
+    """
+
+    name: ClassVar[str]
+    draws: int
+
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return a number to be minimised, differentiable by JAX."""
+        ...
+
+
+def covariance(plan: Plan, outcome: Outcome) -> Array:
+    """Posterior covariance of the coordinates of the bodies to identify (Laplace), all else marginalised."""
+    keep = jnp.asarray(plan.bodies(), dtype=int)
+    total = outcome.information + jnp.eye(plan.unknowns.size)
+    return _inverse(total)[jnp.ix_(keep, keep)]
+
+
+@dataclass(frozen=True)
+class Paper26:
+    """The paper's (26) as printed, from the largest excursion of each state of the base.
+
+    Its signed differences cancel most of it: of three states -y1^2 + y2^2 + 3 y3^2 remains, so that it rewards the
+    third state alone, penalises the first, and says nothing of balance. It adds metres to radians.
+    """
+
+    name: ClassVar[str] = "paper-26"
+    draws: int = 0
+
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return minus (26)."""
+        squares = _largest_squares(outcome)
+        value = jnp.sum(squares)
+        for triple in (squares[:3], squares[3:]):
+            value = value - sum(triple[i] - triple[j] for i, j in combinations(range(3), 2))
+        return -value
+
+
+@dataclass(frozen=True)
+class Paper26Intended:
+    """What (26) appears to intend: large differences between the states count against it, whatever their sign.
+
+    Of three states, sorted, 3 smallest^2 + middle^2 - largest^2 remains.
+    """
+
+    name: ClassVar[str] = "paper-26-intended"
+    draws: int = 0
+
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return minus (26) with the sizes of the differences."""
+        squares = _largest_squares(outcome)
+        value = jnp.sum(squares)
+        for triple in (squares[:3], squares[3:]):
+            value = value - sum(jnp.abs(triple[i] - triple[j]) for i, j in combinations(range(3), 2))
+        return -value
+
+
+@dataclass(frozen=True)
+class ConditionNumber:
+    """Logarithm of the condition number of the regressor (Armstrong 1989, Gautier & Khalil 1992).
+
+    Of the base's force balance (19) along the manoeuvre. Columns are per unit of the prior's standard deviation,
+    torques are divided by the bodies' radius of gyration, so that no units are mixed.
+    """
+
+    name: ClassVar[str] = "condition-number"
+    draws: int = 0
+
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return the logarithm of the largest singular value over the smallest."""
+        squares = jnp.linalg.eigvalsh(outcome.regressor.T @ outcome.regressor)
+        return 0.5 * (jnp.log(squares[-1]) - jnp.log(jnp.maximum(squares[0], 1e-15 * squares[-1])))
+
+
+@dataclass(frozen=True)
+class DOptimal:
+    """Volume of the posterior: half the logarithm of its covariance's determinant."""
+
+    name: ClassVar[str] = "d-optimal"
+    draws: int = 0
+
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return half the log-determinant."""
+        return 0.5 * jnp.linalg.slogdet(covariance(plan, outcome))[1]
+
+
+@dataclass(frozen=True)
+class AOptimal:
+    """Logarithm of the root mean variance of the coordinates, whose prior has variance one."""
+
+    name: ClassVar[str] = "a-optimal"
+    draws: int = 0
+
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return the logarithm of a standard deviation."""
+        return 0.5 * jnp.log(jnp.mean(jnp.diag(covariance(plan, outcome))))
+
+
+@dataclass(frozen=True)
+class EOptimal:
+    """Logarithm of the standard deviation along the worst direction, in units of the prior's."""
+
+    name: ClassVar[str] = "e-optimal"
+    draws: int = 0
+
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return the logarithm of a standard deviation."""
+        return 0.5 * jnp.log(jnp.linalg.eigvalsh(covariance(plan, outcome))[-1])
+
+
+@dataclass(frozen=True)
+class InformationGain:
+    """Expected gain of information about the bodies, averaged over their prior [nats], with its sign turned.
+
+    The posterior at each draw is taken as normal (Chaloner & Verdinelli 1995, section 2.2).
+    """
+
+    name: ClassVar[str] = "information-gain"
+    draws: int = 8
+
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return minus the gain at one draw: the prior's covariance is one."""
+        return 0.5 * jnp.linalg.slogdet(covariance(plan, outcome))[1]
+
+
+@dataclass(frozen=True)
+class Separation:
+    """Signal-to-noise by which rival effects can be told apart: of each, with all else and its rivals marginalised.
+
+    For two effects of one parameter this is lambda (1 - rho^2) of the weaker one. The model of the plan must carry the
+    rivals; their amplitudes are those of their priors.
+
+    Parameters
+    ----------
+    rivals : tuple of str
+        Labels of effects.
+    """
+
+    rivals: tuple[str, ...]
+    name: ClassVar[str] = "separation"
+    draws: int = 0
+
+    def __post_init__(self) -> None:
+        if len(self.rivals) < 2:
+            raise InputError(
+                f"{len(self.rivals)} effects to tell apart", place="design.rivals", remedy="Name at least two"
+            )
+
+    def noncentrality(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return the expected lambda (1 - rho^2) of each rival, shape (rivals,)."""
+        groups = [jnp.asarray(self._coordinates(plan, label), dtype=int) for label in self.rivals]
+        # a rival may have any size: its amplitude has no prior here
+        prior = jnp.ones(plan.unknowns.size).at[jnp.concatenate(groups)].set(1e-9)
+        total = outcome.information + jnp.diag(prior)
+        values = []
+        for group in groups:
+            rest = jnp.setdiff1d(jnp.arange(plan.unknowns.size), group, size=plan.unknowns.size - len(group))
+            own = outcome.information[jnp.ix_(group, group)]
+            cross = outcome.information[jnp.ix_(group, rest)]
+            values.append(jnp.trace(own - cross @ _inverse(total[jnp.ix_(rest, rest)]) @ cross.T))
+        return jnp.stack(values)
+
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return minus the logarithm of the smallest root noncentrality."""
+        return -0.5 * jnp.log(jnp.maximum(jnp.min(self.noncentrality(plan, outcome)), 1e-12))
+
+    def _coordinates(self, plan: Plan, label: str) -> list[int]:
+        found = list(plan.effect(label))
+        if not found:
+            raise InputError(
+                f"the plan's model has no effect {label!r} with parameters",
+                place="design.rivals",
+                remedy="Extend the model by the rivals",
+            )
+        return found
+
+
+def _largest_squares(outcome: Outcome) -> Array:
+    return jnp.max(jnp.abs(outcome.course.excursion), axis=0) ** 2
+
+
+def _inverse(matrix: Array) -> Array:
+    """Inverse of a positive-definite matrix whose rows differ in scale."""
+    scale = 1.0 / jnp.sqrt(jnp.diag(matrix))
+    return jnp.linalg.inv(matrix * jnp.outer(scale, scale)) * jnp.outer(scale, scale)

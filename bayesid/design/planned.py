@@ -1,0 +1,285 @@
+"""A manoeuvre as planned: what the robot does, and what its sensors would tell, as functions JAX differentiates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bayesid.arrays import Floats
+from bayesid.design.parameterisation import Parameterisation
+from bayesid.dynamics import Grid, quaternion_product
+from bayesid.effects.base import Readings
+from bayesid.errors import InputError
+from bayesid.grid import build_grid
+from bayesid.model import Model
+from bayesid.regressors import balance_regressor
+from bayesid.robot import Robot
+from bayesid.sensors import Kind
+from bayesid.simulator import Simulator
+from bayesid.tables import joint_motion, kinematics
+from bayesid.unknowns import Unknowns
+
+__all__ = ["Course", "Outcome", "Plan", "Tip"]
+
+
+class Course(NamedTuple):
+    """What the robot does, at T instants.
+
+    position, velocity (T, joints); tip_speed [m/s] and tip_rate [rad/s] (T,), each the larger of those relative to the
+    base and to inertial space; rotation (T,) of the base since the start [rad]; excursion (T, 6): displacement of the
+    base origin [m] and Cardan angles x, y, z [rad] of the base, in the axes of the start; rate, rate_change and
+    acceleration (T, 3) of the base origin in base axes.
+    """
+
+    time: Floats
+    position: Array
+    velocity: Array
+    tip_speed: Array
+    tip_rate: Array
+    rotation: Array
+    excursion: Array
+    rate: Array
+    rate_change: Array
+    acceleration: Array
+
+
+class Outcome(NamedTuple):
+    """What criteria judge.
+
+    Attributes
+    ----------
+    course : Course
+    information : (n, n) array
+        Fisher information of the unknowns' coordinates, without their standard-normal prior.
+    regressor : (6 T, b) array
+        Force balance of the base against the bodies' coordinates; torques are over the radius of gyration [N].
+    """
+
+    course: Course
+    information: Array
+    regressor: Array
+
+
+@dataclass(frozen=True)
+class Tip:
+    """A frame of the URDF: the joint that carries it and its pose (4, 4) in that joint's axes."""
+
+    name: str
+    joint: int
+    placement: Floats
+
+    @classmethod
+    def of(cls, robot: Robot, name: str | None = None) -> Tip:
+        """Return a frame by name; where left out, the last link's."""
+        frames = {frame.name: frame for frame in robot.model.frames if frame.parentJoint > 0}
+        if name is None:
+            name = max(frames.values(), key=lambda frame: frame.parentJoint).name if robot.joints else robot.base
+            last = [frame.name for frame in frames.values() if frame.parentJoint == frames[name].parentJoint]
+            name = last[-1]
+        if name not in frames:
+            raise InputError(
+                f"no frame named {name!r}",
+                file=robot.file,
+                place="design.tip_frame",
+                remedy=f"Choose a link or joint of the URDF: {', '.join(frames)}",
+            )
+        frame = frames[name]
+        return cls(name, frame.parentJoint - 2, frame.placement.homogeneous)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A family of manoeuvres of a model's robot.
+
+    Parameters
+    ----------
+    model : Model
+    family : Parameterisation
+    interval : float
+        Between samples of all sensors [s].
+    tip : Tip
+    attitude : (4,) array
+        Base to orbit axes at time 0.
+    attitude_sigma : float
+        Its standard deviation per axis [rad].
+    latitude : float
+        Argument of latitude at time 0 [rad].
+    step : float
+        Of the integration [s]; limits are looked at every half step.
+    thinning : int
+        Only every n-th sample is simulated, and counts as n.
+    """
+
+    model: Model
+    family: Parameterisation
+    interval: float
+    tip: Tip
+    attitude: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
+    attitude_sigma: float = 0.0
+    latitude: float = 0.0
+    step: float = 2.0
+    thinning: int = 1
+
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        """The unknowns of an identification from this one manoeuvre."""
+        return Unknowns(
+            bodies=self.model.priors,
+            effects=self.model.effects,
+            recordings=1,
+            rate_sigma=self.model.rate_sigma,
+            tilt_sigma=(self.attitude_sigma,),
+        )
+
+    @cached_property
+    def simulator(self) -> Simulator:
+        """Return the model as a function of the unknowns."""
+        return Simulator(self.model, self.unknowns)
+
+    @cached_property
+    def samples(self) -> Floats:
+        """Times of the samples [s], the last one at the end."""
+        count = max(4, int(np.floor(self.family.duration / (self.interval * self.thinning) + 1e-9)))
+        return np.linspace(0.0, self.family.duration, count + 1)
+
+    @cached_property
+    def sigma(self) -> Floats:
+        """Noise of each sensor's axes, one after the other, shape (3 sensors,)."""
+        weight = np.sqrt((self.family.duration / self.interval + 1.0) / len(self.samples))
+        return np.concatenate([sensor.noise.sigma(self.interval) for sensor in self.model.sensors]) / weight
+
+    def bodies(self, nuisance: bool = False) -> Sequence[int]:
+        """Return the indices of the bodies' coordinates; with ``nuisance``, of those marginalised too."""
+        return [
+            10 * index + k
+            for index, prior in enumerate(self.model.priors)
+            if nuisance or not prior.nuisance
+            for k in range(10)
+        ]
+
+    def effect(self, label: str) -> Sequence[int]:
+        """Return the indices of an effect's coordinates."""
+        return [
+            index
+            for index, name in enumerate(self.unknowns.names)
+            if name.startswith((f"{label}.", f"{label}[")) and index >= 10 * len(self.model.priors)
+        ]
+
+    # ---- functions of the parameters of the motion and of the unknowns, both traced ----
+
+    def course(self, parameters: Array, z: Array) -> Course:
+        """Return what the robot does."""
+        return self._course(parameters, z, self._grid(parameters))[0]
+
+    def outcome(self, parameters: Array, z: Array) -> Outcome:
+        """Return what criteria judge."""
+        grid = self._grid(parameters)
+        course, tables = self._course(parameters, z, grid)
+        slope = self._slope(z, grid) / jnp.asarray(self.sigma)[:, None]
+        flat = slope.reshape(-1, slope.shape[-1])
+        bodies = jnp.asarray(self.bodies(), dtype=int)
+        per_coordinate = jax.jacfwd(lambda z: self.unknowns.values(z).inertial)(z)[:, bodies]
+        wrench = balance_regressor(tables, course.rate, course.rate_change, course.acceleration)
+        wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / self._gyration)])[:, None]
+        return Outcome(course, flat.T @ flat, (wrench @ per_coordinate).reshape(-1, len(bodies)))
+
+    @property
+    def _gyration(self) -> float:
+        """Mean radius of gyration of the bodies to identify [m]."""
+        moments = [prior.centre.inertia.trace() / prior.centre.mass for prior in self.model.bodies]
+        return float(np.sqrt(0.5 * np.mean(moments))) if moments else 1.0
+
+    def _grid(self, parameters: Array) -> Grid:
+        grid = build_grid(
+            self.model.robot,
+            tuple(prior.name for prior in self.model.priors),
+            self.family.motion(parameters),
+            self.samples,
+            self.step,
+            orbit=self.model.orbit,
+            latitude=self.latitude,
+            effects=self.model.effects,
+        )
+        return jax.tree.map(lambda x: x[None], grid)
+
+    def _slope(self, z: Array, grid: Grid) -> Array:
+        """Return derivatives of what the sensors read, (T, 3 sensors, n)."""
+        attitude = jnp.asarray(self.attitude)[None]
+
+        def read(z: Array) -> tuple[Readings, Readings]:
+            readings = jax.tree.map(lambda x: x[0], self.simulator.readings(z, grid, attitude))
+            return readings, readings
+
+        slopes, here = jax.jacfwd(read, has_aux=True)(z)
+        parts = []
+        for kind in self.simulator.kinds:
+            slope = getattr(slopes, kind.value)
+            parts.append(_turning(here.attitude, slope) if kind is Kind.ATTITUDE else slope)
+        return jnp.concatenate(parts, axis=1)
+
+    def _course(self, parameters: Array, z: Array, grid: Grid) -> tuple[Course, Array]:
+        """Return the course at the stages of the integration, and the tables of the bodies there."""
+        stage, _, _ = self.simulator.trace(z, grid, jnp.asarray(self.attitude)[None])
+        moment = jax.tree.map(lambda x: x[0], stage)
+        # the instants, known beforehand: half steps
+        times = np.linspace(0.0, self.family.duration, moment.rate.shape[0])
+        motion = self.family.motion(parameters)
+        state = motion.evaluate(times)
+        pose, flow, _ = joint_motion(kinematics(self.model.robot, state), self.tip.joint)
+        pose, flow = pose @ self.tip.placement, flow @ self.tip.placement
+        turning = jnp.asarray(flow[:, :3, :3] @ jnp.swapaxes(pose[:, :3, :3], 1, 2))
+        own_rate = jnp.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
+        body = moment.body
+        drift = -body.com_rate - jnp.cross(moment.rate, body.com)  # of the base origin, the centre of mass resting
+        speed = drift + jnp.cross(moment.rate, pose[:, :3, 3]) + flow[:, :3, 3]
+        turned = jnp.einsum("ji,tjk->tik", moment.attitude[0], moment.attitude)
+        displaced = body.com[0] - jnp.einsum("tij,tj->ti", turned, body.com)
+        course = Course(
+            time=times,
+            position=jnp.asarray(state.position),
+            velocity=jnp.asarray(state.velocity),
+            tip_speed=jnp.maximum(_norm(speed), _norm(flow[:, :3, 3])),
+            tip_rate=jnp.maximum(_norm(own_rate + moment.rate), _norm(own_rate)),
+            rotation=_angle(turned),
+            excursion=jnp.concatenate([displaced, _cardan(turned)], axis=1),
+            rate=moment.rate,
+            rate_change=moment.rate_change,
+            acceleration=moment.acceleration,
+        )
+        return course, grid.stage.unknown[0, :, :, : 10 * len(self.model.priors)]
+
+
+def _turning(quaternion: Array, slope: Array) -> Array:
+    """Small rotations in base axes, (T, 3, n), of changes of a quaternion, (T, 4, n)."""
+    inverse = quaternion * jnp.array([-1.0, -1.0, -1.0, 1.0])
+    product = jax.vmap(jax.vmap(quaternion_product, (None, 1), 1))
+    return 2.0 * product(inverse, slope)[:, :3]
+
+
+def _norm(vectors: Array | Floats) -> Array:
+    """Length of vectors (T, 3); smooth at zero."""
+    return jnp.sqrt(jnp.sum(jnp.asarray(vectors) ** 2, axis=1) + 1e-24)
+
+
+def _angle(turned: Array) -> Array:
+    """Angle of rotation matrices (T, 3, 3); smooth at zero."""
+    vector = jnp.stack(
+        [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]],
+        axis=1,
+    )
+    return jnp.arctan2(_norm(vector), jnp.trace(turned, axis1=1, axis2=2) - 1.0)
+
+
+def _cardan(turned: Array) -> Array:
+    """Angles x, y, z of rotation matrices Rx Ry Rz (T, 3, 3)."""
+    y = jnp.arcsin(jnp.clip(turned[:, 0, 2], -1.0 + 1e-12, 1.0 - 1e-12))
+    x = jnp.arctan2(-turned[:, 1, 2], turned[:, 2, 2])
+    z = jnp.arctan2(-turned[:, 0, 1], turned[:, 0, 0])
+    return jnp.stack([x, y, z], axis=1)

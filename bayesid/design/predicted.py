@@ -1,0 +1,126 @@
+"""The posterior that planned manoeuvres would lead to, with the noise of all sensors and encoders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bayesid.arrays import Floats
+from bayesid.inertia import mass_com_inertia
+from bayesid.inference.identification import BODY_QUANTITIES
+from bayesid.model import Manoeuvre, Model
+from bayesid.motion import MeasuredMotion, Motion
+from bayesid.posterior import Posterior
+from bayesid.simulation import simulate_manoeuvre
+
+__all__ = ["Encoder", "Predicted", "planned_manoeuvre", "predict_posterior"]
+
+Encoder = Mapping[int, float | Mapping[str, float | None] | None]
+"""Noise of joint position (0), velocity (1) and acceleration (2), for all joints or by joint."""
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Predicted posterior of the bodies to identify (Laplace, at the prior's centre).
+
+    Attributes
+    ----------
+    names : tuple of str
+        Quantities as in identification.json.
+    mean : (n,) array
+    covariance : (n, n) array
+        Of these quantities, in their units.
+    coordinates : (m, m) array
+        Covariance of all unknowns' coordinates, whose prior is the unit matrix.
+    bodies : int
+        How many of the first coordinates belong to bodies to identify.
+    """
+
+    names: tuple[str, ...]
+    mean: Floats
+    covariance: Floats
+    coordinates: Floats
+    bodies: int
+
+    @property
+    def sd(self) -> Floats:
+        """Standard deviations, shape (n,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def log_det(self) -> float:
+        """Logarithm of the determinant of `covariance`, in SI units."""
+        scale = self.sd
+        return float(np.linalg.slogdet(self.covariance / np.outer(scale, scale))[1] + 2.0 * np.log(scale).sum())
+
+    @property
+    def worst(self) -> float:
+        """Standard deviation along the worst direction, relative to the prior's."""
+        block = self.coordinates[: self.bodies, : self.bodies]
+        return float(np.sqrt(np.linalg.eigvalsh(block)[-1]))
+
+    @property
+    def geometric_mean(self) -> float:
+        """Geometric mean of the standard deviations; only ratios of it mean something."""
+        return float(np.exp(np.log(self.sd).mean()))
+
+
+def planned_manoeuvre(
+    model: Model,
+    motion: Motion,
+    time: Floats,
+    name: str,
+    encoder: Encoder,
+    attitude: Floats | None = None,
+    **start: float,
+) -> Manoeuvre:
+    """Return a manoeuvre as it would be recorded, without noise, with the encoders' noise declared.
+
+    Parameters
+    ----------
+    time : (T,) array
+        Of all samples [s].
+    encoder : Encoder
+    attitude : (4,) array, optional
+        Base to orbit axes at time 0.
+    **start
+        ``attitude_sigma`` and ``latitude`` of `Manoeuvre`.
+    """
+    recording = simulate_manoeuvre(model, motion, time, name=name, attitude=attitude)
+    measured = MeasuredMotion.from_recording(recording, model.robot, sigma=encoder)
+    begin = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude)
+    return Manoeuvre(recording, measured, begin, **start)
+
+
+def predict_posterior(model: Model, manoeuvres: Sequence[Manoeuvre]) -> Predicted:
+    """Return the posterior that manoeuvres lead to if the prior's centre is the truth."""
+    posterior = Posterior(model, manoeuvres)
+    z = np.zeros(posterior.size)
+    jacobian = posterior.at(z).jacobian(z)
+    return describe(posterior, z, np.linalg.inv(jacobian.T @ jacobian))
+
+
+def describe(posterior: Posterior, z: Floats, coordinates: Floats) -> Predicted:
+    """Carry a covariance of the coordinates over to the quantities that are reported."""
+    own = [index for index, prior in enumerate(posterior.model.priors) if not prior.nuisance]
+
+    def quantities(z: Array) -> Array:
+        inertial = posterior.unknowns.values(z).inertial.reshape(-1, 10)[jnp.asarray(own, dtype=int)]
+        return jnp.ravel(mass_com_inertia(inertial))
+
+    slope = np.asarray(jax.jacfwd(quantities)(jnp.asarray(z)))
+    names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
+    order = [10 * index + k for index in own for k in range(10)]
+    order += [k for k in range(posterior.size) if k not in order]
+    return Predicted(
+        names=names,
+        mean=np.asarray(quantities(jnp.asarray(z))),
+        covariance=slope @ coordinates @ slope.T,
+        coordinates=coordinates[np.ix_(order, order)],
+        bodies=10 * len(own),
+    )

@@ -1,0 +1,157 @@
+"""A design problem: a plan, limits and criteria, compiled once, with exact gradients."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bayesid.arrays import Floats
+from bayesid.design.criteria import Criterion
+from bayesid.design.limits import ACTIVE, Limit, Limits, smooth_largest
+from bayesid.design.planned import Course, Plan
+
+__all__ = ["FINER", "Problem", "Reached"]
+
+FINER = 8
+"""How much finer than the optimiser's grid the limits of a result are checked."""
+
+
+@dataclass(frozen=True)
+class Reached:
+    """A limit and how near a manoeuvre comes to it."""
+
+    name: str
+    limit: float
+    largest: float
+    unit: str
+
+    @property
+    def active(self) -> bool:
+        """Whether it is what holds the manoeuvre back."""
+        return self.largest > ACTIVE * self.limit
+
+    @property
+    def kept(self) -> bool:
+        """Whether it is respected."""
+        return self.largest <= self.limit
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A family of manoeuvres to choose from.
+
+    Parameters
+    ----------
+    plan : Plan
+    limits : Limits
+    criteria : sequence of Criterion
+        All that will be asked for: they share one compiled simulation.
+    """
+
+    plan: Plan
+    limits: Limits
+    criteria: tuple[Criterion, ...]
+
+    @cached_property
+    def applied(self) -> tuple[Limit, ...]:
+        """The limits that apply."""
+        return self.limits.of(self.plan.model.robot)
+
+    @cached_property
+    def centre(self) -> Floats:
+        """The prior's centre, in the unknowns' coordinates."""
+        return np.zeros(self.plan.unknowns.size)
+
+    def cost(self, criterion: Criterion, parameters: Floats, points: Sequence[Floats] = ()) -> tuple[float, Floats]:
+        """Return a criterion and its gradient, averaged over points of the unknowns (the prior's centre if none)."""
+        index = self.criteria.index(criterion)
+        pairs = [self._cost(parameters, z, index) for z in (points or [self.centre])]
+        return float(np.mean([pair[0] for pair in pairs])), np.mean([np.asarray(pair[1]) for pair in pairs], axis=0)
+
+    def costs(self, parameters: Floats) -> dict[str, float]:
+        """Return every criterion at the prior's centre."""
+        values = self._costs(parameters, self.centre)
+        return {criterion.name: float(value) for criterion, value in zip(self.criteria, values, strict=True)}
+
+    def fractions(self, parameters: Floats) -> tuple[Floats, Floats]:
+        """Return how much of every limit is used, shape (m,), smooth and never too small; and its Jacobian (m, n)."""
+        value, slope = self._fractions(parameters, self.centre)
+        return np.asarray(value), np.asarray(slope)
+
+    def reached(self, parameters: Floats) -> list[Reached]:
+        """Check every limit on a grid `FINER` times finer than the optimiser's."""
+        largest = np.asarray(self._finely(parameters, self.centre))
+        return self._reached(largest)
+
+    def reached_at(self, parameters: Floats, points: Floats) -> Floats:
+        """Largest value of every limit for many points of the unknowns, shape (k, n) -> (k, m)."""
+        return np.stack([np.asarray(self._finely(parameters, z)) for z in points])
+
+    def course(self, parameters: Floats, z: Floats | None = None) -> Course:
+        """Return what the robot does, on the fine grid."""
+        return jax.tree.map(np.asarray, self._fine_course(parameters, self.centre if z is None else z))
+
+    def points(self, criterion: Criterion, rng: np.random.Generator) -> list[Floats]:
+        """Draw points of the prior of all bodies to average a criterion over; none if it looks at the centre alone."""
+        bodies = 10 * len(self.plan.model.priors)
+        points = np.zeros((criterion.draws, self.plan.unknowns.size))
+        points[:, :bodies] = rng.normal(size=(criterion.draws, bodies))
+        return list(points)
+
+    def _reached(self, largest: Floats) -> list[Reached]:
+        return [
+            Reached(limit.name, limit.bound, float(value), limit.unit)
+            for limit, value in zip(self.applied, largest, strict=True)
+        ]
+
+    # ---- compiled ----
+
+    @cached_property
+    def _cost(self):  # type: ignore[no-untyped-def]
+        def cost(parameters: Array, z: Array, index: Array) -> Array:
+            outcome = self.plan.outcome(parameters, z)
+            branches = [lambda o, c=criterion: c.cost(self.plan, o) for criterion in self.criteria]
+            return jax.lax.switch(index, branches, outcome)
+
+        return jax.jit(jax.value_and_grad(cost))
+
+    @cached_property
+    def _costs(self):  # type: ignore[no-untyped-def]
+        def costs(parameters: Array, z: Array) -> list[Array]:
+            outcome = self.plan.outcome(parameters, z)
+            return [criterion.cost(self.plan, outcome) for criterion in self.criteria]
+
+        return jax.jit(costs)
+
+    @cached_property
+    def _fractions(self):  # type: ignore[no-untyped-def]
+        def fractions(parameters: Array, z: Array) -> tuple[Array, Array]:
+            course = self.plan.course(parameters, z)
+            values = jnp.stack([smooth_largest(limit, course) for limit in self.applied])
+            return values, values
+
+        def both(parameters: Array, z: Array) -> tuple[Array, Array]:
+            slope, value = jax.jacfwd(fractions, has_aux=True)(parameters, z)
+            return value, slope
+
+        return jax.jit(both)
+
+    @cached_property
+    def _fine_course(self):  # type: ignore[no-untyped-def]
+        return jax.jit(replace(self.plan, step=self.plan.step / FINER).course)
+
+    @cached_property
+    def _finely(self):  # type: ignore[no-untyped-def]
+        fine = replace(self.plan, step=self.plan.step / FINER)
+
+        def largest(parameters: Array, z: Array) -> Array:
+            course = fine.course(parameters, z)
+            return jnp.stack([limit.largest(course) for limit in self.applied])
+
+        return jax.jit(largest)
