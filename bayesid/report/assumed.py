@@ -41,7 +41,7 @@ def model_sentences(posterior: Posterior, integration_error: float) -> list[str]
 def _prior_sentences(posterior: Posterior) -> list[str]:
     if posterior.flat_prior:
         return ["No prior: the likelihood alone was used."]
-    sentences = [
+    sentences = _carried_sentences(posterior.model) or [
         f"Prior of {body.name}: the log-Cholesky coordinates of its pseudo-inertia are normal about the given values, "
         f"with a relative width of {format_number(body.spread)}, so that every value is a physical body. The "
         f"logarithm of the mass has a standard deviation of {format_number(2.0 * body.spread)}."
@@ -54,6 +54,24 @@ def _prior_sentences(posterior: Posterior) -> list[str]:
     tilt = max(posterior.unknowns.tilt_sigma)
     attitude = f"uncertain by up to {format_number(tilt)} rad per axis" if tilt > 0.0 else "known exactly"
     return [*sentences, f"The initial rate is {rate}. The initial attitude is {attitude}."]
+
+
+def _carried_sentences(model: Model) -> list[str]:
+    """Describe a joint prior; empty where bodies are independent."""
+    if model.mixing is None:
+        return []
+    # theta_1 is half the logarithm of the mass
+    widths = np.linalg.norm(np.array(model.mixing)[::10], axis=1)
+    masses = ", ".join(
+        f"{prior.name} {format_number(prior.centre.mass, 5)} kg ± {format_number(200.0 * float(width), 2)} %"
+        for prior, width in zip(model.priors, widths, strict=True)
+        if not prior.nuisance
+    )
+    return [
+        "The prior of the bodies is the posterior of an earlier study, with the changes of mass stated since: a "
+        "correlated Gaussian of their log-Cholesky coordinates, so that every value is a physical body. "
+        f"Masses: {masses}."
+    ]
 
 
 def _link_sentence(model: Model) -> str:

@@ -93,6 +93,10 @@ class Study(Section):
                     remedy="Remove one: the same data would count twice",
                 )
         for index, load in enumerate(self.robot.loads, start=1):
-            if load.name in self.unknowns.bodies and load.name not in self.unknowns.prior:
+            if (
+                self.unknowns.posterior is None
+                and load.name in self.unknowns.bodies
+                and load.name not in self.unknowns.prior
+            ):
                 check_extended(load, place=f"robot.loads #{index} ('{load.name}')")
         return self
