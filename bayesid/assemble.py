@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from bayesid.carry import InertialDraws, JointPrior, joint_prior
 from bayesid.effects import AccelBias, Effect, RateBias, create
 from bayesid.errors import InputError
 from bayesid.model import RATE_SIGMA, Manoeuvre, Model, spread_links
@@ -20,9 +21,13 @@ from bayesid.recording import Recording
 from bayesid.robot import Load, Robot
 from bayesid.sensors import Filter, Kind, Sensor
 from bayesid.study import RecordingSection, Study
-from bayesid.unknowns import BodyPrior
+from bayesid.unknowns import BodyPrior, Mixing
 
 __all__ = ["load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
+
+
+CHANGE_SEED = 0
+"""Of the draws of an uncertain change of mass, so that a study always has the same prior."""
 
 
 def load_posterior(study: Study) -> Posterior:
@@ -39,6 +44,11 @@ def load_posterior(study: Study) -> Posterior:
 
 def load_robot(study: Study) -> Robot:
     """Read the robot with its loads; bodies whose prior the study gives have that prior's centre."""
+    return _load_robot(study)[0]
+
+
+def _load_robot(study: Study) -> tuple[Robot, JointPrior | None]:
+    """Read the robot, and the joint prior of the bodies of an earlier posterior if the study names one."""
     robot = Robot.from_urdf(study.robot.urdf)
     try:
         for load in study.robot.loads:
@@ -49,28 +59,61 @@ def load_robot(study: Study) -> Robot:
                 robot = robot.with_inertial(name, study.unknowns.prior[name].parameters)
     except InputError as error:
         raise InputError(error.problem, file=study.file, place=error.place, remedy=error.remedy) from None
-    return robot
+    carried = _carried(study, robot)
+    for name, centre in zip(carried.names, carried.centres, strict=True) if carried else ():
+        robot = robot.with_inertial(name, centre)
+    return robot, carried
+
+
+def _carried(study: Study, robot: Robot) -> JointPrior | None:
+    """Return the joint prior from an earlier posterior.
+
+    Bodies it holds beside those of the study are carried too if the robot has them: they were not known exactly then,
+    and are correlated with the others.
+    """
+    section = study.unknowns
+    if section.posterior is None:
+        return None
+    draws = InertialDraws.read(section.posterior)
+    rest = [name for name in draws.names if name in robot.links and name not in section.bodies]
+    try:
+        draws, rng = draws.of_bodies([*section.bodies, *rest]), np.random.default_rng(CHANGE_SEED)
+        for change in section.changes:
+            draws = draws.changed(change.change, rng)
+        return joint_prior(draws)
+    except InputError as error:
+        raise error.within(file=section.posterior) from None
 
 
 def load_model(study: Study) -> Model:
     """Build the model of a study."""
     for plugin in study.model.plugins:
         _import(Path(plugin))
-    robot = load_robot(study)
+    robot, carried = _load_robot(study)
     try:
-        priors = [
-            BodyPrior(name, robot.link(name).inertial, study.unknowns.spread_of(name)) for name in study.unknowns.bodies
-        ]
+        priors, mixing = _priors(study, robot, carried)
         return Model(
             robot=robot,
             sensors=_sensors(study),
-            priors=(*priors, *spread_links(robot, study.robot.link_spread, study.unknowns.bodies)),
+            priors=priors,
             orbit=_orbit(study),
             effects=_effects(study),
             rate_sigma=_rate_sigma(study),
+            mixing=mixing,
         )
     except InputError as error:
         raise error.within(file=study.file) from None
+
+
+def _priors(study: Study, robot: Robot, carried: JointPrior | None) -> tuple[tuple[BodyPrior, ...], Mixing | None]:
+    """Return the priors of identified bodies, then of bodies only marginalised, and what correlates them."""
+    section, spread = study.unknowns, study.robot.link_spread
+    if carried is None:
+        own = [BodyPrior(name, robot.link(name).inertial, section.spread_of(name)) for name in section.bodies]
+        return (*own, *spread_links(robot, spread, section.bodies)), None
+    known = carried.bodies([name for name in carried.names if name not in section.bodies])
+    links = spread_links(robot, spread, carried.names)
+    return (*known, *links), carried.mixing(links)
 
 
 def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:

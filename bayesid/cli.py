@@ -1,4 +1,4 @@
-"""The command line: ``bayesid check|identify|diagnose|simulate STUDY.toml --output DIR``, ``bayesid demo``."""
+"""The command line: ``bayesid check|identify|diagnose|simulate|predict STUDY.toml --output DIR``, ``bayesid demo``."""
 
 from __future__ import annotations
 
@@ -81,6 +81,24 @@ def simulate(
 
     with _reported():
         for line in run_simulate(study, output, seed=seed, noise=noise):
+            console.print(line)
+
+
+@app.command()
+def predict(
+    study: StudyFile,
+    output: Output,
+    seed: Seed = 0,
+    draws: Annotated[int, typer.Option(help="Draws of what is known of the robot.")] = 500,
+    posterior: Annotated[
+        Path | None, typer.Option(help="posterior.nc of an earlier study, in place of the study's prior.")
+    ] = None,
+) -> None:
+    """Predict where planned joint motions take base and end-effector: prediction.json and report.pdf."""
+    from bayesid.commands import run_predict
+
+    with _reported(), _progress() as show:
+        for line in run_predict(study, output, posterior=posterior, seed=seed, draws=draws, progress=show):
             console.print(line)
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from bayesid.assemble import load_manoeuvres, load_model, load_posterior
-from bayesid.checks import RecordingCheck, check_recording, refuse_wrong_units
+from bayesid.checks import RecordingCheck, check_recording, refuse_impossible_joints, refuse_wrong_units
 from bayesid.demo import copy_demonstration
 from bayesid.diagnosis import Diagnosis, diagnose, identify_extended
 from bayesid.errors import InputError
@@ -25,14 +25,22 @@ from bayesid.inference import Identification
 from bayesid.inference import identify as identify_posterior
 from bayesid.inference.ensemble import Progress
 from bayesid.posterior import Posterior
-from bayesid.report import check_report, diagnosis_report, identification_report, simulation_report
+from bayesid.predict import Predictor
+from bayesid.report import (
+    check_report,
+    diagnosis_report,
+    format_quantity,
+    identification_report,
+    prediction_report,
+    simulation_report,
+)
 from bayesid.report.diagnosis import diagnosis_sentences
 from bayesid.sensors import Kind
 from bayesid.simulation import simulate_recordings
 from bayesid.storage import write_netcdf
 from bayesid.study import Study
 
-__all__ = ["run_check", "run_demo", "run_diagnose", "run_identify", "run_simulate"]
+__all__ = ["run_check", "run_demo", "run_diagnose", "run_identify", "run_predict", "run_simulate"]
 
 Show = Callable[[float, str], None]
 
@@ -129,6 +137,36 @@ def run_simulate(file: Path, output: Path, *, seed: int, noise: bool) -> Iterato
         _write_json(folder / "simulation.json", content)
         simulation_report(posterior, recordings, study.title, folder / "report.pdf")
     yield f"Simulated {len(recordings)} recordings; integration step {posterior.step:g} s, error {error:.2g} sigma."
+    yield f"Wrote {output / 'report.pdf'}."
+
+
+def run_predict(
+    file: Path, output: Path, *, posterior: Path | None, seed: int, draws: int, progress: Show
+) -> Iterator[str]:
+    """Write prediction.json and report.pdf of the planned manoeuvres of a study.
+
+    ``posterior`` takes the place of the study's prior.
+    """
+    study = Study.load(file)
+    if posterior is not None:
+        study = study.with_posterior(posterior)
+    model = load_model(study)
+    manoeuvres = load_manoeuvres(study, model.robot)
+    for manoeuvre in manoeuvres:
+        refuse_impossible_joints(manoeuvre.recording, model.robot)
+    tip = None if study.design is None else study.design.tip_frame
+    streams, predictors, predictions = np.random.SeedSequence(seed).spawn(len(manoeuvres)), [], []
+    for index, (manoeuvre, stream) in enumerate(zip(manoeuvres, streams, strict=True)):
+        progress(index / len(manoeuvres), f"predicting {manoeuvre.recording.name}")
+        predictors.append(Predictor(model, manoeuvre, tip))
+        predictions.append(predictors[-1].predict(draws, np.random.default_rng(stream)))
+    with _complete(output) as folder:
+        _write_json(folder / "prediction.json", {"recordings": [prediction.to_dict() for prediction in predictions]})
+        prediction_report(predictors[0].posterior, manoeuvres, predictions, study.title, folder / "report.pdf")
+    for prediction in predictions:
+        final = prediction.tip.pose().millimetres
+        place = ", ".join(format_quantity(float(m), float(s)) for m, s in zip(final.mean, final.sd, strict=True))
+        yield f"{prediction.name}: {prediction.tip_frame} ends at ({place}) mm from where the base started."
     yield f"Wrote {output / 'report.pdf'}."
 
 

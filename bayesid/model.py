@@ -15,7 +15,7 @@ from bayesid.orbit import Orbit
 from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.sensors import Kind, Sensor
-from bayesid.unknowns import BodyPrior
+from bayesid.unknowns import BodyPrior, Mixing, check_mixing
 
 __all__ = ["Manoeuvre", "Model"]
 
@@ -63,6 +63,9 @@ class Model:
     effects : sequence of Effect
     rate_sigma : float
         Prior standard deviation of the initial rate of each recording [rad/s]; 0 for a start at rest.
+    mixing : (10 B, 10 B) tuple of tuples, optional
+        Joint prior of all B ``priors`` about their centres (`Unknowns`), such as the posterior of an earlier study;
+        left out, bodies and coordinates are independent.
     """
 
     robot: Robot
@@ -71,6 +74,7 @@ class Model:
     orbit: Orbit | None = None
     effects: tuple[Effect, ...] = ()
     rate_sigma: float = RATE_SIGMA
+    mixing: Mixing | None = None
 
     def __post_init__(self) -> None:
         if not self.sensors:
@@ -91,6 +95,8 @@ class Model:
                 raise InputError(f"effect {label!r} is in the model twice", remedy="Name it once")
         for prior in self.priors:
             self.robot.link(prior.name)
+        if self.mixing is not None:
+            check_mixing(self.mixing, len(self.priors))
 
     def extend(self, effect: Effect) -> Model:
         """Return the model with one more effect."""

@@ -149,6 +149,7 @@ class Posterior:
             recordings=len(manoeuvres),
             rate_sigma=self._rate_sigma(),
             tilt_sigma=tuple(manoeuvre.attitude_sigma for manoeuvre in manoeuvres),
+            mixing=model.mixing,
         )
         shared = None if like is None or like.model is not model or like.unknowns != self.unknowns else like._compiled
         self._compiled: _Compiled = shared or _Compiled(model, self.unknowns)

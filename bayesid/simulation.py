@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bayesid.arrays import Floats
@@ -9,9 +11,9 @@ from bayesid.model import Manoeuvre, Model
 from bayesid.motion import Motion, sample_joints
 from bayesid.posterior import Posterior
 from bayesid.recording import Recording
-from bayesid.sensors import Kind
+from bayesid.sensors import Kind, Sensor
 
-__all__ = ["simulate_manoeuvre", "simulate_recordings"]
+__all__ = ["blank_channels", "simulate_manoeuvre", "simulate_recordings"]
 
 
 def simulate_recordings(
@@ -67,13 +69,8 @@ def simulate_manoeuvre(
     encoder_sigma : float
         Noise of the recorded joint positions [rad or m].
     """
-    blank = {
-        f"{sensor.kind.value}.{axis}": np.full(len(time), 1.0 if axis == "w" else 0.0)
-        for sensor in model.sensors
-        for axis in ("xyzw" if sensor.kind is Kind.ATTITUDE else "xyz")
-    }
     joints = sample_joints(motion, model.robot, time)
-    planned = Recording(name, None, time, {**joints, **blank})
+    planned = Recording(name, None, time, {**joints, **blank_channels(model.sensors, len(time))})
     start = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude, dtype=float)
     posterior = Posterior(model, [Manoeuvre(planned, motion, start)])
     recording = simulate_recordings(posterior, rng, np.zeros(posterior.size))[0]
@@ -81,6 +78,15 @@ def simulate_manoeuvre(
         return recording
     noisy = {key: recording.channels[key] + encoder_sigma * rng.normal(size=len(time)) for key in joints}
     return Recording(name, None, time, {**recording.channels, **noisy})
+
+
+def blank_channels(sensors: Sequence[Sensor], count: int) -> dict[str, Floats]:
+    """Return channels of sensors at rest, to be simulated: a posterior wants every sensor to have samples."""
+    return {
+        f"{sensor.kind.value}.{axis}": np.full(count, 1.0 if axis == "w" else 0.0)
+        for sensor in sensors
+        for axis in ("xyzw" if sensor.kind is Kind.ATTITUDE else "xyz")
+    }
 
 
 def _noisy(values: Floats, kind: Kind, sigma: Floats, rng: np.random.Generator) -> Floats:

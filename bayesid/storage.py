@@ -21,6 +21,9 @@ STORED = 1000
 PREDICTED = 50
 """Draws of the posterior predictive per ensemble."""
 
+LINEAR = ("m", "mc.x", "mc.y", "mc.z", "xx", "xy", "yy", "xz", "yz", "zz")
+"""Names of the linear parameters of every body (`InertialParameters.vector`), from which a later study starts."""
+
 FRAMES = {
     Kind.RATE: "angular velocity of the base relative to inertial space, sensor axes",
     Kind.ACCEL: "non-gravitational acceleration of the mounting point, sensor axes",
@@ -31,9 +34,9 @@ FRAMES = {
 def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceData:
     """Convert a result.
 
-    Chains are independent ensembles. Groups: ``posterior`` (physical quantities, and ``z``, the coordinates with a
-    standard-normal prior), ``log_likelihood`` per recording, ``posterior_predictive`` with sensor noise, and
-    ``observed_data``.
+    Chains are independent ensembles. Groups: ``posterior`` (physical quantities; ``inertial``, the linear parameters
+    of all bodies, those only marginalised included; ``z``, the coordinates with a standard-normal prior),
+    ``log_likelihood`` per recording, ``posterior_predictive`` with sensor noise, and ``observed_data``.
     """
     z = _thin(result.chains.z, STORED)
     few = z[:, :: max(1, z.shape[1] // PREDICTED)][:, :PREDICTED]
@@ -86,6 +89,9 @@ def _posterior_group(
             group[f"{name}.{key}"] = body.values[:, column].reshape(chains, draws)
             units[f"{name}.{key}"] = unit
     values = result.posterior.values_of(flat)
+    if result.posterior.model.priors:
+        group["inertial"] = np.asarray(values.inertial).reshape(chains, draws, -1, 10)
+        dims["inertial"], units["inertial"] = ["body", "parameter"], "kg, kg m, kg m2 about the origin of the link"
     for effect, parameters in zip(result.posterior.model.effects, values.effects, strict=True):
         reported = reported_effect(effect, np.asarray(parameters)) if effect.parameters else np.zeros((0, 0))
         for column, (key, unit) in enumerate(effect.quantities):
@@ -102,6 +108,8 @@ def _posterior_group(
 def _coords(result: Identification) -> dict[str, Any]:
     coords: dict[str, Any] = {
         "unknown": list(result.posterior.unknowns.names),
+        "body": [prior.name for prior in result.posterior.model.priors],
+        "parameter": list(LINEAR),
         "recording": [manoeuvre.recording.name for manoeuvre in result.posterior.manoeuvres],
         "axis": ["x", "y", "z"],
         "quaternion": ["x", "y", "z", "w"],

@@ -1,12 +1,13 @@
 """The unknowns of an identification: one vector of coordinates whose prior is standard normal.
 
-Inertial parameters are log-Cholesky coordinates relative to the prior's centre: ``J = U0 U(spread z) U(spread z)' U0'``
-with ``U0`` the factor of the given pseudo-inertia, so that every value of z is a physical body.
+Inertial parameters are log-Cholesky coordinates relative to the prior's centre (`bayesid.relative`), so that every
+value is a physical body. They are ``theta = spread z`` body by body, or ``theta = mixing z`` for all bodies together
+where the prior correlates them, as the posterior of an earlier study does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,15 +18,13 @@ from jax import Array
 from bayesid.arrays import Floats
 from bayesid.effects.base import Effect
 from bayesid.errors import InputError
-from bayesid.inertia import (
-    LOG_CHOLESKY,
-    InertialParameters,
-    log_cholesky_factor,
-    log_cholesky_vector,
-    upper_cholesky,
-)
+from bayesid.inertia import LOG_CHOLESKY, InertialParameters, log_cholesky_vector
+from bayesid.relative import SLOPE, absolute, log_volume, relative, relative_coordinates
 
-__all__ = ["BodyPrior", "Unknowns", "Values", "draw_inertial"]
+__all__ = ["BodyPrior", "Mixing", "Unknowns", "Values", "check_mixing", "draw_inertial"]
+
+Mixing = tuple[tuple[float, ...], ...]
+"""Rows of a lower-triangular factor of the joint prior covariance; a tuple, so that models compare and hash."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,8 @@ class BodyPrior:
     centre : InertialParameters
     spread : float
         Standard deviation of each log-Cholesky coordinate relative to the centre's pseudo-inertia. The mass is then
-        log-normal with twice that relative width.
+        log-normal with twice that relative width. Where a model has a joint prior (`Model.mixing`), that counts, and
+        this is its root mean square.
     nuisance : bool
         Whether the body is marginalised only because it is not known exactly.
     """
@@ -89,6 +89,9 @@ class Unknowns:
         Prior standard deviation of the initial rate [rad/s]; 0 for exactly zero.
     tilt_sigma : (R,) tuple
         Of the initial attitude [rad]; 0 for exact.
+    mixing : (10 B, 10 B) tuple of tuples, optional
+        Lower-triangular factor of the joint prior covariance of the log-Cholesky coordinates of all B bodies; left out,
+        they are independent, each with its body's spread.
     """
 
     bodies: tuple[BodyPrior, ...]
@@ -96,6 +99,7 @@ class Unknowns:
     recordings: int
     rate_sigma: float
     tilt_sigma: tuple[float, ...]
+    mixing: Mixing | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -133,7 +137,8 @@ class Unknowns:
             cursor += count
             return z[cursor - count : cursor].reshape(shape)
 
-        inertial = [_inertial(body, take(10)) for body in self.bodies]
+        thetas = self._theta(take(10 * len(self.bodies)))
+        inertial = [log_cholesky_vector(body.centre, theta) for body, theta in zip(self.bodies, thetas, strict=True)]
         rate = jnp.zeros((self.recordings, 3))
         if self._rates:
             rate = self.rate_sigma * take(self.recordings, 3)
@@ -155,85 +160,83 @@ class Unknowns:
         Whatever else is unknown keeps its coordinates. What the dynamics determines sharply are linear combinations of
         inertial parameters up to a common factor, so ridges of the posterior are straight here.
         """
-        bodies = [_relative(body, z[start : start + 10]) for start, body in self._starts]
-        return jnp.concatenate([*bodies, z[10 * len(self.bodies) :]])
+        count = 10 * len(self.bodies)
+        entries = self._each(relative, self._theta(z[:count]))
+        if self.mixing is None:
+            scaled = entries / self._widths
+        else:  # near the centre these are then z itself, up to SLOPE
+            scaled = jnp.asarray(np.linalg.inv(self._mixed_slope)) @ entries
+        return jnp.concatenate([scaled, z[count:]])
 
     def from_linear(self, y: Array) -> Array:
         """Inverse of `to_linear`; not a number where no physical body has these coordinates."""
-        bodies = [_absolute(body, y[start : start + 10]) for start, body in self._starts]
-        return jnp.concatenate([*bodies, y[10 * len(self.bodies) :]])
+        count = 10 * len(self.bodies)
+        if self.mixing is None:
+            entries = y[:count] * self._widths
+            return jnp.concatenate([self._each(absolute, _split(entries)) / self._widths, y[count:]])
+        entries = jnp.asarray(self._mixed_slope) @ y[:count]
+        theta = self._each(absolute, _split(entries))
+        return jnp.concatenate([jnp.asarray(np.linalg.inv(np.array(self.mixing))) @ theta, y[count:]])
 
     def log_volume(self, z: Array) -> Array:
         """Logarithm of the determinant of d to_linear / d z."""
-        return sum((_log_volume(body, z[start : start + 10]) for start, body in self._starts), jnp.zeros(()))
+        return sum((log_volume(theta) for theta in self._theta(z[: 10 * len(self.bodies)])), jnp.zeros(()))
+
+    def _theta(self, z: Array) -> list[Array]:
+        """Log-Cholesky coordinates of each body relative to its centre."""
+        if self.mixing is None:
+            return [body.spread * part for body, part in zip(self.bodies, _split(z), strict=True)]
+        return _split(jnp.asarray(np.array(self.mixing)) @ z)
+
+    def _each(self, function: Callable[[Array], Array], parts: Sequence[Array]) -> Array:
+        return jnp.concatenate([function(part) for part in parts]) if parts else jnp.zeros(0)
 
     @property
-    def _starts(self) -> list[tuple[int, BodyPrior]]:
-        return [(10 * index, body) for index, body in enumerate(self.bodies)]
+    def _widths(self) -> Floats:
+        return np.repeat([body.spread for body in self.bodies], 10)
+
+    @property
+    def _mixed_slope(self) -> Floats:
+        """Map from linear coordinates to entries of the relative pseudo-inertias; of the determinant of the mixing."""
+        slope = np.kron(np.eye(len(self.bodies)), SLOPE)
+        return slope @ np.array(self.mixing) @ np.linalg.inv(slope)
 
     def coordinates(self, inertials: Sequence[InertialParameters], rate: Floats | None = None) -> Floats:
         """Coordinates of given bodies and initial rates, everything else at its prior mean."""
         z = np.zeros(self.size)
         for index, (body, inertial) in enumerate(zip(self.bodies, inertials, strict=True)):
             z[10 * index : 10 * index + 10] = coordinates_of(body, inertial)
+        if self.mixing is not None:
+            count = 10 * len(self.bodies)
+            z[:count] = np.linalg.solve(np.array(self.mixing), z[:count] * self._widths)
         if rate is not None and self._rates:
             first = 10 * len(self.bodies)
             z[first : first + 3 * self.recordings] = (rate / self.rate_sigma).ravel()
         return z
 
 
-def _inertial(body: BodyPrior, z: Array) -> Array:
-    return log_cholesky_vector(body.centre, body.spread * z)
+def _split(z: Array) -> list[Array]:
+    return [z[start : start + 10] for start in range(0, len(z), 10)]
 
 
-_ROW, _COLUMN = np.triu_indices(4)
-
-
-def _relative(body: BodyPrior, z: Array) -> Array:
-    factor = log_cholesky_factor(body.spread * z)
-    return ((factor @ factor.T) - jnp.eye(4))[_ROW, _COLUMN] / body.spread
-
-
-def _absolute(body: BodyPrior, y: Array) -> Array:
-    upper = jnp.zeros((4, 4)).at[_ROW, _COLUMN].set(body.spread * y)
-    matrix = jnp.eye(4) + upper + upper.T - jnp.diag(jnp.diag(upper))
-    u = _upper_factor(matrix)
-    unit = u / u[3, 3]
-    d = jnp.log(jnp.diag(unit)[:3])
-    rest = jnp.stack([unit[0, 1], unit[1, 2], unit[0, 2], unit[0, 3], unit[1, 3], unit[2, 3]])
-    return jnp.concatenate([jnp.log(u[3, 3])[None], d, rest]) / body.spread
-
-
-def _upper_factor(matrix: Array) -> Array:
-    """Upper-triangular U with ``U U' = matrix`` (4, 4), not a number where there is none.
-
-    Written out: thousands of factorisations of this size in one call to LAPACK can block the processor's threads.
-    """
-    u = [[jnp.zeros(()) for _ in range(4)] for _ in range(4)]
-    for k in (3, 2, 1, 0):
-        u[k][k] = jnp.sqrt(matrix[k, k] - sum(u[k][j] ** 2 for j in range(k + 1, 4)))
-        for i in range(k):
-            u[i][k] = (matrix[i, k] - sum(u[i][j] * u[k][j] for j in range(k + 1, 4))) / u[k][k]
-    return jnp.stack([jnp.stack(row) for row in u])
-
-
-def _log_volume(body: BodyPrior, z: Array) -> Array:
-    # |d(U U')/dU| = 2^4 prod u_ii^i for upper-triangular U, times |dU/dtheta| = u_11 u_22 u_33 u_44 u_44^6
-    alpha, d = body.spread * z[0], body.spread * z[1:4]
-    logs = jnp.concatenate([alpha + d, alpha[None]])
-    return 4.0 * jnp.log(2.0) + (jnp.arange(1.0, 5.0) @ logs) + logs.sum() + 6.0 * alpha
+def check_mixing(mixing: Mixing, bodies: int) -> None:
+    """Reject a factor that is not lower-triangular of full rank or does not fit the number of bodies."""
+    count = 10 * bodies
+    square = len(mixing) == count and all(len(row) == count for row in mixing)
+    factor = np.array(mixing) if square else np.zeros((0, 0))
+    if not square or not np.isfinite(factor).all() or np.triu(factor, 1).any() or not (np.diag(factor) > 0.0).all():
+        raise InputError(
+            f"the joint prior of {bodies} bodies is not a lower-triangular factor of {count} rows",
+            remedy="Give the Cholesky factor of the covariance of all their log-Cholesky coordinates",
+        )
 
 
 def coordinates_of(body: BodyPrior, inertial: InertialParameters) -> Floats:
-    """Standard-normal coordinates of a body under its prior, shape (10,)."""
-    relative = np.linalg.solve(upper_cholesky(body.centre.pseudo_inertia), upper_cholesky(inertial.pseudo_inertia))
-    alpha = np.log(relative[3, 3])
-    u = relative / relative[3, 3]
-    d = np.log(np.diag(u)[:3])
-    return np.array([alpha, *d, u[0, 1], u[1, 2], u[0, 2], u[0, 3], u[1, 3], u[2, 3]]) / body.spread
+    """Standard-normal coordinates of a body under its own prior, shape (10,)."""
+    return relative_coordinates(body.centre, inertial) / body.spread
 
 
 def draw_inertial(centre: InertialParameters, spread: float, rng: np.random.Generator) -> InertialParameters:
     """Draw a body from the log-Cholesky prior about a centre."""
-    vector = _inertial(BodyPrior("link", centre, spread), jnp.asarray(rng.normal(size=10)))
+    vector = log_cholesky_vector(centre, jnp.asarray(spread * rng.normal(size=10)))
     return InertialParameters.from_vector(np.asarray(vector))

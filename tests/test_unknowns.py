@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import ClassVar
 
+import jax
 import numpy as np
 import pytest
 
 from bayesid.effects.base import Effect, Parameter
 from bayesid.errors import InputError
 from bayesid.inertia import InertialParameters
-from bayesid.unknowns import LOG_CHOLESKY, BodyPrior, Unknowns, coordinates_of, draw_inertial
+from bayesid.unknowns import LOG_CHOLESKY, BodyPrior, Unknowns, check_mixing, coordinates_of, draw_inertial
 
 CENTRE = InertialParameters(60.0, [0.05, -0.03, 0.1], [[2.4, 0.05, 0.1], [0.05, 2.6, -0.2], [0.1, -0.2, 2.8]])
 OTHER = InertialParameters(5.0, [0.5, 0.0, 0.02], [[0.1, 0.0, 0.0], [0.0, 0.44, 0.01], [0.0, 0.01, 0.46]])
@@ -158,3 +160,56 @@ def test_coordinates_invert_values():
     np.testing.assert_allclose(values.rate, rate, rtol=1e-12)
     for (left, right), body in zip(pairwise((0, 10, 20)), bodies, strict=True):
         np.testing.assert_allclose(values.inertial[left:right], body.vector, rtol=1e-9, atol=1e-9)
+
+
+# a joint prior --------------------------------------------------------------------------------------------------------
+
+
+def mixed(seed: int = 5) -> Unknowns:
+    """A lower-triangular factor whose widths span two decades."""
+    rng = np.random.default_rng(seed)
+    factor = np.tril(0.3 * rng.normal(size=(20, 20)), -1) + np.eye(20)
+    factor *= 0.2 * np.logspace(-2.0, 0.0, 20)[:, None]
+    return unknowns(mixing=tuple(tuple(row) for row in factor))
+
+
+def test_a_diagonal_mixing_is_the_spreads():
+    plain = unknowns()
+    factor = tuple(tuple(row) for row in np.diag(np.repeat([0.3, 0.1], 10)))
+    diagonal = replace(plain, mixing=factor)
+    z = np.random.default_rng(6).normal(size=plain.size)
+    np.testing.assert_allclose(diagonal.values(z).inertial, plain.values(z).inertial, rtol=1e-13)
+    np.testing.assert_allclose(diagonal.to_linear(z), plain.to_linear(z), atol=1e-12)
+    assert diagonal.log_volume(z) == pytest.approx(float(plain.log_volume(z)))
+    assert diagonal != plain
+    assert diagonal == replace(plain, mixing=tuple(map(tuple, factor)))
+    assert diagonal != replace(plain, mixing=mixed().mixing)
+
+
+def test_the_mixing_carries_coordinates_over():
+    layout = mixed()
+    z = np.random.default_rng(7).normal(size=layout.size)
+    z[20:] = 0.0
+    theta = np.array(layout.mixing) @ z[:20]
+    unit = unknowns(bodies=(BodyPrior("base_link", CENTRE, 1.0), BodyPrior("load", OTHER, 1.0)))
+    np.testing.assert_allclose(
+        layout.values(z).inertial, unit.values(np.concatenate([theta, z[20:]])).inertial, rtol=1e-12, atol=1e-12
+    )
+    bodies = [InertialParameters.from_vector(row) for row in np.asarray(layout.values(z).inertial).reshape(2, 10)]
+    np.testing.assert_allclose(layout.coordinates(bodies)[:20], z[:20], atol=1e-6)
+
+
+@pytest.mark.parametrize("layout", [unknowns(), mixed()], ids=["spreads", "mixing"])
+def test_linear_coordinates_invert_and_have_the_stated_volume(layout):
+    z = 0.5 * np.random.default_rng(8).normal(size=layout.size)
+    np.testing.assert_allclose(layout.from_linear(layout.to_linear(z)), z, atol=1e-9)
+    sign, log = np.linalg.slogdet(np.asarray(jax.jacfwd(layout.to_linear)(z)))
+    assert sign == 1.0
+    assert log == pytest.approx(float(layout.log_volume(z)), abs=1e-8)
+
+
+def test_a_mixing_must_fit_the_bodies():
+    with pytest.raises(InputError, match="joint prior of 2 bodies is not a lower-triangular factor of 20 rows"):
+        check_mixing(((1.0,),), 2)
+    with pytest.raises(InputError, match="joint prior of 1 bodies"):
+        check_mixing(tuple(tuple(row) for row in np.ones((10, 10))), 1)

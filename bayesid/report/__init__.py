@@ -5,6 +5,7 @@ from bayesid.report.diagnosis import diagnosis_report
 from bayesid.report.document import Document
 from bayesid.report.identification import identification_report
 from bayesid.report.numbers import format_quantity
+from bayesid.report.prediction import prediction_report
 from bayesid.report.simulation import simulation_report
 
 __all__ = [
@@ -13,5 +14,6 @@ __all__ = [
     "diagnosis_report",
     "format_quantity",
     "identification_report",
+    "prediction_report",
     "simulation_report",
 ]

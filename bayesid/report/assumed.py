@@ -11,7 +11,7 @@ from bayesid.report.fit import sensor_sigma
 from bayesid.report.numbers import format_number, format_unit
 from bayesid.sensors import Filter, Kind, Sensor
 
-__all__ = ["model_sentences"]
+__all__ = ["model_sentences", "planning_sentences"]
 
 
 def model_sentences(posterior: Posterior, integration_error: float) -> list[str]:
@@ -38,15 +38,24 @@ def model_sentences(posterior: Posterior, integration_error: float) -> list[str]
     ]
 
 
+def planning_sentences(posterior: Posterior) -> list[str]:
+    """Return what a prediction supposes of the robot and of what acts on it; it has no sensors."""
+    model = posterior.model
+    tilt = max(posterior.unknowns.tilt_sigma)
+    attitude = f"uncertain by {format_number(tilt)} rad per axis" if tilt > 0.0 else "known exactly"
+    return [
+        *_body_sentences(model),
+        _link_sentence(model),
+        *_effect_sentences(model),
+        _orbit_sentence(model),
+        f"The initial attitude is {attitude}.",
+    ]
+
+
 def _prior_sentences(posterior: Posterior) -> list[str]:
     if posterior.flat_prior:
         return ["No prior: the likelihood alone was used."]
-    sentences = [
-        f"Prior of {body.name}: the log-Cholesky coordinates of its pseudo-inertia are normal about the given values, "
-        f"with a relative width of {format_number(body.spread)}, so that every value is a physical body. The "
-        f"logarithm of the mass has a standard deviation of {format_number(2.0 * body.spread)}."
-        for body in posterior.model.bodies
-    ]
+    sentences = _body_sentences(posterior.model)
     sigma = posterior.unknowns.rate_sigma
     rate = "exactly zero"
     if sigma > 0.0:
@@ -54,6 +63,33 @@ def _prior_sentences(posterior: Posterior) -> list[str]:
     tilt = max(posterior.unknowns.tilt_sigma)
     attitude = f"uncertain by up to {format_number(tilt)} rad per axis" if tilt > 0.0 else "known exactly"
     return [*sentences, f"The initial rate is {rate}. The initial attitude is {attitude}."]
+
+
+def _body_sentences(model: Model) -> list[str]:
+    return _carried_sentences(model) or [
+        f"Prior of {body.name}: the log-Cholesky coordinates of its pseudo-inertia are normal about the given values, "
+        f"with a relative width of {format_number(body.spread)}, so that every value is a physical body. The "
+        f"logarithm of the mass has a standard deviation of {format_number(2.0 * body.spread)}."
+        for body in model.bodies
+    ]
+
+
+def _carried_sentences(model: Model) -> list[str]:
+    """Describe a joint prior; empty where bodies are independent."""
+    if model.mixing is None:
+        return []
+    # theta_1 is half the logarithm of the mass
+    widths = np.linalg.norm(np.array(model.mixing)[::10], axis=1)
+    masses = ", ".join(
+        f"{prior.name} {format_number(prior.centre.mass, 5)} kg ± {format_number(200.0 * float(width), 2)} %"
+        for prior, width in zip(model.priors, widths, strict=True)
+        if not prior.nuisance
+    )
+    return [
+        "The prior of the bodies is the posterior of an earlier study, with the changes of mass stated since: a "
+        "correlated Gaussian of their log-Cholesky coordinates, so that every value is a physical body. "
+        f"Masses: {masses}."
+    ]
 
 
 def _link_sentence(model: Model) -> str:

@@ -82,6 +82,11 @@ class Study(Section):
         """The file it was loaded from."""
         return self._file
 
+    def with_posterior(self, posterior: Path) -> Study:
+        """Return the study with the posterior of an earlier one as its prior, whatever it states itself."""
+        unknowns = self.unknowns.model_copy(update={"posterior": posterior, "prior": {}})
+        return self.model_copy(update={"unknowns": unknowns})
+
     @model_validator(mode="after")
     def _check_whole(self) -> Study:
         files = [recording.file for recording in self.recordings]
@@ -93,6 +98,10 @@ class Study(Section):
                     remedy="Remove one: the same data would count twice",
                 )
         for index, load in enumerate(self.robot.loads, start=1):
-            if load.name in self.unknowns.bodies and load.name not in self.unknowns.prior:
+            if (
+                self.unknowns.posterior is None
+                and load.name in self.unknowns.bodies
+                and load.name not in self.unknowns.prior
+            ):
                 check_extended(load, place=f"robot.loads #{index} ('{load.name}')")
         return self

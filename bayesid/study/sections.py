@@ -6,8 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from bayesid.change import BodyChange
 from bayesid.errors import InputError
 from bayesid.study.faults import suggest
 from bayesid.study.robot import BodySection
@@ -19,10 +20,12 @@ from bayesid.study.values import (
     NonNegative,
     Number,
     PerName,
+    Position,
     Positive,
     Quaternion,
     Section,
     Table,
+    array_of_tables,
     list_of,
     no_more_than,
 )
@@ -62,6 +65,42 @@ class RecordingSection(Section):
     start: Mapping[Name, Number] = Field(default_factory=dict)
 
 
+class ChangeSection(Section):
+    """What was added to a body, or taken from it, since the posterior that is its prior, ``[[unknowns.changes]]``.
+
+    Parameters
+    ----------
+    body : str
+        One of the unknown bodies.
+    mass : float
+        [kg]; negative if it was taken away, as fuel that was burnt.
+    mass_sigma : float, optional
+        Its standard deviation [kg].
+    com : (3,)
+        Its centre of mass in the body's axes [m].
+    inertia : (6,), optional
+        About its own centre of mass, xx yy zz xy xz yz [kg m2]; a point mass where left out.
+    """
+
+    body: Name
+    mass: Number
+    mass_sigma: NonNegative = 0.0
+    com: Position
+    inertia: Annotated[tuple[Number, Number, Number, Number, Number, Number], list_of(6)] = (0.0,) * 6
+
+    @model_validator(mode="after")
+    def _check_physical(self) -> ChangeSection:
+        _ = self.change
+        return self
+
+    @property
+    def change(self) -> BodyChange:
+        """The same as `BodyChange`, which has checked it."""
+        xx, yy, zz, xy, xz, yz = self.inertia
+        tensor = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        return BodyChange(self.body, self.mass, self.com, tensor, self.mass_sigma)
+
+
 class UnknownsSection(Section):
     """What is to be identified, ``[unknowns]``.
 
@@ -73,11 +112,35 @@ class UnknownsSection(Section):
         Relative width of the prior in log-Cholesky coordinates; 1 for a body that the table leaves out.
     prior : table of body to BodySection, optional
         Centre of the prior where it is not the URDF's or the load's values.
+    posterior : Path, optional
+        The ``posterior.nc`` of an earlier study of these bodies, which is then their prior.
+    changes : sequence of ChangeSection, optional
+        What was added to them or taken from them since.
     """
 
     bodies: Names
     spread: Annotated[PerName, no_more_than(10.0, "A fraction, not a percentage: 0.05 is 5 %")] = 1.0
     prior: Mapping[Name, BodySection] = Field(default_factory=dict)
+    posterior: File | None = None
+    changes: Annotated[tuple[ChangeSection, ...], BeforeValidator(array_of_tables)] = ()
+
+    @model_validator(mode="after")
+    def _check_posterior(self) -> UnknownsSection:
+        if self.posterior is None and self.changes:
+            raise InputError("there is no posterior that they could change", place="changes", remedy="Give posterior")
+        for key in ("spread", "prior"):
+            if self.posterior is not None and key in self.model_fields_set:
+                raise InputError(
+                    "it contradicts unknowns.posterior, which is the prior", place=key, remedy="Remove one of the two"
+                )
+        for index, change in enumerate(self.changes, start=1):
+            if change.body not in self.bodies:
+                raise InputError(
+                    f"'{change.body}' is not among unknowns.bodies",
+                    place=f"changes #{index}.body",
+                    remedy=suggest(change.body, self.bodies) or "Add it there or remove it here",
+                )
+        return self
 
     @model_validator(mode="after")
     def _check_bodies(self) -> UnknownsSection:

@@ -8,6 +8,7 @@ from bayesid.report.figures.diagnosis import (
     wrench_histories,
     wrench_spectrum,
 )
+from bayesid.report.figures.prediction import course_bands, final_positions
 from bayesid.report.figures.robot import manoeuvre, robot_pose
 from bayesid.report.figures.sampler import convergence
 from bayesid.report.figures.uncertainty import corner, correlations, prior_to_posterior
@@ -17,6 +18,8 @@ __all__ = [
     "convergence",
     "corner",
     "correlations",
+    "course_bands",
+    "final_positions",
     "manoeuvre",
     "measured_against_simulated",
     "prior_to_posterior",
