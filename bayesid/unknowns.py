@@ -188,6 +188,11 @@ class Unknowns:
             return [body.spread * part for body, part in zip(self.bodies, _split(z), strict=True)]
         return _split(jnp.asarray(np.array(self.mixing)) @ z)
 
+    @property
+    def widths(self) -> Floats:
+        """Log-Cholesky coordinates of all bodies per unit of z, shape (10 B, 10 B)."""
+        return np.diag(self._widths) if self.mixing is None else np.array(self.mixing)
+
     def _each(self, function: Callable[[Array], Array], parts: Sequence[Array]) -> Array:
         return jnp.concatenate([function(part) for part in parts]) if parts else jnp.zeros(0)
 

@@ -11,6 +11,7 @@ from itertools import combinations
 from typing import ClassVar, Protocol
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from bayesid.design.planned import Outcome, Plan
@@ -50,10 +51,14 @@ class Criterion(Protocol):
 
 
 def covariance(plan: Plan, outcome: Outcome) -> Array:
-    """Posterior covariance of the coordinates of the bodies to identify (Laplace), all else marginalised."""
-    keep = jnp.asarray(plan.bodies(), dtype=int)
+    """Posterior covariance (Laplace) of the log-Cholesky coordinates of the bodies to identify, all else marginalised.
+
+    These are relative: a mass is known to twice the coordinate's standard deviation.
+    """
+    own, count = jnp.asarray(plan.bodies(), dtype=int), len(plan.unknowns.widths)
     total = outcome.information + jnp.eye(plan.unknowns.size)
-    return _inverse(total)[jnp.ix_(keep, keep)]
+    every = plan.unknowns.widths @ _inverse(total)[:count, :count] @ plan.unknowns.widths.T
+    return every[jnp.ix_(own, own)]
 
 
 @dataclass(frozen=True)
@@ -126,7 +131,7 @@ class DOptimal:
 
 @dataclass(frozen=True)
 class AOptimal:
-    """Logarithm of the root mean variance of the coordinates, whose prior has variance one."""
+    """Logarithm of the root mean variance of the log-Cholesky coordinates."""
 
     name: ClassVar[str] = "a-optimal"
     draws: int = 0
@@ -138,7 +143,7 @@ class AOptimal:
 
 @dataclass(frozen=True)
 class EOptimal:
-    """Logarithm of the standard deviation along the worst direction, in units of the prior's."""
+    """Logarithm of the standard deviation of the log-Cholesky coordinates along the worst direction."""
 
     name: ClassVar[str] = "e-optimal"
     draws: int = 0
@@ -159,8 +164,10 @@ class InformationGain:
     draws: int = 8
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
-        """Return minus the gain at one draw: the prior's covariance is one."""
-        return 0.5 * jnp.linalg.slogdet(covariance(plan, outcome))[1]
+        """Return minus the gain at one draw."""
+        own = np.ix_(plan.bodies(), plan.bodies())
+        prior = np.linalg.slogdet((plan.unknowns.widths @ plan.unknowns.widths.T)[own])[1]
+        return 0.5 * (jnp.linalg.slogdet(covariance(plan, outcome))[1] - prior)
 
 
 @dataclass(frozen=True)
@@ -216,7 +223,7 @@ class Separation:
 
 
 def _largest_squares(outcome: Outcome) -> Array:
-    return jnp.max(jnp.abs(outcome.course.excursion), axis=0) ** 2
+    return jnp.max(jnp.abs(outcome.trajectory.excursion), axis=0) ** 2
 
 
 def _inverse(matrix: Array) -> Array:

@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bayesid.design.planned import Course
+from bayesid.design.planned import Trajectory
 from bayesid.robot import Robot
 
 __all__ = ["ACTIVE", "Limit", "Limits", "smooth_largest"]
@@ -37,7 +37,7 @@ class Limit:
     bound : float
     unit : str
     quantity : callable
-        Course -> values of any shape, each to be at most the bound.
+        Trajectory -> values of any shape, each to be at most the bound.
     depends : bool
         Whether the quantity depends on the inertial parameters.
     """
@@ -45,12 +45,12 @@ class Limit:
     name: str
     bound: float
     unit: str
-    quantity: Callable[[Course], Array]
+    quantity: Callable[[Trajectory], Array]
     depends: bool = False
 
-    def largest(self, course: Course) -> Array:
-        """Return the largest value along a course."""
-        return jnp.max(self.quantity(course))
+    def largest(self, trajectory: Trajectory) -> Array:
+        """Return the largest value along a trajectory."""
+        return jnp.max(self.quantity(trajectory))
 
 
 @dataclass(frozen=True)
@@ -81,16 +81,16 @@ class Limits:
         limits = [*_joint_limits(robot)]
         if self.joint_speed is not None:
             unit = "rad/s" if all(joint.kind != "prismatic" for joint in robot.joints) else "rad/s or m/s"
-            limits.append(Limit("joint_speed", self.joint_speed, unit, lambda course: jnp.abs(course.velocity)))
+            limits.append(Limit("joint_speed", self.joint_speed, unit, lambda t: jnp.abs(t.velocity)))
         if self.tip_speed is not None:
-            limits.append(Limit("tip_speed", self.tip_speed, "m/s", lambda course: course.tip_speed, depends=True))
+            limits.append(Limit("tip_speed", self.tip_speed, "m/s", lambda t: t.tip_speed, depends=True))
         if self.tip_rate is not None:
-            limits.append(Limit("tip_rate", self.tip_rate, "rad/s", lambda course: course.tip_rate, depends=True))
+            limits.append(Limit("tip_rate", self.tip_rate, "rad/s", lambda t: t.tip_rate, depends=True))
         if self.base_rotation is not None:
-            limits.append(Limit("base_rotation", self.base_rotation, "rad", lambda c: c.rotation, depends=True))
+            limits.append(Limit("base_rotation", self.base_rotation, "rad", lambda t: t.rotation, depends=True))
         if self.quiet_band is not None:
             limits.append(Limit("quiet_band", QUIET, "1", _power_within(self.quiet_band)))
-        limits.append(Limit("rest", REST, "rad/s", lambda course: jnp.abs(course.velocity[jnp.array([0, -1])])))
+        limits.append(Limit("rest", REST, "rad/s", lambda trajectory: jnp.abs(trajectory.velocity[jnp.array([0, -1])])))
         return tuple(limits)
 
     @property
@@ -99,9 +99,9 @@ class Limits:
         return float("inf") if self.quiet_band is None else 0.25 / self.quiet_band[1]
 
 
-def smooth_largest(limit: Limit, course: Course) -> Array:
+def smooth_largest(limit: Limit, trajectory: Trajectory) -> Array:
     """Largest value over its bound, smooth and never below the true one: at most one is demanded."""
-    values = (limit.quantity(course) / limit.bound).ravel()
+    values = (limit.quantity(trajectory) / limit.bound).ravel()
     top = jnp.max(values)
     return top + jnp.log(jnp.sum(jnp.exp(SHARPNESS * (values - top)))) / SHARPNESS
 
@@ -116,7 +116,7 @@ def _joint_limits(robot: Robot) -> Sequence[Limit]:
                     f"joint_range.{joint.name}",
                     half,
                     joint.unit,
-                    lambda course, i=index, m=middle: jnp.abs(course.position[:, i] - m),  # type: ignore[misc]
+                    lambda trajectory, i=index, m=middle: jnp.abs(trajectory.position[:, i] - m),  # type: ignore[misc]
                 )
             )
         if np.isfinite(joint.velocity):
@@ -125,23 +125,23 @@ def _joint_limits(robot: Robot) -> Sequence[Limit]:
                     f"joint_speed.{joint.name}",
                     joint.velocity,
                     f"{joint.unit}/s",
-                    lambda course, i=index: jnp.abs(course.velocity[:, i]),  # type: ignore[misc]
+                    lambda trajectory, i=index: jnp.abs(trajectory.velocity[:, i]),  # type: ignore[misc]
                 )
             )
     return limits
 
 
-def _power_within(band: tuple[float, float]) -> Callable[[Course], Array]:
+def _power_within(band: tuple[float, float]) -> Callable[[Trajectory], Array]:
     """Part of the power of the base's angular acceleration, and of its acceleration, in a band."""
 
-    def quantity(course: Course) -> Array:
-        times = np.asarray(course.time)
+    def quantity(trajectory: Trajectory) -> Array:
+        times = np.asarray(trajectory.time)
         interval, duration = times[1] - times[0], times[-1]
         count = max(2, int(np.ceil(2.0 * duration * (band[1] - band[0]))) + 1)
         frequencies = np.linspace(*band, count)
         waves = np.exp(-2j * np.pi * frequencies[:, None] * times)
         fractions = []
-        for signal in (course.rate_change, course.acceleration):
+        for signal in (trajectory.rate_change, trajectory.acceleration):
             total = jnp.sum(signal**2) * interval
             density = jnp.sum(jnp.abs(waves @ signal * interval) ** 2, axis=1)
             fractions.append(2.0 * jnp.trapezoid(density, frequencies) / (total + 1e-30))

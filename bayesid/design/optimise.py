@@ -40,7 +40,7 @@ class Search:
     """
 
     starts: int = 4
-    iterations: int = 100
+    iterations: int = 200
     tolerance: float = 1e-5
 
 
@@ -143,22 +143,31 @@ class _Run:
     def minimise(self) -> None:
         family = self.problem.plan.family
         constraints: Any = {"type": "ineq", "fun": self.margin, "jac": self.margin_slope}
+        report: Any = self.report
         options: Any = {"maxiter": self.search.iterations, "ftol": self.search.tolerance}
         for tighter in (1.0, 0.99, 0.97, 0.9):  # where the fine grid shows more than the coarse one
             self.bound = tighter
-            minimize(
+            end = minimize(
                 self.cost,
                 (self.best - family.centre) / family.scale,
                 jac=True,
                 method="SLSQP",
                 constraints=constraints,
-                callback=self.report,
+                callback=report,
                 options=options,
             )
+            # SLSQP's iterates lie a little outside until it has converged
+            self.consider(_repaired(self.problem, family.centre + family.scale * end.x, tighter))
             if all(reached.kept for reached in self.problem.reached(self.best)):
                 return
             self.best = _repaired(self.problem, self.best, 0.98 * tighter)
             self.best_cost = self.problem.cost(self.criterion, self.best, self.points)[0]
+
+    def consider(self, parameters: Floats) -> None:
+        """Keep parameters that are better than the best so far and break no limit."""
+        value = self.problem.cost(self.criterion, parameters, self.points)[0]
+        if value < self.best_cost and self.problem.fractions(parameters)[0].max() <= self.bound + SLACK:
+            self.best, self.best_cost = parameters, value
 
     def cost(self, x: Floats) -> tuple[float, Floats]:
         family = self.problem.plan.family

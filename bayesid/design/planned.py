@@ -26,10 +26,10 @@ from bayesid.simulator import Simulator
 from bayesid.tables import joint_motion, kinematics
 from bayesid.unknowns import Unknowns
 
-__all__ = ["Course", "Outcome", "Plan", "Tip"]
+__all__ = ["Outcome", "Plan", "Tip", "Trajectory"]
 
 
-class Course(NamedTuple):
+class Trajectory(NamedTuple):
     """What the robot does, at T instants.
 
     position, velocity (T, joints); tip_speed [m/s] and tip_rate [rad/s] (T,), each the larger of those relative to the
@@ -55,14 +55,14 @@ class Outcome(NamedTuple):
 
     Attributes
     ----------
-    course : Course
+    trajectory : Trajectory
     information : (n, n) array
         Fisher information of the unknowns' coordinates, without their standard-normal prior.
     regressor : (6 T, b) array
         Force balance of the base against the bodies' coordinates; torques are over the radius of gyration [N].
     """
 
-    course: Course
+    trajectory: Trajectory
     information: Array
     regressor: Array
 
@@ -136,6 +136,7 @@ class Plan:
             recordings=1,
             rate_sigma=self.model.rate_sigma,
             tilt_sigma=(self.attitude_sigma,),
+            mixing=self.model.mixing,
         )
 
     @cached_property
@@ -155,13 +156,10 @@ class Plan:
         weight = np.sqrt((self.family.duration / self.interval + 1.0) / len(self.samples))
         return np.concatenate([sensor.noise.sigma(self.interval) for sensor in self.model.sensors]) / weight
 
-    def bodies(self, nuisance: bool = False) -> Sequence[int]:
-        """Return the indices of the bodies' coordinates; with ``nuisance``, of those marginalised too."""
+    def bodies(self) -> Sequence[int]:
+        """Return the indices of the coordinates of the bodies to identify."""
         return [
-            10 * index + k
-            for index, prior in enumerate(self.model.priors)
-            if nuisance or not prior.nuisance
-            for k in range(10)
+            10 * index + k for index, prior in enumerate(self.model.priors) if not prior.nuisance for k in range(10)
         ]
 
     def effect(self, label: str) -> Sequence[int]:
@@ -174,21 +172,21 @@ class Plan:
 
     # ---- functions of the parameters of the motion and of the unknowns, both traced ----
 
-    def course(self, parameters: Array, z: Array) -> Course:
+    def trajectory(self, parameters: Array, z: Array) -> Trajectory:
         """Return what the robot does."""
-        return self._course(parameters, z, self._grid(parameters))[0]
+        return self._trajectory(parameters, z, self._grid(parameters))[0]
 
     def outcome(self, parameters: Array, z: Array) -> Outcome:
         """Return what criteria judge."""
         grid = self._grid(parameters)
-        course, tables = self._course(parameters, z, grid)
+        trajectory, tables = self._trajectory(parameters, z, grid)
         slope = self._slope(z, grid) / jnp.asarray(self.sigma)[:, None]
         flat = slope.reshape(-1, slope.shape[-1])
         bodies = jnp.asarray(self.bodies(), dtype=int)
         per_coordinate = jax.jacfwd(lambda z: self.unknowns.values(z).inertial)(z)[:, bodies]
-        wrench = balance_regressor(tables, course.rate, course.rate_change, course.acceleration)
+        wrench = balance_regressor(tables, trajectory.rate, trajectory.rate_change, trajectory.acceleration)
         wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / self._gyration)])[:, None]
-        return Outcome(course, flat.T @ flat, (wrench @ per_coordinate).reshape(-1, len(bodies)))
+        return Outcome(trajectory, flat.T @ flat, (wrench @ per_coordinate).reshape(-1, len(bodies)))
 
     @property
     def _gyration(self) -> float:
@@ -224,8 +222,8 @@ class Plan:
             parts.append(_turning(here.attitude, slope) if kind is Kind.ATTITUDE else slope)
         return jnp.concatenate(parts, axis=1)
 
-    def _course(self, parameters: Array, z: Array, grid: Grid) -> tuple[Course, Array]:
-        """Return the course at the stages of the integration, and the tables of the bodies there."""
+    def _trajectory(self, parameters: Array, z: Array, grid: Grid) -> tuple[Trajectory, Array]:
+        """Return the trajectory at the stages of the integration, and the tables of the bodies there."""
         stage, _, _ = self.simulator.trace(z, grid, jnp.asarray(self.attitude)[None])
         moment = jax.tree.map(lambda x: x[0], stage)
         # the instants, known beforehand: half steps
@@ -241,7 +239,7 @@ class Plan:
         speed = drift + jnp.cross(moment.rate, pose[:, :3, 3]) + flow[:, :3, 3]
         turned = jnp.einsum("ji,tjk->tik", moment.attitude[0], moment.attitude)
         displaced = body.com[0] - jnp.einsum("tij,tj->ti", turned, body.com)
-        course = Course(
+        trajectory = Trajectory(
             time=times,
             position=jnp.asarray(state.position),
             velocity=jnp.asarray(state.velocity),
@@ -253,7 +251,7 @@ class Plan:
             rate_change=moment.rate_change,
             acceleration=moment.acceleration,
         )
-        return course, grid.stage.unknown[0, :, :, : 10 * len(self.model.priors)]
+        return trajectory, grid.stage.unknown[0, :, :, : 10 * len(self.model.priors)]
 
 
 def _turning(quaternion: Array, slope: Array) -> Array:

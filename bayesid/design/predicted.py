@@ -35,17 +35,14 @@ class Predicted:
     mean : (n,) array
     covariance : (n, n) array
         Of these quantities, in their units.
-    coordinates : (m, m) array
-        Covariance of all unknowns' coordinates, whose prior is the unit matrix.
-    bodies : int
-        How many of the first coordinates belong to bodies to identify.
+    relative : (n, n) array
+        Of the bodies' log-Cholesky coordinates.
     """
 
     names: tuple[str, ...]
     mean: Floats
     covariance: Floats
-    coordinates: Floats
-    bodies: int
+    relative: Floats
 
     @property
     def sd(self) -> Floats:
@@ -60,9 +57,8 @@ class Predicted:
 
     @property
     def worst(self) -> float:
-        """Standard deviation along the worst direction, relative to the prior's."""
-        block = self.coordinates[: self.bodies, : self.bodies]
-        return float(np.sqrt(np.linalg.eigvalsh(block)[-1]))
+        """Standard deviation of the log-Cholesky coordinates along the worst direction."""
+        return float(np.sqrt(np.linalg.eigvalsh(self.relative)[-1]))
 
     @property
     def geometric_mean(self) -> float:
@@ -115,12 +111,12 @@ def describe(posterior: Posterior, z: Floats, coordinates: Floats) -> Predicted:
 
     slope = np.asarray(jax.jacfwd(quantities)(jnp.asarray(z)))
     names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
-    order = [10 * index + k for index in own for k in range(10)]
-    order += [k for k in range(posterior.size) if k not in order]
+    rows = [10 * index + k for index in own for k in range(10)]
+    widths = np.asarray(posterior.unknowns.widths)[rows]
+    count = widths.shape[1]
     return Predicted(
         names=names,
         mean=np.asarray(quantities(jnp.asarray(z))),
         covariance=slope @ coordinates @ slope.T,
-        coordinates=coordinates[np.ix_(order, order)],
-        bodies=10 * len(own),
+        relative=widths @ coordinates[:count, :count] @ widths.T,
     )

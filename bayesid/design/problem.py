@@ -14,7 +14,7 @@ from jax import Array
 from bayesid.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.limits import ACTIVE, Limit, Limits, smooth_largest
-from bayesid.design.planned import Course, Plan
+from bayesid.design.planned import Plan, Trajectory
 
 __all__ = ["FINER", "Problem", "Reached"]
 
@@ -93,9 +93,9 @@ class Problem:
         """Largest value of every limit for many points of the unknowns, shape (k, n) -> (k, m)."""
         return np.stack([np.asarray(self._finely(parameters, z)) for z in points])
 
-    def course(self, parameters: Floats, z: Floats | None = None) -> Course:
+    def trajectory(self, parameters: Floats, z: Floats | None = None) -> Trajectory:
         """Return what the robot does, on the fine grid."""
-        return jax.tree.map(np.asarray, self._fine_course(parameters, self.centre if z is None else z))
+        return jax.tree.map(np.asarray, self._fine_trajectory(parameters, self.centre if z is None else z))
 
     def points(self, criterion: Criterion, rng: np.random.Generator) -> list[Floats]:
         """Draw points of the prior of all bodies to average a criterion over; none if it looks at the centre alone."""
@@ -132,8 +132,8 @@ class Problem:
     @cached_property
     def _fractions(self):  # type: ignore[no-untyped-def]
         def fractions(parameters: Array, z: Array) -> tuple[Array, Array]:
-            course = self.plan.course(parameters, z)
-            values = jnp.stack([smooth_largest(limit, course) for limit in self.applied])
+            trajectory = self.plan.trajectory(parameters, z)
+            values = jnp.stack([smooth_largest(limit, trajectory) for limit in self.applied])
             return values, values
 
         def both(parameters: Array, z: Array) -> tuple[Array, Array]:
@@ -143,15 +143,15 @@ class Problem:
         return jax.jit(both)
 
     @cached_property
-    def _fine_course(self):  # type: ignore[no-untyped-def]
-        return jax.jit(replace(self.plan, step=self.plan.step / FINER).course)
+    def _fine_trajectory(self):  # type: ignore[no-untyped-def]
+        return jax.jit(replace(self.plan, step=self.plan.step / FINER).trajectory)
 
     @cached_property
     def _finely(self):  # type: ignore[no-untyped-def]
         fine = replace(self.plan, step=self.plan.step / FINER)
 
         def largest(parameters: Array, z: Array) -> Array:
-            course = fine.course(parameters, z)
-            return jnp.stack([limit.largest(course) for limit in self.applied])
+            trajectory = fine.trajectory(parameters, z)
+            return jnp.stack([limit.largest(trajectory) for limit in self.applied])
 
         return jax.jit(largest)
