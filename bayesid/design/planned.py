@@ -186,7 +186,7 @@ class Plan:
         per_coordinate = jax.jacfwd(lambda z: self.unknowns.values(z).inertial)(z)[:, bodies]
         wrench = balance_regressor(tables, trajectory.rate, trajectory.rate_change, trajectory.acceleration)
         wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / self._gyration)])[:, None]
-        return Outcome(trajectory, flat.T @ flat, (wrench @ per_coordinate).reshape(-1, len(bodies)))
+        return Outcome(trajectory, flat.T @ flat, (wrench @ per_coordinate).reshape(6 * len(wrench), len(bodies)))
 
     @property
     def _gyration(self) -> float:
