@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bayesid.robot import Robot
-from studies.planning.analysis import _flight, _predictor, plan
+from studies.planning.analysis import flight_of, plan, predictor_of
 from studies.planning.world import BASE, START, Guess, Swing, fly, model_of
 
 DURATION = 20.0
@@ -17,14 +17,14 @@ def test_a_plan_hits_with_the_true_base_and_misses_with_a_wrong_one():
     target = fly(Swing(START, REACHED, DURATION), DURATION).tip
     truth = Robot.shipped("ets7").link(BASE).inertial
     model = model_of(Guess("truth", truth, 0.01))
-    predictor = _predictor(model, Swing(START, START, DURATION))
+    predictor = predictor_of(model, Swing(START, START, DURATION))
     goal = plan(predictor, model, target, DURATION)
     np.testing.assert_allclose(goal, REACHED, atol=1e-6)
-    flight = _flight(goal, target, DURATION)
+    flight = flight_of(goal, target, DURATION)
     assert flight.miss < 1e-6
     # the same path under another base: along the first coordinate, mass and inertia grow by e^0.4
     wrong = predictor.centre.copy()
     wrong[0] = 20.0
-    _, tip = _predictor(model, Swing(START, goal, DURATION), predictor).courses(wrong[None])
+    _, tip = predictor_of(model, Swing(START, goal, DURATION), predictor).courses(wrong[None])
     assert np.linalg.norm(tip.position[0, -1] - target[0]) > 0.005
     assert predictor.posterior.values(wrong).inertial[0] == pytest.approx(truth.mass * np.exp(0.4))

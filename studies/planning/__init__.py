@@ -11,11 +11,18 @@ import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from studies.planning.analysis import Case, Result, analyse
-from studies.planning.report import write_report
-from studies.planning.world import DURATION, drawn_guess, paper_guess
+from studies.planning.analysis import Case, analyse
+from studies.planning.calibration import calibrate
+from studies.planning.report import Result, write_report
+from studies.planning.world import DURATION, SPREAD, drawn_guess, paper_guess
 
 __all__ = ["Case", "Result", "main", "run"]
+
+GUESSES = 80
+"""Of the base, in a full run, over which the regions before identification are counted."""
+
+NARROW = 0.02
+"""Relative width of a prior under which final poses are nearly normal."""
 
 
 def run(
@@ -51,7 +58,13 @@ def run(
         name: analyse(guess, seed, draws, effective_samples, duration, progress or (lambda text: None))
         for name, guess in guesses.items()
     }
-    return Result(cases)
+    first = cases["drawn"].first
+    count = GUESSES if full else GUESSES // 4
+    found = [
+        calibrate(first.goal, first.flown, duration, spread, guesses=count, draws=draws // 2, seed=seed)
+        for spread in (SPREAD, NARROW)
+    ]
+    return Result(cases, tuple(found))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -16,7 +16,7 @@ from bayesid.pose import Pose
 from bayesid.predict import Prediction, Predictor
 from studies.planning.world import ATTITUDE, BASE, START, TIP, Flown, Guess, Swing, fly, measure, model_of
 
-__all__ = ["Case", "Flight", "Result", "Trial", "analyse", "identified", "plan"]
+__all__ = ["Case", "Flight", "Trial", "analyse", "flight_of", "identified", "plan", "predictor_of"]
 
 Floats = NDArray[np.floating]
 
@@ -68,13 +68,6 @@ class Case:
     """The first path with the guess and as identified, and the second path as identified."""
 
 
-@dataclass(frozen=True)
-class Result:
-    """The cases by name: drawn, and in a full run paper."""
-
-    cases: Mapping[str, Case]
-
-
 def analyse(
     guess: Guess,
     seed: int,
@@ -88,14 +81,14 @@ def analyse(
     before = model_of(guess)
     target = fly(Swing(START, REACHED, duration), duration).tip
     progress(f"{guess.title}: planning")
-    predictor = _predictor(before, Swing(START, START, duration))
-    first = _flight(plan(predictor, before, target, duration), target, duration)
+    predictor = predictor_of(before, Swing(START, START, duration))
+    first = flight_of(plan(predictor, before, target, duration), target, duration)
     progress("identifying")
     result = identify(Posterior(before, [measure(seed)]), seed, effective_samples=effective_samples)
     after = identified(before, result)
     progress("planning again")
-    again_predictor = _predictor(after, Swing(START, START, duration))
-    again = _flight(plan(again_predictor, after, target, duration), target, duration)
+    again_predictor = predictor_of(after, Swing(START, START, duration))
+    again = flight_of(plan(again_predictor, after, target, duration), target, duration)
     trials = []
     for title, model, like, flight in (
         ("first path, guessed base", before, predictor, first),
@@ -103,7 +96,7 @@ def analyse(
         ("second path, identified base", after, again_predictor, again),
     ):
         swing = Swing(START, flight.goal, duration)
-        trials.append(_trial(title, _predictor(model, swing, like).predict(draws, rng), flight.flown))
+        trials.append(_trial(title, predictor_of(model, swing, like).predict(draws, rng), flight.flown))
     truth = Robot.shipped("ets7").link(BASE).inertial
     return Case(guess, target, truth, result, first, again, tuple(trials))
 
@@ -121,7 +114,7 @@ def plan(predictor: Predictor, model: Model, target: tuple[Floats, Floats], dura
     """Return the joint positions that bring the end-effector to a pose, with the model's base at its prior's centre."""
 
     def miss(goal: Floats) -> Floats:
-        _, tip = _predictor(model, Swing(START, goal, duration), predictor).courses(predictor.centre[None])
+        _, tip = predictor_of(model, Swing(START, goal, duration), predictor).courses(predictor.centre[None])
         turn = Rotation.from_quat(tip.attitude[0, -1]) * Rotation.from_quat(target[1]).inv()
         return np.concatenate([tip.position[0, -1] - target[0], ARM * turn.as_rotvec()])
 
@@ -129,12 +122,14 @@ def plan(predictor: Predictor, model: Model, target: tuple[Floats, Floats], dura
     return np.asarray(found.x)
 
 
-def _predictor(model: Model, swing: Swing, like: Predictor | None = None) -> Predictor:
+def predictor_of(model: Model, swing: Swing, like: Predictor | None = None) -> Predictor:
+    """Return the predictor of a path; ``like`` is one of the same model."""
     time = np.linspace(0.0, swing.duration, 9)
     return Predictor(model, Manoeuvre(Recording("path", None, time, {}), swing, ATTITUDE), TIP, like)
 
 
-def _flight(goal: Floats, target: tuple[Floats, Floats], duration: float) -> Flight:
+def flight_of(goal: Floats, target: tuple[Floats, Floats], duration: float) -> Flight:
+    """Fly to a goal and measure how far from the target it ends."""
     flown = fly(Swing(START, goal, duration), duration)
     miss = float(np.linalg.norm(flown.tip[0] - target[0]))
     return Flight(goal, flown, miss, _angle(flown.tip[1], target[1]))

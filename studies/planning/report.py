@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,8 @@ from bayesid.pose import CONTENT
 from bayesid.report import Document, figures, format_quantity
 from bayesid.report.figures.style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number
-from studies.planning.analysis import Case, Result
+from studies.planning.analysis import Case
+from studies.planning.calibration import Calibration
 from studies.planning.world import (
     ACCEL_SIGMA,
     BASE,
@@ -23,10 +26,18 @@ from studies.planning.world import (
     RATE_SIGMA,
 )
 
-__all__ = ["miss_figure", "write_report"]
+__all__ = ["Result", "miss_figure", "write_report"]
 
 KEYS = ("mass", "centre of mass x", "centre of mass y", "centre of mass z", "Ixx", "Iyy", "Izz")
 UNITS = ("kg", "m", "m", "m", "kg m²", "kg m²", "kg m²")
+
+
+@dataclass(frozen=True)
+class Result:
+    """The cases by name, drawn and in a full run paper, and how often regions hold the truth."""
+
+    cases: Mapping[str, Case]
+    calibration: tuple[Calibration, ...]
 
 
 def write_report(result: Result, output: Path) -> None:
@@ -44,19 +55,20 @@ def write_report(result: Result, output: Path) -> None:
     document.table(
         ["case", "base", "miss [mm]", "miss [degrees]"],
         [
-            [case.guess.title, base, f"{1e3 * flight.miss:.3g}", f"{flight.turned:.2g}"]
+            [case.guess.title, base, format_number(1e3 * flight.miss, 2), format_number(flight.turned, 2)]
             for case in result.cases.values()
             for base, flight in (("guessed", case.first), ("identified", case.again))
         ],
         "How far from its target the end-effector truly ended, planned with the guessed base and the identified one.",
         ["left", "left", "right", "right"],
     )
-    document.figure(miss_figure(result), "The same, on a logarithmic scale.", "75%")
+    document.figure(miss_figure(result), "The same, on a logarithmic scale.")
     for case in result.cases.values():
         _case(document, case)
     if len(result.cases) == 1:
         document.section("The paper's initial guess")
         document.paragraph("Not evaluated: only the full study has it.")
+    _calibration(document, result.calibration)
     _assumed(document, result)
     document.write(output)
 
@@ -68,7 +80,7 @@ def _case(document: Document, case: Case) -> None:
             "path and prior",
             "body",
             "error [mm]",
-            "95 % semi-axes [mm]",
+            "95 % region [mm]",
             "inside",
             "error [deg]",
             "95 % [deg]",
@@ -79,7 +91,7 @@ def _case(document: Document, case: Case) -> None:
         "ellipsoid (of the rotation, the longest), and whether the region holds the truth.",
         ["left", "left", "right", "right", "left", "right", "right", "left"],
     )
-    before, after, again = case.trials
+    before, after = case.trials[:2]
     document.figure(
         figures.final_positions({"guessed base": before.pose("tip")}, case.first.flown.tip[0]),
         "Final position of the end-effector on the first path as predicted before identification, orbit axes, from "
@@ -115,6 +127,28 @@ def _case(document: Document, case: Case) -> None:
     )
 
 
+def _calibration(document: Document, found: tuple[Calibration, ...]) -> None:
+    document.section("Do the regions hold the truth?")
+    count, content = found[0].guesses, CONTENT
+    document.paragraph(
+        f"The first path was predicted again for {count} guesses of the base, each such that the truth is a draw "
+        f"of the prior about it, with {found[0].draws} draws of each. Of {count} regions {content * count:.0f} ± "
+        f"{np.sqrt(count * content * (1.0 - content)):.1f} should hold the truth. "
+        "The regions are normal approximations; under the narrow prior final poses are nearly normal, which shows how "
+        "much of a shortfall is due to that."
+    )
+    document.table(
+        ["width of the prior", "body", "position held", "rotation held"],
+        [
+            [f"{100.0 * item.spread:g} %", name, f"{place} of {count}", f"{turn} of {count}"]
+            for item in found
+            for name, (place, turn) in (("base", item.base), ("end-effector", item.tip))
+        ],
+        "How many of the 95 % regions before identification hold the pose that was flown.",
+        ["left", "left", "right", "right"],
+    )
+
+
 def _rows(case: Case) -> list[list[str]]:
     rows = []
     for trial in case.trials:
@@ -124,11 +158,11 @@ def _rows(case: Case) -> list[list[str]]:
                 [
                     trial.title,
                     name,
-                    f"{distance:.3g}",
-                    " / ".join(f"{value:.2g}" for value in pose.millimetres.semi_axes),
+                    format_number(distance, 2),
+                    " / ".join(format_number(float(value), 2) for value in pose.millimetres.semi_axes),
                     "yes" if place else "no",
-                    f"{angle:.2g}",
-                    f"{pose.degrees.semi_axes[0]:.2g}",
+                    format_number(angle, 2),
+                    format_number(float(pose.degrees.semi_axes[0]), 2),
                     "yes" if turn else "no",
                 ]
             )
@@ -138,7 +172,7 @@ def _rows(case: Case) -> list[list[str]]:
 @styled
 def miss_figure(result: Result) -> Figure:
     """Draw the true miss of the end-effector before and after identification."""
-    figure = wide_figure(1.9)
+    figure = wide_figure(2.2)
     panels = figure.subplots(1, 2)
     cases = list(result.cases.values())
     place = np.arange(len(cases))
@@ -152,7 +186,8 @@ def miss_figure(result: Result) -> Figure:
         axes.set_xticks(place, [case.guess.title.replace("initial ", "initial\n") for case in cases])
         axes.set_ylabel(f"miss [{unit}]")
         axes.grid(visible=False, axis="x")
-    panels[0].legend(title="planned with the base")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, [f"planned with the {label} base" for label in labels], loc="outside upper center", ncols=2)
     return figure
 
 
@@ -168,16 +203,16 @@ def _assumed(document: Document, result: Result) -> None:
         [
             "The real robot is ETS-VII with the base of the paper and a nominal arm, in MuJoCo, with gravity gradient "
             "on every body. The arm is known exactly to the planner: only the base is not.",
-            "A guess is drawn from the stated prior about the truth, in log-Cholesky coordinates, and the planner's "
-            "prior is as wide. The paper's initial guess is met by a prior of relative width one, under which final "
+            "A guess is drawn such that the truth is a draw of the planner's prior about it, normal in log-Cholesky "
+            "coordinates. The paper's initial guess is met by a prior of relative width one, under which final "
             "positions are far from normal: its ellipsoid before identification is only a rough picture.",
-            f"Target of the end-effector: ({tested}) m from where the base started, orbit axes, with its attitude; it is "
-            "where one true flight ended, so that it can be reached. Joints move from rest to rest on quintics within "
-            f"{case.trials[0].prediction.base.time[-1]:g} s; the planner finds their goals by least squares.",
+            f"Target of the end-effector: ({tested}) m from where the base started, orbit axes, with its attitude; it "
+            "is where one true flight ended, so that it can be reached. Joints move from rest to rest on quintics "
+            f"within {case.trials[0].prediction.base.time[-1]:g} s; the planner finds their goals by least squares.",
             f"Identification: {EXCITATION.duration:.0f} s of joints 1 to 3, sensors each {INTERVAL:g} s with "
-            f"{RATE_SIGMA:g} rad/s, {ACCEL_SIGMA:g} m/s² and {ENCODER_SIGMA:g} rad of white noise, a true initial rate of "
-            f"about {INITIAL_RATE:g} rad/s that is unknown, emcee. Predicted paths start at rest.",
-            "No external force: the centre of mass rests. One flight says little of whether 95 % regions hold the truth "
-            f"in {100.0 * CONTENT:.0f} % of cases; the table states this one.",
+            f"{format_number(RATE_SIGMA)} rad/s, {format_number(ACCEL_SIGMA)} m/s² and {format_number(ENCODER_SIGMA)} "
+            f"rad of white noise, a true initial rate of about {format_number(INITIAL_RATE)} rad/s that is unknown, "
+            "emcee. Predicted paths start at rest.",
+            "No external force: the centre of mass rests.",
         ]
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -26,12 +27,12 @@ from bayesid import (
     White,
 )
 from bayesid.effects import GravityGradient
+from bayesid.inertia import log_cholesky_factor, parameters_from_pseudo_inertia, upper_cholesky
 from bayesid.motion import JointState, Motion
-from bayesid.unknowns import draw_inertial
 from studies.base_body import paper
 from studies.ets7_drift.world import simulator
 
-__all__ = ["Flown", "Guess", "Swing", "drawn_guess", "fly", "measure", "model_of", "paper_guess"]
+__all__ = ["Flown", "Guess", "Swing", "drawn_guess", "fly", "guess_about", "measure", "model_of", "paper_guess"]
 
 Floats = NDArray[np.floating]
 
@@ -45,7 +46,11 @@ INTERVAL = 0.5
 POINT = (0.4, 0.3, 0.8)
 """Of the accelerometer in the base [m]."""
 
-EXCITATION = Excitation(offset=[0.6, -2.2, 0.1, 0, 0, 0], amplitude=[-0.9, -0.2, -0.6, 0, 0, 0], frequency=0.2)
+EXCITATION = Excitation(
+    offset=np.array([0.6, -2.2, 0.1, 0.0, 0.0, 0.0]),
+    amplitude=np.array([-0.9, -0.2, -0.6, 0.0, 0.0, 0.0]),
+    frequency=0.2,
+)
 """The manoeuvre that is flown to identify the base."""
 
 INITIAL_RATE = 1e-4
@@ -103,10 +108,17 @@ class Swing:
 
 
 def drawn_guess(seed: int) -> Guess:
-    """Draw a guess of the base so that the truth is as probable as the prior says."""
+    """Draw a guess of the base (`guess_about`)."""
     truth = Robot.shipped("ets7").link(BASE).inertial
-    body = draw_inertial(truth, SPREAD, np.random.default_rng(seed))
+    body = guess_about(truth, SPREAD, np.random.default_rng(seed))
     return Guess(f"Base guessed to {100.0 * SPREAD:g} %", body, SPREAD)
+
+
+def guess_about(truth: InertialParameters, spread: float, rng: np.random.Generator) -> InertialParameters:
+    """Draw a guess such that the truth is a draw of the prior about it: the inverse of the prior's relative factor."""
+    factor = np.asarray(log_cholesky_factor(jnp.asarray(spread * rng.normal(size=10))))
+    guess = upper_cholesky(truth.pseudo_inertia) @ np.linalg.inv(factor)
+    return InertialParameters.from_vector(np.asarray(parameters_from_pseudo_inertia(jnp.asarray(guess @ guess.T))))
 
 
 def paper_guess() -> Guess:
