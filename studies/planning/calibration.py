@@ -18,7 +18,17 @@ __all__ = ["Calibration", "calibrate"]
 
 @dataclass(frozen=True)
 class Calibration:
-    """Width of the priors, guesses tried, and how many had regions that held the truth: position and rotation of base and end-effector."""
+    """How many regions held the truth: of position and of rotation, of base and of end-effector.
+
+    Parameters
+    ----------
+    spread : float
+        Relative width of the priors.
+    guesses, draws : int
+        Priors tried, and draws of each.
+    base, tip : (2,) tuple
+        Regions of position and rotation that held the truth.
+    """
 
     spread: float
     guesses: int
