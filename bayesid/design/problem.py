@@ -76,8 +76,7 @@ class Problem:
 
     def costs(self, parameters: Floats) -> dict[str, float]:
         """Return every criterion at the prior's centre."""
-        values = self._costs(parameters, self.centre)
-        return {criterion.name: float(value) for criterion, value in zip(self.criteria, values, strict=True)}
+        return {criterion.name: self.cost(criterion, parameters)[0] for criterion in self.criteria}
 
     def fractions(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return how much of every limit is used, shape (m,), smooth and never too small; and its Jacobian (m, n)."""
@@ -86,12 +85,18 @@ class Problem:
 
     def reached(self, parameters: Floats) -> list[Reached]:
         """Check every limit on a grid `FINER` times finer than the optimiser's."""
-        largest = np.asarray(self._finely(parameters, self.centre))
-        return self._reached(largest)
+        trajectory = self.trajectory(parameters)
+        return [
+            Reached(limit.name, limit.bound, float(limit.largest(trajectory)), limit.unit) for limit in self.applied
+        ]
 
-    def reached_at(self, parameters: Floats, points: Floats) -> Floats:
-        """Largest value of every limit for many points of the unknowns, shape (k, n) -> (k, m)."""
-        return np.stack([np.asarray(self._finely(parameters, z)) for z in points])
+    def largest(self, parameters: Floats, points: Floats, limits: Sequence[Limit]) -> Floats:
+        """Largest value of some limits for many points of the unknowns, shape (k, n) -> (k, limits)."""
+        rows = []
+        for z in points:
+            trajectory = self.trajectory(parameters, z)
+            rows.append([float(limit.largest(trajectory)) for limit in limits])
+        return np.array(rows).reshape(len(points), len(limits))
 
     def trajectory(self, parameters: Floats, z: Floats | None = None) -> Trajectory:
         """Return what the robot does, on the fine grid."""
@@ -104,12 +109,6 @@ class Problem:
         points[:, :bodies] = rng.normal(size=(criterion.draws, bodies))
         return list(points)
 
-    def _reached(self, largest: Floats) -> list[Reached]:
-        return [
-            Reached(limit.name, limit.bound, float(value), limit.unit)
-            for limit, value in zip(self.applied, largest, strict=True)
-        ]
-
     # ---- compiled ----
 
     @cached_property
@@ -120,14 +119,6 @@ class Problem:
             return jax.lax.switch(index, branches, outcome)
 
         return jax.jit(jax.value_and_grad(cost))
-
-    @cached_property
-    def _costs(self):  # type: ignore[no-untyped-def]
-        def costs(parameters: Array, z: Array) -> list[Array]:
-            outcome = self.plan.outcome(parameters, z)
-            return [criterion.cost(self.plan, outcome) for criterion in self.criteria]
-
-        return jax.jit(costs)
 
     @cached_property
     def _fractions(self):  # type: ignore[no-untyped-def]
@@ -145,13 +136,3 @@ class Problem:
     @cached_property
     def _fine_trajectory(self):  # type: ignore[no-untyped-def]
         return jax.jit(replace(self.plan, step=self.plan.step / FINER).trajectory)
-
-    @cached_property
-    def _finely(self):  # type: ignore[no-untyped-def]
-        fine = replace(self.plan, step=self.plan.step / FINER)
-
-        def largest(parameters: Array, z: Array) -> Array:
-            trajectory = fine.trajectory(parameters, z)
-            return jnp.stack([limit.largest(trajectory) for limit in self.applied])
-
-        return jax.jit(largest)
