@@ -18,6 +18,9 @@ from bayesid.design.planned import Plan, Trajectory
 
 __all__ = ["FINER", "Problem", "Reached"]
 
+QUICKLY = {"xla_llvm_disable_expensive_passes": True}
+"""Of XLA: compiles a third faster, and what it compiles is as fast."""
+
 FINER = 8
 """How much finer than the optimiser's grid the limits of a result are checked."""
 
@@ -118,7 +121,7 @@ class Problem:
             branches = [lambda o, c=criterion: c.cost(self.plan, o) for criterion in self.criteria]
             return jax.lax.switch(index, branches, outcome)
 
-        return jax.jit(jax.value_and_grad(cost))
+        return jax.jit(jax.value_and_grad(cost), compiler_options=QUICKLY)
 
     @cached_property
     def _fractions(self):  # type: ignore[no-untyped-def]
@@ -131,8 +134,8 @@ class Problem:
             slope, value = jax.jacfwd(fractions, has_aux=True)(parameters, z)
             return value, slope
 
-        return jax.jit(both)
+        return jax.jit(both, compiler_options=QUICKLY)
 
     @cached_property
     def _fine_trajectory(self):  # type: ignore[no-untyped-def]
-        return jax.jit(replace(self.plan, step=self.plan.step / FINER).trajectory)
+        return jax.jit(replace(self.plan, step=self.plan.step / FINER).trajectory, compiler_options=QUICKLY)
