@@ -177,16 +177,13 @@ class Plan:
         stage, _, _ = self.simulator.trace(z, self._grid(parameters), jnp.asarray(self.attitude)[None])
         return self._trajectory(parameters, stage)
 
+    def slopes(self, parameters: Array, z: Array) -> Array:
+        """Return derivatives of what the sensors read in sigmas of a sample, (T, 3 sensors, n)."""
+        return self._judged(parameters, z)[1]
+
     def outcome(self, parameters: Array, z: Array) -> Outcome:
         """Return what criteria judge."""
-        grid = self._grid(parameters)
-
-        def read(z: Array) -> tuple[Readings, tuple[Moment, Readings]]:
-            stage, _, readings = self.simulator.trace(z, grid, jnp.asarray(self.attitude)[None])
-            return readings, (stage, readings)
-
-        slopes, (stage, readings) = jax.jacfwd(read, has_aux=True)(z)
-        slope = self._slope(slopes, readings) / jnp.asarray(self.sigma)[:, None]
+        grid, slope, stage = self._judged(parameters, z)
         flat = slope.reshape(-1, slope.shape[-1])
         trajectory = self._trajectory(parameters, stage)
         bodies = jnp.asarray(self.bodies(), dtype=int)
@@ -196,6 +193,17 @@ class Plan:
         wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / self._gyration)])[:, None]
         regressor = (wrench @ per_coordinate).reshape(6 * len(wrench), len(bodies))
         return Outcome(trajectory, flat.T @ flat, regressor)
+
+    def _judged(self, parameters: Array, z: Array) -> tuple[Grid, Array, Moment]:
+        """Return the grid, the whitened derivatives of what the sensors read and the motion, from one simulation."""
+        grid = self._grid(parameters)
+
+        def read(z: Array) -> tuple[Readings, tuple[Moment, Readings]]:
+            stage, _, readings = self.simulator.trace(z, grid, jnp.asarray(self.attitude)[None])
+            return readings, (stage, readings)
+
+        slopes, (stage, readings) = jax.jacfwd(read, has_aux=True)(z)
+        return grid, self._slope(slopes, readings) / jnp.asarray(self.sigma)[:, None], stage
 
     @property
     def _gyration(self) -> float:

@@ -1,0 +1,5 @@
+"""Write the report: ``python -m studies.excitation --full``."""
+
+from studies.excitation import main
+
+main()

@@ -1,0 +1,93 @@
+"""Does base motion measure the excitation? Criterion (26) against the posterior over random manoeuvres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import spearmanr
+
+from bayesid.design import DOptimal, Paper26, Paper26Intended, Problem
+from bayesid.design.planned import Outcome
+
+__all__ = ["Cloud", "Sensitivity", "random_cloud", "sensitivity"]
+
+Floats = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Random manoeuvres of one family within limits.
+
+    Attributes
+    ----------
+    printed, intended, motion : (n,) arrays
+        Criterion (26) as printed, as intended, and the sum of the largest squared excursions alone.
+    log_det : (n,) array
+        Of the posterior covariance of the base's coordinates.
+    """
+
+    printed: Floats
+    intended: Floats
+    motion: Floats
+    log_det: Floats
+
+    def correlation(self, values: Floats) -> tuple[float, float]:
+        """Return the rank correlation with the information (minus the log-determinant), and its standard error."""
+        rho = float(spearmanr(values, -self.log_det).statistic)
+        return rho, float((1.0 - rho**2) / np.sqrt(len(values) - 3.0))
+
+
+def random_cloud(own: Problem, count: int, rng: np.random.Generator) -> Cloud:
+    """Draw random manoeuvres, each as large as the limits allow times a random part."""
+    family = own.plan.family
+
+    @jax.jit
+    def judged(parameters: jax.Array) -> tuple[jax.Array, ...]:
+        outcome: Outcome = own.plan.outcome(parameters, jax.numpy.asarray(own.centre))
+        largest = jax.numpy.abs(outcome.trajectory.excursion).max(axis=0)
+        return (
+            -Paper26().cost(own.plan, outcome),
+            -Paper26Intended().cost(own.plan, outcome),
+            (largest**2).sum(),
+            2.0 * DOptimal().cost(own.plan, outcome),
+        )
+
+    rows: list[list[float]] = []
+    while len(rows) < count:
+        way = family.scale * rng.normal(size=family.size)
+        size = 1.0
+        while own.fractions(family.centre + size * way)[0].max() > 1.0:
+            size *= 0.7
+        rows.append([float(value) for value in judged(family.centre + size * rng.uniform(0.3, 1.0) * way)])
+    return Cloud(*np.array(rows).T)
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """The weights of the errors in (25) along a manoeuvre.
+
+    Attributes
+    ----------
+    time : (T,) array
+    rate, accel : (T, 10) arrays
+        Length of the derivative of rate and acceleration with respect to each log-Cholesky coordinate of the base, in
+        standard deviations of a sample.
+    """
+
+    time: Floats
+    rate: Floats
+    accel: Floats
+
+
+def sensitivity(own: Problem, parameters: Floats) -> Sensitivity:
+    """Return the sensitivities (25) of a manoeuvre."""
+    plan = own.plan
+    slopes = np.asarray(jax.jit(plan.slopes)(parameters, own.centre))[:, :, plan.bodies()]
+    return Sensitivity(
+        plan.samples,
+        np.linalg.norm(slopes[:, :3], axis=1),
+        np.linalg.norm(slopes[:, 3:6], axis=1),
+    )

@@ -1,0 +1,86 @@
+"""What the predictions are worth: fits of many noisy recordings of an independent simulator, and emcee on one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid import Posterior, identify
+from bayesid.design import Design
+from bayesid.inertia import mass_com_inertia
+from bayesid.inference import maximise
+from studies.excitation.world import BASE, fly, recorded
+
+__all__ = ["Realised", "realise"]
+
+Floats = NDArray[np.floating]
+
+
+@dataclass(frozen=True)
+class Realised:
+    """One manoeuvre flown.
+
+    Attributes
+    ----------
+    errors : (repeats, 10) array
+        Estimate less truth, in the order of the predicted quantities.
+    sampled : (10,) array
+        Posterior standard deviation by emcee on one recording.
+    offset : (10,) array
+        Its mean less the truth.
+    predicted : (10,) array
+        Standard deviation that was predicted.
+    distances : (repeats,) array
+        Squared distance of the truth from the estimate in the predicted covariance; ten on average.
+    """
+
+    errors: Floats
+    sampled: Floats
+    offset: Floats
+    predicted: Floats
+    distances: Floats
+
+    @property
+    def rms(self) -> Floats:
+        """Root mean square error over the predicted standard deviation, shape (10,)."""
+        return np.sqrt((self.errors**2).mean(axis=0)) / self.predicted
+
+    @property
+    def ratio(self) -> float:
+        """Geometric mean of `rms`."""
+        return float(np.exp(np.log(self.rms).mean()))
+
+    @property
+    def rms_error(self) -> float:
+        """Standard error of one entry of `rms`."""
+        return float(1.0 / np.sqrt(2.0 * len(self.errors)))
+
+
+def realise(
+    item: Design, seed: int, repeats: int, effective_samples: float, progress: Callable[[str], None]
+) -> Realised:
+    """Fly a design with the independent simulator, record it many times, and identify the base from each."""
+    run = fly(item.motion)
+    seeds = np.random.SeedSequence(seed).spawn(repeats)
+    truth = mass_com_inertia(item.posterior.model.robot.link(BASE).inertial.vector)
+    errors: list[Floats] = []
+    sampled: Floats = np.zeros(10)
+    offset: Floats = np.zeros(10)
+    for index, own in enumerate(seeds):
+        rng = np.random.default_rng(own)
+        posterior = Posterior(item.posterior.model, [recorded(run, rng)], step=item.posterior.step, like=item.posterior)
+        if index == 0:
+            result = identify(posterior, seed, effective_samples=effective_samples)
+            sampled, offset = result.bodies[BASE].sd, result.bodies[BASE].mean - truth
+        _, optimum = maximise(posterior, rng, np.zeros(posterior.size))
+        errors.append(mass_com_inertia(posterior.inertials(optimum.z)[0].vector) - truth)
+        if index % 50 == 49:
+            progress(f"{item.name}: {index + 1} of {repeats} recordings identified")
+    every = np.array(errors)
+    scale = item.predicted.sd
+    inverse = np.linalg.inv(item.predicted.covariance / np.outer(scale, scale))
+    distances = np.einsum("ij,jk,ik->i", every / scale, inverse, every / scale)
+    return Realised(every, sampled, offset, scale, distances)
