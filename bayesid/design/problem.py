@@ -15,11 +15,15 @@ from bayesid.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.limits import ACTIVE, Limit, Limits, smooth_largest
 from bayesid.design.planned import Plan, Trajectory
+from bayesid.errors import InputError
 
 __all__ = ["FINER", "Problem", "Reached"]
 
 FINER = 8
 """How much finer than the optimiser's grid the limits of a result are checked."""
+
+_SHARED = ("_cost", "_costs", "_fractions", "_fine_trajectory", "_finely")
+"""Compiled functions that no bound enters."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,19 @@ class Problem:
         return self.limits.of(self.plan.model.robot)
 
     @cached_property
+    def bounds(self) -> Floats:
+        """Bound of every limit, shape (m,)."""
+        return np.array([limit.bound for limit in self.applied])
+
+    def with_limits(self, limits: Limits) -> Problem:
+        """Return the problem with other bounds of the same limits, without compiling anything anew."""
+        new = replace(self, limits=limits)
+        if [limit.name for limit in new.applied] != [limit.name for limit in self.applied]:
+            raise InputError("other limits apply than before", place="limits", remedy="Change bounds only")
+        new.__dict__.update({key: getattr(self, key) for key in _SHARED})
+        return new
+
+    @cached_property
     def centre(self) -> Floats:
         """The prior's centre, in the unknowns' coordinates."""
         return np.zeros(self.plan.unknowns.size)
@@ -81,7 +98,7 @@ class Problem:
 
     def fractions(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return how much of every limit is used, shape (m,), smooth and never too small; and its Jacobian (m, n)."""
-        value, slope = self._fractions(parameters, self.centre)
+        value, slope = self._fractions(parameters, self.centre, self.bounds)
         return np.asarray(value), np.asarray(slope)
 
     def reached(self, parameters: Floats) -> list[Reached]:
@@ -131,13 +148,14 @@ class Problem:
 
     @cached_property
     def _fractions(self):  # type: ignore[no-untyped-def]
-        def fractions(parameters: Array, z: Array) -> tuple[Array, Array]:
+        def fractions(parameters: Array, z: Array, bounds: Array) -> tuple[Array, Array]:
             trajectory = self.plan.trajectory(parameters, z)
-            values = jnp.stack([smooth_largest(limit, trajectory) for limit in self.applied])
+            pairs = zip(self.applied, bounds, strict=True)
+            values = jnp.stack([smooth_largest(limit, trajectory, bound) for limit, bound in pairs])
             return values, values
 
-        def both(parameters: Array, z: Array) -> tuple[Array, Array]:
-            slope, value = jax.jacfwd(fractions, has_aux=True)(parameters, z)
+        def both(parameters: Array, z: Array, bounds: Array) -> tuple[Array, Array]:
+            slope, value = jax.jacfwd(fractions, has_aux=True)(parameters, z, bounds)
             return value, slope
 
         return jax.jit(both)
