@@ -51,13 +51,20 @@ def model_of(base: InertialParameters, spread: float) -> Model:
     return Model(robot_of(base), SENSORS, (BodyPrior("base_link", base, spread),), rate_sigma=0.0)
 
 
-def loop_of(**options) -> Loop:
-    """Twelve seconds of two joints; the prior is 20 % wide in every coordinate."""
-    model = model_of(Robot.from_urdf(PLANAR).link("base_link").inertial, 0.2)
+def problem() -> Problem:
+    """Twelve seconds of two joints; the prior is 5 % wide in every coordinate."""
+    model = model_of(Robot.from_urdf(PLANAR).link("base_link").inertial, 0.05)
     family = BSplines([0.3, -0.6], (0, 1), 12.0, points=3)
-    plan = Plan(model, family, interval=0.25, tip=Tip.of(model.robot), step=0.5)
+    return Problem(Plan(model, family, interval=0.25, tip=Tip.of(model.robot), step=1.0), LIMITS, (DOptimal(),))
+
+
+PROBLEM = problem()
+
+
+def loop_of(**options) -> Loop:
+    """One of the problem."""
     settings = {"wanted": 0.0, "at_most": 2, "search": Search(1, 10), "identifier": Laplace(), "seed": 3, **options}
-    return Loop(Problem(plan, LIMITS, (DOptimal(),)), ENCODER, **settings)
+    return Loop(PROBLEM, ENCODER, **settings)
 
 
 def mass_alone(bodies) -> float:
@@ -82,7 +89,7 @@ def test_every_step_narrows_the_posterior_about_the_truth(done):
         assert abs(mass["mean"] - TRUE.mass) < 4.0 * mass["sd"]
         widths.append(mass["sd"])
     assert widths[1] < 0.9 * widths[0]
-    assert widths[0] < 0.2 * 2 * 60.0 / 5.0
+    assert widths[0] < 0.05 * 2 * 60.0 / 3.0
 
 
 def test_what_may_break_a_limit_is_shrunk_before_it_is_flown(done):

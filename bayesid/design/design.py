@@ -236,10 +236,7 @@ def risks(problem: Problem, parameters: Floats, rng: np.random.Generator, draws:
 
     The base starts at rest: the uncertainty of the initial rate, which the manoeuvre does not cause, is left out.
     """
-    bodies = 10 * len(problem.plan.model.priors)
-    points = np.zeros((draws, problem.plan.unknowns.size))
-    points[:, :bodies] = rng.normal(size=(draws, bodies))
-    largest = problem.reached_at(parameters, points)
+    largest = problem.reached_at(parameters, problem.draws(draws, rng))
     return [
         Risk(limit.name, limit.bound, float(np.quantile(largest[:, index], CERTAIN)), limit.unit)
         for index, limit in enumerate(problem.applied)

@@ -16,7 +16,7 @@ import numpy as np
 
 from bayesid.carry import InertialDraws
 from bayesid.checks import refuse_impossible_joints, refuse_wrong_units
-from bayesid.design.design import evaluate, sample_times
+from bayesid.design.design import sample_times
 from bayesid.design.go import plan_to_go
 from bayesid.design.history import History
 from bayesid.design.optimise import Search, Show
@@ -31,6 +31,7 @@ from bayesid.design.update import (
     bodies_of_draws,
     carried_model,
     describe_bodies,
+    known_of,
     worst_relative_sd,
 )
 from bayesid.errors import InputError
@@ -97,10 +98,10 @@ class Loop:
             Where a plan is impossible or a recording does not fit.
         """
         history = History.open(folder, self._key())
-        model = self.problem.plan.model
+        problem, model = self.problem, self.problem.plan.model
         for number in range(1, self.at_most + 1):
             progress((number - 1) / self.at_most, f"step {number}: planning")
-            if not self._plan(history, number, model, progress):
+            if not self._plan(history, number, problem, progress):
                 history.close("no-go")
                 return history
             progress((number - 0.5) / self.at_most, f"step {number}: executing")
@@ -115,34 +116,42 @@ class Loop:
             if last and history.steps[-1]["identification"]["precision"] <= self.wanted:
                 history.close("reached")
                 return history
-            model = carried_model(self.problem.plan.model, InertialDraws.read(history.path(number, "identification")))
+            if number < self.at_most:
+                draws = InertialDraws.read(history.path(number, "identification"))
+                problem = self.problem.knowing(known_of(self.problem.plan.unknowns, draws))
+                model = carried_model(self.problem.plan.model, draws)
         history.close("at-most")
         return history
 
-    def _plan(self, history: History, number: int, model: Model, progress: Show) -> bool:
+    def _plan(self, history: History, number: int, problem: Problem, progress: Show) -> bool:
         """Plan a step unless that is done; return whether it may be flown."""
         entry = history.entry(number, "plan")
         if entry is not None:
             return bool(entry["go"])
-        problem = self.problem
-        if model is not problem.plan.model:
-            problem = Problem(replace(problem.plan, model=model), problem.limits, problem.criteria)
-        criterion, plan, stem = problem.criteria[0], problem.plan, f"step-{number}"
-        search = Store.open(history.folder / f".{stem}-search.json", self._key())
-        designs, predicted = np.random.SeedSequence([self.seed, number, 0]).spawn(2)
-        attempts = plan_to_go(problem, criterion, designs, self.search, search, progress)
-        final = evaluate(problem, stem, attempts[-1].found, self.encoder, np.random.default_rng(predicted))
-        content = final.to_dict()
-        # what depends on how often the loop was started
-        del content["search"]
-        content |= {"criterion": criterion.name, "go": attempts[-1].go}
-        content["attempts"] = [attempt.to_dict() for attempt in attempts]
+        plan, criterion, stem = problem.plan, problem.criteria[0], f"step-{number}"
+        store = Store.open(history.folder / f".{stem}-search.json", history.key)
+        attempts = plan_to_go(
+            problem, criterion, np.random.SeedSequence([self.seed, number, 0]), self.search, store, progress
+        )
+        best = attempts[-1]
+        motion = plan.family.motion(best.found.parameters)
         time = sample_times(plan.family.duration, plan.interval)
-        plan_recording(final.motion, model.robot, time, stem).write(history.path(number, "plan"))
+        plan_recording(motion, plan.model.robot, time, stem).write(history.path(number, "plan"))
+        content = {
+            "go": best.go,
+            "criterion": criterion.name,
+            "cost": best.found.cost,
+            "parameterisation": plan.family.name,
+            "parameters": dict(zip(plan.family.names, map(float, best.found.parameters), strict=True)),
+            "limits": {
+                item.name: {"limit": item.limit, "largest": item.largest, "unit": item.unit} for item in best.reached
+            },
+            "attempts": [attempt.to_dict() for attempt in attempts],
+        }
         history.record(number, "plan", content)
-        if search.file is not None:
-            search.file.unlink(missing_ok=True)
-        return attempts[-1].go
+        if store.file is not None:
+            store.file.unlink(missing_ok=True)
+        return best.go
 
     def _execute(self, history: History, number: int, spacecraft: Spacecraft) -> None:
         """Fly a step unless there is a recording."""

@@ -57,14 +57,17 @@ class Outcome(NamedTuple):
     ----------
     trajectory : Trajectory
     information : (n, n) array
-        Fisher information of the unknowns' coordinates, without their standard-normal prior.
+        Fisher information of the unknowns' coordinates, without their prior.
     regressor : (6 T, b) array
         Force balance of the base against the bodies' coordinates; torques are over the radius of gyration [N].
+    prior : (n, n) array
+        Precision of the unknowns' coordinates before the manoeuvre.
     """
 
     trajectory: Trajectory
     information: Array
     regressor: Array
+    prior: Array
 
 
 @dataclass(frozen=True)
@@ -176,8 +179,8 @@ class Plan:
         """Return what the robot does."""
         return self._trajectory(parameters, z, self._grid(parameters))[0]
 
-    def outcome(self, parameters: Array, z: Array) -> Outcome:
-        """Return what criteria judge."""
+    def outcome(self, parameters: Array, z: Array, prior: Array | None = None) -> Outcome:
+        """Return what criteria judge; ``prior`` is the precision (n, n) of the coordinates, one where left out."""
         grid = self._grid(parameters)
         trajectory, tables = self._trajectory(parameters, z, grid)
         slope = self._slope(z, grid) / jnp.asarray(self.sigma)[:, None]
@@ -186,7 +189,12 @@ class Plan:
         per_coordinate = jax.jacfwd(lambda z: self.unknowns.values(z).inertial)(z)[:, bodies]
         wrench = balance_regressor(tables, trajectory.rate, trajectory.rate_change, trajectory.acceleration)
         wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / self._gyration)])[:, None]
-        return Outcome(trajectory, flat.T @ flat, (wrench @ per_coordinate).reshape(-1, len(bodies)))
+        return Outcome(
+            trajectory,
+            flat.T @ flat,
+            (wrench @ per_coordinate).reshape(-1, len(bodies)),
+            jnp.eye(self.unknowns.size) if prior is None else prior,
+        )
 
     @property
     def _gyration(self) -> float:

@@ -17,13 +17,13 @@ from bayesid.design.limits import ACTIVE, Limit, Limits, smooth_largest
 from bayesid.design.planned import Plan, Trajectory
 from bayesid.errors import InputError
 
-__all__ = ["FINER", "Problem", "Reached"]
+__all__ = ["FINER", "Known", "Problem", "Reached"]
 
 FINER = 8
 """How much finer than the optimiser's grid the limits of a result are checked."""
 
 _SHARED = ("_cost", "_costs", "_fractions", "_fine_trajectory", "_finely")
-"""Compiled functions that no bound enters."""
+"""Compiled functions that neither bounds nor what is known enter."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,21 @@ class Reached:
 
 
 @dataclass(frozen=True)
+class Known:
+    """What earlier manoeuvres told: a normal distribution of the unknowns' coordinates.
+
+    Parameters
+    ----------
+    centre : (n,) array
+    precision : (n, n) array
+        Inverse of the covariance.
+    """
+
+    centre: Floats
+    precision: Floats
+
+
+@dataclass(frozen=True)
 class Problem:
     """A family of manoeuvres to choose from.
 
@@ -56,11 +71,14 @@ class Problem:
     limits : Limits
     criteria : sequence of Criterion
         All that will be asked for: they share one compiled simulation.
+    known : Known, optional
+        Takes the place of the prior of the plan's model.
     """
 
     plan: Plan
     limits: Limits
     criteria: tuple[Criterion, ...]
+    known: Known | None = None
 
     @cached_property
     def applied(self) -> tuple[Limit, ...]:
@@ -77,23 +95,43 @@ class Problem:
         new = replace(self, limits=limits)
         if [limit.name for limit in new.applied] != [limit.name for limit in self.applied]:
             raise InputError("other limits apply than before", place="limits", remedy="Change bounds only")
-        new.__dict__.update({key: getattr(self, key) for key in _SHARED})
-        return new
+        return self._sharing(new)
+
+    def knowing(self, known: Known) -> Problem:
+        """Return the problem after earlier manoeuvres, without compiling anything anew."""
+        return self._sharing(replace(self, known=known))
+
+    def _sharing(self, other: Problem) -> Problem:
+        other.__dict__.update({key: getattr(self, key) for key in _SHARED})
+        return other
 
     @cached_property
     def centre(self) -> Floats:
         """The prior's centre, in the unknowns' coordinates."""
-        return np.zeros(self.plan.unknowns.size)
+        return np.zeros(self.plan.unknowns.size) if self.known is None else self.known.centre
+
+    @cached_property
+    def precision(self) -> Floats:
+        """The prior's precision, in the unknowns' coordinates."""
+        return np.eye(self.plan.unknowns.size) if self.known is None else self.known.precision
+
+    def draws(self, count: int, rng: np.random.Generator) -> Floats:
+        """Draw the bodies from their prior, everything else at its centre, shape (count, n)."""
+        bodies = 10 * len(self.plan.model.priors)
+        points = np.tile(self.centre, (count, 1))
+        covariance = np.linalg.inv(self.precision)[:bodies, :bodies]
+        points[:, :bodies] += rng.normal(size=(count, bodies)) @ np.linalg.cholesky(covariance).T
+        return points
 
     def cost(self, criterion: Criterion, parameters: Floats, points: Sequence[Floats] = ()) -> tuple[float, Floats]:
         """Return a criterion and its gradient, averaged over points of the unknowns (the prior's centre if none)."""
         index = self.criteria.index(criterion)
-        pairs = [self._cost(parameters, z, index) for z in (points or [self.centre])]
+        pairs = [self._cost(parameters, z, index, self.precision) for z in (points or [self.centre])]
         return float(np.mean([pair[0] for pair in pairs])), np.mean([np.asarray(pair[1]) for pair in pairs], axis=0)
 
     def costs(self, parameters: Floats) -> dict[str, float]:
         """Return every criterion at the prior's centre."""
-        values = self._costs(parameters, self.centre)
+        values = self._costs(parameters, self.centre, self.precision)
         return {criterion.name: float(value) for criterion, value in zip(self.criteria, values, strict=True)}
 
     def fractions(self, parameters: Floats) -> tuple[Floats, Floats]:
@@ -116,10 +154,7 @@ class Problem:
 
     def points(self, criterion: Criterion, rng: np.random.Generator) -> list[Floats]:
         """Draw points of the prior of all bodies to average a criterion over; none if it looks at the centre alone."""
-        bodies = 10 * len(self.plan.model.priors)
-        points = np.zeros((criterion.draws, self.plan.unknowns.size))
-        points[:, :bodies] = rng.normal(size=(criterion.draws, bodies))
-        return list(points)
+        return list(self.draws(criterion.draws, rng))
 
     def _reached(self, largest: Floats) -> list[Reached]:
         return [
@@ -131,8 +166,8 @@ class Problem:
 
     @cached_property
     def _cost(self):  # type: ignore[no-untyped-def]
-        def cost(parameters: Array, z: Array, index: Array) -> Array:
-            outcome = self.plan.outcome(parameters, z)
+        def cost(parameters: Array, z: Array, index: Array, prior: Array) -> Array:
+            outcome = self.plan.outcome(parameters, z, prior)
             branches = [lambda o, c=criterion: c.cost(self.plan, o) for criterion in self.criteria]
             return jax.lax.switch(index, branches, outcome)
 
@@ -140,8 +175,8 @@ class Problem:
 
     @cached_property
     def _costs(self):  # type: ignore[no-untyped-def]
-        def costs(parameters: Array, z: Array) -> list[Array]:
-            outcome = self.plan.outcome(parameters, z)
+        def costs(parameters: Array, z: Array, prior: Array) -> list[Array]:
+            outcome = self.plan.outcome(parameters, z, prior)
             return [criterion.cost(self.plan, outcome) for criterion in self.criteria]
 
         return jax.jit(costs)

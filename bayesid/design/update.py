@@ -12,13 +12,16 @@ import numpy as np
 
 from bayesid.arrays import Floats
 from bayesid.carry import InertialDraws, joint_prior
+from bayesid.design.problem import Known
 from bayesid.errors import InputError
-from bayesid.inertia import mass_com_inertia
+from bayesid.inertia import BASIS, mass_com_inertia
 from bayesid.inference.identification import BODY_QUANTITIES, BodyDraws, Identification, identify, quantity
 from bayesid.inference.optimum import maximise
 from bayesid.model import Model
 from bayesid.posterior import Posterior
+from bayesid.relative import log_cholesky_coordinates
 from bayesid.storage import write_netcdf
+from bayesid.unknowns import Unknowns
 
 __all__ = [
     "Identifier",
@@ -27,6 +30,7 @@ __all__ = [
     "bodies_of_draws",
     "carried_model",
     "describe_bodies",
+    "known_of",
     "worst_relative_sd",
 ]
 
@@ -106,6 +110,19 @@ def carried_model(model: Model, draws: InertialDraws) -> Model:
         robot = robot.with_inertial(name, centre)
     nuisance = [body.name for body in model.priors if body.nuisance]
     return replace(model, robot=robot, priors=prior.bodies(nuisance), mixing=prior.mixing())
+
+
+def known_of(unknowns: Unknowns, draws: InertialDraws) -> Known:
+    """Return draws of all uncertain bodies as a normal distribution of a plan's coordinates."""
+    values = draws.of_bodies([body.name for body in unknowns.bodies]).values
+    parts = [
+        log_cholesky_coordinates(body.centre.pseudo_inertia, np.einsum("np,pij->nij", values[:, index], BASIS))
+        for index, body in enumerate(unknowns.bodies)
+    ]
+    z = np.linalg.solve(unknowns.widths, np.concatenate(parts, axis=1).T)
+    centre, precision, count = np.zeros(unknowns.size), np.eye(unknowns.size), len(z)
+    centre[:count], precision[:count, :count] = z.mean(axis=1), np.linalg.inv(np.cov(z))
+    return Known(centre, precision)
 
 
 def bodies_of_draws(model: Model, draws: InertialDraws) -> dict[str, BodyDraws]:
