@@ -42,7 +42,11 @@ class Criterion(Protocol):
     """
 
     name: ClassVar[str]
-    draws: int
+
+    @property
+    def draws(self) -> int:
+        """Points of the prior to average over."""
+        ...
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return a number to be minimised, differentiable by JAX."""
