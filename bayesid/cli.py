@@ -1,4 +1,4 @@
-"""The command line: ``bayesid check|identify|diagnose|simulate|predict|loop STUDY.toml --output DIR``, ``bayesid demo``."""
+"""The command line: ``bayesid check|identify|diagnose|simulate|predict|loop STUDY.toml --output DIR``, and ``demo``."""
 
 from __future__ import annotations
 

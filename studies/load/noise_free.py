@@ -25,9 +25,6 @@ Floats = NDArray[np.floating]
 STEP = 0.5
 """Integration step of the fit [s]."""
 
-PHYSICAL = (*range(7),)
-"""Quantities whose true value is not zero: mass, centre of mass, moments."""
-
 
 @dataclass(frozen=True)
 class Iteration:
@@ -78,7 +75,8 @@ def iterate(
     """Plan by a criterion of the paper, fly with MuJoCo, fit by least squares; and again from what was found."""
     known, spacecraft = model(1.0), MuJoCoSpacecraft()
     present = problem(known, excitation(), criterion)
-    z, found = np.zeros(10), []
+    z: Floats = np.zeros(10)
+    found = []
     time = np.arange(0.0, DURATION + 1e-9, INTERVAL)
     for number, stream in enumerate(np.random.SeedSequence(seed).spawn(count), start=1):
         best = optimise(present, criterion, np.random.default_rng(stream), search).parameters

@@ -11,7 +11,7 @@ from bayesid.inertia import InertialParameters
 
 __all__ = ["GUESS", "RADIUS", "RESULTS", "TRUTH", "Reading", "body", "readings"]
 
-Floats = NDArray[np.float64]
+Floats = NDArray[np.floating]
 
 # mass, centre of mass, inertia xx yy zz xy xz yz: the order of `bayesid.inference.identification.BODY_QUANTITIES`
 TRUTH = np.array([370.0, 0.33, 0.50, 1.04, 700.0, 700.0, 700.0, 0.0, 0.0, 0.0])
