@@ -141,7 +141,7 @@ def loop(
             effective_samples=samples,
             progress=show,
         ):
-            console.print(line)
+            console.print(line, soft_wrap=True)  # paths to be copied
 
 
 @contextmanager

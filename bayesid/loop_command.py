@@ -117,7 +117,14 @@ class _Checked:
 
     def execute(self, plan: Recording) -> Recording:
         """Execute and refuse what is no recording."""
-        recording = self.inner.execute(plan)
+        try:
+            recording = self.inner.execute(plan)
+        except (InputError, NotFlown):
+            raise
+        except Exception as error:
+            raise InputError(
+                f"execute fails: {type(error).__name__}: {error}", file=self.file, remedy="Correct the file"
+            ) from error
         if not isinstance(recording, Recording):
             raise InputError(
                 f"execute returned a {type(recording).__name__}",

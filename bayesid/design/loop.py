@@ -155,14 +155,20 @@ class Loop:
 
     def _execute(self, history: History, number: int, spacecraft: Spacecraft) -> None:
         """Fly a step unless there is a recording."""
-        if history.entry(number, "recording") is not None:
-            return
         file = history.path(number, "recording")
         if not file.is_file():
             plan = replace(Recording.read(history.path(number, "plan")), name=f"step-{number}")
-            spacecraft.execute(plan).write(file)
-        refuse_impossible_joints(Recording.read(file), self.problem.plan.model.robot)
-        history.record(number, "recording", {})
+            recording = spacecraft.execute(plan)
+            self._check(recording)
+            recording.write(file)
+
+    def _check(self, recording: Recording) -> None:
+        """Refuse what cannot be identified from, before it is kept."""
+        model = self.problem.plan.model
+        flown(self.problem.plan, recording, self.encoder)
+        refuse_impossible_joints(recording, model.robot)
+        for sensor in model.sensors:
+            recording.vector(sensor.kind.value)
 
     def _identify(self, history: History, number: int, model: Model) -> None:
         """Identify a step unless that is done."""
@@ -170,8 +176,11 @@ class Loop:
             return
         file = history.path(number, "identification")
         recording = Recording.read(history.path(number, "recording"))
+        self._check(recording)
         posterior = Posterior(model, [flown(self.problem.plan, recording, self.encoder)])
         refuse_wrong_units(posterior)
+        if history.entry(number, "recording") is None:
+            history.record(number, "recording", {})
         seed = int(np.random.SeedSequence([self.seed, number, 1]).generate_state(1)[0])
         fit = self.identifier.identify(posterior, seed, file)
         bodies = bodies_of_draws(model, InertialDraws.read(file))

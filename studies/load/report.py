@@ -103,9 +103,9 @@ def _readings(document: Document) -> None:
 def _noise_free(document: Document, iterations: Sequence[Iteration]) -> None:
     document.section("Without noise and without prior")
     document.paragraph(
-        f"The motion is (27): the first three joints oscillate, the wrist is extended. It lasts {DURATION:g} s with two "
-        f"periods, stays within ±{RANGE:.3f} rad as in the paper, and within {LIMITS.joint_speed:g} rad/s, which the "
-        "paper does not state. It maximises (26) as it appears to be intended, with the sizes of the differences. "
+        f"The motion is (27): the first three joints oscillate, the wrist is extended. It lasts {DURATION:g} s with "
+        f"two periods, stays within ±{RANGE:.3f} rad as in the paper, and within {LIMITS.joint_speed:g} rad/s, which "
+        "the paper does not state. It maximises (26) as it appears to be intended, with the sizes of the differences. "
         "MuJoCo flies it, and ten parameters are fitted to rates and accelerations by least squares. The first "
         "manoeuvre is planned with the load guessed, the second with the load found."
     )
