@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from conftest import PLANAR
+from jax import Array
 
 from bayesid.carry import InertialDraws
 from bayesid.design import (
@@ -17,7 +20,6 @@ from bayesid.design import (
     Limits,
     Loop,
     NotFlown,
-    Paper26Intended,
     Plan,
     PlannedMotion,
     Problem,
@@ -53,14 +55,25 @@ def model_of(base: InertialParameters, spread: float) -> Model:
     return Model(robot_of(base), SENSORS, (BodyPrior("base_link", base, spread),), rate_sigma=0.0)
 
 
-def problem() -> Problem:
-    """Twelve seconds of two joints; the prior is 5 % wide in every coordinate.
+@dataclass(frozen=True)
+class Swing:
+    """A criterion of one's own: how far the base turns about z.
 
-    The criterion needs no derivative of what the sensors read, which would take long to compile.
+    It needs no derivative of what the sensors read, which would take long to compile.
     """
+
+    name: ClassVar[str] = "swing"
+    draws: int = 0
+
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+        return -jnp.mean(outcome.trajectory.excursion[:, 5] ** 2)
+
+
+def problem() -> Problem:
+    """Twelve seconds of two joints; the prior is 5 % wide in every coordinate."""
     model = model_of(Robot.from_urdf(PLANAR).link("base_link").inertial, 0.05)
     family = BSplines([0.3, -0.6], (0, 1), 12.0, points=3)
-    return Problem(Plan(model, family, interval=0.25, tip=Tip.of(model.robot), step=1.0), LIMITS, (Paper26Intended(),))
+    return Problem(Plan(model, family, interval=0.25, tip=Tip.of(model.robot), step=1.0), LIMITS, (Swing(),))
 
 
 PROBLEM = problem()
@@ -92,9 +105,10 @@ def test_every_step_narrows_the_posterior_about_the_truth(done):
     for body in bodies:
         assert abs(body["mass"]["mean"] - TRUE.mass) < 4.0 * body["mass"]["sd"]
     first, second = (np.array([item["sd"] for item in body.values()]) for body in bodies)
-    assert (second < 1.03 * first).all()
+    # what moves in a plane tells nothing of some moments of inertia
+    assert (second < 1.1 * first).all()
     assert (second < 0.9 * first).sum() >= 2
-    assert first[0] < 1.0  # the prior's is 6 kg
+    assert second[0] < 1.0  # the prior's is 6 kg
 
 
 def test_what_may_break_a_limit_is_shrunk_before_it_is_flown(done):

@@ -47,6 +47,9 @@ __all__ = ["Loop", "NotFlown"]
 LOOSE = 10.0
 """Initial attitude taken from a star sensor's first sample: this many times its noise, as that sample counts again."""
 
+NARROW = 0.5
+"""Width of a prior up to which readings ten times too large are wrong units rather than another body."""
+
 
 class NotFlown(Exception):  # noqa: N818  (nothing went wrong)
     """A spacecraft raises it where the recording will only come later."""
@@ -178,7 +181,8 @@ class Loop:
         recording = Recording.read(history.path(number, "recording"))
         self._check(recording)
         posterior = Posterior(model, [flown(self.problem.plan, recording, self.encoder)])
-        refuse_wrong_units(posterior)
+        if all(prior.spread <= NARROW for prior in model.priors):
+            refuse_wrong_units(posterior)
         if history.entry(number, "recording") is None:
             history.record(number, "recording", {})
         seed = int(np.random.SeedSequence([self.seed, number, 1]).generate_state(1)[0])

@@ -68,13 +68,14 @@ def fly_all(
     """Fly the paper's way, its criterion on its family; and ours, d-optimal B-splines of all joints, within limits."""
     known = model(SPREAD)
     start = [0.0, 0.0, 0.0, *extended_wrist()]
-    cases: dict[str, tuple[Any, Criterion, Limits]] = {
-        "paper": (excitation(), Paper26Intended(), LIMITS),
-        "d-optimal": (excitation(), DOptimal(), LIMITS),
-        "careful": (BSplines(start, range(6), DURATION, points=5), DOptimal(), CAREFUL),
+    paper_motion = excitation()
+    jolts = (paper_motion.ramp, DURATION - paper_motion.ramp)
+    cases: dict[str, tuple[Any, Criterion, Limits, MuJoCoSpacecraft]] = {
+        "paper": (paper_motion, Paper26Intended(), LIMITS, MuJoCoSpacecraft(seed, jolts)),
+        "careful": (BSplines(start, range(6), DURATION, points=5), DOptimal(), CAREFUL, MuJoCoSpacecraft(seed)),
     }
     flights = {}
-    for name, (family, criterion, limits) in cases.items():
+    for name, (family, criterion, limits, spacecraft) in cases.items():
         loop = Loop(
             problem(known, family, criterion, limits=limits),
             {0: ENCODER},
@@ -84,13 +85,13 @@ def fly_all(
             search=search,
             identifier=Sampled(effective_samples),
         )
-        flights[name] = _fly(loop, seed)
+        flights[name] = _fly(loop, spacecraft)
     return flights
 
 
-def _fly(loop: Loop, seed: int) -> Flight:
+def _fly(loop: Loop, spacecraft: MuJoCoSpacecraft) -> Flight:
     with TemporaryDirectory() as folder:
-        history = loop.run(MuJoCoSpacecraft(seed), Path(folder))
+        history = loop.run(spacecraft, Path(folder))
         flown = [step for step in history.steps if "identification" in step]
         files = [history.path(step["step"], "identification") for step in flown]
         return Flight(
