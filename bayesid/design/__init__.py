@@ -22,7 +22,7 @@ from bayesid.design.loop import Loop, NotFlown
 from bayesid.design.optimise import Found, Search, optimise
 from bayesid.design.parameterisation import BSplines, Fourier, Linear, PaperExcitation, Parameterisation
 from bayesid.design.planned import Plan, Tip
-from bayesid.design.predicted import Predicted, planned_manoeuvre, predict_posterior
+from bayesid.design.predicted import Predicted, planned_manoeuvre, planned_posterior, predict
 from bayesid.design.problem import Problem
 from bayesid.design.spacecraft import PlannedMotion, SimulatedSpacecraft, Spacecraft
 from bayesid.design.store import Store
@@ -64,6 +64,7 @@ __all__ = [
     "evaluate",
     "optimise",
     "planned_manoeuvre",
-    "predict_posterior",
+    "planned_posterior",
+    "predict",
     "worst_relative_sd",
 ]

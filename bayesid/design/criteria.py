@@ -58,7 +58,11 @@ def covariance(plan: Plan, outcome: Outcome) -> Array:
 
     These are relative: a mass is known to twice the coordinate's standard deviation.
     """
-    return _of_bodies(plan, outcome.information + outcome.prior)
+    return _of_bodies(plan, outcome.information + _prior(plan, outcome))
+
+
+def _prior(plan: Plan, outcome: Outcome) -> Array:
+    return jnp.eye(plan.unknowns.size) if outcome.prior is None else outcome.prior
 
 
 def _of_bodies(plan: Plan, precision: Array) -> Array:
@@ -171,7 +175,7 @@ class InformationGain:
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus the gain at one draw."""
-        prior = jnp.linalg.slogdet(_of_bodies(plan, outcome.prior))[1]
+        prior = jnp.linalg.slogdet(_of_bodies(plan, _prior(plan, outcome)))[1]
         return 0.5 * (jnp.linalg.slogdet(covariance(plan, outcome))[1] - prior)
 
 
@@ -203,7 +207,7 @@ class Separation:
         groups = [jnp.asarray(self._coordinates(plan, label), dtype=int) for label in self.rivals]
         # a rival may have any size: its amplitude has no prior here
         free = jnp.ones(plan.unknowns.size).at[jnp.concatenate(groups)].set(0.0)
-        total = outcome.information + outcome.prior * jnp.outer(free, free) + 1e-9 * jnp.diag(1.0 - free)
+        total = outcome.information + _prior(plan, outcome) * jnp.outer(free, free) + 1e-9 * jnp.diag(1.0 - free)
         values = []
         for group in groups:
             rest = jnp.setdiff1d(jnp.arange(plan.unknowns.size), group, size=plan.unknowns.size - len(group))

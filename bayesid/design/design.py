@@ -13,10 +13,11 @@ from bayesid.design.criteria import Criterion
 from bayesid.design.optimise import Found, Search, Show, optimise
 from bayesid.design.parameterisation import ParameterisedMotion
 from bayesid.design.planned import Trajectory
-from bayesid.design.predicted import Encoder, Predicted, planned_manoeuvre, predict_posterior
+from bayesid.design.predicted import Encoder, Predicted, planned_manoeuvre, planned_posterior, predict
 from bayesid.design.problem import Problem, Reached
 from bayesid.design.store import Store
 from bayesid.model import Manoeuvre
+from bayesid.posterior import Posterior
 
 __all__ = ["Design", "Risk", "design", "evaluate", "sample_times"]
 
@@ -68,8 +69,8 @@ class Design:
         How the search went.
     costs : mapping of str to float
         Every criterion of the problem.
-    manoeuvre : Manoeuvre
-        As it would be recorded, without noise.
+    posterior : Posterior
+        Of the manoeuvre as it would be recorded without noise.
     predicted : Predicted
     reached : sequence of Reached
     risks : sequence of Risk
@@ -81,10 +82,15 @@ class Design:
     parameters: Floats
     found: Found
     costs: Mapping[str, float]
-    manoeuvre: Manoeuvre
+    posterior: Posterior
     predicted: Predicted
     reached: Sequence[Reached]
     risks: Sequence[Risk]
+
+    @property
+    def manoeuvre(self) -> Manoeuvre:
+        """The manoeuvre as it would be recorded, without noise."""
+        return self.posterior.manoeuvres[0]
 
     @property
     def motion(self) -> ParameterisedMotion:
@@ -197,14 +203,25 @@ def design(
             )
         )
     rng = np.random.default_rng(seeds[-1])
-    return [
-        evaluate(problem, criterion.name, item, encoder, rng)
-        for criterion, item in zip(problem.criteria, polished, strict=True)
-    ]
+    designs: list[Design] = []
+    for criterion, item in zip(problem.criteria, polished, strict=True):
+        like = designs[0].posterior if designs else None
+        designs.append(evaluate(problem, criterion.name, item, encoder, rng, like))
+    return designs
 
 
-def evaluate(problem: Problem, name: str, found: Found, encoder: Encoder, rng: np.random.Generator) -> Design:
-    """Compute the posterior a manoeuvre leads to, with the noise of all sensors and encoders, and its limits."""
+def evaluate(
+    problem: Problem,
+    name: str,
+    found: Found,
+    encoder: Encoder,
+    rng: np.random.Generator,
+    like: Posterior | None = None,
+) -> Design:
+    """Compute the posterior a manoeuvre leads to, with the noise of all sensors and encoders, and its limits.
+
+    Compiled functions are shared with those of ``like``.
+    """
     plan = problem.plan
     parameters = found.parameters
     manoeuvre = planned_manoeuvre(
@@ -217,6 +234,7 @@ def evaluate(problem: Problem, name: str, found: Found, encoder: Encoder, rng: n
         attitude_sigma=plan.attitude_sigma,
         latitude=plan.latitude,
     )
+    posterior = planned_posterior(plan.model, [manoeuvre], like)
     return Design(
         name=name,
         criterion=name,
@@ -224,8 +242,8 @@ def evaluate(problem: Problem, name: str, found: Found, encoder: Encoder, rng: n
         parameters=parameters,
         found=found,
         costs=problem.costs(parameters),
-        manoeuvre=manoeuvre,
-        predicted=predict_posterior(plan.model, [manoeuvre]),
+        posterior=posterior,
+        predicted=predict(posterior),
         reached=problem.reached(parameters),
         risks=risks(problem, parameters, rng),
     )
@@ -236,11 +254,11 @@ def risks(problem: Problem, parameters: Floats, rng: np.random.Generator, draws:
 
     The base starts at rest: the uncertainty of the initial rate, which the manoeuvre does not cause, is left out.
     """
-    largest = problem.reached_at(parameters, problem.draws(draws, rng))
+    limits = [limit for limit in problem.applied if limit.depends]
+    largest = problem.largest(parameters, problem.draws(draws, rng), limits)
     return [
         Risk(limit.name, limit.bound, float(np.quantile(largest[:, index], CERTAIN)), limit.unit)
-        for index, limit in enumerate(problem.applied)
-        if limit.depends
+        for index, limit in enumerate(limits)
     ]
 
 

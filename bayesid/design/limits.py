@@ -17,6 +17,9 @@ __all__ = ["ACTIVE", "Limit", "Limits", "smooth_largest"]
 QUIET = 1e-3
 """Part of the power of the base's motion that may lie in a quiet band."""
 
+NOTHING = 1e-20
+"""Power below which the base does not move; no band is quiet then [(rad/s2)^2 s, (m/s2)^2 s]."""
+
 SHARPNESS = 300.0
 """Of the smooth maximum: it is above the largest of 500 values by 2 % of the limit at most."""
 
@@ -40,6 +43,8 @@ class Limit:
         Trajectory -> values of any shape, each to be at most the bound.
     depends : bool
         Whether the quantity depends on the inertial parameters.
+    shrinks : bool
+        Whether a smaller motion reduces it.
     """
 
     name: str
@@ -47,6 +52,7 @@ class Limit:
     unit: str
     quantity: Callable[[Trajectory], Array]
     depends: bool = False
+    shrinks: bool = True
 
     def largest(self, trajectory: Trajectory) -> Array:
         """Return the largest value along a trajectory."""
@@ -89,7 +95,7 @@ class Limits:
         if self.base_rotation is not None:
             limits.append(Limit("base_rotation", self.base_rotation, "rad", lambda t: t.rotation, depends=True))
         if self.quiet_band is not None:
-            limits.append(Limit("quiet_band", QUIET, "1", _power_within(self.quiet_band)))
+            limits.append(Limit("quiet_band", QUIET, "1", _power_within(self.quiet_band), shrinks=False))
         limits.append(Limit("rest", REST, "rad/s", lambda trajectory: jnp.abs(trajectory.velocity[jnp.array([0, -1])])))
         return tuple(limits)
 
@@ -132,7 +138,7 @@ def _joint_limits(robot: Robot) -> Sequence[Limit]:
 
 
 def _power_within(band: tuple[float, float]) -> Callable[[Trajectory], Array]:
-    """Part of the power of the base's angular acceleration, and of its acceleration, in a band."""
+    """Part of the power of the base's angular acceleration (times 1 m) and acceleration in a band."""
 
     def quantity(trajectory: Trajectory) -> Array:
         times = np.asarray(trajectory.time)
@@ -140,11 +146,9 @@ def _power_within(band: tuple[float, float]) -> Callable[[Trajectory], Array]:
         count = max(2, int(np.ceil(2.0 * duration * (band[1] - band[0]))) + 1)
         frequencies = np.linspace(*band, count)
         waves = np.exp(-2j * np.pi * frequencies[:, None] * times)
-        fractions = []
-        for signal in (trajectory.rate_change, trajectory.acceleration):
-            total = jnp.sum(signal**2) * interval
-            density = jnp.sum(jnp.abs(waves @ signal * interval) ** 2, axis=1)
-            fractions.append(2.0 * jnp.trapezoid(density, frequencies) / (total + 1e-30))
-        return jnp.stack(fractions)
+        signal = jnp.concatenate([trajectory.rate_change, trajectory.acceleration], axis=1)
+        density = jnp.sum(jnp.abs(waves @ signal * interval) ** 2, axis=1)
+        inside, total = 2.0 * jnp.trapezoid(density, frequencies), jnp.sum(signal**2) * interval
+        return ((inside + NOTHING) / (total + NOTHING))[None]
 
     return quantity

@@ -21,6 +21,9 @@ Show = Callable[[float, str], None]
 FILLED = 0.8
 """Part of the tightest limit that random starts use."""
 
+SHRUNK = 12
+"""Times that a random start is shrunk at most."""
+
 SLACK = 1e-6
 """Part of a limit by which the optimiser may overshoot: the smooth maximum is larger than the true one."""
 
@@ -195,16 +198,14 @@ class _Run:
 
 
 def _random_start(problem: Problem, rng: np.random.Generator) -> Floats:
-    """Draw parameters and shrink them towards the centre until the tightest limit is filled to a part."""
+    """Draw parameters; shrink them towards the centre until the tightest limit that this helps is filled to a part."""
     family = problem.plan.family
     direction = family.scale * rng.normal(size=family.size)
-    size, feasible = 1.0, 0.0
-    for _ in range(12):
-        if problem.fractions(family.centre + size * direction)[0].max() <= FILLED:
-            feasible = size
+    helped = [limit.shrinks for limit in problem.applied]
+    for size in 0.6 ** np.arange(SHRUNK):
+        if problem.fractions(family.centre + size * direction)[0][helped].max() <= FILLED:
             break
-        size *= 0.6
-    return family.centre + feasible * direction
+    return family.centre + size * direction
 
 
 def _repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) -> Floats:

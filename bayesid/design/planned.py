@@ -15,7 +15,7 @@ from jax import Array
 from bayesid.arrays import Floats
 from bayesid.design.parameterisation import Parameterisation
 from bayesid.dynamics import Grid, quaternion_product
-from bayesid.effects.base import Readings
+from bayesid.effects.base import Moment, Readings
 from bayesid.errors import InputError
 from bayesid.grid import build_grid
 from bayesid.model import Model
@@ -60,14 +60,14 @@ class Outcome(NamedTuple):
         Fisher information of the unknowns' coordinates, without their prior.
     regressor : (6 T, b) array
         Force balance of the base against the bodies' coordinates; torques are over the radius of gyration [N].
-    prior : (n, n) array
-        Precision of the unknowns' coordinates before the manoeuvre.
+    prior : (n, n) array, optional
+        Precision of the unknowns' coordinates before the manoeuvre; one where left out.
     """
 
     trajectory: Trajectory
     information: Array
     regressor: Array
-    prior: Array
+    prior: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -177,24 +177,28 @@ class Plan:
 
     def trajectory(self, parameters: Array, z: Array) -> Trajectory:
         """Return what the robot does."""
-        return self._trajectory(parameters, z, self._grid(parameters))[0]
+        stage, _, _ = self.simulator.trace(z, self._grid(parameters), jnp.asarray(self.attitude)[None])
+        return self._trajectory(parameters, stage)
 
     def outcome(self, parameters: Array, z: Array, prior: Array | None = None) -> Outcome:
         """Return what criteria judge; ``prior`` is the precision (n, n) of the coordinates, one where left out."""
         grid = self._grid(parameters)
-        trajectory, tables = self._trajectory(parameters, z, grid)
-        slope = self._slope(z, grid) / jnp.asarray(self.sigma)[:, None]
+
+        def read(z: Array) -> tuple[Readings, tuple[Moment, Readings]]:
+            stage, _, readings = self.simulator.trace(z, grid, jnp.asarray(self.attitude)[None])
+            return readings, (stage, readings)
+
+        slopes, (stage, readings) = jax.jacfwd(read, has_aux=True)(z)
+        slope = self._slope(slopes, readings) / jnp.asarray(self.sigma)[:, None]
         flat = slope.reshape(-1, slope.shape[-1])
+        trajectory = self._trajectory(parameters, stage)
         bodies = jnp.asarray(self.bodies(), dtype=int)
         per_coordinate = jax.jacfwd(lambda z: self.unknowns.values(z).inertial)(z)[:, bodies]
+        tables = grid.stage.unknown[0, :, :, : 10 * len(self.model.priors)]
         wrench = balance_regressor(tables, trajectory.rate, trajectory.rate_change, trajectory.acceleration)
         wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / self._gyration)])[:, None]
-        return Outcome(
-            trajectory,
-            flat.T @ flat,
-            (wrench @ per_coordinate).reshape(-1, len(bodies)),
-            jnp.eye(self.unknowns.size) if prior is None else prior,
-        )
+        regressor = (wrench @ per_coordinate).reshape(6 * len(wrench), len(bodies))
+        return Outcome(trajectory, flat.T @ flat, regressor, prior)
 
     @property
     def _gyration(self) -> float:
@@ -215,24 +219,16 @@ class Plan:
         )
         return jax.tree.map(lambda x: x[None], grid)
 
-    def _slope(self, z: Array, grid: Grid) -> Array:
-        """Return derivatives of what the sensors read, (T, 3 sensors, n)."""
-        attitude = jnp.asarray(self.attitude)[None]
-
-        def read(z: Array) -> tuple[Readings, Readings]:
-            readings = jax.tree.map(lambda x: x[0], self.simulator.readings(z, grid, attitude))
-            return readings, readings
-
-        slopes, here = jax.jacfwd(read, has_aux=True)(z)
+    def _slope(self, slopes: Readings, readings: Readings) -> Array:
+        """Return derivatives of what the sensors read, (T, 3 sensors, n); of an attitude as a small rotation."""
         parts = []
         for kind in self.simulator.kinds:
-            slope = getattr(slopes, kind.value)
-            parts.append(_turning(here.attitude, slope) if kind is Kind.ATTITUDE else slope)
+            slope = getattr(slopes, kind.value)[0]
+            parts.append(_turning(readings.attitude[0], slope) if kind is Kind.ATTITUDE else slope)
         return jnp.concatenate(parts, axis=1)
 
-    def _trajectory(self, parameters: Array, z: Array, grid: Grid) -> tuple[Trajectory, Array]:
-        """Return the trajectory at the stages of the integration, and the tables of the bodies there."""
-        stage, _, _ = self.simulator.trace(z, grid, jnp.asarray(self.attitude)[None])
+    def _trajectory(self, parameters: Array, stage: Moment) -> Trajectory:
+        """Return the trajectory at the stages of the integration."""
         moment = jax.tree.map(lambda x: x[0], stage)
         # the instants, known beforehand: half steps
         times = np.linspace(0.0, self.family.duration, moment.rate.shape[0])
@@ -247,7 +243,7 @@ class Plan:
         speed = drift + jnp.cross(moment.rate, pose[:, :3, 3]) + flow[:, :3, 3]
         turned = jnp.einsum("ji,tjk->tik", moment.attitude[0], moment.attitude)
         displaced = body.com[0] - jnp.einsum("tij,tj->ti", turned, body.com)
-        trajectory = Trajectory(
+        return Trajectory(
             time=times,
             position=jnp.asarray(state.position),
             velocity=jnp.asarray(state.velocity),
@@ -259,7 +255,6 @@ class Plan:
             rate_change=moment.rate_change,
             acceleration=moment.acceleration,
         )
-        return trajectory, grid.stage.unknown[0, :, :, : 10 * len(self.model.priors)]
 
 
 def _turning(quaternion: Array, slope: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
@@ -14,11 +14,12 @@ from bayesid.arrays import Floats
 from bayesid.inertia import mass_com_inertia
 from bayesid.inference.identification import BODY_QUANTITIES
 from bayesid.model import Manoeuvre, Model
-from bayesid.motion import MeasuredMotion, Motion
+from bayesid.motion import MeasuredMotion, Motion, sample_joints
 from bayesid.posterior import Posterior
-from bayesid.simulation import simulate_manoeuvre
+from bayesid.recording import Recording
+from bayesid.simulation import blank_channels, simulate_recordings
 
-__all__ = ["Encoder", "Predicted", "planned_manoeuvre", "predict_posterior"]
+__all__ = ["Encoder", "Predicted", "describe", "planned_manoeuvre", "planned_posterior", "predict"]
 
 Encoder = Mapping[int, float | Mapping[str, float | None] | None]
 """Noise of joint position (0), velocity (1) and acceleration (2), for all joints or by joint."""
@@ -75,7 +76,7 @@ def planned_manoeuvre(
     attitude: Floats | None = None,
     **start: float,
 ) -> Manoeuvre:
-    """Return a manoeuvre as it would be recorded, without noise, with the encoders' noise declared.
+    """Return a manoeuvre with joints as they would be recorded without noise, and blanks for the sensors.
 
     Parameters
     ----------
@@ -87,15 +88,28 @@ def planned_manoeuvre(
     **start
         ``attitude_sigma`` and ``latitude`` of `Manoeuvre`.
     """
-    recording = simulate_manoeuvre(model, motion, time, name=name, attitude=attitude)
+    recording = Recording(
+        name, None, time, {**sample_joints(motion, model.robot, time), **blank_channels(model.sensors, len(time))}
+    )
     measured = MeasuredMotion.from_recording(recording, model.robot, sigma=encoder)
     begin = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude)
     return Manoeuvre(recording, measured, begin, **start)
 
 
-def predict_posterior(model: Model, manoeuvres: Sequence[Manoeuvre]) -> Predicted:
-    """Return the posterior that manoeuvres lead to if the prior's centre is the truth."""
-    posterior = Posterior(model, manoeuvres)
+def planned_posterior(model: Model, manoeuvres: Sequence[Manoeuvre], like: Posterior | None = None) -> Posterior:
+    """Return the posterior of planned manoeuvres if the sensors read what the prior's centre predicts.
+
+    Compiled functions are shared with those of ``like``, where they fit.
+    """
+    blank = Posterior(model, manoeuvres, like=like)
+    recordings = simulate_recordings(blank, z=np.zeros(blank.size))
+    return blank.with_manoeuvres(
+        [replace(manoeuvre, recording=own) for manoeuvre, own in zip(manoeuvres, recordings, strict=True)]
+    )
+
+
+def predict(posterior: Posterior) -> Predicted:
+    """Return what manoeuvres lead to if the prior's centre is the truth."""
     z = np.zeros(posterior.size)
     jacobian = posterior.at(z).jacobian(z)
     return describe(posterior, z, np.linalg.inv(jacobian.T @ jacobian))

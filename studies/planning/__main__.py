@@ -1,0 +1,5 @@
+"""Write the report: ``python -m studies.planning --full``."""
+
+from studies.planning import main
+
+main()

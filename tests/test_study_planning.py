@@ -1,0 +1,30 @@
+"""The planning study: a plan with the true base hits its target in the independent simulator, a wrong one misses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesid.robot import Robot
+from studies.planning.analysis import flight_of, plan, predictor_of
+from studies.planning.world import BASE, START, Guess, Swing, fly, model_of
+
+DURATION = 20.0
+REACHED = START + np.array([0.4, -0.3, 0.2, 0.1, -0.2, 0.2])
+
+
+def test_a_plan_hits_with_the_true_base_and_misses_with_a_wrong_one():
+    target = fly(Swing(START, REACHED, DURATION), DURATION).tip
+    truth = Robot.shipped("ets7").link(BASE).inertial
+    model = model_of(Guess("truth", truth, 0.01))
+    predictor = predictor_of(model, Swing(START, START, DURATION))
+    goal = plan(predictor, model, target, DURATION)
+    np.testing.assert_allclose(goal, REACHED, atol=1e-6)
+    flight = flight_of(goal, target, DURATION)
+    assert flight.miss < 1e-6
+    # the same path under another base: along the first coordinate, mass and inertia grow by e^0.4
+    wrong = predictor.centre.copy()
+    wrong[0] = 20.0
+    _, tip = predictor_of(model, Swing(START, goal, DURATION), predictor).courses(wrong[None])
+    assert np.linalg.norm(tip.position[0, -1] - target[0]) > 0.005
+    assert predictor.posterior.values(wrong).inertial[0] == pytest.approx(truth.mass * np.exp(0.4))
