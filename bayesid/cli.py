@@ -1,4 +1,4 @@
-"""The command line: ``bayesid check|identify|diagnose|simulate|predict STUDY.toml --output DIR``, ``bayesid demo``."""
+"""The command line: ``bayesid check|identify|diagnose|simulate|predict|loop STUDY.toml --output DIR``, and ``demo``."""
 
 from __future__ import annotations
 
@@ -113,6 +113,35 @@ def demo(output: Output, seed: Seed = 0, samples: Samples = 4000.0) -> None:
     with _reported(), _progress() as show:
         for line in run_demo(output, seed=seed, effective_samples=samples, progress=show):
             console.print(line)
+
+
+@app.command()
+def loop(
+    study: StudyFile,
+    output: Output,
+    seed: Seed = 0,
+    samples: Samples = 2000.0,
+    spacecraft: Annotated[
+        Path | None, typer.Option(help="Python file that executes plans; left out, the recordings are put into DIR.")
+    ] = None,
+    wanted: Annotated[float, typer.Option(help="Relative sd at which to stop, of mass and principal moments.")] = 0.01,
+    at_most: Annotated[int, typer.Option(help="Manoeuvres.")] = 5,
+) -> None:
+    """Plan a manoeuvre, have it executed, identify, and plan again from the posterior: loop.json."""
+    from bayesid.loop_command import run_loop
+
+    with _reported(), _progress() as show:
+        for line in run_loop(
+            study,
+            output,
+            spacecraft=spacecraft,
+            wanted=wanted,
+            at_most=at_most,
+            seed=seed,
+            effective_samples=samples,
+            progress=show,
+        ):
+            console.print(line, soft_wrap=True)  # paths to be copied
 
 
 @contextmanager

@@ -52,6 +52,7 @@ def simulate_manoeuvre(
     *,
     name: str = "manoeuvre",
     attitude: Floats | None = None,
+    latitude: float = 0.0,
     rng: np.random.Generator | None = None,
     encoder_sigma: float = 0.0,
 ) -> Recording:
@@ -64,6 +65,8 @@ def simulate_manoeuvre(
         Sample times of all sensors and joints [s].
     attitude : (4,) array, optional
         Base to orbit axes at time 0.
+    latitude : float
+        Argument of latitude at time 0 [rad].
     rng : numpy.random.Generator, optional
         For the noise of sensors and encoders.
     encoder_sigma : float
@@ -72,7 +75,7 @@ def simulate_manoeuvre(
     joints = sample_joints(motion, model.robot, time)
     planned = Recording(name, None, time, {**joints, **blank_channels(model.sensors, len(time))})
     start = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude, dtype=float)
-    posterior = Posterior(model, [Manoeuvre(planned, motion, start)])
+    posterior = Posterior(model, [Manoeuvre(planned, motion, start, latitude=latitude)])
     recording = simulate_recordings(posterior, rng, np.zeros(posterior.size))[0]
     if rng is None or encoder_sigma == 0.0:
         return recording

@@ -2,6 +2,7 @@
 
 Data flows one way: `parameterisation` -> `planned` (what the robot does, what its sensors tell) -> `criteria` and
 `limits` -> `problem` (compiled, with gradients) -> `optimise` -> `design` (with the posterior each leads to).
+`loop` plans, lets a `spacecraft` execute, identifies and plans again from the posterior.
 """
 
 from bayesid.design.criteria import (
@@ -17,12 +18,15 @@ from bayesid.design.criteria import (
 )
 from bayesid.design.design import Design, design, evaluate
 from bayesid.design.limits import Limit, Limits
+from bayesid.design.loop import Loop, NotFlown
 from bayesid.design.optimise import Found, Search, optimise
 from bayesid.design.parameterisation import BSplines, Fourier, Linear, PaperExcitation, Parameterisation
 from bayesid.design.planned import Plan, Tip
 from bayesid.design.predicted import Predicted, planned_manoeuvre, planned_posterior, predict
 from bayesid.design.problem import Problem
+from bayesid.design.spacecraft import PlannedMotion, SimulatedSpacecraft, Spacecraft
 from bayesid.design.store import Store
+from bayesid.design.update import Laplace, Sampled, worst_relative_sd
 
 __all__ = [
     "AOptimal",
@@ -35,18 +39,25 @@ __all__ = [
     "Found",
     "Fourier",
     "InformationGain",
+    "Laplace",
     "Limit",
     "Limits",
     "Linear",
+    "Loop",
+    "NotFlown",
     "Paper26",
     "Paper26Intended",
     "PaperExcitation",
     "Parameterisation",
     "Plan",
+    "PlannedMotion",
     "Predicted",
     "Problem",
+    "Sampled",
     "Search",
     "Separation",
+    "SimulatedSpacecraft",
+    "Spacecraft",
     "Store",
     "Tip",
     "design",
@@ -55,4 +66,5 @@ __all__ = [
     "planned_manoeuvre",
     "planned_posterior",
     "predict",
+    "worst_relative_sd",
 ]

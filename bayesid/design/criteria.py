@@ -11,7 +11,6 @@ from itertools import combinations
 from typing import ClassVar, Protocol
 
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 
 from bayesid.design.planned import Outcome, Plan
@@ -43,7 +42,11 @@ class Criterion(Protocol):
     """
 
     name: ClassVar[str]
-    draws: int
+
+    @property
+    def draws(self) -> int:
+        """Points of the prior to average over."""
+        ...
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return a number to be minimised, differentiable by JAX."""
@@ -55,9 +58,16 @@ def covariance(plan: Plan, outcome: Outcome) -> Array:
 
     These are relative: a mass is known to twice the coordinate's standard deviation.
     """
+    return _of_bodies(plan, outcome.information + _prior(plan, outcome))
+
+
+def _prior(plan: Plan, outcome: Outcome) -> Array:
+    return jnp.eye(plan.unknowns.size) if outcome.prior is None else outcome.prior
+
+
+def _of_bodies(plan: Plan, precision: Array) -> Array:
     own, count = jnp.asarray(plan.bodies(), dtype=int), len(plan.unknowns.widths)
-    total = outcome.information + jnp.eye(plan.unknowns.size)
-    every = plan.unknowns.widths @ _inverse(total)[:count, :count] @ plan.unknowns.widths.T
+    every = plan.unknowns.widths @ _inverse(precision)[:count, :count] @ plan.unknowns.widths.T
     return every[jnp.ix_(own, own)]
 
 
@@ -165,8 +175,7 @@ class InformationGain:
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus the gain at one draw."""
-        own = np.ix_(plan.bodies(), plan.bodies())
-        prior = np.linalg.slogdet((plan.unknowns.widths @ plan.unknowns.widths.T)[own])[1]
+        prior = jnp.linalg.slogdet(_of_bodies(plan, _prior(plan, outcome)))[1]
         return 0.5 * (jnp.linalg.slogdet(covariance(plan, outcome))[1] - prior)
 
 
@@ -197,8 +206,8 @@ class Separation:
         """Return the expected lambda (1 - rho^2) of each rival, shape (rivals,)."""
         groups = [jnp.asarray(self._coordinates(plan, label), dtype=int) for label in self.rivals]
         # a rival may have any size: its amplitude has no prior here
-        prior = jnp.ones(plan.unknowns.size).at[jnp.concatenate(groups)].set(1e-9)
-        total = outcome.information + jnp.diag(prior)
+        free = jnp.ones(plan.unknowns.size).at[jnp.concatenate(groups)].set(0.0)
+        total = outcome.information + _prior(plan, outcome) * jnp.outer(free, free) + 1e-9 * jnp.diag(1.0 - free)
         values = []
         for group in groups:
             rest = jnp.setdiff1d(jnp.arange(plan.unknowns.size), group, size=plan.unknowns.size - len(group))

@@ -254,11 +254,8 @@ def risks(problem: Problem, parameters: Floats, rng: np.random.Generator, draws:
 
     The base starts at rest: the uncertainty of the initial rate, which the manoeuvre does not cause, is left out.
     """
-    bodies = 10 * len(problem.plan.model.priors)
-    points = np.zeros((draws, problem.plan.unknowns.size))
-    points[:, :bodies] = rng.normal(size=(draws, bodies))
     limits = [limit for limit in problem.applied if limit.depends]
-    largest = problem.largest(parameters, points, limits)
+    largest = problem.largest(parameters, problem.draws(draws, rng), limits)
     return [
         Risk(limit.name, limit.bound, float(np.quantile(largest[:, index], CERTAIN)), limit.unit)
         for index, limit in enumerate(limits)

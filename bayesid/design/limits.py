@@ -105,9 +105,9 @@ class Limits:
         return float("inf") if self.quiet_band is None else 0.25 / self.quiet_band[1]
 
 
-def smooth_largest(limit: Limit, trajectory: Trajectory) -> Array:
-    """Largest value over its bound, smooth and never below the true one: at most one is demanded."""
-    values = (limit.quantity(trajectory) / limit.bound).ravel()
+def smooth_largest(limit: Limit, trajectory: Trajectory, bound: Array | float) -> Array:
+    """Largest value over a bound, smooth and never below the true one: at most one is demanded."""
+    values = (limit.quantity(trajectory) / bound).ravel()
     top = jnp.max(values)
     return top + jnp.log(jnp.sum(jnp.exp(SHARPNESS * (values - top)))) / SHARPNESS
 

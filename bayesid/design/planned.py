@@ -57,14 +57,17 @@ class Outcome(NamedTuple):
     ----------
     trajectory : Trajectory
     information : (n, n) array
-        Fisher information of the unknowns' coordinates, without their standard-normal prior.
+        Fisher information of the unknowns' coordinates, without their prior.
     regressor : (6 T, b) array
         Force balance of the base against the bodies' coordinates; torques are over the radius of gyration [N].
+    prior : (n, n) array, optional
+        Precision of the unknowns' coordinates before the manoeuvre; one where left out.
     """
 
     trajectory: Trajectory
     information: Array
     regressor: Array
+    prior: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -181,8 +184,8 @@ class Plan:
         """Return derivatives of what the sensors read in sigmas of a sample, (T, 3 sensors, n)."""
         return self._judged(parameters, z)[1]
 
-    def outcome(self, parameters: Array, z: Array) -> Outcome:
-        """Return what criteria judge."""
+    def outcome(self, parameters: Array, z: Array, prior: Array | None = None) -> Outcome:
+        """Return what criteria judge; ``prior`` is the precision (n, n) of the coordinates, one where left out."""
         grid, slope, stage = self._judged(parameters, z)
         flat = slope.reshape(-1, slope.shape[-1])
         trajectory = self._trajectory(parameters, stage)
@@ -192,7 +195,7 @@ class Plan:
         wrench = balance_regressor(tables, trajectory.rate, trajectory.rate_change, trajectory.acceleration)
         wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / self._gyration)])[:, None]
         regressor = (wrench @ per_coordinate).reshape(6 * len(wrench), len(bodies))
-        return Outcome(trajectory, flat.T @ flat, regressor)
+        return Outcome(trajectory, flat.T @ flat, regressor, prior)
 
     def _judged(self, parameters: Array, z: Array) -> tuple[Grid, Array, Moment]:
         """Return the grid, the whitened derivatives of what the sensors read and the motion, from one simulation."""

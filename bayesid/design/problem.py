@@ -15,14 +15,18 @@ from bayesid.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.limits import ACTIVE, Limit, Limits, smooth_largest
 from bayesid.design.planned import Plan, Trajectory
+from bayesid.errors import InputError
 
-__all__ = ["FINER", "Problem", "Reached"]
+__all__ = ["FINER", "Known", "Problem", "Reached"]
 
 QUICKLY = {"xla_llvm_disable_expensive_passes": True}
 """Of XLA: compiles a third faster, and what it compiles is as fast."""
 
 FINER = 8
 """How much finer than the optimiser's grid the limits of a result are checked."""
+
+_SHARED = ("_cost", "_fractions", "_fine_trajectory")
+"""Compiled functions that neither bounds nor what is known enter."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,21 @@ class Reached:
 
 
 @dataclass(frozen=True)
+class Known:
+    """What earlier manoeuvres told: a normal distribution of the unknowns' coordinates.
+
+    Parameters
+    ----------
+    centre : (n,) array
+    precision : (n, n) array
+        Inverse of the covariance.
+    """
+
+    centre: Floats
+    precision: Floats
+
+
+@dataclass(frozen=True)
 class Problem:
     """A family of manoeuvres to choose from.
 
@@ -55,11 +74,14 @@ class Problem:
     limits : Limits
     criteria : sequence of Criterion
         All that will be asked for: they share one compiled simulation.
+    known : Known, optional
+        Takes the place of the prior of the plan's model.
     """
 
     plan: Plan
     limits: Limits
     criteria: tuple[Criterion, ...]
+    known: Known | None = None
 
     @cached_property
     def applied(self) -> tuple[Limit, ...]:
@@ -67,14 +89,47 @@ class Problem:
         return self.limits.of(self.plan.model.robot)
 
     @cached_property
+    def bounds(self) -> Floats:
+        """Bound of every limit, shape (m,)."""
+        return np.array([limit.bound for limit in self.applied])
+
+    def with_limits(self, limits: Limits) -> Problem:
+        """Return the problem with other bounds of the same limits, without compiling anything anew."""
+        new = replace(self, limits=limits)
+        if [limit.name for limit in new.applied] != [limit.name for limit in self.applied]:
+            raise InputError("other limits apply than before", place="limits", remedy="Change bounds only")
+        return self._sharing(new)
+
+    def knowing(self, known: Known) -> Problem:
+        """Return the problem after earlier manoeuvres, without compiling anything anew."""
+        return self._sharing(replace(self, known=known))
+
+    def _sharing(self, other: Problem) -> Problem:
+        other.__dict__.update({key: getattr(self, key) for key in _SHARED})
+        return other
+
+    @cached_property
     def centre(self) -> Floats:
         """The prior's centre, in the unknowns' coordinates."""
-        return np.zeros(self.plan.unknowns.size)
+        return np.zeros(self.plan.unknowns.size) if self.known is None else self.known.centre
+
+    @cached_property
+    def precision(self) -> Floats:
+        """The prior's precision, in the unknowns' coordinates."""
+        return np.eye(self.plan.unknowns.size) if self.known is None else self.known.precision
+
+    def draws(self, count: int, rng: np.random.Generator) -> Floats:
+        """Draw the bodies from their prior, everything else at its centre, shape (count, n)."""
+        bodies = 10 * len(self.plan.model.priors)
+        points = np.tile(self.centre, (count, 1))
+        covariance = np.linalg.inv(self.precision)[:bodies, :bodies]
+        points[:, :bodies] += rng.normal(size=(count, bodies)) @ np.linalg.cholesky(covariance).T
+        return points
 
     def cost(self, criterion: Criterion, parameters: Floats, points: Sequence[Floats] = ()) -> tuple[float, Floats]:
         """Return a criterion and its gradient, averaged over points of the unknowns (the prior's centre if none)."""
         index = self.criteria.index(criterion)
-        pairs = [self._cost(parameters, z, index) for z in (points or [self.centre])]
+        pairs = [self._cost(parameters, z, index, self.precision) for z in (points or [self.centre])]
         return float(np.mean([pair[0] for pair in pairs])), np.mean([np.asarray(pair[1]) for pair in pairs], axis=0)
 
     def costs(self, parameters: Floats) -> dict[str, float]:
@@ -83,7 +138,7 @@ class Problem:
 
     def fractions(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return how much of every limit is used, shape (m,), smooth and never too small; and its Jacobian (m, n)."""
-        value, slope = self._fractions(parameters, self.centre)
+        value, slope = self._fractions(parameters, self.centre, self.bounds)
         return np.asarray(value), np.asarray(slope)
 
     def reached(self, parameters: Floats) -> list[Reached]:
@@ -107,17 +162,14 @@ class Problem:
 
     def points(self, criterion: Criterion, rng: np.random.Generator) -> list[Floats]:
         """Draw points of the prior of all bodies to average a criterion over; none if it looks at the centre alone."""
-        bodies = 10 * len(self.plan.model.priors)
-        points = np.zeros((criterion.draws, self.plan.unknowns.size))
-        points[:, :bodies] = rng.normal(size=(criterion.draws, bodies))
-        return list(points)
+        return list(self.draws(criterion.draws, rng))
 
     # ---- compiled ----
 
     @cached_property
     def _cost(self):  # type: ignore[no-untyped-def]
-        def cost(parameters: Array, z: Array, index: Array) -> Array:
-            outcome = self.plan.outcome(parameters, z)
+        def cost(parameters: Array, z: Array, index: Array, prior: Array) -> Array:
+            outcome = self.plan.outcome(parameters, z, prior)
             branches = [lambda o, c=criterion: c.cost(self.plan, o) for criterion in self.criteria]
             return jax.lax.switch(index, branches, outcome)
 
@@ -125,13 +177,14 @@ class Problem:
 
     @cached_property
     def _fractions(self):  # type: ignore[no-untyped-def]
-        def fractions(parameters: Array, z: Array) -> tuple[Array, Array]:
+        def fractions(parameters: Array, z: Array, bounds: Array) -> tuple[Array, Array]:
             trajectory = self.plan.trajectory(parameters, z)
-            values = jnp.stack([smooth_largest(limit, trajectory) for limit in self.applied])
+            pairs = zip(self.applied, bounds, strict=True)
+            values = jnp.stack([smooth_largest(limit, trajectory, bound) for limit, bound in pairs])
             return values, values
 
-        def both(parameters: Array, z: Array) -> tuple[Array, Array]:
-            slope, value = jax.jacfwd(fractions, has_aux=True)(parameters, z)
+        def both(parameters: Array, z: Array, bounds: Array) -> tuple[Array, Array]:
+            slope, value = jax.jacfwd(fractions, has_aux=True)(parameters, z, bounds)
             return value, slope
 
         return jax.jit(both, compiler_options=QUICKLY)

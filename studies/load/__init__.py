@@ -1,0 +1,61 @@
+"""Section 4.2 of the paper, identification of a load, beside what the paper printed; then with real sensors.
+
+``python -m studies.load --full`` writes ``reports/load.pdf``.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bayesid.design import Search
+from studies.load.noise_free import Iteration, iterate
+from studies.load.report import write
+from studies.load.sampled import Flight, fly_all
+
+__all__ = ["Result", "main", "run"]
+
+
+@dataclass(frozen=True)
+class Result:
+    """Numbers of the study.
+
+    Attributes
+    ----------
+    iterations : list of Iteration
+        Without noise.
+    flights : mapping of str to Flight
+        With noise, by how the manoeuvres were planned; full study only.
+    """
+
+    iterations: list[Iteration]
+    flights: Mapping[str, Flight]
+
+
+def run(*, full: bool = False, seed: int = 0) -> Result:
+    """Run the study.
+
+    Parameters
+    ----------
+    full : bool
+        Search longer, and add the loops with noise, which take some ten minutes.
+    seed : int
+        Every random number follows from it.
+    """
+    search = Search(starts=2, iterations=60) if full else Search(starts=1, iterations=10)
+    iterations = iterate(seed=seed, search=search)
+    return Result(iterations, fly_all(seed=seed, search=search) if full else {})
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the study and write its report."""
+    parser = argparse.ArgumentParser(description="Identify a load on the arm of ETS-VII.")
+    parser.add_argument("--full", action="store_true", help="search longer, and fly with noise")
+    parser.add_argument("--output", type=Path, default=Path("reports/load.pdf"))
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args(arguments)
+    options.output.parent.mkdir(parents=True, exist_ok=True)
+    result = run(full=options.full, seed=options.seed)
+    write(result.iterations, result.flights, options.output)

@@ -1,0 +1,5 @@
+"""``python -m studies.load``."""
+
+from studies.load import main
+
+main()

@@ -1,0 +1,99 @@
+"""Section 4.2 without noise and without prior: plan, execute, identify, twice, from the paper's initial guess."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid.design import Criterion, Paper26Intended, PlannedMotion, Search, optimise
+from bayesid.design.problem import Known
+from bayesid.design.spacecraft import plan_recording
+from bayesid.inertia import mass_com_inertia
+from bayesid.inference.optimum import fit
+from bayesid.model import Manoeuvre
+from bayesid.posterior import Posterior
+from bayesid.recording import Recording
+from studies.load import paper
+from studies.load.setting import DURATION, INTERVAL, MuJoCoSpacecraft, excitation, model, problem
+
+__all__ = ["Iteration", "iterate"]
+
+Floats = NDArray[np.floating]
+
+STEP = 0.5
+"""Integration step of the fit [s]."""
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One plan, execution and identification.
+
+    Attributes
+    ----------
+    parameters : (6,) array
+        q1 and q2 of the first three joints [rad].
+    recording : Recording
+    estimate : (10,) array
+        In the order of `paper.TRUTH`.
+    misfit : float
+        Root mean square residual over 1e-5 rad/s and 1e-5 m/s2.
+    excursion : (6,) array
+        Largest displacement [m] and rotation [rad] of the base that was planned, by axis.
+    """
+
+    parameters: Floats
+    recording: Recording
+    estimate: Floats
+    misfit: float
+    excursion: Floats
+
+    @property
+    def errors(self) -> Floats:
+        """Of mass, centre of mass and inertia; relative, products of inertia to the true moments, shape (10,)."""
+        return errors(self.estimate)
+
+    @property
+    def worst(self) -> float:
+        """Largest of the errors."""
+        return float(np.abs(self.errors).max())
+
+
+def errors(estimate: Floats) -> Floats:
+    """Return errors relative to the truth; of products of inertia relative to the moments, shape (10,)."""
+    return (estimate - paper.TRUTH) / np.where(paper.TRUTH == 0.0, paper.TRUTH[4], paper.TRUTH)
+
+
+def iterate(
+    criterion: Criterion = Paper26Intended(),  # noqa: B008  (immutable)
+    *,
+    seed: int = 0,
+    search: Search = Search(starts=2, iterations=60),  # noqa: B008  (immutable)
+    count: int = 2,
+) -> list[Iteration]:
+    """Plan by a criterion of the paper, fly with MuJoCo, fit by least squares; and again from what was found."""
+    known, spacecraft = model(1.0), MuJoCoSpacecraft()
+    present = problem(known, excitation(), criterion)
+    z: Floats = np.zeros(10)
+    found = []
+    time = np.arange(0.0, DURATION + 1e-9, INTERVAL)
+    for number, stream in enumerate(np.random.SeedSequence(seed).spawn(count), start=1):
+        best = optimise(present, criterion, np.random.default_rng(stream), search).parameters
+        plan = plan_recording(present.plan.family.motion(best), known.robot, time, f"iteration {number}")
+        recording = spacecraft.execute(plan)
+        motion = PlannedMotion(plan, [joint.name for joint in known.robot.joints])
+        posterior = Posterior(known, [Manoeuvre(recording, motion)], step=STEP, flat_prior=True)
+        optimum = fit(posterior, z)
+        z = optimum.z
+        found.append(
+            Iteration(
+                parameters=best,
+                recording=recording,
+                estimate=mass_com_inertia(np.asarray(posterior.values(z).inertial)),
+                misfit=float(np.sqrt(optimum.chi2 / posterior.samples)),
+                excursion=np.abs(present.trajectory(best).excursion).max(axis=0),
+            )
+        )
+        present = present.knowing(Known(z, np.eye(10)))
+    return found

@@ -1,0 +1,67 @@
+"""What the paper prints on problem 2 (section 4.2), and whether a rigid body can have these values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid.inertia import InertialParameters
+
+__all__ = ["GUESS", "RADIUS", "RESULTS", "TRUTH", "Reading", "body", "readings"]
+
+Floats = NDArray[np.floating]
+
+# mass, centre of mass, inertia xx yy zz xy xz yz: the order of `bayesid.inference.identification.BODY_QUANTITIES`
+TRUTH = np.array([370.0, 0.33, 0.50, 1.04, 700.0, 700.0, 700.0, 0.0, 0.0, 0.0])
+GUESS = np.array([10.0, 0.1, 0.1, 0.1, 10.0, 10.0, 10.0, 1e-4, 1e-4, 1e-4])
+RESULTS = (
+    np.array([377.90, 0.30, 0.51, 1.00, 721.6, 743.2, 710.9, 0.0, 0.0, 0.0]),
+    np.array([370.12, 0.33, 0.50, 1.04, 700.3, 700.7, 700.2, 0.0, 0.0, 0.0]),
+)
+"""After the first and the second iteration."""
+
+RADIUS = 6.916e6
+"""Of the orbit [m]."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The printed inertia taken about one point.
+
+    Attributes
+    ----------
+    moments : (3,) array
+        Principal moments about the centre of mass, ascending [kg m2].
+    """
+
+    about: str
+    moments: Floats
+
+    @property
+    def physical(self) -> bool:
+        """Whether a rigid body can have them: none negative, and none above the sum of the others."""
+        return bool(self.moments[0] >= 0.0 and self.moments[0] + self.moments[1] >= self.moments[2] * (1.0 - 1e-12))
+
+
+def tensor(quantities: Floats) -> Floats:
+    """Return the printed inertia as a matrix."""
+    xx, yy, zz, xy, xz, yz = quantities[4:]
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def readings(quantities: Floats) -> tuple[Reading, Reading]:
+    """Return both readings of ten printed quantities: about the centre of mass, and about the link's origin."""
+    mass, com = quantities[0], quantities[1:4]
+    steiner = mass * (com @ com * np.eye(3) - np.outer(com, com))
+    printed = tensor(quantities)
+    return (
+        Reading("the load's centre of mass", np.linalg.eigvalsh(printed)),
+        Reading("the link's origin", np.linalg.eigvalsh(printed - steiner)),
+    )
+
+
+def body(quantities: Floats) -> InertialParameters:
+    """Return the body of ten quantities, the inertia taken about the centre of mass."""
+    return InertialParameters(quantities[0], quantities[1:4], tensor(quantities))
