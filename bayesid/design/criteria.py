@@ -38,12 +38,14 @@ class Criterion(Protocol):
     ----------
     name : str
         As in design.json.
-    draws : int
-        Points of the prior to average over; 0 for its centre alone.
     """
 
     name: ClassVar[str]
-    draws: int
+
+    @property
+    def draws(self) -> int:
+        """Points of the prior to average over; 0 for its centre alone."""
+        ...
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return a number to be minimised, differentiable by JAX."""
