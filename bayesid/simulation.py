@@ -54,6 +54,7 @@ def simulate_manoeuvre(
     attitude: Floats | None = None,
     rng: np.random.Generator | None = None,
     encoder_sigma: float = 0.0,
+    like: Posterior | None = None,
 ) -> Recording:
     """Simulate a planned manoeuvre with the bodies of a model at their prior's centre.
 
@@ -68,11 +69,13 @@ def simulate_manoeuvre(
         For the noise of sensors and encoders.
     encoder_sigma : float
         Noise of the recorded joint positions [rad or m].
+    like : Posterior, optional
+        Of the same model; its compiled functions are shared.
     """
     joints = sample_joints(motion, model.robot, time)
     planned = Recording(name, None, time, {**joints, **blank_channels(model.sensors, len(time))})
     start = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude, dtype=float)
-    posterior = Posterior(model, [Manoeuvre(planned, motion, start)])
+    posterior = Posterior(model, [Manoeuvre(planned, motion, start)], like=like)
     recording = simulate_recordings(posterior, rng, np.zeros(posterior.size))[0]
     if rng is None or encoder_sigma == 0.0:
         return recording

@@ -73,6 +73,7 @@ def planned_manoeuvre(
     name: str,
     encoder: Encoder,
     attitude: Floats | None = None,
+    like: Posterior | None = None,
     **start: float,
 ) -> Manoeuvre:
     """Return a manoeuvre as it would be recorded, without noise, with the encoders' noise declared.
@@ -84,18 +85,23 @@ def planned_manoeuvre(
     encoder : Encoder
     attitude : (4,) array, optional
         Base to orbit axes at time 0.
+    like : Posterior, optional
+        Of the same model; its compiled functions are shared.
     **start
         ``attitude_sigma`` and ``latitude`` of `Manoeuvre`.
     """
-    recording = simulate_manoeuvre(model, motion, time, name=name, attitude=attitude)
+    recording = simulate_manoeuvre(model, motion, time, name=name, attitude=attitude, like=like)
     measured = MeasuredMotion.from_recording(recording, model.robot, sigma=encoder)
     begin = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude)
     return Manoeuvre(recording, measured, begin, **start)
 
 
-def predict_posterior(model: Model, manoeuvres: Sequence[Manoeuvre]) -> Predicted:
-    """Return the posterior that manoeuvres lead to if the prior's centre is the truth."""
-    posterior = Posterior(model, manoeuvres)
+def predict_posterior(model: Model, manoeuvres: Sequence[Manoeuvre], like: Posterior | None = None) -> Predicted:
+    """Return the posterior that manoeuvres lead to if the prior's centre is the truth.
+
+    Compiled functions of a posterior of the same model, ``like``, are shared.
+    """
+    posterior = Posterior(model, manoeuvres, like=like)
     z = np.zeros(posterior.size)
     jacobian = posterior.at(z).jacobian(z)
     return describe(posterior, z, np.linalg.inv(jacobian.T @ jacobian))

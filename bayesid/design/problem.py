@@ -15,6 +15,11 @@ from bayesid.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.limits import ACTIVE, Limit, Limits, smooth_largest
 from bayesid.design.planned import Plan, Trajectory
+from bayesid.model import Manoeuvre
+from bayesid.motion import sample_joints
+from bayesid.posterior import Posterior
+from bayesid.recording import Recording
+from bayesid.simulation import blank_channels
 
 __all__ = ["FINER", "Problem", "Reached"]
 
@@ -68,6 +73,15 @@ class Problem:
         """The prior's centre, in the unknowns' coordinates."""
         return np.zeros(self.plan.unknowns.size)
 
+    @cached_property
+    def resting(self) -> Posterior:
+        """Return the posterior of the centre of the family, whose compiled functions serve those of all manoeuvres."""
+        plan, motion = self.plan, self.plan.family.motion(self.plan.family.centre)
+        time = np.linspace(0.0, plan.family.duration, len(plan.samples))
+        channels = sample_joints(motion, plan.model.robot, time) | blank_channels(plan.model.sensors, len(time))
+        start = Manoeuvre(Recording("rest", None, time, channels), motion, plan.attitude, plan.attitude_sigma)
+        return Posterior(plan.model, [start])
+
     def cost(self, criterion: Criterion, parameters: Floats, points: Sequence[Floats] = ()) -> tuple[float, Floats]:
         """Return a criterion and its gradient, averaged over points of the unknowns (the prior's centre if none)."""
         index = self.criteria.index(criterion)
@@ -76,8 +90,7 @@ class Problem:
 
     def costs(self, parameters: Floats) -> dict[str, float]:
         """Return every criterion at the prior's centre."""
-        values = self._costs(parameters, self.centre)
-        return {criterion.name: float(value) for criterion, value in zip(self.criteria, values, strict=True)}
+        return {criterion.name: self.cost(criterion, parameters)[0] for criterion in self.criteria}
 
     def fractions(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return how much of every limit is used, shape (m,), smooth and never too small; and its Jacobian (m, n)."""
@@ -86,16 +99,16 @@ class Problem:
 
     def reached(self, parameters: Floats) -> list[Reached]:
         """Check every limit on a grid `FINER` times finer than the optimiser's."""
-        largest = np.asarray(self._finely(parameters, self.centre))
+        largest = np.asarray(self._finely(parameters, self.centre)[1])
         return self._reached(largest)
 
     def reached_at(self, parameters: Floats, points: Floats) -> Floats:
         """Largest value of every limit for many points of the unknowns, shape (k, n) -> (k, m)."""
-        return np.stack([np.asarray(self._finely(parameters, z)) for z in points])
+        return np.stack([np.asarray(self._finely(parameters, z)[1]) for z in points])
 
     def trajectory(self, parameters: Floats, z: Floats | None = None) -> Trajectory:
         """Return what the robot does, on the fine grid."""
-        return jax.tree.map(np.asarray, self._fine_trajectory(parameters, self.centre if z is None else z))
+        return jax.tree.map(np.asarray, self._finely(parameters, self.centre if z is None else z)[0])
 
     def points(self, criterion: Criterion, rng: np.random.Generator) -> list[Floats]:
         """Draw points of the prior of all bodies to average a criterion over; none if it looks at the centre alone."""
@@ -122,14 +135,6 @@ class Problem:
         return jax.jit(jax.value_and_grad(cost))
 
     @cached_property
-    def _costs(self):  # type: ignore[no-untyped-def]
-        def costs(parameters: Array, z: Array) -> list[Array]:
-            outcome = self.plan.outcome(parameters, z)
-            return [criterion.cost(self.plan, outcome) for criterion in self.criteria]
-
-        return jax.jit(costs)
-
-    @cached_property
     def _fractions(self):  # type: ignore[no-untyped-def]
         def fractions(parameters: Array, z: Array) -> tuple[Array, Array]:
             trajectory = self.plan.trajectory(parameters, z)
@@ -143,15 +148,11 @@ class Problem:
         return jax.jit(both)
 
     @cached_property
-    def _fine_trajectory(self):  # type: ignore[no-untyped-def]
-        return jax.jit(replace(self.plan, step=self.plan.step / FINER).trajectory)
-
-    @cached_property
     def _finely(self):  # type: ignore[no-untyped-def]
         fine = replace(self.plan, step=self.plan.step / FINER)
 
-        def largest(parameters: Array, z: Array) -> Array:
+        def judged(parameters: Array, z: Array) -> tuple[Trajectory, Array]:
             trajectory = fine.trajectory(parameters, z)
-            return jnp.stack([limit.largest(trajectory) for limit in self.applied])
+            return trajectory, jnp.stack([limit.largest(trajectory) for limit in self.applied])
 
-        return jax.jit(largest)
+        return jax.jit(judged)
