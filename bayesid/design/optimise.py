@@ -196,16 +196,19 @@ class _Run:
 
 
 def _random_start(problem: Problem, rng: np.random.Generator) -> Floats:
-    """Draw parameters and shrink them towards the centre until the tightest limit is filled to a part."""
+    """Draw parameters and shrink them towards the centre until the tightest limit is filled to a part.
+
+    A limit that does not depend on the size, as a quiet band, may be broken in the end: rest would keep it, but is no
+    manoeuvre.
+    """
     family = problem.plan.family
     direction = family.scale * rng.normal(size=family.size)
-    size, feasible = 1.0, 0.0
+    size = 1.0
     for _ in range(12):
         if problem.fractions(family.centre + size * direction)[0].max() <= FILLED:
-            feasible = size
             break
         size *= 0.6
-    return family.centre + feasible * direction
+    return family.centre + size * direction
 
 
 def _repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) -> Floats:
@@ -227,7 +230,8 @@ def _repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) -
 
 def _describe(problem: Problem, fractions: Floats) -> str:
     parts = [
-        f"{limit.name} {fraction * limit.bound:.4g} {limit.unit} where {limit.bound:.4g} is allowed"
+        f"{limit.name} {fraction * limit.bound:.4g}{'' if limit.unit == '1' else f' {limit.unit}'} where "
+        f"{limit.bound:.4g} is allowed"
         for limit, fraction in zip(problem.applied, fractions, strict=True)
         if fraction > 1.0 + SLACK
     ]
