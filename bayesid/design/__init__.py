@@ -15,7 +15,7 @@ from bayesid.design.criteria import (
     Paper26Intended,
     Separation,
 )
-from bayesid.design.design import Design, design, evaluate
+from bayesid.design.design import Design, best_design, design, evaluate
 from bayesid.design.limits import Limit, Limits
 from bayesid.design.optimise import Found, Search, optimise
 from bayesid.design.parameterisation import BSplines, Fourier, Linear, PaperExcitation, Parameterisation
@@ -49,6 +49,7 @@ __all__ = [
     "Separation",
     "Store",
     "Tip",
+    "best_design",
     "design",
     "evaluate",
     "optimise",

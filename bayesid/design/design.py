@@ -16,9 +16,10 @@ from bayesid.design.planned import Trajectory
 from bayesid.design.predicted import Encoder, Predicted, planned_manoeuvre, predict_posterior
 from bayesid.design.problem import Problem, Reached
 from bayesid.design.store import Store
+from bayesid.errors import InputError
 from bayesid.model import Manoeuvre
 
-__all__ = ["Design", "Risk", "design", "evaluate", "sample_times"]
+__all__ = ["Design", "Risk", "best_design", "design", "evaluate", "sample_times"]
 
 CERTAIN = 0.99
 """Probability with which a limit must hold for a go."""
@@ -133,6 +134,19 @@ class Design:
         }
 
 
+def best_design(designs: Sequence[Design]) -> Design:
+    """Return the design that leads to the smallest posterior, of those that keep their limits."""
+    kept = [design for design in designs if all(reached.kept for reached in design.reached)]
+    if not kept:
+        broken = {item.name for design in designs for item in design.reached if not item.kept}
+        raise InputError(
+            f"no design keeps its limits along all of the manoeuvre: {', '.join(sorted(broken))}",
+            place="design.limits",
+            remedy="Loosen these limits, or allow more time",
+        )
+    return min(kept, key=lambda design: design.predicted.log_det)
+
+
 def sample_times(duration: float, interval: float) -> Floats:
     """Return the times of all samples of a manoeuvre [s]; the last one is its end if the interval divides it."""
     return interval * np.arange(int(np.floor(duration / interval + 1e-6)) + 1)
@@ -214,6 +228,7 @@ def evaluate(problem: Problem, name: str, found: Found, encoder: Encoder, rng: n
         name,
         encoder,
         plan.attitude,
+        problem.resting,
         attitude_sigma=plan.attitude_sigma,
         latitude=plan.latitude,
     )
@@ -225,7 +240,7 @@ def evaluate(problem: Problem, name: str, found: Found, encoder: Encoder, rng: n
         found=found,
         costs=problem.costs(parameters),
         manoeuvre=manoeuvre,
-        predicted=predict_posterior(plan.model, [manoeuvre]),
+        predicted=predict_posterior(plan.model, [manoeuvre], problem.resting),
         reached=problem.reached(parameters),
         risks=risks(problem, parameters, rng),
     )

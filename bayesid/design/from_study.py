@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -34,7 +36,7 @@ from bayesid.robot import Robot
 from bayesid.study import DesignSection, Study
 from bayesid.study.faults import suggest
 
-__all__ = ["encoders", "load_problem"]
+__all__ = ["encoders", "fingerprint", "load_problem"]
 
 SAMPLES = 120
 """Of a manoeuvre that are simulated, at most, each standing for as many as it takes."""
@@ -101,6 +103,16 @@ def encoders(study: Study, robot: Robot) -> Encoder:
             remedy="Give it in rad or m per sample",
         )
     return noise
+
+
+def fingerprint(study: Study) -> str:
+    """Return a hash of all files that define the problem of a study."""
+    files = [study.file, study.robot.urdf, study.unknowns.posterior, *study.model.plugins]
+    content = hashlib.sha256()
+    for file in files:
+        part = b"" if file is None else Path(file).read_bytes()
+        content.update(hashlib.sha256(part).digest())
+    return content.hexdigest()
 
 
 def _with_rivals(model: Model, section: DesignSection) -> Model:
