@@ -68,7 +68,7 @@ def _add_result(document: Document, designs: Sequence[Design], best: Design) -> 
 def _add_limits(document: Document, designs: Sequence[Design], best: Design) -> None:
     document.section("Limits")
     document.table(
-        ["limit", "unit", "limit", "largest", "used", ""],
+        ["quantity", "unit", "limit", "largest", "used", "state"],
         tables.limit_rows(best),
         f"Limits of {best.name} and the largest value along it, at the prior's centre. A joint's range is counted from "
         "its middle; rest is the joints' speed at both ends; a quiet band's value is the part of the power of the "
@@ -77,7 +77,7 @@ def _add_limits(document: Document, designs: Sequence[Design], best: Design) -> 
     )
     if rows := tables.risk_rows(designs):
         document.table(
-            ["manoeuvre", "limit", "unit", "limit", "99 % below", "go"],
+            ["manoeuvre", "quantity", "unit", "limit", "99 % below", "go"],
             rows,
             "Limits that depend on the inertial parameters, under the present uncertainty: the value that the largest "
             "along the manoeuvre stays below with 99 % probability.",

@@ -47,12 +47,11 @@ def summary(designs: Sequence[Design], best: Design) -> str:
     )
     if best is reference:
         return f"{text}. {_verdict(best)}"
-    ratio = reference.predicted.geometric_mean / best.predicted.geometric_mean
-    worst = reference.predicted.worst / best.predicted.worst
+    ratio = best.predicted.geometric_mean / reference.predicted.geometric_mean
+    worst = best.predicted.worst / reference.predicted.worst
     return (
-        f"{text}: against {reference.name}, the standard deviations are {_times(ratio)} smaller in the geometric "
-        f"mean, and {_times(worst)} {'smaller' if worst >= 1.0 else 'as large'} along the worst direction. "
-        f"{_verdict(best)}"
+        f"{text}: in the geometric mean its standard deviations are {ratio:.3g} times those of {reference.name}, and "
+        f"{worst:.3g} times along the worst direction. {_verdict(best)}"
     )
 
 
@@ -103,10 +102,6 @@ def _verdict(best: Design) -> str:
         "It keeps every limit for the robot as given, but under the present uncertainty not with 99 % probability: "
         f"{broken}. It is no go until the robot is known better or the limits leave more room."
     )
-
-
-def _times(ratio: float) -> str:
-    return f"{ratio:.3g} times"
 
 
 def _ordinal(number: int) -> str:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from bayesid.arrays import Floats
 from bayesid.design import Design
-from bayesid.report.figures.style import curve_style, styled, wide_figure
+from bayesid.report.figures.style import curve_style, decimal_scale, styled, wide_figure
 from bayesid.report.numbers import format_number, format_unit
 from bayesid.robot import Joint
 
@@ -122,19 +122,23 @@ def covariance_ellipses(
     angle = np.linspace(0.0, 2.0 * np.pi, 181)
     circle = ELLIPSE * np.stack([np.cos(angle), np.sin(angle)])
     for number, (axes, pair) in enumerate(zip(panels.flat, pairs, strict=False)):
-        widths = []
-        for index, design in enumerate(designs):
+        widths, outlines = [], []
+        for design in designs:
             chosen = [design.predicted.names.index(name) for name in pair]
             covariance = design.predicted.covariance[np.ix_(chosen, chosen)]
             values, vectors = np.linalg.eigh(covariance)
             outline = (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle
-            axes.plot(outline[0], outline[1], label=design.name if number == 0 else None, **curve_style(index))
+            outlines.append(outline)
             widths.append(ELLIPSE * np.sqrt(np.diag(covariance)))
         half = 1.1 * np.minimum(np.max(widths, axis=0), WIDEST * np.median(widths, axis=0))
-        axes.set_xlim(-half[0], half[0])
-        axes.set_ylim(-half[1], half[1])
-        axes.set_xlabel(f"{pair[0]} [{format_unit(units[pair[0]])}]")
-        axes.set_ylabel(f"{pair[1]} [{format_unit(units[pair[1]])}]")
+        scales = [decimal_scale(half[0]), decimal_scale(half[1])]
+        for index, (design, outline) in enumerate(zip(designs, outlines, strict=True)):
+            name = design.name if number == 0 else None
+            axes.plot(outline[0] / scales[0][0], outline[1] / scales[1][0], label=name, **curve_style(index))
+        axes.set_xlim(-half[0] / scales[0][0], half[0] / scales[0][0])
+        axes.set_ylim(-half[1] / scales[1][0], half[1] / scales[1][0])
+        for label, name, (_, power) in zip((axes.set_xlabel, axes.set_ylabel), pair, scales, strict=True):
+            label(f"{name.split('.', 1)[1]} [{power}{format_unit(units[name])}]")
         axes.locator_params(nbins=5)
     figure.legend(loc="outside upper center", ncols=4)
     return figure
