@@ -201,9 +201,11 @@ def _check_traceable(plan: Plan) -> None:
                 lambda p, own=effect: own.table(plan.model.robot, plan.family.motion(p), times),
                 jnp.asarray(plan.family.centre),
             )
-        except jax.errors.JAXTypeError:
+        except InputError:
+            raise
+        except (TypeError, ValueError) as error:  # JAX's own, and NumPy's where it is handed a traced array
             raise InputError(
                 f"effect {effect.label!r} computes the joints' motion outside JAX, so that a design has no gradient",
                 place="model.effects",
                 remedy="Leave it out of the model for the design",
-            ) from None
+            ) from error
