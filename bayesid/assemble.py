@@ -23,7 +23,7 @@ from bayesid.sensors import Filter, Kind, Sensor
 from bayesid.study import RecordingSection, Study
 from bayesid.unknowns import BodyPrior, Mixing
 
-__all__ = ["load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
+__all__ = ["encoder_noise", "load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
 
 
 CHANGE_SEED = 0
@@ -126,14 +126,7 @@ def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:
 def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
     """Read one recording of a study."""
     recording = Recording.read(section.file)
-    encoder = study.sensors.encoder
-    joints = [joint.name for joint in robot.joints]
-    families: tuple[Literal["position", "velocity", "acceleration"], ...] = ("position", "velocity", "acceleration")
-    sigma = {
-        derivative: {joint: encoder.sigma_of(family, joint) for joint in joints}
-        for derivative, family in enumerate(families)
-    }
-    motion = MeasuredMotion.from_recording(recording, robot, sigma=sigma, start=section.start)
+    motion = MeasuredMotion.from_recording(recording, robot, sigma=encoder_noise(study, robot), start=section.start)
     return Manoeuvre(
         recording=recording,
         motion=motion,
@@ -141,6 +134,15 @@ def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Man
         attitude_sigma=section.attitude_sigma,
         latitude=section.argument_of_latitude or 0.0,
     )
+
+
+def encoder_noise(study: Study, robot: Robot) -> dict[int, dict[str, float | None]]:
+    """Return the noise of position (0), velocity (1), acceleration (2) by joint; None where it is to be estimated."""
+    families: tuple[Literal["position", "velocity", "acceleration"], ...] = ("position", "velocity", "acceleration")
+    return {
+        derivative: {joint.name: study.sensors.encoder.sigma_of(family, joint.name) for joint in robot.joints}
+        for derivative, family in enumerate(families)
+    }
 
 
 def _orbit(study: Study) -> Orbit | None:

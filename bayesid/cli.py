@@ -1,4 +1,4 @@
-"""The command line: ``bayesid check|identify|diagnose|simulate|predict|loop STUDY.toml --output DIR``, and ``demo``."""
+"""The command line: ``bayesid check|identify|diagnose|design|simulate|predict|loop STUDY.toml``, and ``demo``."""
 
 from __future__ import annotations
 
@@ -66,6 +66,24 @@ def diagnose(
     keep_compiled()
     with _reported(), _progress() as show:
         for line in run_diagnose(study, output, seed=seed, effective_samples=samples, sample=sample, progress=show):
+            console.print(line)
+
+
+@app.command()
+def design(
+    study: StudyFile,
+    output: Output,
+    seed: Seed = 0,
+    starts: Annotated[int, typer.Option(min=1, help="Random starts of the search, for every criterion.")] = 4,
+    iterations: Annotated[int, typer.Option(min=1, help="Iterations of the optimiser from each start.")] = 200,
+) -> None:
+    """Design manoeuvres by several criteria, within limits: design.json, a CSV file for each, and report.pdf."""
+    from bayesid.commands import run_design
+    from bayesid.compiled import keep_compiled
+
+    keep_compiled()
+    with _reported(), _progress() as show:
+        for line in run_design(study, output, seed=seed, starts=starts, iterations=iterations, progress=show):
             console.print(line)
 
 
@@ -153,7 +171,7 @@ def _reported() -> Iterator[None]:
         Console(stderr=True, soft_wrap=True).print(f"Error: {error}", style="red", highlight=False, markup=False)
         raise typer.Exit(2) from None
     except KeyboardInterrupt:
-        console.print("Interrupted; the same command goes on from the samples kept so far.")
+        console.print("Interrupted; the same command goes on from what was kept so far.")
         raise typer.Exit(130) from None
 
 

@@ -19,6 +19,8 @@ import numpy as np
 from bayesid.assemble import load_manoeuvres, load_model, load_posterior
 from bayesid.checks import RecordingCheck, check_recording, refuse_impossible_joints, refuse_wrong_units
 from bayesid.demo import copy_demonstration
+from bayesid.design import Search, Store, best_design, design
+from bayesid.design.from_study import encoders, fingerprint, load_problem
 from bayesid.diagnosis import Diagnosis, diagnose, identify_extended
 from bayesid.errors import InputError
 from bayesid.inference import Identification
@@ -26,21 +28,24 @@ from bayesid.inference import identify as identify_posterior
 from bayesid.inference.ensemble import Progress
 from bayesid.posterior import Posterior
 from bayesid.predict import Predictor
+from bayesid.recording import Recording
 from bayesid.report import (
     check_report,
+    design_report,
     diagnosis_report,
     format_quantity,
     identification_report,
     prediction_report,
     simulation_report,
 )
+from bayesid.report.design_text import design_sentences
 from bayesid.report.diagnosis import diagnosis_sentences
 from bayesid.sensors import Kind
 from bayesid.simulation import simulate_recordings
 from bayesid.storage import write_netcdf
 from bayesid.study import Study
 
-__all__ = ["run_check", "run_demo", "run_diagnose", "run_identify", "run_predict", "run_simulate"]
+__all__ = ["run_check", "run_demo", "run_design", "run_diagnose", "run_identify", "run_predict", "run_simulate"]
 
 Show = Callable[[float, str], None]
 
@@ -167,6 +172,35 @@ def run_predict(
         final = prediction.tip.pose().millimetres
         place = ", ".join(format_quantity(float(m), float(s)) for m, s in zip(final.mean, final.sd, strict=True))
         yield f"{prediction.name}: {prediction.tip_frame} ends at ({place}) mm from where the base started."
+    yield f"Wrote {output / 'report.pdf'}."
+
+
+def run_design(file: Path, output: Path, *, seed: int, starts: int, iterations: int, progress: Show) -> Iterator[str]:
+    """Write design.json, a recording of the joints of every designed manoeuvre, and report.pdf of a study."""
+    study = Study.load(file)
+    problem = load_problem(study)
+    noise = encoders(study, problem.plan.model.robot)
+    yield (
+        f"{study.title}: {len(problem.criteria)} criteria, {problem.plan.family.size} parameters of "
+        f"{problem.plan.family.name}, {problem.plan.family.duration:g} s."
+    )
+    progress(0.0, "compiling")
+    key = f"{fingerprint(study)} {seed} {starts} {iterations}"
+    store = Store.open(output / "search.json", key)
+    try:
+        designs = design(problem, seed, noise, Search(starts, iterations), store=store, progress=progress)
+        best = best_design(designs)
+    except InputError as error:
+        raise error.within(file=file) from None
+    with _complete(output) as folder:
+        content = {"title": study.title, "seed": seed, "manoeuvres": [item.to_dict() for item in designs]}
+        _write_json(folder / "design.json", {**content, "best": best.name})
+        for item in designs:
+            joints = {key: values for key, values in item.manoeuvre.recording.channels.items() if "position." in key}
+            Recording(item.name, None, item.manoeuvre.recording.time, joints).write(folder / f"{item.name}.csv")
+        design_report(designs, best, study.title, folder / "report.pdf")
+    (output / "search.json").unlink(missing_ok=True)
+    yield from design_sentences(designs, best)
     yield f"Wrote {output / 'report.pdf'}."
 
 

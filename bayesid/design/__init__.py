@@ -16,7 +16,7 @@ from bayesid.design.criteria import (
     Paper26Intended,
     Separation,
 )
-from bayesid.design.design import Design, design, evaluate
+from bayesid.design.design import Design, best_design, design, evaluate
 from bayesid.design.limits import Limit, Limits
 from bayesid.design.loop import Loop, NotFlown
 from bayesid.design.optimise import Found, Search, optimise
@@ -60,6 +60,7 @@ __all__ = [
     "Spacecraft",
     "Store",
     "Tip",
+    "best_design",
     "design",
     "evaluate",
     "optimise",

@@ -37,8 +37,6 @@ class Criterion(Protocol):
     ----------
     name : str
         As in design.json.
-    draws : int
-        Points of the prior to average over; 0 for its centre alone.
     """
 
     name: ClassVar[str]

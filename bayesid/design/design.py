@@ -16,10 +16,11 @@ from bayesid.design.planned import Trajectory
 from bayesid.design.predicted import Encoder, Predicted, planned_manoeuvre, planned_posterior, predict
 from bayesid.design.problem import Problem, Reached
 from bayesid.design.store import Store
+from bayesid.errors import InputError
 from bayesid.model import Manoeuvre
 from bayesid.posterior import Posterior
 
-__all__ = ["Design", "Risk", "design", "evaluate", "sample_times"]
+__all__ = ["Design", "Risk", "best_design", "design", "evaluate", "sample_times"]
 
 CERTAIN = 0.99
 """Probability with which a limit must hold for a go."""
@@ -137,6 +138,19 @@ class Design:
             "search": {"costs_of_starts": list(self.found.costs), "evaluations": self.found.evaluations},
             "file": f"{self.name}.csv",
         }
+
+
+def best_design(designs: Sequence[Design]) -> Design:
+    """Return the design that leads to the smallest posterior, of those that keep their limits."""
+    kept = [design for design in designs if all(reached.kept for reached in design.reached)]
+    if not kept:
+        broken = {item.name for design in designs for item in design.reached if not item.kept}
+        raise InputError(
+            f"no design keeps its limits along all of the manoeuvre: {', '.join(sorted(broken))}",
+            place="design.limits",
+            remedy="Loosen these limits, or allow more time",
+        )
+    return min(kept, key=lambda design: design.predicted.log_det)
 
 
 def sample_times(duration: float, interval: float) -> Floats:

@@ -73,8 +73,8 @@ def optimise(
     search: Search = Search(),
     *,
     first: Floats | None = None,
-    known: Callable[[int], tuple[Floats, float] | None] = lambda start: None,
-    keep: Callable[[int, Floats, float], None] = lambda start, parameters, cost: None,
+    known: Callable[[int], tuple[Floats, float, int] | None] = lambda start: None,
+    keep: Callable[[int, Floats, float, int], None] = lambda start, parameters, cost, evaluations: None,
     progress: Show = lambda fraction, text: None,
 ) -> Found:
     """Minimise a criterion within the limits.
@@ -84,9 +84,9 @@ def optimise(
     first : (n,) array, optional
         Parameters to start from in place of the first random start.
     known : callable
-        Number of a start -> what an earlier run found there; None if nothing.
+        Number of a start -> parameters, cost and evaluations of an earlier run there; None if nothing.
     keep : callable
-        Handed the best of every start as it is found.
+        Handed the same of every start as it is found.
 
     Raises
     ------
@@ -103,6 +103,7 @@ def optimise(
         earlier = known(start)
         if earlier is not None:
             results.append((earlier[1], earlier[0]))
+            evaluations += earlier[2]
             continue
         begin = _repaired(problem, begin)
         fractions = problem.fractions(begin)[0]
@@ -113,7 +114,7 @@ def optimise(
         run.minimise()
         evaluations += run.evaluations
         results.append((run.best_cost, run.best))
-        keep(start, run.best, run.best_cost)
+        keep(start, run.best, run.best_cost, run.evaluations)
     if not results:
         raise InputError(
             f"no manoeuvre of the family {problem.plan.family.name!r} was found within the limits: {broken}",
@@ -227,7 +228,8 @@ def _repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) -
 
 def _describe(problem: Problem, fractions: Floats) -> str:
     parts = [
-        f"{limit.name} {fraction * limit.bound:.4g} {limit.unit} where {limit.bound:.4g} is allowed"
+        f"{limit.name} {fraction * limit.bound:.4g}{'' if limit.unit == '1' else f' {limit.unit}'} where "
+        f"{limit.bound:.4g} is allowed"
         for limit, fraction in zip(problem.applied, fractions, strict=True)
         if fraction > 1.0 + SLACK
     ]

@@ -138,8 +138,17 @@ class Problem:
 
     def fractions(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return how much of every limit is used, shape (m,), smooth and never too small; and its Jacobian (m, n)."""
-        value, slope = self._fractions(parameters, self.centre, self.bounds)
-        return np.asarray(value), np.asarray(slope)
+        key = np.asarray(parameters, dtype=float).tobytes()
+        if key not in self._latest:  # the optimiser asks for value and slope of one point one after the other
+            value, slope = self._fractions(parameters, self.centre, self.bounds)
+            self._latest.clear()
+            self._latest[key] = (np.asarray(value), np.asarray(slope))
+        return self._latest[key]
+
+    @cached_property
+    def _latest(self) -> dict[bytes, tuple[Floats, Floats]]:
+        """The fractions asked for last."""
+        return {}
 
     def reached(self, parameters: Floats) -> list[Reached]:
         """Check every limit on a grid `FINER` times finer than the optimiser's."""

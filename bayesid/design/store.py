@@ -29,7 +29,7 @@ class Store:
 
     file: Path | None
     key: str
-    results: dict[str, dict[str, tuple[list[float], float]]] = field(default_factory=dict)
+    results: dict[str, dict[str, tuple[list[float], float, int]]] = field(default_factory=dict)
 
     @classmethod
     def forgetful(cls) -> Store:
@@ -70,13 +70,13 @@ class Starts:
     store: Store
     search: str
 
-    def known(self, start: int) -> tuple[Floats, float] | None:
-        """Return what was found from a start."""
+    def known(self, start: int) -> tuple[Floats, float, int] | None:
+        """Return what was found from a start: parameters, cost and evaluations."""
         entry = self.store.results.get(self.search, {}).get(str(start))
-        return None if entry is None else (np.array(entry[0]), float(entry[1]))
+        return None if entry is None else (np.array(entry[0]), float(entry[1]), int(entry[2]))
 
-    def keep(self, start: int, parameters: Floats, cost: float) -> None:
+    def keep(self, start: int, parameters: Floats, cost: float, evaluations: int) -> None:
         """Keep what was found from a start."""
         own = self.store.results.setdefault(self.search, {})
-        own[str(start)] = ([float(value) for value in parameters], float(cost))
+        own[str(start)] = ([float(value) for value in parameters], float(cost), evaluations)
         self.store.write()

@@ -1,6 +1,7 @@
 """Reports as PDF."""
 
 from bayesid.report.check import check_report
+from bayesid.report.design import design_report
 from bayesid.report.diagnosis import diagnosis_report
 from bayesid.report.document import Document
 from bayesid.report.identification import identification_report
@@ -11,6 +12,7 @@ from bayesid.report.simulation import simulation_report
 __all__ = [
     "Document",
     "check_report",
+    "design_report",
     "diagnosis_report",
     "format_quantity",
     "identification_report",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesid.design import Plan
 from bayesid.model import Model
 from bayesid.motion import MeasuredMotion
 from bayesid.posterior import Posterior
@@ -11,7 +12,7 @@ from bayesid.report.fit import sensor_sigma
 from bayesid.report.numbers import format_number, format_unit
 from bayesid.sensors import Filter, Kind, Sensor
 
-__all__ = ["model_sentences", "planning_sentences"]
+__all__ = ["model_sentences", "planning_sentences", "span"]
 
 
 def model_sentences(posterior: Posterior, integration_error: float) -> list[str]:
@@ -38,10 +39,10 @@ def model_sentences(posterior: Posterior, integration_error: float) -> list[str]
     ]
 
 
-def planning_sentences(posterior: Posterior) -> list[str]:
+def planning_sentences(planned: Posterior | Plan) -> list[str]:
     """Return what a prediction supposes of the robot and of what acts on it; it has no sensors."""
-    model = posterior.model
-    tilt = max(posterior.unknowns.tilt_sigma)
+    model = planned.model
+    tilt = max(planned.unknowns.tilt_sigma)
     attitude = f"uncertain by {format_number(tilt)} rad per axis" if tilt > 0.0 else "known exactly"
     return [
         *_body_sentences(model),
@@ -96,7 +97,7 @@ def _link_sentence(model: Model) -> str:
     nuisance = [prior for prior in model.priors if prior.nuisance]
     if not nuisance:
         return "All other links are known exactly: masses, centres of mass, inertias and geometry as given."
-    width = _span([prior.spread for prior in nuisance])
+    width = span([prior.spread for prior in nuisance])
     names = ", ".join(prior.name for prior in nuisance)
     return (
         f"The inertial parameters of {names} are uncertain by a relative width of {width}, which the result accounts "
@@ -105,7 +106,7 @@ def _link_sentence(model: Model) -> str:
 
 
 def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:
-    width = _span(sensor_sigma(posterior, sensor).ravel().tolist())
+    width = span(sensor_sigma(posterior, sensor).ravel().tolist())
     parts = [f"Sensor {sensor.kind.value}: white noise of {width} {format_unit(sensor.kind.unit)} per sample and axis"]
     if sensor.kind is Kind.ACCEL:
         position = ", ".join(format_number(float(value)) for value in posterior.model.point)
@@ -151,6 +152,7 @@ def _motion_sentence(posterior: Posterior) -> str:
     )
 
 
-def _span(values: list[float]) -> str:
+def span(values: list[float]) -> str:
+    """Return smallest and largest of some values, or the one value."""
     low, high = format_number(min(values)), format_number(max(values))
     return low if low == high else f"{low} to {high}"

@@ -5,9 +5,10 @@ is a table of the file and each of its fields a key, so that an unknown key is a
 are plain mappings and not to be changed.
 """
 
+from bayesid.study.design import DesignLimits, DesignSection
 from bayesid.study.file import Study
 from bayesid.study.robot import BodySection, LoadSection, OrbitSection, RobotSection
-from bayesid.study.sections import DesignLimits, DesignSection, ModelSection, RecordingSection, UnknownsSection
+from bayesid.study.sections import ModelSection, RecordingSection, UnknownsSection
 from bayesid.study.sensors import AccelSensor, AttitudeSensor, EncoderSensor, RateSensor, SensorsSection
 
 __all__ = [

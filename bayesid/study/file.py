@@ -10,9 +10,10 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, PrivateAttr, ValidationError, model_validator
 
 from bayesid.errors import InputError
+from bayesid.study.design import DesignSection
 from bayesid.study.faults import explain, syntax_error
 from bayesid.study.robot import OrbitSection, RobotSection
-from bayesid.study.sections import DesignSection, ModelSection, RecordingSection, UnknownsSection, check_extended
+from bayesid.study.sections import ModelSection, RecordingSection, UnknownsSection, check_extended
 from bayesid.study.sensors import SensorsSection
 from bayesid.study.values import Section, array_of_tables
 

@@ -1,4 +1,4 @@
-"""Sections of a study file on recordings, unknowns, the model and the manoeuvre to design."""
+"""Sections of a study file on recordings, unknowns and the model."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, field_validator, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from bayesid.change import BodyChange
 from bayesid.errors import InputError
@@ -193,53 +193,3 @@ class ModelSection(Section):
                 remedy="Remove it, or set initial_rate = 'unknown'",
             )
         return self
-
-
-class DesignLimits(Section):
-    """What a designed manoeuvre must respect, ``[design.limits]``; a limit left out does not apply.
-
-    Parameters
-    ----------
-    tip_speed, tip_rate : float, optional
-        [m/s], [rad/s]
-    joint_speed : float, optional
-        [rad/s or m/s]
-    base_rotation : float, optional
-        [rad]
-    quiet_band : (2,), optional
-        Frequencies between which the motion must not excite anything [Hz].
-    """
-
-    tip_speed: Positive | None = None
-    tip_rate: Positive | None = None
-    joint_speed: Positive | None = None
-    base_rotation: Annotated[Positive, FULL_TURN] | None = None
-    quiet_band: Annotated[tuple[NonNegative, Positive], list_of(2)] | None = None
-
-    @field_validator("quiet_band")
-    @classmethod
-    def _ascending(cls, band: tuple[float, float] | None) -> tuple[float, float] | None:
-        if band is not None and band[0] >= band[1]:
-            raise InputError(f"{list(band)} does not ascend", remedy="Give the lower frequency first")
-        return band
-
-
-class DesignSection(Section):
-    """The manoeuvre to design, ``[design]``.
-
-    Parameters
-    ----------
-    duration : float, optional
-        [s]
-    tip_frame : str, optional
-        The frame of the URDF whose motion is limited.
-    joints : sequence of str, optional
-        Joints that move.
-    limits : DesignLimits
-        What the manoeuvre must respect.
-    """
-
-    duration: Positive | None = None
-    tip_frame: Name | None = None
-    joints: Names | None = None
-    limits: DesignLimits = DesignLimits()

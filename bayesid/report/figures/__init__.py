@@ -1,6 +1,7 @@
 """Figures of reports. Every function returns a new matplotlib Figure; none touches pyplot."""
 
 from bayesid.report.figures.agreement import measured_against_simulated, residual_spectrum
+from bayesid.report.figures.design import base_motion, covariance_ellipses, joints_within_limits, tip_motion
 from bayesid.report.figures.diagnosis import (
     candidate_strengths,
     residual_histories,
@@ -14,12 +15,15 @@ from bayesid.report.figures.sampler import convergence
 from bayesid.report.figures.uncertainty import corner, correlations, prior_to_posterior
 
 __all__ = [
+    "base_motion",
     "candidate_strengths",
     "convergence",
     "corner",
     "correlations",
     "course_bands",
+    "covariance_ellipses",
     "final_positions",
+    "joints_within_limits",
     "manoeuvre",
     "measured_against_simulated",
     "prior_to_posterior",
@@ -27,6 +31,7 @@ __all__ = [
     "residual_spectra",
     "residual_spectrum",
     "robot_pose",
+    "tip_motion",
     "wrench_histories",
     "wrench_spectrum",
 ]

@@ -1,0 +1,108 @@
+"""Sentences of a design report: the outcome, what each criterion asks for, what was assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from bayesid.design import Design
+from bayesid.report.assumed import planning_sentences, span
+from bayesid.report.numbers import format_number, format_unit
+
+__all__ = ["MEANING", "assumption_sentences", "design_sentences", "reference_design", "summary"]
+
+REFERENCE = "paper-26"
+
+MEANING: Mapping[str, str] = {
+    "paper-26": "The paper's (26) as printed, of the largest excursions y1, y2, y3 of the base's position and of its "
+    "attitude. The signed differences cancel most of it: of each triple −y1² + y2² + 3 y3² remains to be maximised, "
+    "which rewards the third state, penalises the first and says nothing of balance. Metres are added to radians.",
+    "paper-26-intended": "What (26) appears to intend: the squares of the excursions less the sizes of their "
+    "differences, so that an uneven motion counts against itself whatever the sign.",
+    "condition-number": "The smallest condition number of the regressor of the base's force balance, columns per unit "
+    "of the prior's width, torques over the radius of gyration.",
+    "d-optimal": "The smallest volume of the posterior: the determinant of its covariance.",
+    "a-optimal": "The smallest mean variance of the log-Cholesky coordinates of the bodies.",
+    "e-optimal": "The smallest standard deviation along the direction that is known worst.",
+    "information-gain": "The largest expected gain of information on the bodies, averaged over draws of their prior "
+    "instead of taken at its centre.",
+    "separation": "The largest signal-to-noise ratio by which the rival effects can be told apart, with everything "
+    "else unknown.",
+}
+"""One sentence or so on each criterion."""
+
+
+def reference_design(designs: Sequence[Design]) -> Design:
+    """Return the design that others are compared with: that by (26), or the first where there is none."""
+    return next((design for design in designs if design.name == REFERENCE), designs[0])
+
+
+def summary(designs: Sequence[Design], best: Design) -> str:
+    """Return which manoeuvre is best and what it buys."""
+    reference, family = reference_design(designs), best.problem.plan.family
+    names = " and ".join(body.name for body in best.problem.plan.model.bodies)
+    text = (
+        f"{len(designs)} manoeuvre{'' if len(designs) == 1 else 's'} of {family.duration:g} s for the robot "
+        f"{best.problem.plan.model.robot.name}, of the family {family.name} with {family.size} parameters, were "
+        f"designed to identify {names}. The smallest posterior is that of {best.name}"
+    )
+    if best is reference:
+        return f"{text}. {_verdict(best)}"
+    ratio = best.predicted.geometric_mean / reference.predicted.geometric_mean
+    worst = best.predicted.worst / reference.predicted.worst
+    return (
+        f"{text}: in the geometric mean its standard deviations are {ratio:.3g} times those of {reference.name}, and "
+        f"{worst:.3g} times along the worst direction. {_verdict(best)}"
+    )
+
+
+def design_sentences(designs: Sequence[Design], best: Design) -> list[str]:
+    """Return one sentence per design for the terminal, and the best."""
+    reference = reference_design(designs)
+    scale = reference.predicted.geometric_mean
+    lines = [
+        f"{design.name}: standard deviations {design.predicted.geometric_mean / scale:.3g} "
+        f"times those of {reference.name}; {'go' if design.go else 'no go'} under the present uncertainty."
+        for design in designs
+    ]
+    return [*lines, f"Best: {best.name}."]
+
+
+def assumption_sentences(best: Design) -> list[str]:
+    """Return what the design supposes."""
+    problem = best.problem
+    plan = problem.plan
+    sensors = [
+        f"Sensor {sensor.kind.value}: white noise of {span(list(sensor.noise.sigma(plan.interval)))} "
+        f"{format_unit(sensor.kind.unit)} per sample and axis."
+        for sensor in plan.model.sensors
+    ]
+    return [
+        "The search compares manoeuvres by the white noise of the sensors alone; the predicted standard deviations and "
+        "covariances below include the noise of the encoders and filters, and every other unknown is marginalised.",
+        "Predictions hold to first order about the prior's centre (Laplace), and include the prior.",
+        f"Sampling every {plan.interval:g} s; the search integrates with steps of {format_number(plan.step)} s and "
+        f"simulates every {_ordinal(plan.thinning)} sample. Limits are looked at every half step in the search, and "
+        "eight times more finely at its end.",
+        f"Tip speed and tip rate are those of {plan.tip.name}, each the larger of the one relative to the base and the "
+        "one relative to inertial space.",
+        "The risk is taken over draws of the prior of the bodies, the base starting at rest: the initial rate, which "
+        "the manoeuvre does not cause, is left out.",
+        *sensors,
+        *planning_sentences(plan),
+    ]
+
+
+def _verdict(best: Design) -> str:
+    if best.go:
+        return "It keeps every limit, with 99 % probability also under the present uncertainty of the robot."
+    broken = ", ".join(
+        f"{risk.name} ({format_number(risk.quantile)} {risk.unit})" for risk in best.risks if not risk.go
+    )
+    return (
+        "It keeps every limit for the robot as given, but under the present uncertainty not with 99 % probability: "
+        f"{broken}. It is no go until the robot is known better or the limits leave more room."
+    )
+
+
+def _ordinal(number: int) -> str:
+    return {1: "single", 2: "second", 3: "third"}.get(number, f"{number}th")
