@@ -19,8 +19,6 @@ FOUND = (
     "gravity-gradient",
     "flexible-appendage",
     "payload:link3",
-    "joint-latency",
-    "outliers:rate",
     "wheel-momentum, accel-bias",
     "thermal-snap",
 )
