@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,9 @@ from bayesid.design import (
     Search,
     design,
     evaluate,
+    optimise,
 )
+from bayesid.design.problem import Known
 from studies.base_body import paper
 from studies.base_body.setting import POOR
 from studies.excitation.world import ENCODER, paper_family, problem, splines
@@ -54,7 +56,8 @@ class Contest:
     limits : Limits
     designs : mapping of str to Design
         ``printed`` and ``poor`` are the paper's manoeuvre and its poor neighbour, made smaller until they keep the
-        limits; ``27: NAME`` was designed in the paper's own family, ``NAME`` with splines on all joints.
+        limits; ``27: NAME`` was designed in the paper's own family, ``NAME`` with splines on all joints; ``wrong
+        guess`` is d-optimal for the paper's initial guess of the base.
     shrink : mapping of str to float
         By how much the first two were made smaller.
     """
@@ -104,7 +107,19 @@ def compete(
     ours = problem(splines(points), limits, criteria)
     for item in design(ours, seeds[2], {0: ENCODER}, search, progress=tell("splines")):
         designs[item.criterion] = item
+    if full:
+        designs["wrong guess"] = _from_wrong_guess(ours, search, rng, designs["d-optimal"])
     return Contest(limits, designs, shrink)
+
+
+def _from_wrong_guess(ours: Problem, search: Search, rng: np.random.Generator, like: Design) -> Design:
+    """Design by the posterior that would be if the paper's initial guess of the base were true."""
+    unknowns = ours.plan.unknowns
+    guess = unknowns.coordinates([paper.body(paper.GUESS)])
+    guessing = ours.knowing(Known(guess, np.eye(unknowns.size)))
+    found = optimise(guessing, DOptimal(), rng, search)
+    parameters, _ = shrunk(ours, found.parameters)  # the true base may not keep what the guessed one does
+    return evaluate(ours, "wrong guess", replace(found, parameters=parameters), {0: ENCODER}, rng, like.posterior)
 
 
 def shrunk(own: Problem, q: Sequence[float] | Floats) -> tuple[Floats, float]:

@@ -30,6 +30,7 @@ TITLES = {
     "a-optimal": "a-optimal",
     "e-optimal": "e-optimal",
     "information-gain": "information gain",
+    "wrong guess": "d-optimal for the paper's wrong guess",
 }
 
 
