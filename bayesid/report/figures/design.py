@@ -154,7 +154,7 @@ def _bounds(joint: Joint, speed: bool, general: float | None) -> list[float]:
 def _draw_limits(axes: Axes, values: Floats, bounds: set[float], unit: str) -> None:
     """Draw the limits near the curves, and name those that would squeeze them."""
     low, high = float(values.min()), float(values.max())
-    span = max(high - low, 1e-9)
+    span = 0.5 * max(high - low, 1e-9)
     finite = sorted(bound for bound in bounds if np.isfinite(bound))
     for bound in finite:
         if low - span <= bound <= high + span:
