@@ -164,7 +164,8 @@ def _sampled(document: Document, flights: Mapping[str, Flight]) -> None:
     document.paragraph(
         f"What the base's sensors read within {JOLT:g} s of where (27) meets its connecting splines is left out. The "
         "third derivative of the joints jumps there, which no smoothing of encoder samples at 2 Hz follows: "
-        "accelerations are wrong by some fifteen of their standard deviations, and with these samples chi-square was 1715 of 1446. "
+        "accelerations are wrong by some fifteen of their standard deviations, and with these samples chi-square was "
+        "1715 of 1446. "
         "Splines have no such place."
     )
     document.table(
