@@ -172,7 +172,8 @@ def _sampled(document: Document, flights: Mapping[str, Flight]) -> None:
         ["", "truth", *heads], rows, caption="Posterior mean and sd.", align=["left", *["right"] * (len(heads) + 1)]
     )
     document.figure(width_figure(flights, TITLES), "Posterior widths after each step, and the means beside the truth.")
-    document.items(_attempts(flights["careful"]))
+    if "careful" in flights:
+        document.items(_attempts(flights["careful"]))
     sentences = [
         f"{TITLES[name]}, step {step + 1}: {sentence}"
         for name, item in flights.items()
