@@ -41,8 +41,8 @@ from bayesid.robot import Robot
 from bayesid.sensors import Kind, Sensor, White
 from bayesid.unknowns import BodyPrior
 
-ENCODER = {0: 1e-5}
-SENSORS = (Sensor(Kind.RATE, White(1e-4)), Sensor(Kind.ACCEL, White(2e-4), position=(0.1, -0.15, 0.3)))
+ENCODER = {0: 1e-6}
+SENSORS = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(2e-5), position=(0.1, -0.15, 0.3)))
 TRUE = InertialParameters(66.0, [0.09, -0.05, 0.01], np.diag([2.6, 2.5, 3.1]))
 LIMITS = Limits(joint_speed=0.5, base_rotation=0.08)
 
@@ -90,7 +90,7 @@ def mass_alone(bodies) -> float:
     return bodies["base_link"].sd[0] / bodies["base_link"].mean[0]
 
 
-TRUTH = SimulatedSpacecraft(model_of(TRUE, 1.0), encoder_sigma=1e-5, seed=8)
+TRUTH = SimulatedSpacecraft(model_of(TRUE, 1.0), encoder_sigma=1e-6, seed=8)
 
 
 @pytest.fixture(scope="module")
@@ -225,7 +225,7 @@ def test_a_plan_is_flown_as_it_was_planned():
 def test_noise_follows_from_seed_and_step(done):
     plan = replace(Recording.read(done.path(1, "plan")), name="step-2")
     first, other = Recording.read(done.path(1, "recording")), TRUTH.execute(plan)
-    assert np.abs(first.channels["rate.z"] - other.channels["rate.z"]).max() > 1e-5
+    assert np.abs(first.channels["rate.z"] - other.channels["rate.z"]).max() > 1e-6
 
 
 def test_what_is_known_takes_the_place_of_the_prior():

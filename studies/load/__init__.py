@@ -40,19 +40,20 @@ def run(*, full: bool = False, seed: int = 0) -> Result:
     Parameters
     ----------
     full : bool
-        Search longer, and add the loops with noise, which take some ten minutes.
+        Search for the manoeuvres, and add the loops with noise: a quarter of an hour.
     seed : int
         Every random number follows from it.
     """
-    search = Search(starts=2, iterations=60) if full else Search(starts=1, iterations=10)
-    iterations = iterate(seed=seed, search=search)
-    return Result(iterations, fly_all(seed=seed, search=search) if full else {})
+    if not full:
+        return Result(iterate(seed=seed), {})
+    search = Search(starts=2, iterations=60)
+    return Result(iterate(seed=seed, search=search), fly_all(seed=seed, search=search))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     parser = argparse.ArgumentParser(description="Identify a load on the arm of ETS-VII.")
-    parser.add_argument("--full", action="store_true", help="search longer, and fly with noise")
+    parser.add_argument("--full", action="store_true", help="search for the manoeuvres, and fly with noise")
     parser.add_argument("--output", type=Path, default=Path("reports/load.pdf"))
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args(arguments)
