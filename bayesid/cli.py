@@ -74,8 +74,8 @@ def design(
     study: StudyFile,
     output: Output,
     seed: Seed = 0,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts of the search, for every criterion.")] = 4,
-    iterations: Annotated[int, typer.Option(min=1, help="Iterations of the optimiser from each start.")] = 200,
+    starts: Annotated[int, typer.Option(min=1, help="Random starts of the search, for every criterion.")] = 2,
+    iterations: Annotated[int, typer.Option(min=1, help="Iterations of the optimiser from each start.")] = 60,
 ) -> None:
     """Design manoeuvres by several criteria, within limits: design.json, a CSV file for each, and report.pdf."""
     from bayesid.commands import run_design

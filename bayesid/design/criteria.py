@@ -169,7 +169,7 @@ class InformationGain:
     """
 
     name: ClassVar[str] = "information-gain"
-    draws: int = 8
+    draws: int = 4
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus the gain at one draw."""

@@ -186,7 +186,7 @@ def _start(robot: Robot, section: DesignSection) -> Floats:
 def _step(model: Model, section: DesignSection, limits: Limits) -> float:
     """Return a step of the integration that is short against everything that happens; limits are seen twice a step."""
     functions = section.functions or FUNCTIONS
-    steps = [LONGEST_STEP, section.duration / STEPS, section.duration / (4 * functions), 2.0 * section.interval]
+    steps = [LONGEST_STEP, section.duration / STEPS, section.duration / (4 * functions), 4.0 * section.interval]
     return min(*steps, 2.0 * limits.finest, *(effect.longest_step for effect in model.effects))
 
 
