@@ -57,8 +57,7 @@ def write_report(result: Result, output: Path) -> None:
         _cloud_figure(result),
         "Information (minus half the log-determinant of the posterior covariance of the log-Cholesky coordinates) of "
         "random manoeuvres against (26) as printed, as intended, and against the plain sum of the squared largest "
-        "excursions. Logarithmic where the criterion is positive; where (26) is negative the manoeuvre is left out "
-        "of the drawing, but not of the rank correlation.",
+        "excursions. Logarithmic to either side of a linear part about zero.",
     )
     document.section("The weights of the errors, (25)")
     document.figure(
@@ -206,13 +205,12 @@ def _cloud_figure(result: Result) -> Figure:
             ("sum of squared excursions", cloud.motion),
         )
         for axes, (label, values) in zip(panels[row], columns, strict=True):
-            positive = values > 0.0
-            axes.semilogx(values[positive], -0.5 * cloud.log_det[positive], ".", color=COLOURS[0], markersize=2.5)
+            axes.plot(values, -0.5 * cloud.log_det, ".", color=COLOURS[0], markersize=2.5)
+            axes.set_xscale("symlog", linthresh=max(float(np.quantile(np.abs(values), 0.1)), 1e-12), linscale=0.3)
             rho, error = cloud.correlation(values)
-            axes.set_title(
-                f"rank correlation {rho:.2f} ± {error:.2f}, {100 * (1 - positive.mean()):.0f} % negative", fontsize=6
-            )
+            axes.set_title(f"rank correlation {rho:.2f} ± {error:.2f}", fontsize=6.5)
             axes.set_xlabel(f"{label} [m², rad²]")
+            axes.tick_params(axis="x", labelsize=5, labelrotation=45)
         panels[row, 0].set_ylabel(f"{family}\ninformation [nats]")
     return figure
 
