@@ -20,7 +20,7 @@ from bayesid.assemble import load_manoeuvres, load_model, load_posterior
 from bayesid.checks import RecordingCheck, check_recording, refuse_impossible_joints, refuse_wrong_units
 from bayesid.demo import copy_demonstration
 from bayesid.design import Search, Store, best_design, design
-from bayesid.design.from_study import encoders, fingerprint, load_problem
+from bayesid.design.from_study import ASSUMED, assumed_encoders, encoders, fingerprint, load_problem
 from bayesid.diagnosis import Diagnosis, diagnose, identify_extended
 from bayesid.errors import InputError
 from bayesid.inference import Identification
@@ -184,6 +184,8 @@ def run_design(file: Path, output: Path, *, seed: int, starts: int, iterations: 
         f"{study.title}: {len(problem.criteria)} criteria, {problem.plan.family.size} parameters of "
         f"{problem.plan.family.name}, {problem.plan.family.duration:g} s."
     )
+    if guessed := assumed_encoders(study, problem.plan.model.robot):
+        yield f"The study gives no sensors.encoder.sigma of {', '.join(guessed)}: {ASSUMED:g} rad or m is assumed."
     progress(0.0, "compiling")
     key = f"{fingerprint(study)} {seed} {starts} {iterations}"
     store = Store.open(output / "search.json", key)

@@ -179,7 +179,6 @@ BAD = {
     "frame": ('tip_frame = "tip"', 'tip_frame = "tool"', ["design.tip_frame", "tool", "link2"]),
     "start": ("joint2 = 0.8", "joint2 = 8.0", ["design.start.joint2", "8 rad", "2.8"]),
     "start joint": ("joint2 = 0.8", "elbow = 0.8", ["design.start.elbow", "no moving joint 'elbow'"]),
-    "encoder": ("[sensors.encoder]\nsigma = 1e-6", "", ["sensors.encoder.sigma", "joint1, joint2"]),
     "nothing unknown": ('bodies = ["base_link"]', "bodies = []", ["unknowns.bodies", "nothing is unknown"]),
     "interval": ("interval = 1.0", "interval = 5.0", ["design.interval", "fewer than 16 samples"]),
     "one rival": ("functions = 2", 'rivals = ["rate-bias"]', ["design.rivals", "at least two"]),

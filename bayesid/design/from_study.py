@@ -36,7 +36,7 @@ from bayesid.robot import Robot
 from bayesid.study import DesignSection, Study
 from bayesid.study.faults import suggest
 
-__all__ = ["encoders", "fingerprint", "load_problem"]
+__all__ = ["ASSUMED", "assumed_encoders", "encoders", "fingerprint", "load_problem"]
 
 SAMPLES = 120
 """Of a manoeuvre that are simulated, at most, each standing for as many as it takes."""
@@ -57,6 +57,10 @@ CRITERIA: tuple[Criterion, ...] = (
     InformationGain(),
 )
 """All that need nothing but the plan."""
+
+
+ASSUMED = 1e-6
+"""Noise of an encoder of which the study says nothing, and no data tell [rad or m]."""
 
 
 def load_problem(study: Study) -> Problem:
@@ -92,17 +96,15 @@ def load_problem(study: Study) -> Problem:
 
 
 def encoders(study: Study, robot: Robot) -> Encoder:
-    """Return the noise of the joints' recorded positions, which a design must know beforehand."""
+    """Return the noise of the joints' recorded positions, `ASSUMED` where the study does not give it."""
     noise = encoder_noise(study, robot)
-    missing = [joint for joint, sigma in noise[0].items() if sigma is None]
-    if missing:
-        raise InputError(
-            f"the noise of the position of {', '.join(missing)} is missing, and no data tell of it",
-            file=study.file,
-            place="sensors.encoder.sigma",
-            remedy="Give it in rad or m per sample",
-        )
-    return noise
+    positions = {joint: ASSUMED if sigma is None else sigma for joint, sigma in noise[0].items()}
+    return {**noise, 0: positions}
+
+
+def assumed_encoders(study: Study, robot: Robot) -> list[str]:
+    """Return the joints whose encoders' noise had to be assumed."""
+    return [joint for joint, sigma in encoder_noise(study, robot)[0].items() if sigma is None]
 
 
 def fingerprint(study: Study) -> str:
