@@ -70,7 +70,7 @@ def run(
     search : Search, optional
         Effort of each design.
     repeats : int, optional
-        Noisy recordings identified per flown design.
+        Noisy recordings identified of the d-optimal design within the first set of limits; a quarter of them of others.
     random : int, optional
         Random manoeuvres per family.
     points : int
@@ -78,14 +78,14 @@ def run(
     sets : sequence of str
         Of limits.
     """
-    search = search or (Search(starts=2, iterations=150) if full else Search(starts=1, iterations=10))
+    search = search or (Search(starts=1, iterations=90) if full else Search(starts=1, iterations=10))
     repeats = (400 if full else 4) if repeats is None else repeats
     random = (500 if full else 20) if random is None else random
     contests, realised = {}, {}
     for name in sets:
         contests[name] = compete(SETS[name], seed, search, full, points, progress)
         for design in ("paper-26", "d-optimal") if full else ("d-optimal",):
-            count = repeats if design == "d-optimal" else max(4, repeats // 4)
+            count = repeats if (name, design) == (sets[0], "d-optimal") else max(4, repeats // 4)
             item = contests[name].designs[design]
             realised[name, design] = realise(item, seed, count, 2000.0 if full else 300.0, progress)
     rng = np.random.default_rng(seed)

@@ -42,7 +42,7 @@ ALL: tuple[Criterion, ...] = (
     DOptimal(),
     AOptimal(),
     EOptimal(),
-    InformationGain(draws=4),
+    InformationGain(draws=2),
 )
 FEW: tuple[Criterion, ...] = (Paper26(), ConditionNumber(), DOptimal())
 
