@@ -13,7 +13,7 @@ from bayesid.design import Found, Problem, Search, Store, optimise
 from bayesid.design.parameterisation import ParameterisedMotion
 from bayesid.design.planned import Trajectory
 from bayesid.design.problem import Reached
-from bayesid.sensors import StarTracker
+from bayesid.sensors import Noise, StarTracker
 from studies.ets7_limits.flight import Flight
 from studies.ets7_limits.information import LONGEST, Grade, Knowledge, wide_posterior
 from studies.ets7_limits.setting import ACCEL, ARM_SPREAD, RATE, START
@@ -33,7 +33,7 @@ __all__ = [
 
 Floats = NDArray[np.floating]
 
-RATES = {
+RATES: dict[str, Noise] = {
     "star sensor 2″": StarTracker(2.0),
     "10⁻⁵ rad/s": White(1e-5),
     "10⁻⁶ rad/s": White(1e-6),

@@ -7,17 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesid.design.planned import Trajectory
 from bayesid.report.figures.style import COLOURS, styled, wide_figure
-from studies.ets7_limits.analysis import Designed
 from studies.ets7_limits.setting import LIMITS
 
 __all__ = ["manoeuvre_figure", "repetition_figure"]
 
 
 @styled
-def manoeuvre_figure(designed: Designed) -> Figure:
-    """Draw the joints, the tip's speed and the base's rotation along the designed manoeuvre."""
-    trajectory = designed.trajectory
+def manoeuvre_figure(trajectory: Trajectory) -> Figure:
+    """Draw the joints, the tip's speed and the base's rotation along a manoeuvre."""
     figure = wide_figure(2.3)
     left, middle, right = figure.subplots(1, 3)
     for index, values in enumerate(np.asarray(trajectory.position).T):

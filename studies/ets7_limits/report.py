@@ -57,7 +57,8 @@ def write_report(result: Result, output: Path) -> None:
     document.section("What was asked, and what came out")
     document.paragraph(
         "How long must the arm move, within the rules of the flight, until mass and moments of inertia of the base are "
-        "known to 1 % (the largest of the four relative standard deviations), and what must the sensors be? A manoeuvre "
+        "known to 1 % (the largest of the four relative standard deviations), and what must the sensors be? A "
+        "manoeuvre "
         f"of all six joints of {result.duration:g} s was designed by d-optimality. Other sensors are answered by the "
         "information of that one manoeuvre, computed anew with their noise; longer times by repeating it. Information "
         "adds; the initial rate is new and unknown in every repetition; accelerometer bias and arm are the same in all."
@@ -87,7 +88,8 @@ def _findings(result: Result) -> list[str]:
     ]
     if floors:
         texts.append(
-            "With the arm's masses known to 5 % no time is enough: nothing but the arm's own mass sets the scale of the "
+            "With the arm's masses known to 5 % no time is enough: nothing but the arm's own mass sets the "
+            "scale of the "
             "base's, since no external force of known size acts. The floor is "
             f"{format_number(100.0 * min(floors), 2)} % or more, whatever the sensors."
         )
@@ -139,7 +141,8 @@ def _manoeuvre(document: Document, result: Result) -> None:
         f"better manoeuvres may exist. Limits: {limits}."
     )
     document.figure(
-        manoeuvre_figure(result.designed), "Joints, speed of the tip (limit dashed) and rotation of the base."
+        manoeuvre_figure(result.designed.trajectory),
+        "Joints, speed of the tip (limit dashed) and rotation of the base.",
     )
 
 
@@ -158,7 +161,8 @@ def _alone(document: Document, result: Result) -> None:
         ["left", "left", *["right"] * 6],
     )
     document.paragraph(
-        "The flight's manoeuvre: joints 2 to 4 by 0.264, −0.321 and 0.057 rad out and back in 22.6 s each, 39.4 s apart, "
+        "The flight's manoeuvre: joints 2 to 4 by 0.264, −0.321 and 0.057 rad out and back in 22.6 s each, "
+        "39.4 s apart, "
         f"its corners rounded over {ROUNDING:g} s; the time around it is recorded too, so that both last "
         f"{result.duration:g} s."
     )
@@ -168,7 +172,8 @@ def _checked(document: Document, result: Result) -> None:
     document.section("Is the prediction right?")
     check = result.check
     document.paragraph(
-        f"MuJoCo flew the designed manoeuvre with an initial rate of ({', '.join(f'{v:g}' for v in RATE_AT_START)}) rad/s "
+        f"MuJoCo flew the designed manoeuvre with an initial rate of "
+        f"({', '.join(f'{v:g}' for v in RATE_AT_START)}) rad/s "
         f"that the fits do not know; {len(check.estimates)} recordings with fresh noise of all sensors and joints were "
         "fitted. The root mean square error over the predicted standard deviation should be one within "
         f"{check.sampling_error:.2f}; the mean error, in its own standard deviations, a standard normal number. "
@@ -198,13 +203,15 @@ def _assumed(document: Document, result: Result) -> None:
             "Base as published in the paper, under a prior of relative width one; arm with nominal inertias. Start of "
             f"every manoeuvre: joints at {', '.join(f'{value:g}' for value in START)} rad; accelerometer at "
             f"{', '.join(f'{value:g}' for value in POINT)} m. Neither is published.",
-            f"Samples each {INTERVAL:g} s; noise is white. The star sensor's 2 seconds of arc, differenced, are taken as "
+            f"Samples each {INTERVAL:g} s; noise is white. The star sensor's 2 seconds of arc, differenced, "
+            "are taken as "
             f"white too (2.7 × 10⁻⁵ rad/s). Joints have {format_number(ENCODER)} rad of noise, which reaches the "
             "accelerometer: below some 10⁻⁶ m/s² its own noise hardly matters.",
             f"Initial rate unknown; attitude at the start known exactly; accelerometer bias, where unknown, within "
             f"{format_number(BIAS)} m/s² and the same in all repetitions. Gravity gradient is modelled; wheels, fuel, "
             "paddles and thrusters are taken to be silent, and the attitude control off.",
-            "The manoeuvre was designed once, for one grade of sensors and an arm that is known: designs made for another "
+            "The manoeuvre was designed once, for one grade of sensors and an arm that is known: designs made "
+            "for another "
             "grade would need somewhat less time there. Collisions and true joint ranges, which are not published, are "
             "not looked at.",
             "Standard deviations are to first order; where they are large (beyond some 30 %) they are rough.",

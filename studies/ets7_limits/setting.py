@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from bayesid import BodyPrior, Kind, Model, Orbit, Robot, Sensor, White
@@ -75,4 +77,5 @@ def limits_problem(duration: float = DURATION, points: int = POINTS, thinning: i
     model = model_of()
     family = BSplines(START, range(len(START)), duration, points)
     tip = Tip.of(model.robot, TIP)
-    return Problem(Plan(model, family, INTERVAL, tip, thinning=thinning), LIMITS, (DOptimal(),))
+    criteria: Any = (DOptimal(),)  # frozen, which the protocol's attributes are not
+    return Problem(Plan(model, family, INTERVAL, tip, thinning=thinning), LIMITS, criteria)

@@ -17,10 +17,14 @@ from studies.separating.factors import Rivalry, Sampled, flown, noisy
 from studies.separating.manoeuvres import Designed, design_both, separating_problem
 from studies.separating.pairs import Pair
 from studies.separating.setting import RIVALS, TRUTHS, amplitude, rival_model
+from studies.separating.verdicts import Verdict
 
-__all__ = ["STAGES", "Realised", "Result", "design_stage", "expectations", "realise"]
+__all__ = ["STAGES", "Realised", "Result", "design_stage", "expectations", "motions_of", "realise"]
 
 Floats = NDArray[np.floating]
+
+DIRECTIONS = 200
+"""Random directions of an effect for which the separation is computed."""
 
 STAGES = {
     "first alone": ("first",),
@@ -56,11 +60,13 @@ class Result:
     designs: Mapping[str, Designed]
     expected: Mapping[tuple[str, str], Expected]
     """By truth and stage."""
+    directions: Mapping[tuple[str, str], Floats]
+    """Likewise, lambda (1 - rho^2) / 2 of effects of the same size in random directions."""
     realised: Sequence[Realised]
     sampled: Mapping[str, Sampled]
     """By truth, of the first noise and the designed manoeuvre."""
-    diagnoses: Mapping[str, tuple[str, str]]
-    """By stage, of the first truth: status and causes named."""
+    verdicts: Mapping[tuple[str, str], Verdict]
+    """By truth and stage, what `diagnose` says of the first noise; empty where it was not asked."""
     duration: float
 
 
@@ -76,19 +82,28 @@ def motions_of(designs: Mapping[str, Designed]) -> dict[str, Motion]:
     return {"first": Flight(START), **{name: item.motion for name, item in designs.items()}}
 
 
-def expectations(motions: Mapping[str, Motion], duration: float) -> dict[tuple[str, str], Expected]:
-    """Expect the Bayes factors of all truths and stages."""
-    model, single, posterior = rival_model(RIVALS), {}, None
+def expectations(
+    motions: Mapping[str, Motion], duration: float, seed: int
+) -> tuple[dict[tuple[str, str], Expected], dict[tuple[str, str], Floats]]:
+    """Expect the Bayes factors of all truths and stages, and for effects of the same size in random directions."""
+    model, posterior = rival_model(RIVALS), None
+    single = {}
     for name, motion in motions.items():
         single[name], posterior = Linearised.of(model, motion, duration, posterior)
-    found = {}
+    directions = np.random.default_rng(seed).normal(size=(DIRECTIONS, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    found, energies = {}, {}
     for stage, names in STAGES.items():
         joined = single[names[0]]
         for name in names[1:]:
             joined = joined.with_another(single[name])
         for truth in RIVALS:
-            found[truth, stage] = joined.expect(truth, amplitude(truth))
-    return found
+            own = amplitude(truth)
+            found[truth, stage] = joined.expect(truth, own)
+            turned = np.zeros((DIRECTIONS, len(own)))
+            turned[:, -3:] = np.linalg.norm(own) * directions
+            energies[truth, stage] = joined.energies(truth, turned)
+    return found, energies
 
 
 def realise(

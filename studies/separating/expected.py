@@ -46,7 +46,7 @@ class Expected:
 
     @property
     def energy(self) -> float:
-        """lambda (1 - rho^2) / 2."""
+        """Half of `apart`."""
         return 0.5 * self.apart
 
 
@@ -85,6 +85,10 @@ class Linearised:
         total[:count, :count] = self.information
         total[np.ix_(place, place)] += other.information
         return Linearised(total, (*self.names, *(f"second {other.names[index]}" for index in fresh)))
+
+    def energies(self, truth: str, amplitudes: Floats) -> Floats:
+        """Return lambda (1 - rho^2) / 2 of one truth for many amplitudes, shape (k, n) -> (k,)."""
+        return np.array([self.expect(truth, amplitude).energy for amplitude in amplitudes])
 
     def expect(self, truth: str, amplitude: Floats) -> Expected:
         """Expect what follows where one of the rivals acts with an amplitude, in prior standard deviations."""

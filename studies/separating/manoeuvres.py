@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesid.design import BSplines, DOptimal, Plan, Problem, Search, Separation, Store, Tip, optimise
 from bayesid.design.parameterisation import ParameterisedMotion
+from bayesid.design.planned import Trajectory
 from bayesid.design.problem import Reached
 from studies.ets7_limits.setting import DURATION, INTERVAL, LIMITS, POINTS, START, TIP
 from studies.separating.setting import RIVALS, drifting, rival_model
@@ -43,6 +45,7 @@ class Designed:
         Of all criteria.
     reached : list of Reached
     motion : ParameterisedMotion
+    trajectory : Trajectory
     """
 
     name: str
@@ -50,6 +53,7 @@ class Designed:
     costs: dict[str, float]
     reached: list[Reached]
     motion: ParameterisedMotion
+    trajectory: Trajectory
 
 
 def separating_problem(duration: float = DURATION, points: int = POINTS, thinning: int = 4) -> Drifting:
@@ -57,7 +61,8 @@ def separating_problem(duration: float = DURATION, points: int = POINTS, thinnin
     model = rival_model(RIVALS)
     family = BSplines(START, range(len(START)), duration, points)
     plan = Plan(model, family, INTERVAL, Tip.of(model.robot, TIP), thinning=thinning)
-    return Drifting(plan, LIMITS, (Separation(RIVALS), DOptimal()))
+    criteria: Any = (Separation(RIVALS), DOptimal())  # frozen, which the protocol's attributes are not
+    return Drifting(plan, LIMITS, criteria)
 
 
 def design_both(
@@ -76,9 +81,12 @@ def design_both(
             keep=kept.keep,
             progress=lambda fraction, text: progress(text),
         )
-        reached = problem.reached(best.parameters)
-        costs = problem.costs(best.parameters)
         found[criterion.name] = Designed(
-            criterion.name, best.parameters, costs, reached, family.motion(best.parameters)
+            name=criterion.name,
+            parameters=best.parameters,
+            costs=problem.costs(best.parameters),
+            reached=problem.reached(best.parameters),
+            motion=family.motion(best.parameters),
+            trajectory=problem.trajectory(best.parameters),
         )
     return found

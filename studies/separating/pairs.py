@@ -7,6 +7,7 @@ from itertools import combinations
 
 import jax
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesid.design import Plan, Separation, Tip
 from studies.ets7_limits.setting import INTERVAL, TIP
@@ -38,10 +39,10 @@ class Pair:
         return min(part / whole for part, whole in zip(self.apart, self.alone, strict=True))
 
 
-def pairs(thinning: int = 2) -> list[Pair]:
+def pairs(duration: float, thinning: int = 2) -> list[Pair]:
     """Return all pairs of the candidates, the most alike first."""
     labels = [effect.label for effect in CANDIDATES]
-    model, family = rival_model(labels), FlightFamily()
+    model, family = rival_model(labels), FlightFamily(duration)
     plan = Plan(model, family, INTERVAL, Tip.of(model.robot, TIP), thinning=thinning)
     z = drifting(model, plan.unknowns.names)
     outcome = jax.jit(plan.outcome)(family.centre, z)
@@ -61,9 +62,9 @@ def pairs(thinning: int = 2) -> list[Pair]:
     return sorted(found, key=lambda pair: pair.left)
 
 
-def _alone(information: np.ndarray, group: list[int]) -> float:
+def _alone(information: NDArray[np.floating], group: list[int]) -> float:
     """Trace of the information of a group with all else, which has a standard-normal prior, marginalised."""
-    rest = np.setdiff1d(np.arange(len(information)), group)
+    rest = [index for index in range(len(information)) if index not in group]
     cross = information[np.ix_(group, rest)]
     inner = information[np.ix_(rest, rest)] + np.eye(len(rest))
     return float(np.trace(information[np.ix_(group, group)] - cross @ np.linalg.solve(inner, cross.T)))
