@@ -1,4 +1,4 @@
-"""The study of ETS-VII's limits in its smallest version: a short manoeuvre, one joint's worth of search, four noises."""
+"""The study of ETS-VII's limits: the flight's ramps, what repetitions add, floors, and times in words."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def write_report(result: Result, output: Path) -> None:
             "factor of the "
             f"truth against no cause is {item.detected.min():.1f} to {item.detected.max():.1f} over "
             f"{len(before)} noises. "
-            f"It cannot name it: against the rival it is {_range(before)}. With the separating manoeuvre it is "
+            f"Against the rival it is {_range(before)}, where 2.7 is asked for to name a cause. With the separating manoeuvre it is "
             f"{_range(after)}, with a d-optimal manoeuvre of the same duration and limits {_range(other)}."
         )
     document.paragraph(_verdict(result))
@@ -154,10 +154,10 @@ def _pairs(document: Document, result: Result) -> None:
     document.section("How the rivals were chosen")
     document.paragraph(
         "For every pair of five candidates the noncentrality on the first manoeuvre was computed, at the amplitudes of "
-        "their priors and summed over their parameters: alone, and with the rival of any size marginalised. A leak and "
-        "a drift of the rate sensor, or a leak and an accelerometer bias, are still more alike, but they are alike "
-        "whatever the arm does. Wheels and leak are the pair most alike of which a motion of the base "
-        "decides: the wheels' torque follows the rate, the leak's does not."
+        "their priors and summed over their parameters: alone, and with the rival of any size marginalised. A leak "
+        "and a drift of the rate sensor, or a leak and an accelerometer bias, are still more alike. Wheels and leak "
+        "were taken because a motion of the base decides between them: the wheels' torque follows the rate, the "
+        "leak's does not. No manoeuvre was designed for the other pairs."
     )
     document.table(
         ["pair", "alone", "with the rival", "least part left"],
@@ -166,7 +166,7 @@ def _pairs(document: Document, result: Result) -> None:
                 " / ".join(pair.labels),
                 " / ".join(format_number(value) for value in pair.alone),
                 " / ".join(format_number(value) for value in pair.apart),
-                f"{100.0 * pair.left:.2g} %",
+                f"{format_number(100.0 * pair.left, 2)} %",
             ]
             for pair in result.pairs
         ],
@@ -214,7 +214,11 @@ def _diagnosed(document: Document, result: Result) -> None:
             [truth, stage, item.status, ", ".join(item.causes) or "—", "; ".join(item.rivals) or "—"]
             for (truth, stage), item in result.verdicts.items()
         ],
-        "`diagnose` on the first noise, with the five candidates of the study.",
+        "The package's diagnosis on the first noise, with the five candidates of the study.",
+    )
+    document.paragraph(
+        "The diagnosis has all five candidates to choose from, and the manoeuvre was designed for two of them: where a "
+        "leak and a drift of the rate sensor remain rivals, another manoeuvre would have to be designed for that pair."
     )
 
 
