@@ -44,7 +44,8 @@ def write_report(result: Result, output: Path) -> None:
             "factor of the "
             f"truth against no cause is {item.detected.min():.1f} to {item.detected.max():.1f} over "
             f"{len(before)} noises. "
-            f"Against the rival it is {_range(before)}, where 2.7 is asked for to name a cause. With the separating manoeuvre it is "
+            f"Against the rival it is {_range(before)}, where 2.7 is asked for to name a cause. "
+            "With the separating manoeuvre it is "
             f"{_range(after)}, with a d-optimal manoeuvre of the same duration and limits {_range(other)}."
         )
     document.paragraph(_verdict(result))
