@@ -118,7 +118,12 @@ def _times(document: Document, result: Result) -> None:
             ],
             f"{title}: largest relative standard deviation after one manoeuvre (bias unknown), and time until 1 %. "
             f"'Never': more time no longer helps, the floor is in brackets. One manoeuvre of {result.duration:g} s is "
-            "the shortest time that was looked at.",
+            "the shortest time that was looked at."
+            + (
+                ""
+                if known
+                else " Where rates alone need years, it is never too: no less is left without the accelerometer."
+            ),
             ["left", "left", "right", "right", "right"],
         )
     document.figure(
@@ -130,7 +135,7 @@ def _times(document: Document, result: Result) -> None:
 
 def _manoeuvre(document: Document, result: Result) -> None:
     document.section("The designed manoeuvre")
-    costs = ", ".join(f"{cost:.2f}" for cost in result.designed.found.costs)
+    costs = ", ".join(f"{cost:.2f}".replace("-", "−") for cost in result.designed.found.costs)
     limits = "; ".join(
         f"{item.name} reaches {format_number(item.largest)} of {format_number(item.limit)} {item.unit}"
         for item in result.designed.reached
@@ -205,8 +210,9 @@ def _assumed(document: Document, result: Result) -> None:
             f"{', '.join(f'{value:g}' for value in POINT)} m. Neither is published.",
             f"Samples each {INTERVAL:g} s; noise is white. The star sensor's 2 seconds of arc, differenced, "
             "are taken as "
-            f"white too (2.7 × 10⁻⁵ rad/s). Joints have {format_number(ENCODER)} rad of noise, which reaches the "
-            "accelerometer: below some 10⁻⁶ m/s² its own noise hardly matters.",
+            f"white too (2.7 × 10⁻⁵ rad/s). Joints have {format_number(ENCODER)} rad of noise, "
+            "smoothed; it reaches the accelerometer, so that one of 10⁻⁹ m/s² is not a hundred times better than one of "
+            "10⁻⁷. How well it is smoothed was judged on the planned motion; the check was made at 10⁻⁵ m/s² only.",
             f"Initial rate unknown; attitude at the start known exactly; accelerometer bias, where unknown, within "
             f"{format_number(BIAS)} m/s² and the same in all repetitions. Gravity gradient is modelled; wheels, fuel, "
             "paddles and thrusters are taken to be silent, and the attitude control off.",
