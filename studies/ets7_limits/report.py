@@ -211,8 +211,8 @@ def _assumed(document: Document, result: Result) -> None:
             f"Samples each {INTERVAL:g} s; noise is white. The star sensor's 2 seconds of arc, differenced, "
             "are taken as "
             f"white too (2.7 × 10⁻⁵ rad/s). Joints have {format_number(ENCODER)} rad of noise, "
-            "smoothed; it reaches the accelerometer, so that one of 10⁻⁹ m/s² is not a hundred times better than one of "
-            "10⁻⁷. How well it is smoothed was judged on the planned motion; the check was made at 10⁻⁵ m/s² only.",
+            "smoothed; it reaches the accelerometer, so that one of 10⁻⁹ m/s² is not a hundred times better than one "
+            "of 10⁻⁷. How well it is smoothed was judged on the planned motion; the check was made at 10⁻⁵ m/s² only.",
             f"Initial rate unknown; attitude at the start known exactly; accelerometer bias, where unknown, within "
             f"{format_number(BIAS)} m/s² and the same in all repetitions. Gravity gradient is modelled; wheels, fuel, "
             "paddles and thrusters are taken to be silent, and the attitude control off.",
