@@ -1,0 +1,149 @@
+"""What one manoeuvre tells of the base, for any sensors, any knowledge of the arm and any number of repetitions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from bayesid import Kind, Sensor, White
+from bayesid.design import planned_manoeuvre, planned_posterior
+from bayesid.design.design import sample_times
+from bayesid.inertia import mass_com_inertia
+from bayesid.motion import Motion
+from bayesid.posterior import Posterior
+from bayesid.sensors import Noise
+from studies.base_body.physical import physical_sd, physical_slope
+from studies.ets7_limits.setting import ARM_SPREAD, DURATION, ENCODER, INTERVAL, POINT, model_of
+
+__all__ = ["LONGEST", "Grade", "Knowledge", "Repeated", "wide_posterior"]
+
+Floats = NDArray[np.floating]
+
+ABSENT = 1e3
+"""Noise of an accelerometer that is not there [m/s2]."""
+
+LONGEST = 1e6
+"""Repetitions beyond which nobody waits: years of moving without a pause."""
+
+JUDGED = (0, 4, 5, 6)
+"""Of the ten quantities, those that are to be known: mass and the three moments of inertia."""
+
+
+@dataclass(frozen=True)
+class Grade:
+    """Sensors: noise of the rate, noise of the accelerometer per sample [m/s2], None where there is none."""
+
+    rate: Noise
+    accel: float | None
+    bias_known: bool = False
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """What n repetitions of a manoeuvre tell.
+
+    Attributes
+    ----------
+    information : (c, c) array
+        Of the unknowns that all repetitions share, each repetition's initial rate marginalised; without prior.
+    slope : (10, c) array
+        Of the base's quantities.
+    truth : (10,) array
+    duration : float
+        Of one repetition [s].
+    """
+
+    information: Floats
+    slope: Floats
+    truth: Floats
+    duration: float
+
+    def sd(self, repetitions: float) -> Floats:
+        """Posterior standard deviation of the base's ten quantities, in their units."""
+        total = np.eye(len(self.information)) + repetitions * self.information
+        scale = 1.0 / np.sqrt(np.diag(total))
+        inverse = np.linalg.inv(total * np.outer(scale, scale)) * np.outer(scale, scale)
+        return physical_sd(self.slope, inverse)
+
+    def relative(self, repetitions: float) -> Floats:
+        """Relative standard deviation of the base's mass and three moments of inertia, shape (4,)."""
+        judged = list(JUDGED)
+        return self.sd(repetitions)[judged] / self.truth[judged]
+
+    def worst(self, repetitions: float) -> float:
+        """Return the largest of `relative`."""
+        return float(self.relative(repetitions).max())
+
+    def needed(self, target: float = 0.01) -> float:
+        """Repetitions until the worst is down to the target, at least one; infinite where `LONGEST` is not enough."""
+        if self.worst(1.0) <= target:
+            return 1.0
+        if self.worst(LONGEST) > target:
+            return float("inf")
+        return float(np.exp(brentq(lambda n: self.worst(float(np.exp(n))) - target, 0.0, np.log(LONGEST))))
+
+    @property
+    def floored(self) -> bool:
+        """Whether more repetitions no longer help at the end."""
+        return self.worst(LONGEST) > 0.9 * self.worst(0.01 * LONGEST)
+
+
+@dataclass
+class Knowledge:
+    """A manoeuvre's posterior with everything unknown that a question may fix; see `wide_posterior`."""
+
+    posterior: Posterior
+    duration: float = DURATION
+    _fisher: dict[tuple[Noise, float], Floats] = field(default_factory=dict)
+
+    def repeated(self, grade: Grade, arm_known: bool) -> Repeated:
+        """Return what repetitions tell with some sensors; without an accelerometer its bias does not matter."""
+        information, names = self.fisher(grade), self.posterior.unknowns.names
+        rates = [index for index, name in enumerate(names) if name.startswith("initial-rate")]
+        shared = [index for index, name in enumerate(names) if _shared(name, grade, arm_known)]
+        cross = information[np.ix_(shared, rates)]
+        inner = information[np.ix_(rates, rates)] + np.eye(len(rates))
+        own = information[np.ix_(shared, shared)] - cross @ np.linalg.solve(inner, cross.T)
+        return Repeated(own, self.slope[:, shared], self.truth, self.duration)
+
+    def fisher(self, grade: Grade) -> Floats:
+        """Information of one manoeuvre, without prior, the encoders' noise carried into the sensors; kept."""
+        accel = ABSENT if grade.accel is None else grade.accel
+        if (grade.rate, accel) not in self._fisher:
+            sensors = (Sensor(Kind.RATE, grade.rate), Sensor(Kind.ACCEL, White(accel), position=POINT))
+            z = np.zeros(self.posterior.size)
+            jacobian = self.posterior.with_sensors(sensors, z).jacobian(z)[: -self.posterior.size]
+            self._fisher[grade.rate, accel] = jacobian.T @ jacobian
+        return self._fisher[grade.rate, accel]
+
+    @cached_property
+    def slope(self) -> Floats:
+        """Derivative of the base's quantities, shape (10, n)."""
+        return physical_slope(self.posterior, np.zeros(self.posterior.size))
+
+    @cached_property
+    def truth(self) -> Floats:
+        """The base's quantities, shape (10,)."""
+        inertial = self.posterior.values(np.zeros(self.posterior.size)).inertial[:10]
+        return np.asarray(mass_com_inertia(np.asarray(inertial)))
+
+
+def _shared(name: str, grade: Grade, arm_known: bool) -> bool:
+    """Whether an unknown is the same in all repetitions and unknown."""
+    if name.startswith("initial-rate") or (arm_known and name.startswith("link")):
+        return False
+    return not (grade.bias_known and name.startswith("accel-bias"))
+
+
+def wide_posterior(
+    motion: Motion, like: Posterior | None = None, duration: float = DURATION, arm_spread: float = ARM_SPREAD
+) -> Posterior:
+    """Return the posterior of a planned manoeuvre with the arm unknown too."""
+    model = model_of(arm_spread) if like is None else like.model
+    time = sample_times(duration, INTERVAL)
+    manoeuvre = planned_manoeuvre(model, motion, time, "manoeuvre", {0: ENCODER})
+    return planned_posterior(model, [manoeuvre], like)

@@ -1,0 +1,5 @@
+"""Write the report: ``python -m studies.separating``."""
+
+from studies.separating import main
+
+main()

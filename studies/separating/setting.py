@@ -1,0 +1,82 @@
+"""The robot, the rivals and the manoeuvres of the study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid import Effect, Model
+from bayesid.design import Linear
+from bayesid.effects import AccelBias, GravityGradient, RateBias, RateDrift, ThrusterLeak, WheelMomentum
+from studies.ets7_limits.flight import Flight
+from studies.ets7_limits.setting import DURATION, START, model_of
+
+__all__ = ["CANDIDATES", "DRIFT", "RIVALS", "SPREAD", "TRUTHS", "FlightFamily", "amplitude", "drifting", "rival_model"]
+
+Floats = NDArray[np.floating]
+
+CANDIDATES: tuple[Effect, ...] = (
+    WheelMomentum(1.0),
+    ThrusterLeak(5e-4, 5e-4),
+    RateDrift(1e-7),
+    RateBias(5e-5),
+    AccelBias(2e-5),
+)
+"""From which a pair is chosen; the leak is a small one, of half a millinewton."""
+
+RIVALS = ("wheel-momentum", "thruster-leak")
+
+TRUTHS: dict[str, Floats] = {
+    "wheel-momentum": np.array([-0.6, 0.35, 0.7]),
+    "thruster-leak": np.array([-3e-4, 1.8e-4, 3.6e-4]),
+}
+"""Momentum left in the wheels [N m s], and torque of the leak [N m], base axes: one of them is hidden."""
+
+SPREAD = 0.1
+"""Relative width of the prior of the base."""
+
+DRIFT = np.array([3e-4, -2e-4, 2.5e-4])
+"""Rate of the base when a manoeuvre starts, about a degree in a minute [rad/s]; unknown to every fit."""
+
+
+class FlightFamily(Linear):
+    """The flight manoeuvre times a factor."""
+
+    name = "flight"
+
+    def __init__(self, duration: float = DURATION) -> None:
+        self.duration, self.names = duration, ("size",)
+        self.scale, self.centre = np.ones(1), np.ones(1)
+
+    def matrices(self, time: Floats) -> tuple[Floats, Floats]:
+        """Return rest (3, T, joints) and basis (3, T, joints, 1)."""
+        rest = np.stack(Flight(START, 0.0 * START).evaluate(time))
+        return rest, (np.stack(Flight(START).evaluate(time)) - rest)[..., None]
+
+
+def rival_model(labels: Sequence[str], spread: float = SPREAD) -> Model:
+    """Return the model with some of the candidates, each by its label."""
+    effects = tuple(effect for effect in CANDIDATES if effect.label in labels)
+    return replace(model_of(spread=spread), effects=(GravityGradient(), *effects))
+
+
+def amplitude(label: str) -> Floats:
+    """Return what is hidden in standard deviations of the prior; a leak has no force."""
+    effect = next(effect for effect in CANDIDATES if effect.label == label)
+    sigma = np.array([parameter.sigma for parameter in effect.parameters])
+    values = np.zeros(len(sigma))
+    values[-3:] = TRUTHS[label]
+    return values / sigma
+
+
+def drifting(model: Model, names: Sequence[str]) -> Floats:
+    """Return the coordinates of the prior's centre, but with every manoeuvre starting at the rate `DRIFT`."""
+    z = np.zeros(len(names))
+    for axis, value in zip("xyz", DRIFT, strict=True):
+        for index, name in enumerate(names):
+            if name.startswith("initial-rate[") and name.endswith(f".{axis}"):
+                z[index] = value / model.rate_sigma
+    return z

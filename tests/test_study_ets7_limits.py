@@ -1,0 +1,61 @@
+"""The study of ETS-VII's limits: the flight's ramps, what repetitions add, floors, and times in words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from studies.ets7_limits.analysis import Answer
+from studies.ets7_limits.flight import EXCURSION, RAMPS, Flight
+from studies.ets7_limits.information import Repeated
+from studies.ets7_limits.report import time_needed
+from studies.ets7_limits.setting import START
+
+TRUTH = np.ones(10)
+
+
+def repeated(information: np.ndarray) -> Repeated:
+    """Ten quantities that are the coordinates themselves."""
+    return Repeated(information, np.eye(10), TRUTH, 240.0)
+
+
+def test_the_flight_ramps_at_constant_speed_between_rounded_corners():
+    time = np.linspace(50.0, 160.0, 11001)
+    state = Flight(START).evaluate(time)
+    np.testing.assert_allclose(np.gradient(state.position, time, axis=0)[5:-5], state.velocity[5:-5], atol=1e-7)
+    np.testing.assert_allclose(np.gradient(state.velocity, time, axis=0)[5:-5], state.acceleration[5:-5], atol=1e-5)
+    held = Flight(START).evaluate(np.array([0.0, 100.0, 200.0])).position - START
+    np.testing.assert_allclose(held, [0.0 * EXCURSION, EXCURSION, 0.0 * EXCURSION], atol=1e-12)
+    middle = Flight(START).evaluate(np.array([np.mean(RAMPS[0])]))
+    np.testing.assert_allclose(middle.velocity[0], EXCURSION / 22.6)
+
+
+def test_repetitions_add_information():
+    found = repeated(25.0 * np.eye(10))
+    np.testing.assert_allclose(found.sd(4.0), 1.0 / np.sqrt(101.0))
+    assert found.needed() == pytest.approx(9999.0 / 25.0)
+    assert repeated(1e4 * np.eye(10)).needed() == 1.0
+
+
+def test_what_is_not_seen_sets_a_floor():
+    information = 25.0 * np.eye(10)
+    # mass and moment in one combination only
+    information[0, 0] = information[0, 4] = information[4, 0] = information[4, 4] = 12.5
+    found = repeated(information)
+    assert found.needed() == np.inf
+    assert found.floored
+    assert found.worst(1e6) == pytest.approx(np.sqrt(0.5), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("repetitions", "floored", "words"),
+    [
+        (1.0, False, "240 s"),
+        (6.0, False, "24 min"),
+        (150.0, False, "10 h"),
+        (np.inf, True, "never (2.3 %)"),
+        (np.inf, False, "over 7.6 years"),
+    ],
+)
+def test_times_in_words(repetitions: float, floored: bool, words: str):
+    assert time_needed(Answer(0.5, repetitions, 0.0234, floored), 240.0) == words

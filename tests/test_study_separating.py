@@ -1,0 +1,62 @@
+"""The separating study: what linear theory expects of the rivals, and one short flight."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesid.motion import JointState
+from studies.ets7_limits.setting import START
+from studies.separating.expected import Linearised
+from studies.separating.factors import flown, noisy
+from studies.separating.setting import TRUTHS
+
+DURATION = 40.0
+
+
+class Still:
+    """An arm that rests."""
+
+    def evaluate(self, time: np.ndarray) -> JointState:
+        """Return the joint state."""
+        rest = np.zeros((len(time), len(START)))
+        return JointState(START + rest, rest, rest)
+
+
+def linearised(first: np.ndarray, second: np.ndarray) -> Linearised:
+    """Signals of one wheel and one leak parameter, and of an unknown that is never seen."""
+    signals = np.stack([first, second, np.zeros_like(first)])
+    return Linearised(signals @ signals.T, ("wheel-momentum.x", "thruster-leak.torque.x", "initial-rate[0].x"))
+
+
+def test_noncentralities_are_those_of_two_signals():
+    first, second = np.array([3.0, 1.0, 0.0]), np.array([0.0, 2.0, 1.0])
+    found = linearised(first, second).expect("wheel-momentum", np.array([2.0]))
+    assert found.alone == pytest.approx(4.0 * first @ first)
+    left = first - second * (first @ second) / (1.0 + second @ second)  # the rival has a prior
+    assert found.apart == pytest.approx(4.0 * first @ left)
+
+    # by hand: mean log evidence of y = s + noise under N(0, 1 + signal signal')
+    def evidence(signal: np.ndarray) -> float:
+        covariance = np.eye(3) + np.outer(signal, signal)
+        mean = 2.0 * first @ np.linalg.solve(covariance, 2.0 * first) + np.trace(np.linalg.inv(covariance))
+        return -0.5 * float(mean + np.linalg.slogdet(covariance)[1])
+
+    assert found.log_factor == pytest.approx(evidence(first) - evidence(second))
+
+
+def test_a_second_manoeuvre_shares_all_but_the_initial_rate():
+    one = linearised(np.array([3.0, 1.0]), np.array([0.0, 2.0]))
+    both = one.with_another(one)
+    assert both.names[-1] == "second initial-rate[0].x"
+    np.testing.assert_allclose(both.information[:2, :2], 2.0 * one.information[:2, :2])
+    np.testing.assert_allclose(both.information[3, :3], 0.0)
+
+
+def test_a_leak_pushes_steadily_and_noise_is_that_of_its_seed():
+    leak = flown(Still(), DURATION, "thruster-leak", TRUTHS["thruster-leak"])
+    pushed = leak.run.rate - flown(Still(), DURATION, "", np.zeros(3)).run.rate
+    np.testing.assert_allclose(pushed[-1], 2.0 * pushed[len(pushed) // 2], rtol=0.02)
+    channels = [noisy({"first": leak}, ["first"], seed)[0].recording.channels["rate.x"] for seed in (3, 3, 4)]
+    np.testing.assert_array_equal(channels[0], channels[1])
+    assert np.abs(channels[0] - channels[2]).max() > 1e-5
