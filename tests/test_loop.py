@@ -43,8 +43,9 @@ from bayesid.unknowns import BodyPrior
 
 ENCODER = {0: 1e-6}
 SENSORS = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(2e-5), position=(0.1, -0.15, 0.3)))
-TRUE = InertialParameters(66.0, [0.09, -0.05, 0.01], np.diag([2.6, 2.5, 3.1]))
-LIMITS = Limits(joint_speed=0.5, base_rotation=0.08)
+TRUE = InertialParameters(61.2, [0.0525, -0.028, 0.0015], [[2.42, 0.047, 0.0], [0.047, 2.64, 0.0], [0.0, 0.0, 2.82]])
+"""As the prior has it, which is so narrow that normal approximations do: at 5 % they lose a tenth of some widths."""
+LIMITS = Limits(joint_speed=0.5, base_rotation=0.045)
 
 
 def robot_of(base: InertialParameters) -> Robot:
@@ -52,7 +53,7 @@ def robot_of(base: InertialParameters) -> Robot:
 
 
 def model_of(base: InertialParameters, spread: float) -> Model:
-    return Model(robot_of(base), SENSORS, (BodyPrior("base_link", base, spread),), rate_sigma=0.0)
+    return Model(robot_of(base), SENSORS, (BodyPrior("base_link", base, spread),))
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,8 @@ class Swing:
 
 
 def problem() -> Problem:
-    """Twelve seconds of two joints; the prior is 5 % wide in every coordinate."""
-    model = model_of(Robot.from_urdf(PLANAR).link("base_link").inertial, 0.05)
+    """Twelve seconds of two joints; the prior is 2 % wide in every coordinate."""
+    model = model_of(Robot.from_urdf(PLANAR).link("base_link").inertial, 0.02)
     family = BSplines([0.3, -0.6], (0, 1), 12.0, points=3)
     return Problem(Plan(model, family, interval=0.25, tip=Tip.of(model.robot), step=1.0), LIMITS, (Swing(),))
 
@@ -81,7 +82,7 @@ PROBLEM = problem()
 
 def loop_of(**options) -> Loop:
     """One of the problem."""
-    settings = {"wanted": 0.0, "at_most": 2, "search": Search(1, 10), "identifier": Laplace(), "seed": 3, **options}
+    settings = {"wanted": 0.0, "at_most": 2, "search": Search(2, 40), "identifier": Laplace(), "seed": 3, **options}
     return Loop(PROBLEM, ENCODER, **settings)
 
 
@@ -102,13 +103,15 @@ def done(tmp_path_factory: pytest.TempPathFactory):
 def test_every_step_narrows_the_posterior_about_the_truth(done):
     assert done.status == "at-most"
     bodies = [step["identification"]["bodies"]["base_link"] for step in done.steps]
-    for body in bodies:
+    for step, body in zip(done.steps, bodies, strict=True):
+        fit = step["identification"]
+        assert abs(fit["chi2"] / fit["samples"] - 1.0) < 5.0 * np.sqrt(2.0 / fit["samples"])
         assert abs(body["mass"]["mean"] - TRUE.mass) < 4.0 * body["mass"]["sd"]
     first, second = (np.array([item["sd"] for item in body.values()]) for body in bodies)
     # what moves in a plane tells nothing of some moments of inertia
     assert (second < 1.1 * first).all()
     assert (second < 0.9 * first).sum() >= 2
-    assert second[0] < 4.5  # the prior's is 6 kg
+    assert second[0] < 0.5  # the prior's is 2.4 kg
 
 
 def test_what_may_break_a_limit_is_shrunk_before_it_is_flown(done):
@@ -232,14 +235,17 @@ def test_what_is_known_takes_the_place_of_the_prior():
     """Half as wide in every coordinate, and elsewhere."""
     unknowns, body = PROBLEM.plan.unknowns, PROBLEM.plan.model.priors[0]
     rng = np.random.default_rng(2)
-    z = 0.3 + 0.5 * rng.normal(size=(4000, 10))
+    z = np.zeros((400, unknowns.size))
+    z[:, :10] = 0.3 + 0.5 * rng.normal(size=(400, 10))
     values = np.stack([np.asarray(unknowns.values(row).inertial) for row in z])
     known = known_of(unknowns, InertialDraws((body.name,), values[:, None]))
     np.testing.assert_allclose(known.centre, z.mean(axis=0), atol=1e-8)
-    np.testing.assert_allclose(known.precision, np.linalg.inv(np.cov(z.T)), rtol=1e-6)
+    np.testing.assert_allclose(known.precision[:10, :10], np.linalg.inv(np.cov(z[:, :10].T)), rtol=1e-6)
     problem = Problem(PROBLEM.plan, LIMITS, PROBLEM.criteria, known)
     draws = problem.draws(4000, rng)
-    np.testing.assert_allclose(draws.mean(axis=0), 0.3, atol=0.05)
-    np.testing.assert_allclose(draws.std(axis=0), 0.5, atol=0.04)
-    nothing = Outcome(None, np.zeros((10, 10)), None, known.precision)
-    np.testing.assert_allclose(covariance(PROBLEM.plan, nothing), body.spread**2 * np.cov(z.T), rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(draws[:, :10].mean(axis=0), z[:, :10].mean(axis=0), atol=0.05)
+    np.testing.assert_allclose(draws[:, :10].std(axis=0), z[:, :10].std(axis=0), atol=0.04)
+    nothing = Outcome(None, np.zeros((unknowns.size, unknowns.size)), None, known.precision)
+    np.testing.assert_allclose(
+        covariance(PROBLEM.plan, nothing), body.spread**2 * np.cov(z[:, :10].T), rtol=1e-6, atol=1e-12
+    )

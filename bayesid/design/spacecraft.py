@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
-from scipy.interpolate import BPoly
+from scipy.interpolate import BSpline, make_interp_spline
 
 from bayesid.arrays import Floats
 from bayesid.errors import InputError
@@ -47,7 +47,10 @@ class Spacecraft(Protocol):
 
 @dataclass(frozen=True)
 class PlannedMotion:
-    """The motion between the samples of a plan: quintic, through positions, velocities and accelerations.
+    """The motion between the samples of a plan: the quintic spline through its positions.
+
+    Its third and fourth derivatives are continuous, so that samples of it can be smoothed well. Velocity and
+    acceleration of the plan are met exactly at its ends.
 
     Parameters
     ----------
@@ -64,13 +67,16 @@ class PlannedMotion:
             for name in (f"{family}.{joint}" for family in FAMILIES):
                 if name not in self.plan.channels:
                     raise InputError(f"a plan has no {name}", file=self.plan.file, remedy="Give what the loop planned")
-        states = np.stack([[self.plan.channels[f"{family}.{j}"] for j in self.joints] for family in FAMILIES])
-        spline = BPoly.from_derivatives(self.plan.time, states.transpose(2, 0, 1))
+        position, velocity, acceleration = (
+            np.stack([self.plan.channels[f"{family}.{joint}"] for joint in self.joints], axis=1) for family in FAMILIES
+        )
+        ends: Any = tuple([(1, velocity[at]), (2, acceleration[at])] for at in (0, -1))
+        spline = make_interp_spline(self.plan.time, position, k=5, bc_type=ends)
         object.__setattr__(self, "_splines", [spline, spline.derivative(1), spline.derivative(2)])
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,); at rest before and after."""
-        splines: Sequence[BPoly] = self._splines  # type: ignore[attr-defined]
+        splines: Sequence[BSpline] = self._splines  # type: ignore[attr-defined]
         inside = np.clip(time, self.plan.time[0], self.plan.time[-1])
         return JointState(*(np.asarray(spline(inside)) for spline in splines))
 
