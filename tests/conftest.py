@@ -46,6 +46,13 @@ def pytest_configure(config: pytest.Config) -> None:
     keep_compiled(Path(os.environ[COMPILED]))
 
 
+@pytest.fixture
+def slow(request: pytest.FixtureRequest) -> None:
+    """Leave a test to ``pytest --catalogue``."""
+    if not request.config.getoption("--catalogue"):
+        pytest.skip("takes long; run with --catalogue")
+
+
 ROOT = Path(__file__).resolve().parents[1]
 PLANAR = ROOT / "bayesid" / "robots" / "planar.urdf"
 

@@ -121,6 +121,7 @@ def laplace(posterior: Posterior) -> np.ndarray:
     return np.asarray(posterior.values_of(z).inertial)
 
 
+@pytest.mark.usefixtures("slow")  # the loop's tests show the same on two steps
 def test_two_studies_in_turn_tell_what_one_tells_of_both():
     """The planar robot at rest; the second recording halves what the first left uncertain."""
     robot = Robot.from_urdf(PLANAR)

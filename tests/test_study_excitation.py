@@ -41,9 +41,8 @@ def test_rank_correlation_of_a_cloud():
     assert cloud.correlation(cloud.intended)[0] == pytest.approx(-1.0)
 
 
-def test_the_whole_study_small(request, tmp_path):
-    if not request.config.getoption("--catalogue"):
-        pytest.skip("compiles for minutes; run with --catalogue")
+@pytest.mark.usefixtures("slow")
+def test_the_whole_study_small(tmp_path):
     rule = "within the flight's rule"
     result = run(seed=2, search=Search(starts=1, iterations=4), repeats=6, random=12, points=2, sets=(rule,))
     (contest,) = result.contests.values()
