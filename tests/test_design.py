@@ -249,6 +249,7 @@ def quiet(trajectory: Trajectory, band: tuple[float, float]) -> float:
     return float(spectrum[inside].sum() / spectrum.sum())
 
 
+@pytest.mark.usefixtures("slow")  # the command's tests show the same
 def test_limits_that_cannot_be_kept_are_named() -> None:
     problem = Problem(plan(duration=4.0), Limits(quiet_band=(0.0, 2.0)), (DOptimal(),))
     with pytest.raises(InputError, match="quiet_band"):
