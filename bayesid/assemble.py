@@ -21,6 +21,7 @@ from bayesid.recording import Recording
 from bayesid.robot import Load, Robot
 from bayesid.sensors import Filter, Kind, Sensor
 from bayesid.study import RecordingSection, Study
+from bayesid.torque import TorqueSensor
 from bayesid.unknowns import BodyPrior, Mixing
 
 __all__ = ["encoder_noise", "load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
@@ -100,6 +101,7 @@ def load_model(study: Study) -> Model:
             effects=_effects(study),
             rate_sigma=_rate_sigma(study),
             mixing=mixing,
+            torque=_torque(study, robot),
         )
     except InputError as error:
         raise error.within(file=study.file) from None
@@ -177,6 +179,15 @@ def _sensors(study: Study) -> tuple[Sensor, ...]:
     if attitude is not None:
         sensors.append(Sensor(Kind.ATTITUDE, attitude.noise, filter=Filter(attitude.low_pass, attitude.decimate)))
     return tuple(sensors)
+
+
+def _torque(study: Study, robot: Robot) -> TorqueSensor | None:
+    section = study.sensors.torque
+    if section is None:
+        return None
+    given = section.sigma
+    sigma = dict(given) if isinstance(given, Mapping) else {joint.name: given for joint in robot.joints}
+    return TorqueSensor(tuple(sigma), tuple(sigma.values()))
 
 
 def _effects(study: Study) -> tuple[Effect, ...]:

@@ -18,6 +18,7 @@ from jax import Array
 
 from bayesid.effects.base import Composite, Effect, Environment, Modes, Moment, Readings, Wrench
 from bayesid.tables import ENTRIES
+from bayesid.torque import BaseMotion, Beyond, joint_torques
 
 __all__ = ["Grid", "Instants", "Start", "composite", "simulate", "solve_small", "trace"]
 
@@ -25,11 +26,15 @@ ATTITUDE, MOMENTUM, INNER = slice(0, 4), slice(4, 7), slice(7, None)
 
 
 class Instants(NamedTuple):
-    """Tables at some instants: rows of the known bodies (T, 28), coefficients of the unknown ones (T, 28, p)."""
+    """Tables at some instants: rows of the known bodies (T, 28), coefficients of the unknown ones (T, 28, p).
+
+    ``beyond`` is what the joints carry, for their torques.
+    """
 
     known: Array
     unknown: Array
     environment: Environment
+    beyond: Beyond
 
 
 class Grid(NamedTuple):
@@ -174,11 +179,9 @@ def _integrate(
 def _sense(grid: Grid, point: Array, system: _System, loads: Array, course: _Course) -> Readings:
     """Return what the sensors read along a course."""
     seen = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ loads)
-    sense = jax.vmap(system.sense, (0, 0, 0, None))
-    rate, accel, attitude = sense(
-        course.at(grid.step_of, grid.fraction), (seen, grid.sample.environment), grid.held[grid.step_of], point
-    )
-    return Readings(grid.sample.environment.time, rate, accel, attitude)
+    sense = jax.vmap(system.sense, (0, 0, 0, None, 0, None))
+    states, held = course.at(grid.step_of, grid.fraction), grid.held[grid.step_of]
+    return Readings(*sense(states, (seen, grid.sample.environment), held, point, grid.sample, loads))
 
 
 class _Inner(NamedTuple):
@@ -222,15 +225,23 @@ class _System(NamedTuple):
         return jnp.concatenate(parts)
 
     def sense(
-        self, state: Array, instant: tuple[Composite, Environment], held: Array, point: Array
-    ) -> tuple[Array, Array, Array]:
+        self,
+        state: Array,
+        instant: tuple[Composite, Environment],
+        held: Array,
+        point: Array,
+        tables: Instants,
+        loads: Array,
+    ) -> tuple[Array, Array, Array, Array, Array]:
         moment, _ = self.motion(state, instant, held)
         rate = moment.rate
         accel = moment.acceleration + _cross(moment.rate_change, point) + _cross(rate, _cross(rate, point))
         for effect, values, *_ in self.inner(state[INNER]):
             if effect.uses("field"):
                 accel = accel + effect.field(values, moment, point - moment.body.com)
-        return rate, accel, state[ATTITUDE] / jnp.linalg.norm(state[ATTITUDE])
+        motion = BaseMotion(rate, moment.rate_change, moment.acceleration)
+        torque = joint_torques(tables.beyond, tables.unknown, loads, motion, moment.body.com, self.tide(moment))
+        return instant[1].time, rate, accel, state[ATTITUDE] / jnp.linalg.norm(state[ATTITUDE]), torque
 
     def motion(self, state: Array, instant: tuple[Composite, Environment], held: Array) -> tuple[Moment, Array]:
         """Return the instant with its accelerations, and those of the modes' amplitudes."""
@@ -304,6 +315,11 @@ class _System(NamedTuple):
                 more = effect.wrench(values, moment, own)
                 total = Wrench(total.force + more.force, total.torque + more.torque)
         return total
+
+    def tide(self, moment: Moment) -> Array:
+        """Return gravitational acceleration per distance from the centre of mass, (3, 3)."""
+        parts = zip(self.effects, self.values, strict=True)
+        return sum((e.tide(v, moment) for e, v in parts if e.uses("tide")), jnp.zeros((3, 3)))
 
     def inner(self, inner: Array) -> list[_Inner]:
         parts, start = [], 0

@@ -19,6 +19,7 @@ from bayesid.orbit import Orbit, OrbitState
 from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.tables import WIDTH, composite_rows, kinematics, link_table
+from bayesid.torque import beyond_joints, no_joints
 
 __all__ = ["Actions", "build_grid", "pad_grids", "rounded"]
 
@@ -93,6 +94,7 @@ def build_grid(
     latitude: float = 0.0,
     actions: Actions | None = None,
     effects: Sequence[Effect] = (),
+    torques: bool = False,
 ) -> Grid:
     """Reduce one recording to a `Grid`.
 
@@ -110,11 +112,16 @@ def build_grid(
         Argument of latitude at time 0 [rad].
     effects : sequence of Effect
         Whose tables follow those of the unknown links.
+    torques : bool
+        Whether the joints' torques are sampled too.
     """
     actions = Actions.none() if actions is None else actions
     nodes = _nodes(float(samples[-1]), step, actions.time)
     stage = np.sort(np.concatenate([nodes, 0.5 * (nodes[1:] + nodes[:-1])]))
-    instants = [_instants(robot, unknown, effects, motion, time, orbit, latitude, actions) for time in (stage, samples)]
+    instants = [
+        _instants(robot, unknown, effects, motion, time, orbit, latitude, actions, sampled)
+        for time, sampled in ((stage, False), (samples, torques))
+    ]
     index = np.clip(np.searchsorted(nodes, samples, side="right") - 1, 0, len(nodes) - 2)
     size = np.diff(nodes)
     return Grid(
@@ -146,11 +153,14 @@ def _instants(
     orbit: Orbit | None,
     latitude: float,
     actions: Actions,
+    torques: bool,
 ) -> Instants:
-    moved = kinematics(robot, motion.evaluate(time))
+    joints = motion.evaluate(time)
+    moved = kinematics(robot, joints)
     known = composite_rows(robot, moved, leave_out=unknown)
-    tables = [np.zeros((len(time), WIDTH, 0)), *(link_table(robot, name, moved) for name in unknown)]
-    tables += [effect.table(robot, motion, time) for effect in effects if effect.uses("table")]
+    tables: list[tuple[str | None, Floats]] = [(name, link_table(robot, name, moved)) for name in unknown]
+    tables += [(effect.link, effect.table(robot, motion, time)) for effect in effects if effect.uses("table")]
+    owners = [name for name, table in tables for _ in range(table.shape[2])]
     none = OrbitState(*(np.zeros((len(time), *shape)) for shape in ((3,), (), (3,), (3,), (), (3,))))
     state = none if orbit is None else orbit.state(time, latitude)
     momentum, torque = actions.wheels(time)
@@ -166,7 +176,11 @@ def _instants(
         wheel_torque=jnp.asarray(torque),
         wrench=jnp.zeros((len(time), 6)),
     )
-    return Instants(jnp.asarray(known), jnp.concatenate([jnp.asarray(table) for table in tables], axis=2), environment)
+    coefficients = [jnp.zeros((len(time), WIDTH, 0)), *(jnp.asarray(table) for _, table in tables)]
+    beyond = no_joints(len(time), len(owners))
+    if torques and robot.joints:
+        beyond = beyond_joints(robot, joints, moved, unknown, owners)
+    return Instants(jnp.asarray(known), jnp.concatenate(coefficients, axis=2), environment, beyond)
 
 
 ROUND = 16

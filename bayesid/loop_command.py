@@ -64,7 +64,7 @@ def problem_of(study: Study) -> Problem:
 
     The base starts as in the first of its ``[[recordings]]``, whose file is not read.
     """
-    section, model = study.design or DesignSection(), load_model(study)
+    section, model = study.design or DesignSection(), load_model(study).without_torque
     joints = [joint.name for joint in model.robot.joints]
     for name in section.joints or ():
         if name not in joints:

@@ -15,6 +15,7 @@ from bayesid.orbit import Orbit
 from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.sensors import Kind, Sensor
+from bayesid.torque import TorqueSensor
 from bayesid.unknowns import BodyPrior, Mixing, check_mixing
 
 __all__ = ["Manoeuvre", "Model"]
@@ -66,6 +67,8 @@ class Model:
     mixing : (10 B, 10 B) tuple of tuples, optional
         Joint prior of all B ``priors`` about their centres (`Unknowns`), such as the posterior of an earlier study;
         left out, bodies and coordinates are independent.
+    torque : TorqueSensor, optional
+        Where joint torques are measured.
     """
 
     robot: Robot
@@ -75,6 +78,7 @@ class Model:
     effects: tuple[Effect, ...] = ()
     rate_sigma: float = RATE_SIGMA
     mixing: Mixing | None = None
+    torque: TorqueSensor | None = None
 
     def __post_init__(self) -> None:
         if not self.sensors:
@@ -97,6 +101,23 @@ class Model:
             self.robot.link(prior.name)
         if self.mixing is not None:
             check_mixing(self.mixing, len(self.priors))
+        if self.torque is not None:
+            self._check_torque(self.torque)
+
+    def _check_torque(self, sensor: TorqueSensor) -> None:
+        sensor.columns(self.robot)
+        for effect in self.effects:
+            if effect.uses("table") and effect.link is None:
+                raise InputError(
+                    f"effect {effect.label!r} is not carried into the joint torques",
+                    remedy="Leave [sensors.torque] or the effect out",
+                )
+
+    @property
+    def without_torque(self) -> Model:
+        """The model without torque sensors and what only they read."""
+        rest = tuple(effect for effect in self.effects if not effect.uses("friction"))
+        return self if self.torque is None and rest == self.effects else replace(self, torque=None, effects=rest)
 
     def extend(self, effect: Effect) -> Model:
         """Return the model with one more effect."""

@@ -20,13 +20,11 @@ from bayesid.errors import InputError
 from bayesid.grid import Actions, build_grid, pad_grids, rounded
 from bayesid.inertia import InertialParameters
 from bayesid.model import Manoeuvre, Model
-from bayesid.motion import MeasuredMotion
-from bayesid.robot import Robot
-from bayesid.sensitivity import joint_sensitivity
+from bayesid.samples import Samples
 from bayesid.sensors import Kind, Sensor
 from bayesid.simulator import Simulator
 from bayesid.unknowns import Unknowns, Values
-from bayesid.whitening import Channel, NoiseModel, Whitening
+from bayesid.whitening import Whitening
 
 __all__ = ["Posterior", "Predictions"]
 
@@ -46,9 +44,6 @@ BATCH = 8
 
 MAPPED = 256
 """Points whose coordinates are converted together."""
-
-FEWEST = 4
-"""Samples a sensor must have in a recording."""
 
 
 class Data(NamedTuple):
@@ -103,12 +98,16 @@ class Traced(NamedTuple):
 
 
 class Predictions(NamedTuple):
-    """What one recording's sensors should read: time (T,) and per sensor (T, 3) or, for an attitude, (T, 4)."""
+    """What one recording's sensors should read: time (T,) and per sensor (T, 3) or, for an attitude, (T, 4).
+
+    ``torque`` is (T, n), of the n joints of the model's torque sensor.
+    """
 
     time: Floats
     rate: Floats
     accel: Floats
     attitude: Floats
+    torque: Floats
 
 
 class Posterior:
@@ -140,7 +139,7 @@ class Posterior:
         if not manoeuvres:
             raise InputError("there is no recording", remedy="Give at least one")
         self.model, self.manoeuvres, self.flat_prior = model, tuple(manoeuvres), flat_prior
-        self._samples = [_Samples(model, manoeuvre) for manoeuvre in manoeuvres]
+        self._samples = [Samples(model, manoeuvre) for manoeuvre in manoeuvres]
         self._built: dict[float, list[Grid]] = {}
         self._left_out: list[NDArray[np.bool_]] = []
         self.unknowns = Unknowns(
@@ -290,6 +289,8 @@ class Posterior:
     def predict(self, z: Floats) -> list[Predictions]:
         """Return what the sensors of each recording should read at ``z``, in sensor axes."""
         readings = jax.tree.map(np.asarray, self._compiled.readings(jnp.asarray(z), self.data))
+        if self.model.torque is not None:
+            readings = readings._replace(torque=readings.torque[..., self.model.torque.columns(self.model.robot)])
         return [
             Predictions(*(np.asarray(field)[index, : len(samples.time)] for field in readings))
             for index, samples in enumerate(self._samples)
@@ -302,6 +303,10 @@ class Posterior:
     def measured(self, index: int, kind: Kind) -> tuple[Floats, Floats]:
         """Return times and values of one sensor of a recording, as recorded."""
         return self._samples[index].series[kind]
+
+    def torques(self, index: int) -> tuple[Floats, Floats]:
+        """Return times (n,) and torques (n, joints) of a recording, as recorded by the model's torque sensor."""
+        return self._samples[index].torque
 
     def sigma(self, index: int, kind: Kind) -> Floats:
         """White noise per axis of one sensor of a recording, shape (3,)."""
@@ -369,6 +374,7 @@ class Posterior:
                 latitude=manoeuvre.latitude,
                 actions=Actions.from_recording(manoeuvre.recording),
                 effects=self.model.effects,
+                torques=self.model.torque is not None,
             )
             for manoeuvre, samples in zip(self.manoeuvres, self._samples, strict=True)
         ]
@@ -393,6 +399,9 @@ class Posterior:
             sigma = np.stack([item.sigma(sensor) for item in self._samples])
             first, second = (np.asarray(getattr(item, sensor.kind.value)) for item in (coarse, fine))
             worst = max(worst, float((np.abs(first - second)[..., :3] / sigma[:, None]).max()))
+        if (torque := self.model.torque) is not None:
+            change = np.abs(np.asarray(coarse.torque - fine.torque))[..., torque.columns(self.model.robot)]
+            worst = max(worst, float((change / np.array(torque.sigma)).max()))
         return worst * 16.0 / 15.0  # the error of a fourth-order step, from its difference to half the step
 
     def _simulated(self, step: float, z: Floats, like: float | None = None) -> Readings:
@@ -501,84 +510,3 @@ class _Compiled:
 
 def _lengthen(array: Floats, length: int) -> Floats:
     return np.concatenate([array, np.repeat(array[-1:], length - len(array), axis=0)])
-
-
-def _coloured(sensor: Sensor) -> list[tuple[float, float]]:
-    noise = sensor.coloured
-    return [(0.0, 1.0)] * 3 if noise is None else [(level, noise.time) for level in noise.sigma]
-
-
-class _Samples:
-    """Sensor samples of one recording on one time grid."""
-
-    def __init__(self, model: Model, manoeuvre: Manoeuvre) -> None:
-        recording = manoeuvre.recording
-        self.motion = manoeuvre.motion
-        self.sensors = model.sensors
-        self.series = {}
-        for sensor in model.sensors:
-            axes = ("x", "y", "z", "w") if sensor.kind is Kind.ATTITUDE else ("x", "y", "z")
-            if f"{sensor.kind.value}.x" not in recording.channels:
-                raise InputError(
-                    f"no column {sensor.kind.value}.x|y|z, but the study declares the sensor",
-                    file=recording.file or recording.name,
-                    remedy="Record the sensor or take it out of [sensors]",
-                )
-            self.series[sensor.kind] = recording.vector(sensor.kind.value, axes)
-            if len(self.series[sensor.kind][0]) < FEWEST:
-                raise InputError(
-                    f"only {len(self.series[sensor.kind][0])} samples of {sensor.kind.value}",
-                    file=recording.file or recording.name,
-                    remedy=f"Record at least {FEWEST}, or take the sensor out of [sensors]",
-                )
-        self.time = np.unique(np.concatenate([time for time, _ in self.series.values()]))
-        self.rows = {kind: np.searchsorted(self.time, time) for kind, (time, _) in self.series.items()}
-        self.measured = np.zeros((len(self.time), 3 * len(self.sensors)))
-        self.quaternion = np.tile([0.0, 0.0, 0.0, 1.0], (len(self.time), 1))
-        for slot, sensor in enumerate(self.sensors):
-            values = self.series[sensor.kind][1]
-            if sensor.kind is Kind.ATTITUDE:
-                self.quaternion[self.rows[sensor.kind]] = values
-            else:
-                self.measured[self.rows[sensor.kind], 3 * slot : 3 * slot + 3] = values
-
-    def with_sensors(self, sensors: Sequence[Sensor]) -> _Samples:
-        """Return the samples of the same sensors with other noise."""
-        new = object.__new__(_Samples)
-        new.__dict__.update(self.__dict__)
-        new.sensors = tuple(sensors)
-        return new
-
-    @property
-    def first_rate(self) -> Floats:
-        """Rate at the start in base axes, from the first samples."""
-        for sensor in self.sensors:
-            if sensor.kind is Kind.RATE:
-                return sensor.rotation @ self.series[sensor.kind][1][:3].mean(axis=0)
-        return np.zeros(3)
-
-    def interval(self, kind: Kind) -> float:
-        """Median sampling interval of a sensor [s]."""
-        return float(np.median(np.diff(self.series[kind][0])))
-
-    def sigma(self, sensor: Sensor) -> Floats:
-        """Noise per axis, shape (3,)."""
-        return sensor.noise.sigma(self.interval(sensor.kind))
-
-    def noise_model(self, model: Model, robot: Robot, rate: Floats) -> NoiseModel:
-        """Return the second moments of the errors, the encoder noise seen through ``robot`` turning at ``rate``."""
-        channels = [
-            Channel(float(value), self.rows[sensor.kind], sensor.filter, coloured)
-            for sensor in self.sensors
-            for value, coloured in zip(self.sigma(sensor), _coloured(sensor), strict=True)
-        ]
-        if not isinstance(self.motion, MeasuredMotion) or not robot.joints:
-            empty = np.zeros((0, 3, len(self.time), len(channels)))
-            return NoiseModel(self.time, channels, empty, np.zeros((0, 1, len(self.time), 3, 3)))
-        response = joint_sensitivity(robot, self.motion.evaluate(self.time), rate, model.point)
-        sensitivity = np.zeros((len(robot.joints), 3, len(self.time), len(channels)))
-        for slot, sensor in enumerate(self.sensors):
-            turn = np.eye(3) if sensor.kind is Kind.ATTITUDE else sensor.rotation
-            sensitivity[..., 3 * slot : 3 * slot + 3] = getattr(response, sensor.kind.value) @ turn
-        covariance = self.motion.lag_covariance(self.time, min(max(whitening.WINDOWS), len(self.time) - 1))
-        return NoiseModel(self.time, channels, sensitivity, covariance)

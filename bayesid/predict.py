@@ -94,7 +94,7 @@ class Predictor:
         self.name, self.tip_frame = manoeuvre.recording.name, tip_frame or last_link(model.robot)
         planned = replace(manoeuvre, recording=_planned(manoeuvre.recording), motion=_Exact(manoeuvre.motion))
         if like is None:
-            self.posterior = Posterior(replace(model, sensors=(ATTITUDE,)), [planned])
+            self.posterior = Posterior(replace(model.without_torque, sensors=(ATTITUDE,)), [planned])
         else:
             self.posterior = like.posterior.with_manoeuvres([planned])
         self.rate = _first_rate(model, manoeuvre.recording)

@@ -9,9 +9,10 @@ import numpy as np
 from bayesid.arrays import Floats
 from bayesid.model import Manoeuvre, Model
 from bayesid.motion import Motion, sample_joints
-from bayesid.posterior import Posterior
+from bayesid.posterior import Posterior, Predictions
 from bayesid.recording import Recording
 from bayesid.sensors import Kind, Sensor
+from bayesid.torque import TorqueSensor
 
 __all__ = ["blank_channels", "simulate_manoeuvre", "simulate_recordings"]
 
@@ -41,6 +42,7 @@ def simulate_recordings(
                 full = np.full(len(manoeuvre.recording.time), np.nan)
                 full[np.searchsorted(manoeuvre.recording.time, predicted.time)] = values[:, column]
                 channels[name] = np.where(np.isnan(manoeuvre.recording.channels[name]), np.nan, full)
+        channels |= _torques(posterior, index, predicted, rng)
         recordings.append(Recording(manoeuvre.recording.name, None, manoeuvre.recording.time, channels))
     return recordings
 
@@ -73,7 +75,7 @@ def simulate_manoeuvre(
         Noise of the recorded joint positions [rad or m].
     """
     joints = sample_joints(motion, model.robot, time)
-    planned = Recording(name, None, time, {**joints, **blank_channels(model.sensors, len(time))})
+    planned = Recording(name, None, time, {**joints, **blank_channels(model.sensors, len(time), model.torque)})
     start = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude, dtype=float)
     posterior = Posterior(model, [Manoeuvre(planned, motion, start, latitude=latitude)])
     recording = simulate_recordings(posterior, rng, np.zeros(posterior.size))[0]
@@ -83,13 +85,30 @@ def simulate_manoeuvre(
     return Recording(name, None, time, {**recording.channels, **noisy})
 
 
-def blank_channels(sensors: Sequence[Sensor], count: int) -> dict[str, Floats]:
+def blank_channels(sensors: Sequence[Sensor], count: int, torque: TorqueSensor | None = None) -> dict[str, Floats]:
     """Return channels of sensors at rest, to be simulated: a posterior wants every sensor to have samples."""
+    joints = () if torque is None else torque.joints
     return {
         f"{sensor.kind.value}.{axis}": np.full(count, 1.0 if axis == "w" else 0.0)
         for sensor in sensors
         for axis in ("xyzw" if sensor.kind is Kind.ATTITUDE else "xyz")
-    }
+    } | {f"torque.{joint}": np.zeros(count) for joint in joints}
+
+
+def _torques(
+    posterior: Posterior, index: int, predicted: Predictions, rng: np.random.Generator | None
+) -> dict[str, Floats]:
+    """Simulate the joint torques of one recording, at the times of its samples."""
+    sensor, time = posterior.model.torque, posterior.manoeuvres[index].recording.time
+    if sensor is None:
+        return {}
+    sampled, _ = posterior.torques(index)
+    values = predicted.torque[np.searchsorted(predicted.time, sampled)]
+    if rng is not None:
+        values = values + np.array(sensor.sigma) * rng.normal(size=values.shape)
+    full = np.full((len(time), len(sensor.joints)), np.nan)
+    full[np.searchsorted(time, sampled)] = values
+    return {f"torque.{joint}": full[:, column] for column, joint in enumerate(sensor.joints)}
 
 
 def _noisy(values: Floats, kind: Kind, sigma: Floats, rng: np.random.Generator) -> Floats:

@@ -30,6 +30,7 @@ class Simulator:
         self.point = np.asarray(model.point)
         self.kinds = [sensor.kind for sensor in model.sensors]
         self.turn = {sensor.kind: sensor.rotation for sensor in model.sensors}
+        self.torques = () if model.torque is None else tuple(model.torque.columns(model.robot))
 
     def readings(self, z: Array, grid: Grid, attitude: Array) -> Readings:
         """Return what the sensors read, in sensor axes, (R, T, ...)."""
@@ -40,9 +41,10 @@ class Simulator:
         return self._each(self._moved, z, grid, attitude)
 
     def misfit(self, readings: Readings, measured: Array, quaternion: Array) -> Array:
-        """Measured less predicted, sensor after sensor, (R, T, 3 sensors); of an attitude the small rotation between.
+        """Measured less predicted, sensor after sensor, (R, T, C); of an attitude the small rotation between.
 
-        ``measured`` (R, T, 3 sensors) holds no attitudes: they are in ``quaternion``, (R, T, 4).
+        C is three per sensor, then one per joint with a torque sensor. ``measured`` (R, T, C) holds no attitudes: they
+        are in ``quaternion``, (R, T, 4).
         """
         parts = []
         for slot, kind in enumerate(self.kinds):
@@ -50,7 +52,8 @@ class Simulator:
                 parts.append(jax.vmap(jax.vmap(_rotation_between))(readings.attitude, quaternion))
             else:
                 parts.append(measured[..., 3 * slot : 3 * slot + 3] - getattr(readings, kind.value))
-        return jnp.concatenate(parts, axis=-1)
+        torques = readings.torque[..., list(self.torques)] if self.torques else jnp.zeros((*measured.shape[:-1], 0))
+        return jnp.concatenate([*parts, measured[..., 3 * len(self.kinds) :] - torques], axis=-1)
 
     def _each(self, run: Callable[..., Any], z: Array, grid: Grid, attitude: Array) -> Any:
         values = self.unknowns.values(z)
@@ -63,20 +66,23 @@ class Simulator:
         readings = simulate(
             grid, inertial, _start(attitude, rate, tilt), self.model.effects, effects, jnp.asarray(self.point)
         )
-        return self._distorted(readings, effects)
+        return self._distorted(readings, effects, grid)
 
     def _moved(self, grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Any:
         start = _start(attitude, rate, tilt)
         stage, sample, readings = trace(grid, inertial, start, self.model.effects, effects, jnp.asarray(self.point))
-        return stage, sample, self._distorted(readings, effects)
+        return stage, sample, self._distorted(readings, effects, grid)
 
-    def _distorted(self, readings: Readings, effects: Any) -> Readings:
+    def _distorted(self, readings: Readings, effects: Any, grid: Grid) -> Readings:
         readings = readings._replace(
             rate=readings.rate @ self.turn.get(Kind.RATE, np.eye(3)),
             accel=readings.accel @ self.turn.get(Kind.ACCEL, np.eye(3)),
         )
         for effect, values in zip(self.model.effects, effects, strict=True):
             readings = effect.read(values, readings)
+            if self.torques and effect.uses("friction"):
+                added = effect.friction(values, grid.sample.beyond.velocity)
+                readings = readings._replace(torque=readings.torque + added)
         return readings
 
 

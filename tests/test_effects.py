@@ -26,7 +26,7 @@ from tests import mujoco_truth as mj
 from tests import reference as ref
 
 PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robots" / "planar.urdf"
-HOOKS = ("momentum", "wrench", "derivative", "field", "read")
+HOOKS = ("momentum", "wrench", "derivative", "field", "read", "tide", "friction")
 
 
 def instance(name: str) -> Effect:
@@ -80,7 +80,8 @@ def readings() -> Readings:
     rng, count = np.random.default_rng(1), 12
     quaternion = rng.normal(size=(count, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1)[:, None]
-    return Readings(*map(jnp.asarray, (np.arange(count) * 0.5, *(rng.normal(size=(2, count, 3))), quaternion)))
+    rate, accel = rng.normal(size=(2, count, 3))
+    return Readings(*map(jnp.asarray, (np.arange(count) * 0.5, rate, accel, quaternion, rng.normal(size=(count, 2)))))
 
 
 def call(effect: Effect, hook: str, values):
@@ -89,6 +90,10 @@ def call(effect: Effect, hook: str, values):
         return effect.read(values, readings())
     if hook == "field":
         return effect.field(values, moment(), jnp.asarray([0.1, -0.2, 0.3]))
+    if hook == "tide":
+        return effect.tide(values, moment())
+    if hook == "friction":
+        return effect.friction(values, jnp.linspace(-0.1, 0.1, 12).reshape(6, 2))
     return getattr(effect, hook)(values, moment(), inner)
 
 
@@ -97,7 +102,9 @@ SHAPES = {
     "wrench": lambda _: Wrench((3,), (3,)),
     "derivative": lambda effect: (effect.states,),
     "field": lambda _: (3,),
-    "read": lambda _: Readings((12,), (12, 3), (12, 3), (12, 4)),
+    "read": lambda _: Readings((12,), (12, 3), (12, 3), (12, 4), (12, 2)),
+    "tide": lambda _: (3, 3),
+    "friction": lambda _: (6, 2),
 }
 
 

@@ -71,7 +71,7 @@ def load_problem(study: Study) -> Problem:
     InputError
         Naming file, place, value and remedy.
     """
-    section, model = study.design or DesignSection(), load_model(study)
+    section, model = study.design or DesignSection(), load_model(study).without_torque
     try:
         model = _with_rivals(model, section)
         if not model.bodies:

@@ -89,7 +89,10 @@ def planned_manoeuvre(
         ``attitude_sigma`` and ``latitude`` of `Manoeuvre`.
     """
     recording = Recording(
-        name, None, time, {**sample_joints(motion, model.robot, time), **blank_channels(model.sensors, len(time))}
+        name,
+        None,
+        time,
+        {**sample_joints(motion, model.robot, time), **blank_channels(model.sensors, len(time), model.torque)},
     )
     measured = MeasuredMotion.from_recording(recording, model.robot, sigma=encoder)
     begin = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude)

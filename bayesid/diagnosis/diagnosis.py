@@ -119,7 +119,7 @@ def diagnose(
     knows_latitude: bool = True,
     progress: Callable[[float, str], None] | None = None,
 ) -> Diagnosis:
-    """Show what a model gets wrong about recordings, and name the cause.
+    """Show what a model gets wrong about recordings, and name the cause. Joint torques are not used.
 
     Parameters
     ----------
@@ -134,6 +134,7 @@ def diagnose(
     progress : callable, optional
         Told a fraction and a sentence.
     """
+    model = model.without_torque  # whose friction no catalogue of causes holds
     with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
         return _diagnose(model, manoeuvres, seed, effects, knows_latitude, progress)
 

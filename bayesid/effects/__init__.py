@@ -22,6 +22,7 @@ from bayesid.effects.environment import (
     SolarPressure,
     ThrusterLeak,
 )
+from bayesid.effects.friction import JointFriction, TorqueBias
 from bayesid.effects.internal import FlexibleAppendage, FuelSlosh, WheelMomentum
 from bayesid.effects.sensor import (
     AccelBias,
@@ -52,6 +53,7 @@ __all__ = [
     "FuelSlosh",
     "GravityGradient",
     "JointFlexibility",
+    "JointFriction",
     "JointLatency",
     "LinkInertia",
     "MagneticDipole",
@@ -71,6 +73,7 @@ __all__ = [
     "SensorFault",
     "SolarPressure",
     "ThrusterLeak",
+    "TorqueBias",
     "WheelMomentum",
     "Wrench",
     "create",

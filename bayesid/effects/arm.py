@@ -14,6 +14,7 @@ from scipy.interpolate import make_interp_spline
 
 from bayesid.arrays import Floats, namespace
 from bayesid.effects.base import Effect, Parameter, Prior, Quantity, register
+from bayesid.effects.place import OnJoint, Placed
 from bayesid.errors import InputError
 from bayesid.inertia import LOG_CHOLESKY, InertialParameters, log_cholesky_vector, mass_com_inertia
 from bayesid.motion import JointState, Motion
@@ -29,28 +30,7 @@ CHANGES = (
 )
 
 
-class _Placed(Effect):
-    """An effect at a link or a joint."""
-
-    def __init__(self, place: str = "") -> None:
-        if not place:
-            raise InputError(
-                f"effect {self.name!r} does not say where", remedy=f"Write {self.name}:NAME, with a name of the URDF"
-            )
-        self.place = place
-
-    @property
-    def label(self) -> str:
-        """Name and place."""
-        return f"{self.name}:{self.place}"
-
-    def _copy(self) -> Self:
-        changed = type(self).__new__(type(self))
-        changed.__dict__.update(self.__dict__)
-        return changed
-
-
-class _OnLink(_Placed):
+class _OnLink(Placed):
     """A change of one link's ten inertial parameters that leaves the link a physical body.
 
     The coordinates are log-Cholesky relative to the nominal link; reported are changes of mass, centre of mass and
@@ -73,9 +53,14 @@ class _OnLink(_Placed):
                 f"effect {self.label!r}: the link is no body with volume",
                 remedy="Name the link with mass that it is fixed on",
             )
-        changed = self._copy()
+        changed = self.copied()
         changed.nominal = nominal
         return changed
+
+    @property
+    def link(self) -> str | None:
+        """The link."""
+        return self.place
 
     @property
     def quantities(self) -> Sequence[Quantity]:
@@ -123,29 +108,12 @@ class LinkInertia(_OnLink):
     spread = 0.1
 
 
-class _OnJoint(_Placed):
-    """An effect at one joint."""
-
-    def attach(self, robot: Robot) -> Self:
-        """Check that the joint exists."""
-        self._index(robot)
-        return self
-
-    def _index(self, robot: Robot) -> int:
-        names = [joint.name for joint in robot.joints]
-        if self.place not in names:
-            raise InputError(
-                f"effect {self.label!r}: no moving joint {self.place!r}", remedy=f"Joints: {', '.join(names)}"
-            )
-        return names.index(self.place)
-
-
 OFFSET_STEP = 0.02
 """Joint offset at which the tables are sampled for a quadratic [rad or m]; its cubic rest is below 1e-5 at 0.03 rad."""
 
 
 @register
-class EncoderOffset(_OnJoint):
+class EncoderOffset(OnJoint):
     """Constant error of a joint's recorded position: recorded = true + offset.
 
     The prior of 0.02 rad is a wrong zero by a degree.
@@ -160,7 +128,7 @@ class EncoderOffset(_OnJoint):
 
     def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
         """Return first and second differences of the tables in the joint's position."""
-        index = self._index(robot)
+        index = self.index_in(robot)
         state = motion.evaluate(time)
         rows = []
         for step in (-OFFSET_STEP, 0.0, OFFSET_STEP):
@@ -204,7 +172,7 @@ class JointLatency(Effect):
 
 
 @register
-class JointFlexibility(_OnJoint):
+class JointFlexibility(OnJoint):
     """A joint whose link side gives way behind the measured motor side, on a damped spring.
 
     ``frequency`` is that of everything beyond the joint swinging on the spring with the base and the other joints held,
@@ -229,7 +197,7 @@ class JointFlexibility(_OnJoint):
 
     def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
         """Return changes of the tables by the deflection that the joint's torque makes, and by its derivatives."""
-        index, state = self._index(robot), motion.evaluate(time)
+        index, state = self.index_in(robot), motion.evaluate(time)
         deflection = _Deflection(robot, motion, index, float(time[-1]))
         columns = []
         for order in (0, 2, 1):

@@ -159,12 +159,16 @@ class Modes(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What the sensors read at their sample times: rate (T, 3), accel (T, 3), attitude quaternion (T, 4), time (T,)."""
+    """What the sensors read at their sample times: rate (T, 3), accel (T, 3), attitude quaternion (T, 4), time (T,).
+
+    ``torque`` (T, n) has a column for every joint of the robot, or none where no torque is measured.
+    """
 
     time: Array
     rate: Array
     accel: Array
     attitude: Array
+    torque: Array
 
 
 class Effect:
@@ -224,6 +228,11 @@ class Effect:
         """Name with the place, as in study files."""
         return self.name
 
+    @property
+    def link(self) -> str | None:
+        """Link that `table` is a table of; None where it changes others too, which joint torques do not follow."""
+        return None
+
     def momentum(self, values: Array, moment: Moment, inner: Array) -> tuple[Array, Array]:
         """Return angular momentum relative to the base and its derivative, as a free couple [N m s, N m]."""
         return jnp.zeros(3), jnp.zeros(3)
@@ -240,6 +249,10 @@ class Effect:
         """Return what an accelerometer at ``lever`` from the centre of mass reads beyond wrench and motion [m/s2]."""
         return jnp.zeros(3)
 
+    def tide(self, values: Array, moment: Moment) -> Array:
+        """Return gravitational acceleration per distance from the centre of mass, shape (3, 3) [1/s2]."""
+        return jnp.zeros((3, 3))
+
     def modes(self, values: Array) -> Modes:
         """Return the vibration modes."""
         raise NotImplementedError
@@ -255,6 +268,10 @@ class Effect:
     def read(self, values: Array, readings: Readings) -> Readings:
         """Return what faulty sensors make of the true readings, in sensor axes."""
         return readings
+
+    def friction(self, values: Array, velocity: Array) -> Array:
+        """Return torques of the joints' motors beyond those that move the bodies, (T, n), of joint speeds (T, n)."""
+        return jnp.zeros_like(velocity)
 
     def uses(self, hook: str) -> bool:
         """Whether the class overrides a hook."""

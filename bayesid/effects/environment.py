@@ -38,8 +38,12 @@ class GravityGradient(Effect):
 
     def field(self, values: Array, moment: Moment, lever: Array) -> Array:
         """Return less the tidal acceleration at the accelerometer."""
+        return -self.tide(values, moment) @ lever
+
+    def tide(self, values: Array, moment: Moment) -> Array:
+        """Return mu/r^3 (3 u u' - 1)."""
         up = moment.to_base(moment.environment.zenith)
-        return -moment.environment.gradient * (3.0 * up * (up @ lever) - lever)
+        return moment.environment.gradient * (3.0 * jnp.outer(up, up) - jnp.eye(3))
 
 
 class _Pressure(Effect):

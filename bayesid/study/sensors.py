@@ -175,6 +175,19 @@ class EncoderSensor(Section):
         return given.get(joint) if isinstance(given, Mapping) else given
 
 
+class TorqueSection(Section):
+    """Joint torque sensors, ``[sensors.torque]``.
+
+    Parameters
+    ----------
+    sigma : float or table of joint to float
+        White noise per sample [N m, or N for prismatic]. One number is for every moving joint; a table names the joints
+        that have a sensor.
+    """
+
+    sigma: Annotated[PerName, no_more_than(1e4, "N m")]
+
+
 class SensorsSection(Section):
     """The sensors, ``[sensors]``; of rate, accel and attitude at least one.
 
@@ -182,6 +195,8 @@ class SensorsSection(Section):
     ----------
     rate, accel, attitude : optional
         Sensors of the base; one that is left out is not used, even if it was recorded.
+    torque : optional
+        Sensors of the joint torques; left out, recorded torques are not used.
     encoder : EncoderSensor
         Sensors of the joints.
     """
@@ -189,6 +204,7 @@ class SensorsSection(Section):
     rate: RateSensor | None = None
     accel: AccelSensor | None = None
     attitude: AttitudeSensor | None = None
+    torque: TorqueSection | None = None
     encoder: EncoderSensor = EncoderSensor()
 
     @model_validator(mode="after")
