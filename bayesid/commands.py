@@ -23,6 +23,7 @@ from bayesid.design import Search, Store, best_design, design
 from bayesid.design.from_study import ASSUMED, assumed_encoders, encoders, fingerprint, load_problem
 from bayesid.diagnosis import Diagnosis, diagnose, identify_extended
 from bayesid.errors import InputError
+from bayesid.identified import write_identified
 from bayesid.inference import Identification
 from bayesid.inference import identify as identify_posterior
 from bayesid.inference.ensemble import Progress
@@ -67,7 +68,7 @@ def run_check(file: Path, output: Path) -> Iterator[str]:
 
 
 def run_identify(file: Path, output: Path, *, seed: int, effective_samples: float, progress: Show) -> Iterator[str]:
-    """Write identification.json, posterior.nc and report.pdf of a study."""
+    """Write identification.json, posterior.nc, the identified robot and report.pdf of a study."""
     study, posterior = _read(file)
     if not posterior.size:
         raise InputError("nothing is unknown", file=file, place="unknowns.bodies", remedy="Name a body to identify")
@@ -248,6 +249,8 @@ def _write_identification(result: Identification, title: str, output: Path, seed
     with _complete(output) as folder:
         result.write_json(folder / "identification.json")
         write_netcdf(result, folder / "posterior.nc", np.random.default_rng(seed))
+        if result.posterior.model.priors:
+            write_identified(result, folder)
         identification_report(result, title, [], folder / "report.pdf")
     (output / "samples.h5").unlink(missing_ok=True)
 

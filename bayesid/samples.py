@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesid import whitening
 from bayesid.arrays import Floats
+from bayesid.effects.friction import STANDSTILL, JointFriction
 from bayesid.errors import InputError
 from bayesid.model import Manoeuvre, Model
-from bayesid.motion import MeasuredMotion
+from bayesid.motion import JointState, MeasuredMotion
 from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.sensitivity import joint_sensitivity
@@ -51,10 +53,10 @@ class Samples:
         self.torque_sigma = () if model.torque is None else model.torque.sigma
         self.time = np.unique(np.concatenate([*(time for time, _ in self.series.values()), self.torque[0]]))
         self.rows = {kind: np.searchsorted(self.time, time) for kind, (time, _) in self.series.items()}
-        self.torque_rows = np.searchsorted(self.time, self.torque[0])
-        base = 3 * len(self.sensors)
+        rows, base = np.searchsorted(self.time, self.torque[0]), 3 * len(self.sensors)
         self.measured = np.zeros((len(self.time), base + len(self.torque_sigma)))
-        self.measured[self.torque_rows, base:] = self.torque[1]
+        self.measured[rows, base:] = self.torque[1]
+        self.torque_rows = [rows[moving] for moving in _moving(model, self.motion.evaluate(self.torque[0]))]
         self.quaternion = np.tile([0.0, 0.0, 0.0, 1.0], (len(self.time), 1))
         for slot, sensor in enumerate(self.sensors):
             values = self.series[sensor.kind][1]
@@ -93,7 +95,9 @@ class Samples:
             for sensor in self.sensors
             for value, coloured in zip(self.sigma(sensor), _coloured(sensor), strict=True)
         ]
-        channels += [Channel(sigma, self.torque_rows, Filter()) for sigma in self.torque_sigma]
+        channels += [
+            Channel(sigma, rows, Filter()) for sigma, rows in zip(self.torque_sigma, self.torque_rows, strict=True)
+        ]
         if not isinstance(self.motion, MeasuredMotion) or not robot.joints:
             empty = np.zeros((0, 3, len(self.time), len(channels)))
             return NoiseModel(self.time, channels, empty, np.zeros((0, 1, len(self.time), 3, 3)))
@@ -111,6 +115,18 @@ class Samples:
 def _coloured(sensor: Sensor) -> list[tuple[float, float]]:
     noise = sensor.coloured
     return [(0.0, 1.0)] * 3 if noise is None else [(level, noise.time) for level in noise.sigma]
+
+
+def _moving(model: Model, state: JointState) -> list[NDArray[np.bool_]]:
+    """For each torque sensor, which of its samples dry friction leaves of use."""
+    if model.torque is None:
+        return []
+    rubbing = {effect.place for effect in model.effects if isinstance(effect, JointFriction)}
+    speed = np.abs(state.velocity[:, model.torque.columns(model.robot)])
+    return [
+        speed[:, column] > (STANDSTILL if joint in rubbing else -1.0)
+        for column, joint in enumerate(model.torque.joints)
+    ]
 
 
 def _series(recording: Recording, family: str, axes: Sequence[str]) -> tuple[Floats, Floats]:

@@ -56,6 +56,8 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
             for manoeuvre in result.posterior.manoeuvres:
                 variable = group[_name(sensor.kind, manoeuvre.recording.name)]
                 variable.attrs.update(unit=sensor.kind.unit, frame=FRAMES[sensor.kind])
+        for manoeuvre in result.posterior.manoeuvres if result.posterior.model.torque is not None else ():
+            group[f"torque.{manoeuvre.recording.name}"].attrs.update(unit="N m or N", frame="along the joint's axis")
     data.posterior.attrs.update(
         unknowns=list(result.posterior.unknowns.names),
         log_evidence=result.evidence.value,
@@ -114,20 +116,23 @@ def _coords(result: Identification) -> dict[str, Any]:
         "axis": ["x", "y", "z"],
         "quaternion": ["x", "y", "z", "w"],
     }
+    if (torque := result.posterior.model.torque) is not None:
+        coords["joint"] = list(torque.joints)
     for index, manoeuvre in enumerate(result.posterior.manoeuvres):
         coords[f"time.{manoeuvre.recording.name}"] = result.posterior.sample_times(index)
     return coords
 
 
 def _sensor_dims(result: Identification) -> dict[str, list[str]]:
-    return {
-        _name(sensor.kind, manoeuvre.recording.name): [
-            f"time.{manoeuvre.recording.name}",
-            "quaternion" if sensor.kind is Kind.ATTITUDE else "axis",
-        ]
+    recordings = [manoeuvre.recording.name for manoeuvre in result.posterior.manoeuvres]
+    dims = {
+        _name(sensor.kind, name): [f"time.{name}", "quaternion" if sensor.kind is Kind.ATTITUDE else "axis"]
         for sensor in result.posterior.model.sensors
-        for manoeuvre in result.posterior.manoeuvres
+        for name in recordings
     }
+    if result.posterior.model.torque is not None:
+        dims |= {f"torque.{name}": [f"time.{name}", "joint"] for name in recordings}
+    return dims
 
 
 def _name(kind: Kind, recording: str) -> str:
@@ -149,6 +154,11 @@ def _observed(result: Identification) -> dict[str, Floats]:
             grid = np.full((len(times), values.shape[1]), np.nan)
             grid[np.searchsorted(times, time)] = values
             observed[_name(sensor.kind, manoeuvre.recording.name)] = grid
+        if result.posterior.model.torque is not None:
+            time, values = result.posterior.torques(index)
+            grid = np.full((len(times), values.shape[1]), np.nan)
+            grid[np.searchsorted(times, time)] = values
+            observed[f"torque.{manoeuvre.recording.name}"] = grid
     return observed
 
 
@@ -163,4 +173,8 @@ def _predictive(result: Identification, z: Floats, rng: np.random.Generator) -> 
             if sensor.kind is not Kind.ATTITUDE:
                 mean = mean + result.posterior.sigma(index, sensor.kind) * rng.normal(size=mean.shape)
             predictive[_name(sensor.kind, manoeuvre.recording.name)] = mean.reshape(chains, draws, *mean.shape[1:])
+        if (torque := result.posterior.model.torque) is not None:
+            mean = np.stack([np.asarray(point[index].torque) for point in points])
+            mean = mean + np.array(torque.sigma) * rng.normal(size=mean.shape)
+            predictive[f"torque.{manoeuvre.recording.name}"] = mean.reshape(chains, draws, *mean.shape[1:])
     return predictive

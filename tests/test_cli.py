@@ -9,7 +9,7 @@ from pathlib import Path
 import arviz as az
 import numpy as np
 import pytest
-from mujoco_truth import Manoeuvres, write_study
+from mujoco_truth import Manoeuvres, TruthModel, write_study
 from typer.testing import CliRunner
 
 from bayesid.cli import app
@@ -45,7 +45,8 @@ def copy(study: Path, folder: Path) -> Path:
 def test_identify_writes_what_the_contract_names(study: Path, tmp_path: Path) -> None:
     status, output = run("identify", study, "--output", tmp_path, "--samples", 300)
     assert status == 0, output
-    assert sorted(item.name for item in tmp_path.iterdir()) == ["identification.json", "posterior.nc", "report.pdf"]
+    names = ["identification.json", "identified-uncertainty.json", "identified.urdf", "posterior.nc", "report.pdf"]
+    assert sorted(item.name for item in tmp_path.iterdir()) == names
     content = json.loads((tmp_path / "identification.json").read_text())
     assert set(content) >= {"bodies", "effects", "covariance", "fit", "sampler", "log_evidence"}
     body = content["bodies"]["base_link"]
@@ -55,6 +56,12 @@ def test_identify_writes_what_the_contract_names(study: Path, tmp_path: Path) ->
     assert content["covariance"]["names"][:3] == ["base_link.mass", "base_link.com.x", "base_link.com.y"]
     variance = content["covariance"]["matrix"][0][0]
     assert body["mass"]["sd"] == pytest.approx(np.sqrt(variance), rel=1e-6)
+    identified = TruthModel(tmp_path / "identified.urdf").base  # MuJoCo takes the URDF
+    assert identified.mass == pytest.approx(body["mass"]["mean"], rel=1e-9)
+    np.testing.assert_allclose(identified.com, [q["mean"] for q in body["com"]], atol=0.1 * body["com"][0]["sd"])
+    beside = json.loads((tmp_path / "identified-uncertainty.json").read_text())
+    assert beside["bodies"]["base_link"] == body
+    assert beside["covariance"] == content["covariance"]
     data = az.from_netcdf(tmp_path / "posterior.nc")
     assert {"posterior", "log_likelihood", "posterior_predictive", "observed_data"} <= set(data.groups())
     assert data.posterior["base_link.mass"].attrs["unit"] == "kg"

@@ -11,10 +11,13 @@ from bayesid.effects.base import Parameter, register
 from bayesid.effects.place import OnJoint
 from bayesid.robot import Robot
 
-__all__ = ["JointFriction", "TorqueBias"]
+__all__ = ["STANDSTILL", "JointFriction", "TorqueBias"]
+
+STANDSTILL = 5e-4
+"""Joint speed below which dry friction can be anything between its two values [rad/s, m/s]: no torque is read there."""
 
 REVERSAL = 1e-4
-"""Joint speed within which dry friction changes its sign [rad/s, m/s]."""
+"""Joint speed within which the formula passes from one to the other; well below, so that it never shows."""
 
 
 class _OnTorque(OnJoint):
@@ -41,7 +44,7 @@ class _OnTorque(OnJoint):
 class JointFriction(_OnTorque):
     """Dry and viscous friction between motor and link: ``coulomb sign(v) + viscous v``.
 
-    The sign passes through zero smoothly within 1e-4 rad/s. The priors, 5 N m and 50 N m s/rad, hold the gears of
+    Samples of a joint that stands nearly still are not used. The priors, 5 N m and 50 N m s/rad, hold the gears of
     large manipulators. Friction does not change how the joints move, which is measured: it shows in torques only.
     """
 

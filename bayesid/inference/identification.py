@@ -146,7 +146,7 @@ class Identification:
     def to_dict(self) -> dict[str, Any]:
         """Content of identification.json."""
         return {
-            "bodies": {name: _body_dict(body) for name, body in self.bodies.items()},
+            "bodies": {name: body_dict(body) for name, body in self.bodies.items()},
             "effects": self._effects_dict(),
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
             "fit": {"chi2": self.optimum.chi2, "samples": self.posterior.samples, "unknowns": self.posterior.size},
@@ -248,7 +248,8 @@ def quantity(mean: float, sd: float, unit: str) -> dict[str, Any]:
     return {"mean": float(mean), "sd": float(sd), "unit": unit}
 
 
-def _body_dict(body: BodyDraws) -> dict[str, Any]:
+def body_dict(body: BodyDraws) -> dict[str, Any]:
+    """Return a body as it stands in identification.json."""
     entries = [
         quantity(mean, sd, unit) for mean, sd, unit in zip(body.mean, body.sd, BODY_QUANTITIES.values(), strict=True)
     ]

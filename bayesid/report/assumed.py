@@ -29,6 +29,7 @@ def model_sentences(posterior: Posterior, integration_error: float) -> list[str]
         *_prior_sentences(posterior),
         _link_sentence(model),
         *(_sensor_sentence(posterior, sensor) for sensor in model.sensors),
+        *_torque_sentences(model),
         *_effect_sentences(model),
         _orbit_sentence(model),
         _motion_sentence(posterior),
@@ -120,6 +121,16 @@ def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:
     if sensor.filter != Filter():
         parts.append("measurement and simulation filtered alike")
     return "; ".join(parts) + "."
+
+
+def _torque_sentences(model: Model) -> list[str]:
+    if model.torque is None:
+        return []
+    width = span(list(model.torque.sigma))
+    return [
+        f"Joint torques of {', '.join(model.torque.joints)}: white noise of {width} N m (N of prismatic joints) per "
+        "sample, read at the motor's side. A joint's friction acts only as far as an effect of the model says."
+    ]
 
 
 def _effect_sentences(model: Model) -> list[str]:

@@ -11,7 +11,7 @@ from bayesid.arrays import Floats
 from bayesid.posterior import Posterior
 from bayesid.sensors import Kind, Sensor
 
-__all__ = ["SensorFit", "sensor_fits", "sensor_sigma"]
+__all__ = ["SensorFit", "TorqueFit", "sensor_fits", "sensor_sigma", "torque_fits"]
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,41 @@ def sensor_fits(posterior: Posterior, z: Floats) -> list[list[SensorFit]]:
             own = whitened[:, 3 * slot : 3 * slot + 3]
             kept = np.isfinite(own).any(axis=1)
             fits.append(SensorFit(sensor.kind, time, measured, simulated, grid[whitening.rows][kept], own[kept]))
+        result.append(fits)
+    return result
+
+
+@dataclass(frozen=True)
+class TorqueFit:
+    """One joint's torque sensor in one recording: (n,) arrays, and the (m,) whitened residuals of the samples used."""
+
+    joint: str
+    unit: str
+    time: Floats
+    measured: Floats
+    predicted: Floats
+    residual_time: Floats
+    residual: Floats
+
+
+def torque_fits(posterior: Posterior, z: Floats) -> list[list[TorqueFit]]:
+    """Compare measured and simulated joint torques at ``z``: one list per recording, one entry per joint."""
+    sensor, robot = posterior.model.torque, posterior.model.robot
+    if sensor is None:
+        return [[] for _ in posterior.manoeuvres]
+    predictions, residuals = posterior.predict(z), posterior.residuals(z)
+    first, result = 3 * len(posterior.model.sensors), []
+    for index, (predicted, whitening) in enumerate(zip(predictions, posterior.whitenings, strict=True)):
+        time, measured = posterior.torques(index)
+        grid = posterior.sample_times(index)
+        simulated = predicted.torque[np.searchsorted(grid, time)]
+        fits = []
+        for column, joint in enumerate(sensor.joints):
+            used = whitening.outputs[:, first + column]
+            own = residuals[index, : len(used), first + column][used]
+            unit = "N" if robot.joints[robot.joint_index(joint)].kind == "prismatic" else "N m"
+            rows = grid[whitening.rows][used]
+            fits.append(TorqueFit(joint, unit, time, measured[:, column], simulated[:, column], rows, own))
         result.append(fits)
     return result
 

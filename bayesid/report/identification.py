@@ -12,7 +12,7 @@ from bayesid.report import figures, tables, text
 from bayesid.report.assumed import model_sentences
 from bayesid.report.document import Document
 from bayesid.report.figures.style import WIDTH
-from bayesid.report.fit import sensor_fits
+from bayesid.report.fit import sensor_fits, torque_fits
 
 __all__ = ["add_identification", "identification_report"]
 
@@ -116,11 +116,28 @@ def _add_fit(document: Document, result: Identification) -> None:
             figures.measured_against_simulated(posterior, z, index),
             f"Measured and simulated in {manoeuvre.recording.name}, sensor axes; beneath, the residual in σ.",
         )
+    _add_torques(document, result)
     document.figure(
         figures.residual_spectrum(posterior, z),
         "Residuals of all recordings. Left: mean power by frequency, one for noise alone. Right: distribution, with "
         "the standard normal one.",
     )
+
+
+def _add_torques(document: Document, result: Identification) -> None:
+    posterior, fits = result.posterior, torque_fits(result.posterior, result.optimum.z)
+    if posterior.model.torque is None:
+        return
+    document.table(
+        ["recording", "joint", "noise per sample", "samples used", "chi-square per sample", "largest residual"],
+        tables.torque_rows(posterior, fits),
+        "Joint torques. Where a joint with dry friction stands nearly still, its torque says nothing and is left out.",
+        ["left", "left", "right", "right", "right", "right"],
+    )
+    for manoeuvre, own in zip(posterior.manoeuvres, fits, strict=True):
+        document.figure(
+            figures.torques_over_time(own), f"Measured and simulated joint torques in {manoeuvre.recording.name}."
+        )
 
 
 def _add_uncertainty(document: Document, result: Identification) -> None:

@@ -11,7 +11,7 @@ from bayesid.inertia import mass_com_inertia
 from bayesid.inference.identification import BODY_QUANTITIES, Identification, reported_effect
 from bayesid.motion import MeasuredMotion
 from bayesid.posterior import Posterior
-from bayesid.report.fit import SensorFit
+from bayesid.report.fit import SensorFit, TorqueFit
 from bayesid.report.numbers import format_number, format_quantity, format_unit
 from bayesid.smoothing import SmoothedJoint
 
@@ -107,6 +107,23 @@ def misfit_rows(posterior: Posterior, fits: list[list[SensorFit]]) -> Rows:
         ]
         for manoeuvre, own in zip(posterior.manoeuvres, fits, strict=True)
         for fit in own
+    ]
+
+
+def torque_rows(posterior: Posterior, fits: list[list[TorqueFit]]) -> Rows:
+    """Return recording, joint, noise, samples used, chi2 per sample and largest residual."""
+    sigmas = () if posterior.model.torque is None else posterior.model.torque.sigma
+    return [
+        [
+            manoeuvre.recording.name,
+            fit.joint,
+            f"{format_number(sigma, 2)} {fit.unit}",
+            f"{len(fit.residual)} of {len(fit.time)}",
+            f"{(fit.residual**2).mean():.3f} ± {np.sqrt(2.0 / len(fit.residual)):.3f}" if len(fit.residual) else "none",
+            f"{np.max(np.abs(fit.residual), initial=0.0):.1f} σ",
+        ]
+        for manoeuvre, own in zip(posterior.manoeuvres, fits, strict=True)
+        for fit, sigma in zip(own, sigmas, strict=True)
     ]
 
 

@@ -12,6 +12,7 @@ from bayesid.report.figures.diagnosis import (
 from bayesid.report.figures.prediction import course_bands, final_positions
 from bayesid.report.figures.robot import manoeuvre, robot_pose
 from bayesid.report.figures.sampler import convergence
+from bayesid.report.figures.torques import torques_over_time
 from bayesid.report.figures.uncertainty import corner, correlations, prior_to_posterior
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "residual_spectrum",
     "robot_pose",
     "tip_motion",
+    "torques_over_time",
     "wrench_histories",
     "wrench_spectrum",
 ]
