@@ -1,0 +1,119 @@
+"""What a manoeuvre and its sensors teach beyond the drawings: the information about the truth, linearised.
+
+One Jacobian per manoeuvre, with all sensors, serves every question. The whitening takes sensors in turn, each given
+those before it, so that leaving out later ones is exact; knowing a body is leaving out its columns; another prior
+rescales them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid import Manoeuvre, Posterior, Robot
+from studies.whole_system.setting import bodies, model_of, spreads
+
+__all__ = ["Information", "Knowledge", "Sensors", "informed"]
+
+Floats = NDArray[np.floating]
+
+
+class Sensors(Enum):
+    """Sensors in use, and how many columns of the whitened residual are theirs."""
+
+    RATE = ("star sensor's rate", 3)
+    MOTION = ("rate and accelerometer", 6)
+    TORQUES = ("rate, accelerometer, joint torques", None)
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """A posterior covariance of the unknowns, whose prior is standard normal.
+
+    Attributes
+    ----------
+    robot : Robot
+        The point of linearisation.
+    names : tuple of str
+        Unknown bodies, ten coordinates each, first in the covariance.
+    widths : mapping of str to float
+        The prior's width of every body.
+    covariance : (n, n) array
+    """
+
+    robot: Robot
+    names: tuple[str, ...]
+    widths: Mapping[str, float]
+    covariance: Floats
+
+    def mass(self, *members: str) -> tuple[float, float]:
+        """Relative standard deviation of the sum of some bodies' masses: prior and posterior."""
+        slope = np.zeros(len(self.covariance))
+        total = sum(self.robot.link(name).inertial.mass for name in members)
+        for index, name in enumerate(self.names):
+            if name in members:  # the mass goes with the square of the scale exp(alpha)
+                slope[10 * index] = 2.0 * self.widths[name] * self.robot.link(name).inertial.mass / total
+        return float(np.linalg.norm(slope)), float(np.sqrt(slope @ self.covariance @ slope))
+
+    def shrinkage(self, name: str) -> Floats:
+        """One less the ratio of posterior to prior width of the ten coordinates of a body, shape (10,)."""
+        first = 10 * self.names.index(name)
+        return 1.0 - np.sqrt(np.diag(self.covariance)[first : first + 10])
+
+    @cached_property
+    def directions(self) -> Floats:
+        """Posterior over prior width of the independent directions of the bodies' coordinates, ascending."""
+        own = self.covariance[: 10 * len(self.names), : 10 * len(self.names)]
+        return np.sqrt(np.clip(np.linalg.eigvalsh(own), 0.0, None))
+
+    @property
+    def learnt(self) -> int:
+        """How many of them the data narrowed to half of the prior or less."""
+        return int((self.directions < 0.5).sum())
+
+
+@dataclass(frozen=True)
+class Information:
+    """Whitened Jacobian of some manoeuvres with all sensors about the truth, shape (rows, columns, n)."""
+
+    robot: Robot
+    jacobian: Floats
+
+    def knowledge(
+        self, sensors: Sensors, *, known: Sequence[str] = (), widths: Mapping[str, float] | None = None
+    ) -> Knowledge:
+        """Return what is known after the manoeuvre.
+
+        Parameters
+        ----------
+        sensors : Sensors
+        known : sequence of str
+            Bodies taken for exactly known.
+        widths : mapping of str to float, optional
+            Another prior's width of the bodies.
+        """
+        own = spreads(self.robot)
+        wanted = own if widths is None else widths
+        names = bodies(self.robot)
+        j = self.jacobian[:, : sensors.value[1]].reshape(-1, self.jacobian.shape[-1]).copy()
+        for index, name in enumerate(names):
+            j[:, 10 * index : 10 * index + 10] *= wanted[name] / own[name]
+        left = [10 * i + k for i, name in enumerate(names) if name not in known for k in range(10)]
+        left += list(range(10 * len(names), j.shape[1]))
+        j = j[:, left]
+        covariance = np.linalg.inv(j.T @ j + np.eye(len(left)))
+        return Knowledge(self.robot, tuple(name for name in names if name not in known), wanted, covariance)
+
+
+def informed(truth: Robot, manoeuvres: Sequence[Manoeuvre]) -> Information:
+    """Linearise manoeuvres of the true robot about the truth."""
+    model = model_of(truth, torques=True)
+    posterior = Posterior(model, manoeuvres)
+    z = posterior.initial_point()
+    shape = posterior.residual_shape
+    return Information(truth, posterior.jacobian(z)[: -posterior.size].reshape(-1, shape[2], posterior.size))

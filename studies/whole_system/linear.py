@@ -1,0 +1,97 @@
+"""The regressor method (19) with the joint torques (23) on the same data: linear, and fed with differentiated rates.
+
+Rates, accelerations and joint motion are measured, so every entry of the regressor is noisy. Least squares takes it for
+exact: errors in variables pull the answer towards zero. The method is given everything it can use: the same prior, made
+normal in the linear parameters; smoothing of the rates by local cubics; and weights from its own residuals.
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from bayesid import Manoeuvre, Robot
+from bayesid.regressors import balance_regressor
+from bayesid.tables import kinematics, link_table
+from bayesid.torque import beyond_joints
+from bayesid.unknowns import BodyPrior, Unknowns
+from studies.whole_system.setting import LOAD, POINT, bodies, spreads
+
+__all__ = ["linear_prior", "regress"]
+
+Floats = NDArray[np.floating]
+
+WINDOW, ORDER, ROUNDS = 9, 3, 4
+"""Samples and order of the local polynomials through the rates; rounds of reweighting."""
+
+VAGUE = 1e-4
+"""Factor on the precision of the load's prior."""
+
+
+def linear_prior(drawings: Robot) -> tuple[Floats, Floats]:
+    """Return centre and covariance of the linear parameters of all bodies under the prior, (10 B,), (10 B, 10 B)."""
+    priors = tuple(BodyPrior(name, drawings.link(name).inertial, width) for name, width in spreads(drawings).items())
+    unknowns = Unknowns(priors, (), 1, 0.0, (0.0,))
+    centre = jnp.zeros(unknowns.size)
+    slope = np.asarray(jax.jacfwd(lambda z: unknowns.values(z).inertial)(centre))
+    return np.asarray(unknowns.values(centre).inertial), slope @ slope.T
+
+
+def regress(manoeuvre: Manoeuvre, drawings: Robot, *, torques: bool) -> tuple[Floats, Floats]:
+    """Estimate the linear parameters of all bodies.
+
+    Returns
+    -------
+    estimate, covariance : (10 B,), (10 B, 10 B) arrays
+        The covariance is the one that the method believes in.
+    """
+    recording, joints = manoeuvre.recording, drawings.joints
+    time, measured = recording.vector("rate")
+    interval = float(np.median(np.diff(time)))
+    rate = savgol_filter(measured, WINDOW, ORDER, axis=0)
+    change = savgol_filter(measured, WINDOW, ORDER, deriv=1, delta=interval, axis=0)
+    felt, point = recording.vector("accel")[1], np.array(POINT)
+    origin = felt - np.cross(change, point) - np.cross(rate, np.cross(rate, point))
+    state = manoeuvre.motion.evaluate(time)
+    moved = kinematics(drawings, state)
+    names = bodies(drawings)
+    columns = [
+        np.asarray(balance_regressor(*map(jnp.asarray, (link_table(drawings, name, moved), rate, change, origin))))
+        for name in names
+    ]
+    wrench = np.concatenate(columns, axis=2)
+    blocks: list[tuple[Floats, Floats]] = [(wrench[:, row], np.zeros(len(time))) for row in range(6)]
+    frictions = 0
+    if torques:
+        owners = [name for name in names for _ in range(10)]
+        beyond = beyond_joints(drawings, state, moved, names, owners)
+        through = np.einsum("tjk,tkp,tjp->tjp", np.asarray(beyond.axis), wrench, np.asarray(beyond.carried))
+        speed = state.velocity
+        frictions = 2 * len(joints)
+        for index, joint in enumerate(joints):
+            rubbing = np.zeros((len(time), frictions))
+            rubbing[:, 2 * index], rubbing[:, 2 * index + 1] = np.sign(speed[:, index]), speed[:, index]
+            _, torque = recording.series(f"torque.{joint.name}")
+            moving = np.abs(speed[:, index]) > 5e-4
+            blocks.append((np.concatenate([through[:, index], rubbing], axis=1)[moving], torque[moving]))
+    centre, covariance = linear_prior(drawings)
+    count = len(centre)
+    precision = np.zeros((count + frictions, count + frictions))
+    precision[:count, :count] = np.linalg.inv(covariance)
+    load = slice(10 * names.index(LOAD), 10 * names.index(LOAD) + 10)
+    precision[load, load] *= VAGUE  # normal in linear parameters, a prior of 100 % would exclude a load twice as heavy
+    precision[count:, count:] = np.diag(np.tile([5.0**-2, 50.0**-2], frictions // 2))
+    blocks = [(np.pad(a, ((0, 0), (0, count + frictions - a.shape[1]))), b) for a, b in blocks]
+    x = np.concatenate([centre, np.zeros(frictions)])
+    start = x.copy()
+    for _ in range(ROUNDS):
+        normal, right = precision.copy(), precision @ start
+        for a, b in blocks:
+            weight = 1.0 / np.var(b - a @ x)
+            normal += weight * a.T @ a
+            right += weight * a.T @ b
+        x = np.linalg.solve(normal, right)
+    return x[:count], np.linalg.inv(normal)[:count, :count]
