@@ -11,12 +11,11 @@ from collections.abc import Sequence
 from typing import TypeVar, cast
 
 import numpy as np
-import pinocchio as pin
 from jax import Array
 
 from bayesid.arrays import Floats, namespace
 from bayesid.robot import Robot
-from bayesid.tables import ENTRIES, Kinematics, joint_motion, link_table
+from bayesid.tables import ENTRIES, Kinematics, joint_motion, joint_twist, link_table
 
 __all__ = ["balance_regressor", "gradient_regressor", "momentum_regressor", "torque_regressor"]
 
@@ -152,11 +151,8 @@ def _axes(robot: Robot, motion: Kinematics) -> Floats:
     xp = namespace(motion.pose)
     axes = []
     for index in range(len(robot.joints)):
-        joint = robot.model.joints[index + 2]
-        own = joint.createData()
-        joint.calc(own, pin.neutral(robot.model), np.zeros(robot.model.nv))
         pose = joint_motion(motion, index)[0]
-        linear, angular = (pose[:, :3, :3] @ part for part in np.asarray(own.S).ravel().reshape(2, 3))
+        linear, angular = (pose[:, :3, :3] @ part for part in joint_twist(robot, index).reshape(2, 3))
         axes.append(xp.concatenate([linear + xp.cross(pose[:, :3, 3], angular), angular], axis=-1))
     empty = np.zeros((len(motion.pose), 0, 6))
     return cast("Floats", xp.stack(axes, axis=1) if axes else empty)
