@@ -161,7 +161,7 @@ def base_parameters(
     scaled = regressor / np.where(moving, length, 1.0)
     first = _spanning(scaled, order)
     gap = _checked_rank(scaled[:, moving], len(first))
-    second = [index for index in np.flatnonzero(moving) if index not in first]
+    second = [index for index in order if index not in first]
     independent, dependent = sorted(first), sorted(second)
     return BaseParameters(
         names,
@@ -201,13 +201,15 @@ def _about(axis: Floats) -> tuple[str, ...]:
 
 def _spanning(matrix: Floats, order: Sequence[int]) -> list[int]:
     """Columns, taken in order, that the ones before do not span."""
-    basis, chosen = np.zeros((len(matrix), 0)), []
+    basis = np.zeros((len(matrix), 0))
+    chosen: list[int] = []
     for index in order:
         rest = matrix[:, index]
         for _ in range(2):  # twice is enough against rounding
             rest = rest - basis @ (basis.T @ rest)
         if (size := np.linalg.norm(rest)) > ZERO:
-            basis, chosen = np.column_stack([basis, rest / size]), [*chosen, index]
+            basis = np.column_stack([basis, rest / size])
+            chosen.append(index)
     return chosen
 
 
