@@ -1,8 +1,8 @@
 """Equations of motion as numbers times inertial parameters.
 
-Every regressor is linear in the ten parameters of each body (`InertialParameters.vector`) and is built on the tables of
-`bayesid.tables`. NumPy arrays give NumPy arrays, JAX's give JAX's. Vectors are in base axes, moments of force and of
-momentum about the base origin.
+Every regressor multiplies the ten parameters of each body (`InertialParameters.vector`) and is built on the tables of
+`bayesid.tables`. NumPy arrays give NumPy arrays; where any is JAX's, so is the result. Vectors are in base axes,
+moments of force and of momentum about the base origin.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def balance_regressor(tables: A, rate: A, rate_change: A, acceleration: A) -> A:
         What multiplies the p inertial parameters to give the wrench that moves the bodies so [N, N m]; summed over all
         bodies of the robot it is the external wrench. The gravity gradient is left out (`gradient_regressor`).
     """
-    xp = namespace(tables)
+    xp = namespace(tables, rate, rate_change, acceleration)
     entry = _entries(tables)
     w, change, a = (vector[:, None] for vector in (rate, rate_change, acceleration))
     first, flow = entry["first"], entry["first_rate"]
@@ -79,7 +79,7 @@ def momentum_regressor(tables: A, rate: A, velocity: A) -> A:
     (T, 6, p) array
         What multiplies the p inertial parameters to give the momenta [N s, N m s].
     """
-    xp = namespace(tables)
+    xp = namespace(tables, rate, velocity)
     entry = _entries(tables)
     w, v = rate[:, None], velocity[:, None]
     linear = entry["mass"] * v + entry["first_rate"] + xp.cross(w, entry["first"])
@@ -107,7 +107,7 @@ def gradient_regressor(tables: A, zenith: A, gradient: float) -> A:
     (T, 6, p) array
         Force and torque about the base origin, base axes [N, N m].
     """
-    xp = namespace(tables)
+    xp = namespace(tables, zenith)
     entry, up = _entries(tables), zenith[:, None]
     first = entry["first"]
     force = gradient * (3.0 * up * xp.sum(up * first, axis=-1, keepdims=True) - first)
@@ -139,7 +139,7 @@ def torque_regressor(
         or forces of prismatic joints [N m, N]; friction and the rotors of the drives are left out.
     """
     tables = [link_table(robot, name, motion) for name in bodies]
-    xp = namespace(tables[0])
+    xp = namespace(motion.pose, rate, rate_change, acceleration)
     wrench = balance_regressor(xp.concatenate(tables, axis=2), rate, rate_change, acceleration)
     carried = np.repeat(_carried(robot, bodies), 10, axis=1)
     torque = xp.einsum("tjs,tsp->tjp", _axes(robot, motion), wrench) * carried
@@ -178,13 +178,13 @@ def _entries(tables: A) -> dict[str, A]:
 
 def _rows(upper: A, lower: A) -> A:
     """Regressor (T, 6, p) of two vectors (T, p, 3)."""
-    xp = namespace(upper)
+    xp = namespace(upper, lower)
     return cast("A", xp.swapaxes(xp.concatenate([upper, lower], axis=-1), 1, 2))
 
 
 def _stretched(second: A, vector: A) -> A:
     """Second moments xx, yy, zz, xy, xz, yz (..., 6) times vectors (..., 3)."""
-    xp = namespace(second)
+    xp = namespace(second, vector)
     xx, yy, zz, xy, xz, yz = xp.moveaxis(second, -1, 0)
     x, y, z = xp.moveaxis(vector, -1, 0)
     return cast("A", xp.stack([xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z], axis=-1))

@@ -249,6 +249,29 @@ def test_same_states_every_time():
     np.testing.assert_array_equal(base_parameters(robot).regrouping, base_parameters(robot).regrouping)
 
 
+def almost_parallel(tilt: float) -> Robot:
+    body = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    links = "".join(f'<link name="{name}">{body}</link>' for name in "abc")
+    joint = (
+        '<joint name="{0}{1}" type="continuous"><parent link="{0}"/><child link="{1}"/>{2}<axis xyz="0 0 1"/></joint>'
+    )
+    joints = joint.format("a", "b", "") + joint.format("b", "c", f'<origin xyz="1 0 0" rpy="{tilt} 0 0"/>')
+    return Robot.from_string(f'<robot name="r">{links}{joints}</robot>')
+
+
+@pytest.mark.parametrize(("tilt", "count"), [(0.0, 4), (1e-9, 4), (1e-5, 8), (1e-2, 8), (1.0, 8)])
+def test_almost_parallel_joints(tilt, count):
+    """Faint effects are told from rounding; on a free base the tilt does not matter."""
+    robot = almost_parallel(tilt)
+    assert base_parameters(robot, base=Base.FIXED).count == count
+    assert base_parameters(robot).count == 24
+
+
+def test_no_number_is_given_where_rounding_decides():
+    with pytest.raises(InputError, match=r"cannot be told: 7 or 8.*almost, but not quite, parallel"):
+        base_parameters(almost_parallel(7e-7), base=Base.FIXED)
+
+
 def test_errors():
     with pytest.raises(InputError, match=r"no inertial parameter link9\.mass\. Choose from base_link\.mass"):
         base_parameters(Robot.shipped("planar"), keep=["link9.mass"])

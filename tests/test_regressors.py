@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import jax
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -74,6 +75,24 @@ def test_torque_regressor_is_pinocchios_column_by_column():
     for row in range(TIMES):
         expected = pin.computeJointTorqueRegressor(case.model, case.data, case.q(row), case.v(row), case.a(row))
         np.testing.assert_allclose(regressor[row], expected, rtol=1e-10, atol=1e-11)
+
+
+def test_traced_arrays_give_the_same():
+    case = Case("mixed")
+    base = (case.rate, case.change, case.acceleration)
+
+    @jax.jit
+    def of_joints(*parts):
+        return torque_regressor(case.robot, case.bodies, kinematics(case.robot, JointState(*parts)), *base)
+
+    @jax.jit
+    def of_base(*parts):
+        return torque_regressor(case.robot, case.bodies, case.motion, *parts)
+
+    expected = torque_regressor(case.robot, case.bodies, case.motion, *base)
+    assert isinstance(expected, np.ndarray)
+    for traced in (of_joints(*case.state), of_base(*base)):
+        np.testing.assert_allclose(traced, expected, rtol=1e-11, atol=1e-11 * np.abs(expected).max())
 
 
 def test_a_fixed_base_in_gravity():

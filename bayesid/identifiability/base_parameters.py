@@ -9,7 +9,8 @@ fixed on another one regroups with all ten. These regroupings do not depend on h
 also hides what never moves: a free flyer has no parameters without effect, a fixed robot has (Mayeda, Yoshida and
 Osuka, IEEE Trans. Robotics and Automation 1990; Khalil and Dombre 2002, section 9.4).
 
-The method is Gautier's (J. Robotic Systems 1991): QR decompositions of the regressor in random states.
+The method is Gautier's (J. Robotic Systems 1991): QR decompositions of the regressor in random states
+(`bayesid.identifiability.decomposition`).
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import qr
+from threadpoolctl import threadpool_limits
 
 from bayesid.arrays import Floats
 from bayesid.errors import InputError
+from bayesid.identifiability.decomposition import ZERO, checked_rank, equilibrated, regrouping, spanning
 from bayesid.identifiability.equations import GRAVITY, Base, massive_bodies, stacked_regressor
 from bayesid.robot import Robot
 from bayesid.tables import joint_twist
@@ -37,12 +39,6 @@ LINEAR = (
 
 SEED = 1991
 """Of the random states where no generator is given."""
-
-ZERO = 1e-10
-"""Relative size below which a singular value, or the part of a column that no other column explains, is rounding."""
-
-GAP = 1e3
-"""Ratio of the smallest singular value kept to the largest dropped below which the rank is not told."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +114,7 @@ class BaseParameters:
         return [place[name] for name in names]
 
 
+@threadpool_limits.wrap(limits=1)  # small factorisations: threads only get in each other's way
 def base_parameters(
     robot: Robot,
     *,
@@ -154,22 +151,21 @@ def base_parameters(
         raise InputError(f"no inertial parameter {', '.join(unknown)}", remedy=f"Choose from {', '.join(names)}")
     rng = np.random.default_rng(SEED) if rng is None else rng
     regressor = stacked_regressor(robot, bodies, base, rng, gravity=gravity)
-    length = np.linalg.norm(regressor, axis=0)
-    moving = length > ZERO * length.max(initial=1e-300)
+    scaled, length = equilibrated(regressor)
+    moving = np.linalg.norm(scaled, axis=0) > ZERO
     preferred = [names.index(name) for name in (*keep, *_preferred(robot, bodies))]
     order = [index for index in dict.fromkeys(preferred) if moving[index]]
-    scaled = regressor / np.where(moving, length, 1.0)
-    first = _spanning(scaled, order)
-    gap = _checked_rank(scaled[:, moving], len(first))
-    second = [index for index in order if index not in first]
-    independent, dependent = sorted(first), sorted(second)
+    independent = sorted(spanning(scaled, order))
+    dependent = sorted(set(order) - set(independent))
+    gap = checked_rank(scaled[:, moving], len(independent))
+    beta = regrouping(scaled, independent, dependent)
     return BaseParameters(
-        names,
-        tuple(names[index] for index in independent),
-        tuple(names[index] for index in dependent),
-        tuple(name for name, moves in zip(names, moving, strict=True) if not moves),
-        _regrouping(scaled, independent, dependent) / length[independent][:, None] * length[dependent],
-        gap,
+        standard=names,
+        independent=tuple(names[index] for index in independent),
+        dependent=tuple(names[index] for index in dependent),
+        without_effect=tuple(name for name, moves in zip(names, moving, strict=True) if not moves),
+        regrouping=beta / length[independent][:, None] * length[dependent],
+        gap=gap,
     )
 
 
@@ -197,48 +193,3 @@ def _about(axis: Floats) -> tuple[str, ...]:
     # of equals the textbook's: yy behind a joint about z
     rod = min((1, 2, 0), key=lambda index: round(float(across[index]), 6))
     return (f"first.{'xyz'[along]}", f"inertia.{'xyz'[rod] * 2}", "mass")
-
-
-def _spanning(matrix: Floats, order: Sequence[int]) -> list[int]:
-    """Columns, taken in order, that the ones before do not span."""
-    basis = np.zeros((len(matrix), 0))
-    chosen: list[int] = []
-    for index in order:
-        rest = matrix[:, index]
-        for _ in range(2):  # twice is enough against rounding
-            rest = rest - basis @ (basis.T @ rest)
-        if (size := np.linalg.norm(rest)) > ZERO:
-            basis = np.column_stack([basis, rest / size])
-            chosen.append(index)
-    return chosen
-
-
-def _checked_rank(matrix: Floats, found: int) -> tuple[float, float]:
-    """Return the relative singular values on both sides of the rank; raise where other ways give another rank."""
-    if not matrix.size:
-        return 1.0, 0.0
-    values = np.linalg.svd(matrix, compute_uv=False) / np.linalg.norm(matrix, 2)
-    diagonal = np.abs(np.diag(qr(matrix, mode="r", pivoting=True)[0]))
-    ranks = {found, int(np.sum(diagonal > ZERO * diagonal[0])), int(np.sum(values > ZERO))}
-    kept, dropped = float(values[found - 1]), float(values[found]) if found < len(values) else 0.0
-    if len(ranks) > 1 or kept < GAP * dropped:
-        raise InputError(
-            f"the number of base parameters cannot be told: {' or '.join(map(str, sorted(ranks)))}, with relative "
-            f"singular values {kept:.2g} and {dropped:.2g} on both sides",
-            remedy="Look for joints that are almost, but not quite, parallel or on one axis",
-        )
-    return kept, dropped
-
-
-def _regrouping(matrix: Floats, independent: Sequence[int], dependent: Sequence[int]) -> Floats:
-    """Solve ``matrix[dependent] = matrix[independent] beta``, once refined, and drop what is rounding."""
-    first, second = matrix[:, independent], matrix[:, dependent]
-    beta = np.linalg.lstsq(first, second)[0]
-    beta = beta + np.linalg.lstsq(first, second - first @ beta)[0]
-    beta[np.abs(beta) < ZERO] = 0.0
-    worst = float(np.abs(second - first @ beta).max(initial=0.0))
-    if worst > 10.0 * ZERO:
-        raise InputError(
-            f"the dependent parameters regroup only to {worst:.2g}", remedy="Scale the robot's lengths to metres"
-        )
-    return beta

@@ -11,9 +11,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from bayesid.arrays import Floats
-from bayesid.identifiability.base_parameters import ZERO, BaseParameters
+from bayesid.identifiability.base_parameters import BaseParameters
+from bayesid.identifiability.decomposition import ZERO, equilibrated
 from bayesid.regressors import balance_regressor, gradient_regressor, momentum_regressor
 from bayesid.robot import Robot
 from bayesid.tables import Kinematics, composite_rows
@@ -53,6 +55,7 @@ class Determined:
         return bool(np.linalg.norm(rest) < SEEN * np.linalg.norm(direction))
 
 
+@threadpool_limits.wrap(limits=1)  # small factorisations: threads only get in each other's way
 def determined(base: BaseParameters, equations: Floats) -> Determined:
     """Return which base parameters the solution of linear equations tells.
 
@@ -62,10 +65,7 @@ def determined(base: BaseParameters, equations: Floats) -> Determined:
     equations : (rows, standard) array
         What multiplies the standard parameters; the right sides do not matter.
     """
-    length = np.linalg.norm(equations, axis=0)
-    seen = length > ZERO * length.max(initial=1e-300)
-    length = np.where(seen, length, length.max(initial=1.0))
-    scaled = np.where(seen, equations / length, 0.0)
+    scaled, length = equilibrated(equations)
     square = np.concatenate([scaled, np.zeros((equations.shape[1], equations.shape[1]))])  # at least as many rows
     _, values, rows = np.linalg.svd(np.linalg.qr(square, mode="r"))
     values = values / values.max(initial=1e-300)

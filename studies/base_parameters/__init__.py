@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from bayesid import Robot
 from bayesid.identifiability import Base
@@ -24,6 +25,7 @@ from studies.base_parameters.structure import equations_at, structure
 __all__ = ["Result", "main", "run"]
 
 
+@threadpool_limits.wrap(limits=1)  # small factorisations: threads only get in each other's way
 def run(*, seed: int = 1) -> Result:
     """Run the study; every random state follows from the seed."""
     planar, arm = Robot.shipped("planar"), Robot.shipped("ets7")

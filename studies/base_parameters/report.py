@@ -253,8 +253,8 @@ def _peers(document: Document, result: Result) -> None:
     run = all(case.peer is not None for case in cases)
     document.paragraph(
         f"{cases[0].tool} finds base parameters of robots on a fixed base by QR decomposition of Pinocchio's "
-        "regressor. It was run in the same interpreter on the same robots, bolted to the ground, with random states "
-        "of its own. Tools may choose other parameters as independent; what must agree is their number, and the "
+        "regressor. It was run on the same robots, bolted to the ground, in random states other than those of bayesid. "
+        "Tools may choose other parameters as independent; what must agree is their number, and the "
         "space that the rows of [1, β] span. The rank of Pinocchio's regressor, without any tool, is given beside them."
         if run
         else f"FIGAROH: {cases[0].tool}. The rank of Pinocchio's own regressor is given instead."
