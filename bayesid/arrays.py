@@ -11,6 +11,7 @@ Floats: TypeAlias = NDArray[np.floating[Any]]
 Integers: TypeAlias = NDArray[np.integer[Any]]
 
 
-def namespace(array: Any) -> Any:
-    """Return the module whose functions act on an array: NumPy's or, where it is traced, JAX's."""
-    return array.__array_namespace__()
+def namespace(*arrays: Any) -> Any:
+    """Return the module whose functions act on arrays: NumPy's or, where any of them is JAX's or traced, JAX's."""
+    modules = [array.__array_namespace__() for array in arrays]
+    return next((module for module in modules if module is not np), np)

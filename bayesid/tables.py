@@ -20,7 +20,7 @@ from bayesid.inertia import BASIS
 from bayesid.motion import JointState
 from bayesid.robot import Robot
 
-__all__ = ["ENTRIES", "Kinematics", "composite_rows", "joint_motion", "kinematics", "link_table"]
+__all__ = ["ENTRIES", "Kinematics", "composite_rows", "joint_motion", "joint_twist", "kinematics", "link_table"]
 
 
 ENTRIES = {
@@ -81,10 +81,7 @@ def traced_kinematics(robot: Robot, state: JointState) -> Kinematics:
     frames: list[tuple[Array, ...]] = []
     still = jnp.zeros((len(state.position), 4, 4))
     for index in range(len(robot.joints)):
-        joint = robot.model.joints[index + 2]
-        own = joint.createData()
-        joint.calc(own, pin.neutral(robot.model), np.zeros(robot.model.nv))
-        axis = jnp.asarray(_hat(np.asarray(own.S).ravel()))
+        axis = jnp.asarray(_hat(joint_twist(robot, index)))
         q, speed, change = (part[:, index, None, None] for part in state)
         turn = jnp.eye(4) + jnp.sin(q) * axis + (1.0 - jnp.cos(q)) * (axis @ axis)
         if robot.joints[index].kind == "prismatic":
@@ -135,6 +132,14 @@ def joint_motion(motion: Kinematics, joint: int) -> tuple[Floats, Floats, Floats
         still = np.zeros((len(motion.pose), 4, 4))
         return still + np.eye(4), still, still
     return motion.pose[:, joint], motion.rate[:, joint], motion.acceleration[:, joint]
+
+
+def joint_twist(robot: Robot, joint: int) -> Floats:
+    """Velocity of a joint's frame at unit speed of the joint, linear part first, in the joint's own axes, (6,)."""
+    model = robot.model.joints[joint + 2]
+    own = model.createData()
+    model.calc(own, pin.neutral(robot.model), np.zeros(robot.model.nv))
+    return np.asarray(own.S).ravel()
 
 
 def _moments(pose: Floats, rate: Floats, acceleration: Floats, bodies: Floats) -> Floats:

@@ -1,0 +1,5 @@
+"""Write the report: ``python -m studies.base_parameters``."""
+
+from studies.base_parameters import main
+
+main()

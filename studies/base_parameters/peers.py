@@ -1,0 +1,95 @@
+"""Base parameters of an arm on a fixed base by FIGAROH, a toolbox that is built on Pinocchio too, and by its rank."""
+
+from __future__ import annotations
+
+import importlib.util
+import warnings
+from dataclasses import dataclass
+from importlib.metadata import version
+from types import SimpleNamespace
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.linalg import subspace_angles
+
+from bayesid import Robot
+from bayesid.identifiability import Base, base_parameters, standard_names
+from bayesid.identifiability.equations import GRAVITY
+
+__all__ = ["Comparison", "compare"]
+
+Floats = NDArray[np.floating]
+
+STATES = 80
+
+ABSENT = "not evaluated: FIGAROH is not installed (the extra peers brings it)"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Numbers of base parameters, and how far the two tools' spaces of them are apart.
+
+    Attributes
+    ----------
+    robot : str
+    gravity : tuple of float
+        On the fixed base, base axes [m/s2].
+    ours, rank, peer : int
+        Number by this package, rank of Pinocchio's own regressor, and number by FIGAROH.
+    tool : str
+        FIGAROH and its version, or why it was not run.
+    angle : float
+        Largest angle between the rows that take standard to base parameters, ours and FIGAROH's [rad].
+    """
+
+    robot: str
+    gravity: tuple[float, float, float]
+    ours: int
+    rank: int
+    peer: int | None
+    tool: str
+    angle: float | None
+
+
+def compare(robot: Robot, rng: np.random.Generator, gravity: tuple[float, float, float] = GRAVITY) -> Comparison:
+    """Compare the base parameters of an arm bolted to the ground; each link is fixed on a joint of its own."""
+    found = base_parameters(robot, base=Base.FIXED, gravity=gravity)
+    model = pin.buildModelFromXML(robot.urdf)
+    model.gravity.linear = np.array(gravity)
+    q = rng.uniform(-np.pi, np.pi, size=(STATES, model.nq))
+    v, a = rng.normal(size=(2, STATES, model.nv))
+    data = model.createData()
+    rows = np.concatenate(
+        [
+            np.atleast_2d(pin.computeJointTorqueRegressor(model, data, *state)).copy()
+            for state in zip(q, v, a, strict=True)
+        ]
+    )
+    length = np.linalg.norm(rows, axis=0)
+    rank = int(np.linalg.matrix_rank(rows / np.where(length > 0.0, length, 1.0), tol=1e-9))
+    if importlib.util.find_spec("figaroh") is None:
+        return Comparison(robot.name, gravity, found.count, rank, None, ABSENT, None)
+    links = [next(name for name, link in robot.links.items() if link.joint == k) for k in range(len(robot.joints))]
+    names = standard_names(links)
+    peer = _figaroh(model, q, v, a, names)
+    own = found.projection[:, [found.standard.index(name) for name in names]]
+    same = peer.shape == own.shape
+    angle = float(subspace_angles(peer.T, own.T).max()) if same else None
+    return Comparison(robot.name, gravity, found.count, rank, len(peer), f"FIGAROH {version('figaroh')}", angle)
+
+
+def _figaroh(model: pin.Model, q: Floats, v: Floats, a: Floats, names: tuple[str, ...]) -> Floats:
+    """Return FIGAROH's matrix that takes the standard parameters of the links to base parameters."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # its libraries warn as they are imported
+        from figaroh.tools.qrdecomposition import QRDecomposer
+        from figaroh.tools.regressor import RegressorBuilder, eliminate_non_dynaffect
+
+    robot = SimpleNamespace(model=model, data=model.createData())
+    regressor = RegressorBuilder(robot).build_basic_regressor(q, v, a, {"act_idxv": []})
+    reduced, kept = eliminate_non_dynaffect(regressor, dict.fromkeys(names, 0.0))
+    mapping = QRDecomposer().decompose(reduced, kept).M
+    full = np.zeros((len(mapping), len(names)))
+    full[:, [names.index(name) for name in kept]] = mapping
+    return full

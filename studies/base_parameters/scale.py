@@ -1,0 +1,129 @@
+"""Which data tell the scale of the masses: the rank of the equations, with and without actions that are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid import Load, Robot
+from bayesid.identifiability import (
+    BaseParameters,
+    Determined,
+    base_parameters,
+    consistent_accelerations,
+    determined,
+    rates_at_rest,
+)
+from bayesid.identifiability.equations import massive_bodies, random_motion
+from bayesid.inertia import InertialParameters
+from bayesid.regressors import gradient_regressor, torque_regressor
+from bayesid.tables import Kinematics, link_table
+from studies.base_parameters.structure import standard_parameters
+
+__all__ = ["ScaleCase", "scale_cases"]
+
+Floats = NDArray[np.floating]
+
+STATES = 90
+
+GRADIENT = 1.0
+"""mu / R^3: time is counted such that the random states turn at about the mean motion."""
+
+ACTION = 1.0e3
+"""Size of known forces, torques and momenta in the same units, as large as what the arm's motion takes."""
+
+
+@dataclass(frozen=True)
+class ScaleCase:
+    """What some data determine.
+
+    Attributes
+    ----------
+    data : str
+        What is measured and known.
+    found : Determined
+    count : int
+        Base parameters of the robot.
+    open_scale : bool
+        Whether the data allow any common factor of all base parameters.
+    """
+
+    data: str
+    found: Determined
+    count: int
+    open_scale: bool
+
+
+def scale_cases(robot: Robot, rng: np.random.Generator) -> tuple[ScaleCase, ...]:
+    """Return what motion alone determines, and what it does with each other known thing."""
+    world = _World(robot, rng)
+    wheel, thrust, torque = np.zeros((3, STATES, 6))
+    momentum = ACTION * np.array([0.5, -0.8, 0.3])
+    wheel[:, 3:] = -np.cross(world.rate, momentum)
+    wheel[::10, 3:] -= momentum  # spun up at times
+    thrust[:: STATES // 3, 0] = ACTION
+    torque[:: STATES // 3, 5] = ACTION
+    at_rest = rates_at_rest(robot, world.motion)
+    alone, bodies = world.equations(), world.bodies
+    masses = [f"{body}.mass" for body in bodies]
+    total = np.array([[name in masses for name in world.base.standard]], dtype=float)
+    load = Load("load", bodies[-1], InertialParameters(10.0, [0.1, 0.1, 0.1], 10.0 * np.eye(3)))
+    loaded = _World(robot.with_load(load), rng)
+    return (
+        world.case("motion, tumbling", alone),
+        world.case("motion, from rest", world.equations(rate=at_rest)),
+        world.case("motion in the gravity gradient, tumbling", world.equations(gradient=True)),
+        world.case("motion in the gravity gradient, from rest", world.equations(rate=at_rest, gradient=True)),
+        world.case("motion and joint torques", world.equations(joints=True)),
+        world.case("motion, known wheel spun up at times", world.equations(wheel)),
+        world.case("motion, known thrust on the base at times", world.equations(thrust)),
+        world.case("motion, known torque on the base at times", world.equations(torque)),
+        *(world.case(f"motion, {body} known", alone, world.known(body)) for body in bodies),
+        world.case("motion, mass of the whole robot known", alone, total),
+        world.case(f"motion, mass of {bodies[0]} known", alone, world.known(bodies[0])[:1]),
+        loaded.case(
+            f"motion, {bodies[-1]} with a load fixed on it, load known", loaded.equations(), loaded.known("load")
+        ),
+    )
+
+
+class _World:
+    """Random states of a robot."""
+
+    def __init__(self, robot: Robot, rng: np.random.Generator) -> None:
+        self.robot, self.bodies = robot, massive_bodies(robot)
+        self.base: BaseParameters = base_parameters(robot)
+        self.motion: Kinematics = random_motion(robot, STATES, rng)
+        self.tables = np.concatenate([link_table(robot, body, self.motion) for body in self.bodies], axis=2)
+        self.rate = rng.normal(size=(STATES, 3))
+        up = rng.normal(size=(STATES, 3))
+        self.zenith = up / np.linalg.norm(up, axis=1)[:, None]
+
+    def equations(
+        self, wrench: Floats | None = None, *, rate: Floats | None = None, joints: bool = False, gradient: bool = False
+    ) -> Floats:
+        """Left side of the equations in states that a known wrench leads to; the joints' only where measured."""
+        rate = self.rate if rate is None else rate
+        wrench = np.zeros((STATES, 6)) if wrench is None else wrench
+        zenith = self.zenith if gradient else None
+        change, lift = consistent_accelerations(self.robot, self.motion, rate, wrench, zenith, GRADIENT)
+        left = torque_regressor(self.robot, self.bodies, self.motion, rate, change, lift)
+        left = left if joints else left[:, :6]
+        if zenith is not None:
+            left[:, :6] -= gradient_regressor(self.tables, zenith, GRADIENT)
+        return left.reshape(-1, left.shape[-1])
+
+    def known(self, body: str) -> Floats:
+        """Equations that give the parameters of a body."""
+        return np.eye(10 * len(self.bodies))[10 * self.bodies.index(body) :][:10]
+
+    def case(self, data: str, left: Floats, known: Floats | None = None) -> ScaleCase:
+        """Return what equations determine, with what is known counting as much as one of them."""
+        if known is not None:
+            weight = np.linalg.norm(known * np.linalg.norm(left, axis=0), axis=1, keepdims=True)
+            left = np.concatenate([left, weight * known])
+        found = determined(self.base, left)
+        own = self.base.project(standard_parameters(self.robot))
+        return ScaleCase(data, found, self.base.count, found.leaves_open(own))

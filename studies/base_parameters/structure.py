@@ -1,0 +1,77 @@
+"""Base parameters of a robot, with the singular values they rest on, and its equations in one state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from bayesid import Robot
+from bayesid.identifiability import Base, BaseParameters, base_parameters, consistent_accelerations
+from bayesid.identifiability.equations import massive_bodies, stacked_regressor
+from bayesid.motion import JointState
+from bayesid.regressors import torque_regressor
+from bayesid.tables import configuration, kinematics
+
+__all__ = ["Equations", "Structure", "equations_at", "standard_parameters", "structure"]
+
+Floats = NDArray[np.floating]
+
+STATES = 1991
+"""Seed of the states in which singular values are looked at."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What of a robot can be identified."""
+
+    robot: Robot
+    base: BaseParameters
+    singular: Floats
+    """Of the regressor with columns of unit length, relative to the largest."""
+    parameters: Floats
+    """The robot's own, in the order of ``base.standard``."""
+
+
+@dataclass(frozen=True)
+class Equations:
+    """The paper's (23) in one state: what the regressor gives, and what Pinocchio's recursive Newton-Euler does.
+
+    Base force and torque [N, N m], then the joint torques [N m].
+    """
+
+    regressor: Floats
+    ours: Floats
+    pinocchio: Floats
+
+
+def structure(robot: Robot, base: Base = Base.FREE) -> Structure:
+    """Find what of a robot can be identified."""
+    regressor = stacked_regressor(robot, massive_bodies(robot), base, np.random.default_rng(STATES))
+    length = np.linalg.norm(regressor, axis=0)
+    values = np.linalg.svd(regressor / np.where(length > 0.0, length, 1.0), compute_uv=False)
+    return Structure(robot, base_parameters(robot, base=base), values / values[0], standard_parameters(robot))
+
+
+def standard_parameters(robot: Robot) -> Floats:
+    """Return the linear parameters of all bodies, in the order of `BaseParameters.standard`."""
+    return np.concatenate([robot.link(body).inertial.vector for body in massive_bodies(robot)])
+
+
+def equations_at(robot: Robot, rng: np.random.Generator) -> Equations:
+    """Write (23) in a random state of the robot that no wrench acts on."""
+    position, velocity, acceleration = rng.normal(size=(3, 1, len(robot.joints)))
+    motion = kinematics(robot, JointState(position, velocity, acceleration))
+    rate = rng.normal(size=(1, 3))
+    change, lift = consistent_accelerations(robot, motion, rate, np.zeros((1, 6)))
+    regressor = torque_regressor(robot, massive_bodies(robot), motion, rate, change, lift)[0]
+    expected = pin.rnea(
+        robot.model,
+        robot.model.createData(),
+        configuration(robot, position[0]),
+        np.concatenate([np.zeros(3), rate[0], velocity[0]]),
+        np.concatenate([lift[0], change[0], acceleration[0]]),
+    )
+    return Equations(regressor, regressor @ standard_parameters(robot), expected)
