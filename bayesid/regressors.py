@@ -17,7 +17,14 @@ from bayesid.arrays import Floats, namespace
 from bayesid.robot import Robot
 from bayesid.tables import ENTRIES, Kinematics, joint_motion, joint_twist, link_table
 
-__all__ = ["balance_regressor", "gradient_regressor", "momentum_regressor", "torque_regressor"]
+__all__ = [
+    "balance_regressor",
+    "carried_bodies",
+    "gradient_regressor",
+    "joint_axes",
+    "momentum_regressor",
+    "torque_regressor",
+]
 
 A = TypeVar("A", Floats, Array)
 
@@ -141,13 +148,13 @@ def torque_regressor(
     tables = [link_table(robot, name, motion) for name in bodies]
     xp = namespace(motion.pose, rate, rate_change, acceleration)
     wrench = balance_regressor(xp.concatenate(tables, axis=2), rate, rate_change, acceleration)
-    carried = np.repeat(_carried(robot, bodies), 10, axis=1)
-    torque = xp.einsum("tjs,tsp->tjp", _axes(robot, motion), wrench) * carried
+    carried = np.repeat(carried_bodies(robot, bodies), 10, axis=1)
+    torque = xp.einsum("tjs,tsp->tjp", joint_axes(robot, motion), wrench) * carried
     return cast("A", xp.concatenate([wrench, torque], axis=1))
 
 
-def _axes(robot: Robot, motion: Kinematics) -> Floats:
-    """Twist, at the base origin in base axes, of what a joint carries as it moves at unit speed, (T, joints, 6)."""
+def joint_axes(robot: Robot, motion: Kinematics) -> Floats:
+    """Return the twist, at the base origin in base axes, of what each joint carries at unit speed, (T, joints, 6)."""
     xp = namespace(motion.pose)
     axes = []
     for index in range(len(robot.joints)):
@@ -158,8 +165,8 @@ def _axes(robot: Robot, motion: Kinematics) -> Floats:
     return cast("Floats", xp.stack(axes, axis=1) if axes else empty)
 
 
-def _carried(robot: Robot, bodies: Sequence[str]) -> Floats:
-    """Whether (1 or 0) a joint carries a body, shape (joints, bodies)."""
+def carried_bodies(robot: Robot, bodies: Sequence[str]) -> Floats:
+    """Return whether (1 or 0) a joint carries a body, shape (joints, bodies)."""
     carried = np.zeros((len(robot.joints), len(bodies)))
     for column, name in enumerate(bodies):
         joint = robot.link(name).joint

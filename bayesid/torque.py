@@ -13,13 +13,11 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-import pinocchio as pin
 from jax import Array
 
-from bayesid.arrays import Floats
 from bayesid.errors import InputError
 from bayesid.motion import JointState
-from bayesid.regressors import balance_regressor
+from bayesid.regressors import balance_regressor, carried_bodies, joint_axes
 from bayesid.robot import Robot
 from bayesid.tables import ENTRIES, WIDTH, Kinematics, composite_rows
 
@@ -90,13 +88,17 @@ def beyond_joints(
     owners : sequence of str or None
         Link that each of the p columns of the unknown tables belongs to.
     """
-    subtrees = [_subtree(robot, joint) for joint in range(len(robot.joints))]
-    rows = [composite_rows(robot, moved, leave_out={*unknown, *(robot.links.keys() - links)}) for links in subtrees]
-    carried = np.array([[float(name in links) for name in owners] for links in subtrees])
+    links = list(robot.links)
+    beyond = carried_bodies(robot, links)
+    rows = [
+        composite_rows(robot, moved, leave_out={*unknown, *(n for n, far in zip(links, own, strict=True) if not far)})
+        for own in beyond
+    ]
+    carried = np.array([[0.0 if name is None else own[links.index(name)] for name in owners] for own in beyond])
     return Beyond(
         known=jnp.asarray(np.stack(rows, axis=1)),
         carried=jnp.asarray(np.tile(carried, (len(state.position), 1, 1))),
-        axis=jnp.asarray(_axes(robot, moved)),
+        axis=jnp.asarray(joint_axes(robot, moved)),
         velocity=jnp.asarray(state.velocity),
     )
 
@@ -142,27 +144,3 @@ def _pulled(row: Array, com: Array, tide: Array) -> Array:
     spread = second @ tide  # integral of r (tide r)'; its antisymmetric part is the torque
     torque = jnp.stack([spread[1, 2] - spread[2, 1], spread[2, 0] - spread[0, 2], spread[0, 1] - spread[1, 0]])
     return jnp.concatenate([tide @ (first - mass * com), torque - jnp.cross(first, tide @ com)])
-
-
-def _subtree(robot: Robot, joint: int) -> set[str]:
-    """Names of the links beyond a joint."""
-    parents = robot.model.parents
-    beyond = {joint}
-    for other in range(joint + 1, len(robot.joints)):  # Pinocchio numbers parents before children
-        if parents[other + 2] - 2 in beyond:
-            beyond.add(other)
-    return {name for name, link in robot.links.items() if link.joint in beyond}
-
-
-def _axes(robot: Robot, moved: Kinematics) -> Floats:
-    """Velocity per unit of joint speed of what is beyond each joint, at the base origin, shape (T, n, 6)."""
-    axes = np.zeros((*moved.pose.shape[:2], 6))
-    for index in range(len(robot.joints)):
-        joint = robot.model.joints[index + 2]
-        own = joint.createData()
-        joint.calc(own, pin.neutral(robot.model), np.zeros(robot.model.nv))
-        linear, angular = np.split(np.asarray(own.S).ravel(), 2)
-        turn, place = moved.pose[:, index, :3, :3], moved.pose[:, index, :3, 3]
-        axes[:, index, 3:] = turn @ angular
-        axes[:, index, :3] = turn @ linear + np.cross(place, axes[:, index, 3:])
-    return axes

@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from bayesid import Manoeuvre, Robot
-from bayesid.regressors import balance_regressor
-from bayesid.tables import kinematics, link_table
-from bayesid.torque import beyond_joints
+from bayesid.regressors import torque_regressor
+from bayesid.tables import kinematics
 from bayesid.unknowns import BodyPrior, Unknowns
 from studies.whole_system.setting import LOAD, POINT, bodies, spreads
 
@@ -58,17 +57,10 @@ def regress(manoeuvre: Manoeuvre, drawings: Robot, *, torques: bool) -> tuple[Fl
     state = manoeuvre.motion.evaluate(time)
     moved = kinematics(drawings, state)
     names = bodies(drawings)
-    columns = [
-        np.asarray(balance_regressor(*map(jnp.asarray, (link_table(drawings, name, moved), rate, change, origin))))
-        for name in names
-    ]
-    wrench = np.concatenate(columns, axis=2)
-    blocks: list[tuple[Floats, Floats]] = [(wrench[:, row], np.zeros(len(time))) for row in range(6)]
+    regressor = np.asarray(torque_regressor(drawings, names, moved, rate, change, origin))
+    blocks: list[tuple[Floats, Floats]] = [(regressor[:, row], np.zeros(len(time))) for row in range(6)]
     frictions = 0
     if torques:
-        owners = [name for name in names for _ in range(10)]
-        beyond = beyond_joints(drawings, state, moved, names, owners)
-        through = np.einsum("tjk,tkp,tjp->tjp", np.asarray(beyond.axis), wrench, np.asarray(beyond.carried))
         speed = state.velocity
         frictions = 2 * len(joints)
         for index, joint in enumerate(joints):
@@ -76,7 +68,7 @@ def regress(manoeuvre: Manoeuvre, drawings: Robot, *, torques: bool) -> tuple[Fl
             rubbing[:, 2 * index], rubbing[:, 2 * index + 1] = np.sign(speed[:, index]), speed[:, index]
             _, torque = recording.series(f"torque.{joint.name}")
             moving = np.abs(speed[:, index]) > 5e-4
-            blocks.append((np.concatenate([through[:, index], rubbing], axis=1)[moving], torque[moving]))
+            blocks.append((np.concatenate([regressor[:, 6 + index], rubbing], axis=1)[moving], torque[moving]))
     centre, covariance = linear_prior(drawings)
     count = len(centre)
     precision = np.zeros((count + frictions, count + frictions))
