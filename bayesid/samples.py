@@ -12,7 +12,7 @@ from bayesid.arrays import Floats
 from bayesid.effects.friction import STANDSTILL, JointFriction
 from bayesid.errors import InputError
 from bayesid.model import Manoeuvre, Model
-from bayesid.motion import JointState, MeasuredMotion
+from bayesid.motion import MeasuredMotion, Motion
 from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.sensitivity import joint_sensitivity
@@ -56,7 +56,7 @@ class Samples:
         rows, base = np.searchsorted(self.time, self.torque[0]), 3 * len(self.sensors)
         self.measured = np.zeros((len(self.time), base + len(self.torque_sigma)))
         self.measured[rows, base:] = self.torque[1]
-        self.torque_rows = [rows[moving] for moving in _moving(model, self.motion.evaluate(self.torque[0]))]
+        self.torque_rows = [rows[moving] for moving in _moving(model, self.motion, self.torque[0])]
         self.quaternion = np.tile([0.0, 0.0, 0.0, 1.0], (len(self.time), 1))
         for slot, sensor in enumerate(self.sensors):
             values = self.series[sensor.kind][1]
@@ -117,10 +117,11 @@ def _coloured(sensor: Sensor) -> list[tuple[float, float]]:
     return [(0.0, 1.0)] * 3 if noise is None else [(level, noise.time) for level in noise.sigma]
 
 
-def _moving(model: Model, state: JointState) -> list[NDArray[np.bool_]]:
+def _moving(model: Model, motion: Motion, time: Floats) -> list[NDArray[np.bool_]]:
     """For each torque sensor, which of its samples dry friction leaves of use."""
     if model.torque is None:
         return []
+    state = motion.evaluate(time)
     rubbing = {effect.place for effect in model.effects if isinstance(effect, JointFriction)}
     speed = np.abs(state.velocity[:, model.torque.columns(model.robot)])
     return [

@@ -222,7 +222,7 @@ def _samples(document: Document, result: Result) -> None:
         ],
         rows,
         "Convergence, importance sampling (evidence is evaluated where Pareto k-hat is below 0.7), and the squared "
-        "distance of the truth from the mean, to be compared with the number of unknowns.",
+        "distance of the true bodies from the mean, to be compared with their 80 unknowns.",
         ["left", *["right"] * 8],
     )
     for case in result.cases:

@@ -29,7 +29,7 @@ class Sampled:
         Sensors in use.
     result : Identification
     distance : float
-        Squared Mahalanobis distance of the truth from the mean, in coordinates linear in the parameters.
+        Squared Mahalanobis distance of the true bodies from the mean, in coordinates linear in the parameters.
     p_value : float
         Of a distance that large, under a normal posterior.
     truth : mapping of str to (10,) array
@@ -65,10 +65,11 @@ def sampled(
 
     result = identify(posterior, seed, effective_samples=effective_samples, progress=tell)
     z = true_point(posterior, truth, rate)
-    linear = posterior.to_linear(result.chains.flat)
-    square = distance(posterior.to_linear(z[None])[0], linear.mean(axis=0), np.cov(linear.T))
+    count = 10 * len(posterior.model.priors)
+    linear = posterior.to_linear(result.chains.flat)[:, :count]
+    square = distance(posterior.to_linear(z[None])[0, :count], linear.mean(axis=0), np.cov(linear.T))
     described = {name: mass_com_inertia(truth.link(name).inertial.vector) for name in bodies(truth)}
-    return Sampled(title, result, square, float(stats.chi2.sf(square, len(z))), described)
+    return Sampled(title, result, square, float(stats.chi2.sf(square, count)), described)
 
 
 def true_point(posterior: Posterior, truth: Robot, rate: Floats) -> Floats:

@@ -1,0 +1,150 @@
+"""The whole planar robot as unknown: systems drawn from the prior, flown by MuJoCo, and whether they are recovered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from bayesid.inference import identify
+from bayesid.inference.charts import LinearChart
+from bayesid.inference.optimum import fit
+from bayesid.inference.proposal import StudentT
+from bayesid.model import Manoeuvre, Model
+from bayesid.motion import MeasuredMotion
+from bayesid.posterior import Posterior
+from bayesid.recording import Recording
+from bayesid.robot import Robot
+from bayesid.sensors import Kind, Sensor, White
+from bayesid.torque import TorqueSensor
+from bayesid.unknowns import BodyPrior, draw_inertial
+from tests import mujoco_truth as mj
+from tests.conftest import ENCODER, PLANAR, POINT, SIGMA, STEP
+
+SPREAD = 0.05
+TORQUE = 1e-2
+TIMES = np.arange(0.0, 40.01, 0.5)
+RATE0 = np.array([0.01, -0.02, 0.015])
+JOINTS = ("joint1", "joint2")
+
+
+def drawn(rng: np.random.Generator) -> Robot:
+    """A robot of the prior about the planar one: every body unknown."""
+    robot = Robot.from_urdf(PLANAR)
+    for name, link in Robot.from_urdf(PLANAR).links.items():
+        if link.inertial.mass > 0.0:
+            robot = robot.with_inertial(name, draw_inertial(link.inertial, SPREAD, rng))
+    return robot
+
+
+def flown(robot: Robot, folder: Path, rng: np.random.Generator) -> Manoeuvre:
+    urdf = folder / "drawn.urdf"
+    robot.write_urdf(urdf)
+    motion = mj.smooth_motion(2, 40.0, seed=11, amplitude=0.3, frequencies=(0.03, 0.05), ramp=20.0)
+    run = mj.TruthModel(urdf, accel_position=POINT).run(motion, TIMES, rate0=RATE0, step=0.1)
+    channels = {}
+    for k, joint in enumerate(JOINTS):
+        channels[f"position.{joint}"] = run.position[:, k] + ENCODER * rng.normal(size=len(TIMES))
+        channels[f"torque.{joint}"] = run.torque[:, k] + TORQUE * rng.normal(size=len(TIMES))
+    for family, values in (("rate", run.rate), ("accel", run.accel)):
+        noisy = values + SIGMA * rng.normal(size=values.shape)
+        channels |= {f"{family}.{axis}": noisy[:, k] for k, axis in enumerate("xyz")}
+    recording = Recording("drawn", None, TIMES, channels)
+    return Manoeuvre(recording, MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODER}))
+
+
+def model(torque: bool) -> Model:
+    robot = Robot.from_urdf(PLANAR)
+    priors = tuple(
+        BodyPrior(name, link.inertial, SPREAD) for name, link in robot.links.items() if link.inertial.mass > 0.0
+    )
+    sensors = (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT))
+    bare = Model(robot, sensors, priors)
+    return replace(bare, torque=TorqueSensor(JOINTS, (TORQUE,) * 2)) if torque else bare
+
+
+def true_point(posterior: Posterior, robot: Robot) -> np.ndarray:
+    bodies = [robot.link(prior.name).inertial for prior in posterior.model.priors]
+    return posterior.unknowns.coordinates(bodies, RATE0[None])
+
+
+def squared_distance(posterior: Posterior, normal: StudentT, z: np.ndarray) -> tuple[float, int]:
+    """Of the bodies, in coordinates linear in their parameters, and how many these are.
+
+    The initial rate is left out: what is estimated is the rate that goes with the smoothed joint speed at time 0.
+    """
+    count = 10 * len(posterior.model.priors)
+    covariance = (normal.factor @ normal.factor.T)[:count, :count]
+    d = (posterior.to_linear(z[None])[0] - normal.mean)[:count]
+    return float((np.linalg.solve(np.linalg.cholesky(covariance), d) ** 2).sum()), count
+
+
+def total_mass(posterior: Posterior, covariance: np.ndarray) -> float:
+    """Relative standard deviation of the mass of the whole system at the prior's centre."""
+    masses = np.array([prior.centre.mass for prior in posterior.model.priors])
+    slope = np.zeros(posterior.size)
+    slope[: 10 * len(masses) : 10] = 2.0 * SPREAD * masses / masses.sum()
+    return float(np.sqrt(slope @ covariance @ slope))
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory) -> Callable[[bool], Posterior]:
+    """Posteriors of motion alone and of motion with torques, whose compiled functions all cases share."""
+    made: dict[bool, Posterior] = {}
+
+    def get(torque: bool) -> Posterior:
+        if torque not in made:
+            rng = np.random.default_rng(0)
+            manoeuvre = flown(drawn(rng), tmp_path_factory.mktemp("first"), rng)
+            made[torque] = Posterior(model(torque), [manoeuvre], step=STEP)
+        return made[torque]
+
+    return get
+
+
+@pytest.mark.parametrize(
+    "torque", [pytest.param(False, marks=pytest.mark.usefixtures("slow")), True], ids=["motion", "torques"]
+)
+def test_the_uncertainty_of_drawn_systems_holds_the_truth(torque, compiled, tmp_path):
+    """Squared distances of the truth over fresh systems and fresh noise are chi-square."""
+    count, distances = 16, []
+    for stream in np.random.SeedSequence(7).spawn(count):
+        rng = np.random.default_rng(stream)
+        robot = drawn(rng)
+        posterior = compiled(torque).with_manoeuvres([flown(robot, tmp_path, rng)])
+        z = true_point(posterior, robot)
+        optimum = fit(posterior.at(z), z)  # from the truth, to save time; the next test starts at the prior's centre
+        square, bodies = squared_distance(posterior, LinearChart(posterior).proposal(optimum), z)
+        distances.append(square)
+    reference = stats.chi2(bodies)
+    assert stats.kstest(distances, reference.cdf).pvalue > 0.01
+    assert abs(np.mean(distances) - reference.mean()) < 3.0 * reference.std() / np.sqrt(count)
+
+
+@pytest.mark.usefixtures("slow")
+def test_emcee_samples_all_bodies_and_torques_bring_the_scale(compiled, tmp_path):
+    """From the prior's centre, with every diagnostic of convergence, and the truth inside."""
+    rng = np.random.default_rng(3)
+    robot = drawn(rng)
+    manoeuvre = flown(robot, tmp_path, rng)
+    widths = {}
+    for torque in (False, True):
+        posterior = compiled(torque).with_manoeuvres([manoeuvre])
+        result = identify(posterior, 1, effective_samples=400.0)
+        assert result.chains.converged
+        assert result.chains.r_hat < 1.02
+        assert result.evidence.trusted
+        draws = posterior.to_linear(result.chains.flat)
+        square, bodies = squared_distance(
+            posterior, StudentT.about(draws.mean(axis=0), np.cov(draws.T)), true_point(posterior, robot)
+        )
+        assert stats.chi2(bodies).sf(square) > 1e-3
+        widths[torque] = total_mass(posterior, np.cov(result.chains.flat.T))
+        prior = total_mass(posterior, np.eye(posterior.size))
+    # motion fixes ratios: three masses known to 2 x 5 % each are pooled, and nothing says more of the scale
+    assert widths[False] == pytest.approx(2.0 * SPREAD / np.sqrt(3.0), rel=0.2)
+    assert widths[True] < 0.2 * prior
