@@ -55,9 +55,14 @@ class Refits:
 
     @property
     def apart(self) -> Floats:
-        """Root mean square difference over the standard deviation, shape (10,)."""
+        """Median absolute difference over the standard deviation, shape (10,)."""
         gap = self.nonlinear.errors - self.linear.errors
-        return np.sqrt((gap**2).mean(axis=0)) / self.linear.sd
+        return np.asarray(np.median(np.abs(gap), axis=0)) / self.linear.sd
+
+    @property
+    def runaway(self) -> Floats:
+        """Which fits ended at a body that is wrong by more than its own size in mass or a moment, shape (N,)."""
+        return np.asarray((np.abs(self.nonlinear.errors[:, [0, 4, 5, 6]]) > 1.0).any(axis=1))
 
 
 def refit(raw: Posterior, linear: Linear, draws: Draws, noise: Noise, ours: int, theirs: int) -> dict[str, Refits]:

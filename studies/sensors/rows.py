@@ -13,7 +13,17 @@ from studies.base_body import paper
 from studies.sensors.montecarlo import Spread
 from studies.sensors.result import Result
 
-__all__ = ["MASS", "MOMENTS", "falsified_rows", "honest", "level_rows", "parameter_rows", "percent", "refit_rows"]
+__all__ = [
+    "MASS",
+    "MOMENTS",
+    "falsified_rows",
+    "honest",
+    "level_rows",
+    "median_of",
+    "parameter_rows",
+    "percent",
+    "refit_rows",
+]
 __all__ += ["regression_rows", "rms_of", "scalar_rows", "shift_of", "spread_rows", "worst"]
 
 Floats = NDArray[np.floating]
@@ -24,13 +34,25 @@ JUDGED = [MASS, *MOMENTS]
 NO_CHI2 = 1e-2
 """Below, chi-square is in SI units and says nothing."""
 
+FINEST = 7
+"""Decimals of a percentage at most."""
+
+HALF_NORMAL = 1.17
+"""Error of the median of n absolute normal numbers over that median, times the root of n."""
+
 NOTHING = 1e-9
 """Relative errors below are rounding."""
 
 
 def percent(value: float, error: float) -> str:
-    """Return a fraction and its Monte-Carlo error in percent; only the size where the error is far below it."""
-    return format_quantity(100.0 * value, 100.0 * error)
+    """Return a fraction in percent with its Monte-Carlo error in units of the last digits: ``3.22(35)``."""
+    value, error = 100.0 * value, 100.0 * error
+    if not (np.isfinite(value) and np.isfinite(error) and error > 0.0):
+        return format_number(value, 3)
+    # the error keeps one digit from 2 on, else two
+    decimals = min(max(0, -int(np.floor(np.log10(error / 2.0)))), FINEST)
+    digits = f"{error * 10.0**decimals:.0f}"
+    return f"{value:.{decimals}f}{'' if digits == '0' else f'({digits})'}".replace("-", "−")
 
 
 def worst(spread: Spread, chosen: Sequence[int] = tuple(MOMENTS)) -> int:
@@ -165,23 +187,28 @@ def regression_rows(result: Result) -> list[list[str]]:
     return rows
 
 
+def median_of(spread: Spread, index: int) -> str:
+    """Return the median absolute error in percent; its Monte-Carlo error is that of normal estimates."""
+    median = float(np.median(np.abs(spread.errors[:, index])))
+    return percent(median, HALF_NORMAL * median / float(np.sqrt(len(spread.errors))))
+
+
 def refit_rows(result: Result) -> list[list[str]]:
     """Return nonlinear against linear errors of the same draws."""
     rows = []
     for level, found in result.refits.items():
         for name, own in found.items():
-            index = worst(own.nonlinear)
+            index = worst(own.linear)
             rows.append(
                 [
                     level,
                     name,
-                    str(len(own.nonlinear.errors)),
-                    rms_of(own.nonlinear, MASS),
-                    rms_of(own.linear, MASS),
-                    rms_of(own.nonlinear, index),
-                    rms_of(own.linear, index),
+                    f"{int(own.runaway.sum())} of {len(own.runaway)}",
+                    median_of(own.nonlinear, MASS),
+                    median_of(own.linear, MASS),
+                    median_of(own.nonlinear, index),
+                    median_of(own.linear, index),
                     format_number(float(own.apart[JUDGED].max()), 2),
-                    honest(own.nonlinear),
                 ]
             )
     return rows
