@@ -18,6 +18,7 @@ from studies.sensors.rows import (
     falsified_rows,
     honest,
     level_rows,
+    median_of,
     parameter_rows,
     percent,
     refit_rows,
@@ -99,7 +100,7 @@ def _findings(result: Result) -> list[str]:
         f"as read here, by {rms_of(procedure, MASS)} % and {rms_of(procedure, worst(procedure))} %, "
         f"{_times(procedure)} times. Noise averages: the former needs about "
         f"{_manoeuvres(ours)} such manoeuvres (or as many times the samples) for 2 %, the latter "
-        f"{_manoeuvres(procedure)}, as far as its error is not bias.",
+        f"{_manoeuvres(procedure)}, as far as its error is not bias." + _nonlinear(result, first),
         "Integrating the accelerometer ('not yet analyzed') multiplies the standard deviation of the worst moment by "
         f"{percent(0.01 * ratio, 0.01 * ratio_error)} if least squares take the velocities for white and weigh SI "
         f"units alike, at {first}. With the velocities' whole covariance nothing is lost: the largest ratio of "
@@ -149,6 +150,19 @@ def _joint_finding(spreads: Mapping[str, Spread], level: str) -> str:
         f"of the base's sensors alone gives the mass a standard deviation of "
         f"{percent(float(exact.sd[MASS]), float(exact.sd_error[MASS]))} %; the treatments shift it, on the same noise, "
         f"by [%]: {', '.join(shifts)}. With better accelerometers the difference grows (section 3)."
+    )
+
+
+def _nonlinear(result: Result, level: str) -> str:
+    if level not in result.refits:
+        return ""
+    own = result.refits[level][PAPER]
+    k = worst(own.linear)
+    return (
+        f" All to first order; nonlinear fits by that procedure run away in {int(own.runaway.sum())} of "
+        f"{len(own.runaway)} draws, and their median errors are {median_of(own.nonlinear, MASS)} % and "
+        f"{median_of(own.nonlinear, k)} %, to first order {median_of(own.linear, MASS)} % and "
+        f"{median_of(own.linear, k)} %."
     )
 
 

@@ -68,9 +68,8 @@ LINEAR = (
 REFITS = (
     "The tables above are to first order about the truth, with the exact Jacobian: an estimator errs by a fixed matrix "
     "times the errors of the data. Nonlinear fits of some draws, started at the truth, show how far that holds. Where "
-    "(21) errs by tens of percent, it does not: some of its fits run away along the ridge of light and heavy bodies, "
-    "for which no mean square error exists, and the others err somewhat differently. So its figures at the highest "
-    "noise are an order of magnitude, and rather too small."
+    "(21) errs by tens of percent, it does not: some of its fits run away, so that a mean square error says nothing, "
+    "and the others err differently. Its figures at the highest noise are an order of magnitude."
 )
 
 ASSUMED = (
