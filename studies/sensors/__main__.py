@@ -1,0 +1,5 @@
+"""``python -m studies.sensors``."""
+
+from studies.sensors import main
+
+main()

@@ -1,0 +1,177 @@
+"""The study of noise and sensors: treatments, closed forms, the linear method, and all of it where time allows."""
+
+import numpy as np
+import pytest
+
+from bayesid.inertia import mass_com_inertia
+from studies.base_body import paper
+from studies.sensors import Effort, run
+from studies.sensors.draws import Draws
+from studies.sensors.integration import scalars
+from studies.sensors.linear import Estimator, Linear
+from studies.sensors.montecarlo import ALIKE, OURS, PAPER, PIECES, TREATMENTS, WEIGHTED, WHOLE, Spread
+from studies.sensors.regressor import Balance, attenuation, regress, solve_balance
+from studies.sensors.report import write_report
+from studies.sensors.result import REALISTIC
+from studies.sensors.setting import INTERVAL, Noise, fly, levels, motion
+from studies.sensors.treatments import Differences, LowPass, Polynomial, SavitzkyGolay, SmoothingSpline, Wiener
+from studies.sensors.weights import alternating, as_read, constant, integral, integrated, integrated_whole
+
+
+@pytest.fixture(scope="module")
+def free():
+    return fly(gradient=False)
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A made-up linear problem of 40 samples: slow signals of thirteen unknowns, and a bias."""
+    rng = np.random.default_rng(5)
+    time = INTERVAL * np.arange(40)
+    waves = np.stack([np.cos((0.2 + 0.15 * k) * time + k) for k in range(5)], axis=1)
+    readings = np.einsum("tk,kcn->tcn", waves, rng.normal(size=(5, 6, 13)))
+    bias = np.zeros((40, 6, 3))
+    bias[:, 3:] = np.eye(3)
+    names = tuple(f"base.{k}" for k in range(13)) + tuple(f"accel-bias.{axis}" for axis in "xyz")
+    whole = np.concatenate([readings, bias], axis=2).reshape(240, 16)
+    return Linear(time, whole, np.zeros((6, 3, 40, 6)), np.eye(10, 16), names)
+
+
+@pytest.mark.parametrize("treatment", TREATMENTS, ids=lambda item: item.title)
+def test_treatments_follow_a_slow_wave_and_its_derivatives(treatment):
+    time = INTERVAL * np.arange(241)
+    w, phase = 2.0 * np.pi / 60.0, np.array([0.3, 1.4])
+    angle = w * time[:, None] + phase
+    inner = slice(60, -60)  # the low-pass swings longest after the ends
+    found = treatment(time, np.sin(angle), 1e-8)[:, inner]
+    true = np.stack([np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)])[:, inner]
+    # central differences err by (w h)^2 / 6 and / 12; the others by no more
+    error = np.abs(found - true).max(axis=(1, 2)) / [1.0, w, w**2]
+    assert (error < (w * INTERVAL) ** 2 / 6.0 * 1.01 + 1e-6).all()
+
+
+def test_differences_are_exact_for_parabolas_and_noise_is_as_in_closed_form():
+    time = INTERVAL * np.arange(30)
+    _, speed, bend = Differences()(time, (2.0 - 3.0 * time + 0.5 * time**2)[:, None], 0.0)
+    np.testing.assert_allclose(speed[1:-1, 0], -3.0 + time[1:-1], atol=1e-11)
+    np.testing.assert_allclose(bend[:, 0], 1.0, atol=1e-10)
+    noise = np.random.default_rng(0).normal(size=(30, 4000))
+    _, speed, bend = Differences()(time, noise, 1.0)
+    assert speed[1:-1].std() == pytest.approx(1.0 / (np.sqrt(2.0) * INTERVAL), rel=0.01)
+    assert bend[1:-1].std() == pytest.approx(np.sqrt(6.0) / INTERVAL**2, rel=0.01)
+
+
+def test_pieces_of_a_polynomial_are_exact_where_one_polynomial_is_not():
+    time = np.arange(0.0, 60.0, 0.5)
+    values = np.where(time < 30.0, (time / 10.0) ** 3, 27.0 - (time - 30.0))[:, None]
+    assert np.abs(Polynomial((30.0,))(time, values, 0.0)[0] - values).max() < 1e-9
+    assert np.abs(Polynomial()(time, values, 0.0)[0] - values).max() > 0.1
+
+
+def test_smoothers_beat_differences_on_noise():
+    time = INTERVAL * np.arange(241)
+    rng, w, sigma = np.random.default_rng(3), 2.0 * np.pi / 60.0, 1e-4
+    true = -(w**2) * np.sin(w * time)
+    noisy = (np.sin(w * time) + sigma * rng.normal(size=241))[:, None]
+
+    def error(treatment):
+        return (treatment(time, noisy, sigma)[2, 20:-20, 0] - true[20:-20]).std()
+
+    rough = error(Differences())
+    for treatment in (LowPass(), SavitzkyGolay(), Polynomial(), SmoothingSpline(), Wiener()):
+        assert error(treatment) < 0.2 * rough
+    assert error(Wiener()) < min(error(LowPass()), error(SavitzkyGolay()), error(SmoothingSpline()))
+
+
+def test_integration_loses_what_the_closed_form_says():
+    for item in scalars(400, np.random.default_rng(1), samples=601):
+        assert item.matrices == pytest.approx(item.closed, rel=3e-3)  # sums of 601 samples are no integrals yet
+        assert item.simulated == pytest.approx(item.closed, abs=4.0 * item.error)
+        # one direction of 601 is lost, of which a wave that ends at 1 has no more than this
+        assert 1.0 <= item.whole < 1.0 + 2.0 / 601**2 + 1e-9
+        assert item.bias == pytest.approx(item.bias_closed, rel=1e-3)
+
+
+def test_the_rule_is_exact_for_lines_and_blind_to_alternation_alone():
+    time = INTERVAL * np.arange(41)
+    rule = integral(time)
+    np.testing.assert_allclose(rule @ (2.0 + time), 2.0 * time[1:] + 0.5 * time[1:] ** 2)
+    blind = alternating(41)
+    np.testing.assert_allclose(rule @ blind, 0.0, atol=1e-15)
+    # the whole covariance undoes the sum: all information but the blind direction's
+    kept = rule.T @ np.linalg.solve(rule @ rule.T, rule)
+    np.testing.assert_allclose(kept, np.eye(41) - np.outer(blind, blind), atol=1e-9)
+
+
+def test_stated_deviations_are_those_of_repeated_noise(small):
+    noise, rng, count = Noise(0.02, 0.03, 0.0), np.random.default_rng(7), 4000
+    rate, accel = (sigma * rng.normal(size=(count, 40, 3)) for sigma in (noise.rate, noise.accel))
+    residual = small.residual(rate, accel, np.zeros((count, 3, 40, 6)))
+    for weight in (as_read(small.time, noise), integrated_whole(small.time, noise)):
+        errors, stated, chi2 = Estimator(small, weight).solve(residual)
+        np.testing.assert_allclose(errors.std(axis=0), stated[0], rtol=0.05)
+        assert chi2.mean() == pytest.approx(1.0, abs=0.01)
+    # the velocities' whole covariance gives the very same estimates, less one alternating direction
+    read, whole = (
+        Estimator(small, weigh(small.time, noise)).solve(residual)[0] for weigh in (as_read, integrated_whole)
+    )
+    assert np.abs(read - whole).std() < 0.2 * read.std()
+    # taken for white, velocities are worse, and least squares do not know it
+    errors, stated, _ = Estimator(small, integrated(small.time, noise)).solve(residual)
+    assert (errors.std(axis=0) > read.std(axis=0)).all()
+
+
+def test_unknown_bias_and_constant_take_the_blame(small):
+    noise, still = Noise(1.0, 1.0, 0.0), np.zeros((1, 40, 3))
+    residual = small.residual(still, still + 0.5, np.zeros((1, 3, 40, 6)))
+    weight = integrated(small.time, noise)
+    assert np.abs(Estimator(small, weight).solve(residual)[0]).max() > 0.01
+    np.testing.assert_allclose(Estimator(small, weight, biased=True).solve(residual)[0], 0.0, atol=1e-10)
+    # a velocity at the start is an acceleration that acts during the first sample
+    kick = still.copy()
+    kick[:, 0] = 0.1
+    residual = small.residual(still, kick, np.zeros((1, 3, 40, 6)))
+    free = Estimator(small, weight, nuisance=constant(weight, small.time))
+    np.testing.assert_allclose(free.solve(residual)[0], 0.0, atol=1e-10)
+
+
+def test_monte_carlo_errors_are_those_of_normal_numbers():
+    rng = np.random.default_rng(2)
+    spreads = [Spread(0.3 + rng.normal(size=(50, 10)), np.ones((50, 10)), np.ones(50)) for _ in range(60)]
+    for name in ("bias", "sd", "rms"):
+        values = np.concatenate([getattr(own, name) for own in spreads])
+        errors = np.concatenate([getattr(own, f"{name}_error") for own in spreads])
+        assert errors.mean() == pytest.approx(values.std(), rel=0.15)
+
+
+def test_linear_method_is_exact_without_noise(free):
+    balance = Balance(np.stack(motion().evaluate(free.time)))
+    found = mass_com_inertia(solve_balance(*balance(free.rate, free.rate_change, free.accel)))
+    # the rates' derivative is by differences of samples 0.1 s apart
+    np.testing.assert_allclose(found[:7], paper.TRUTH[:7], rtol=2e-3)
+
+
+def test_linear_method_is_attenuated_as_predicted(free):
+    noise = levels(free)["0.04 deg/s"]
+    errors = regress(free, Draws(free, 6, seed=4), noise, (Differences(),))["differences"].errors
+    predicted = attenuation(free, noise)
+    assert predicted[0] < -0.5
+    np.testing.assert_allclose(errors.mean(axis=0)[[0, 4, 5, 6]], predicted[[0, 4, 5, 6]], atol=0.02)
+
+
+@pytest.mark.usefixtures("slow")
+def test_the_study(tmp_path):
+    result = run(effort=Effort(draws=12, ours=3, theirs=3, levels=("0.04 deg/s", REALISTIC)))
+    for level, refits in result.refits.items():
+        assert refits[OURS].apart[[0, 4, 5, 6]].max() < (0.3 if level == "0.04 deg/s" else 0.05)
+        assert np.isfinite(refits[PAPER].nonlinear.errors).all()
+    for uses in result.accelerometers.values():
+        np.testing.assert_allclose(
+            uses[WHOLE].errors, uses[WEIGHTED].errors, rtol=0.0, atol=2e-3 * uses[WEIGHTED].sd.max()
+        )
+        assert (uses[ALIKE].sd[[0, 4, 5, 6]] > 2.0 * uses[WEIGHTED].sd[[0, 4, 5, 6]]).all()
+    honest = result.joints[REALISTIC][OURS]
+    assert 0.7 < honest.honesty.mean() < 1.3
+    assert PIECES.title in result.rates[REALISTIC]
+    write_report(result, tmp_path / "sensors.pdf")
+    assert (tmp_path / "sensors.pdf").stat().st_size > 50_000
