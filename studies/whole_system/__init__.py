@@ -16,7 +16,7 @@ import numpy as np
 
 from studies.whole_system.contest import contest
 from studies.whole_system.coverage import covered
-from studies.whole_system.information import Information, informed
+from studies.whole_system.information import informed
 from studies.whole_system.report import Result, write_report
 from studies.whole_system.sampled import sampled
 from studies.whole_system.setting import drawn, true_robot
@@ -53,12 +53,9 @@ def run(
     """
     tell = progress or (lambda text: None)
     truth, drawings = true_robot(), drawn(true_robot(), seed)
-    known: dict[str, Information] = {}
-    runs = {}
-    for name, flight in flights(duration).items():
-        tell(f"manoeuvre: {name}")
-        runs[name] = fly(truth, seed, duration=duration, **flight)
-        known[name] = informed(truth, [record(runs[name], truth, name, None)])
+    tell("manoeuvres")
+    runs = {name: fly(truth, seed, duration=duration, **flight) for name, flight in flights(duration).items()}
+    known = informed(truth, {name: record(flown, truth, name, None) for name, flown in runs.items()})
     best = runs["six joints"]
     tell("the linear method")
     methods = contest(best, truth, drawings, count=repeats if full else 3, seed=seed, progress=tell)

@@ -110,10 +110,16 @@ class Information:
         return Knowledge(self.robot, tuple(name for name in names if name not in known), wanted, covariance)
 
 
-def informed(truth: Robot, manoeuvres: Sequence[Manoeuvre]) -> Information:
-    """Linearise manoeuvres of the true robot about the truth."""
-    model = model_of(truth, torques=True)
-    posterior = Posterior(model, manoeuvres)
-    z = posterior.initial_point()
-    shape = posterior.residual_shape
-    return Information(truth, posterior.jacobian(z)[: -posterior.size].reshape(-1, shape[2], posterior.size))
+def informed(truth: Robot, manoeuvres: Mapping[str, Manoeuvre]) -> dict[str, Information]:
+    """Linearise manoeuvres of the true robot about the truth, each by itself."""
+    found: dict[str, Information] = {}
+    posterior: Posterior | None = None
+    for name, manoeuvre in manoeuvres.items():
+        posterior = (
+            Posterior(model_of(truth, torques=True), [manoeuvre])
+            if posterior is None
+            else posterior.with_manoeuvres([manoeuvre])  # shares what is compiled
+        )
+        jacobian = posterior.jacobian(posterior.initial_point())[: -posterior.size]
+        found[name] = Information(truth, jacobian.reshape(-1, posterior.residual_shape[2], posterior.size))
+    return found

@@ -153,8 +153,9 @@ def _parts(document: Document, result: Result) -> None:
         "the load": (LOAD,),
         "the base": (BASE,),
     }
-    rows = []
     vague = dict.fromkeys(names, 1.0)
+    before = masses(result.known["six joints"].knowledge(Sensors.MOTION, widths=vague))
+    rows = [["nothing", "before any", "", *(_percent(width) for width, _ in before)]]
     for title, known in cases.items():
         for name, sensors in (
             ("six joints", Sensors.MOTION),
@@ -164,7 +165,7 @@ def _parts(document: Document, result: Result) -> None:
             knowledge = result.known[name].knowledge(sensors, known=known, widths=vague)
             widths = masses(knowledge)
             rows.append(
-                [title, name, sensors.value[0], *(_percent(width) if before else "known" for before, width in widths)]
+                [title, name, sensors.value[0], *(_percent(after) if prior else "known" for prior, after in widths)]
             )
     document.paragraph(
         "The paper concludes that part of the system must be known to identify the whole. Here no drawings help: every "
