@@ -141,7 +141,7 @@ def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
 
 
 def refuse_wrong_units(posterior: Posterior) -> None:
-    """Refuse recordings whose numbers cannot be in rad, rad/s or m/s2.
+    """Refuse recordings whose numbers cannot be in rad, rad/s, m/s2 or N m.
 
     Raises
     ------
@@ -151,10 +151,9 @@ def refuse_wrong_units(posterior: Posterior) -> None:
     for manoeuvre in posterior.manoeuvres:
         refuse_impossible_joints(manoeuvre.recording, posterior.model.robot)
     predictions = posterior.predict(posterior.initial_point())
-    for manoeuvre, predicted in zip(posterior.manoeuvres, predictions, strict=True):
-        for sensor in posterior.model.sensors:
-            if sensor.kind is not Kind.ATTITUDE:
-                _refuse_factor(manoeuvre.recording, sensor, predicted)
+    for index, (manoeuvre, predicted) in enumerate(zip(posterior.manoeuvres, predictions, strict=True)):
+        for seen in _comparisons(posterior, index, predicted):
+            _refuse_factor(manoeuvre.recording, seen)
 
 
 def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
@@ -194,30 +193,62 @@ def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
             )
 
 
-def _refuse_factor(recording: Recording, sensor: Sensor, predicted: Predictions) -> None:
-    time, measured = recording.vector(sensor.kind.value)
-    expected = getattr(predicted, sensor.kind.value)[np.searchsorted(predicted.time, time)]
-    first, second = _detrend(time, measured), _detrend(time, expected)
+@dataclass(frozen=True)
+class _Comparison:
+    """What a channel or a sensor read and what the model expects at the same times, (n, axes)."""
+
+    column: str
+    unit: str
+    mistaken: str
+    time: Floats
+    measured: Floats
+    expected: Floats
+    sigma: float
+
+
+def _comparisons(posterior: Posterior, index: int, predicted: Predictions) -> list[_Comparison]:
+    found = []
+    for sensor in posterior.model.sensors:
+        if sensor.kind is not Kind.ATTITUDE:
+            time, measured = posterior.measured(index, sensor.kind)
+            expected = getattr(predicted, sensor.kind.value)[np.searchsorted(predicted.time, time)]
+            mistaken = "degrees per second" if sensor.kind is Kind.RATE else "mm/s2 or micro-g"
+            sigma = float(sensor.noise.sigma(float(np.median(np.diff(time)))).max())
+            column = f"{sensor.kind.value}.x|y|z"
+            found.append(_Comparison(column, sensor.kind.unit, mistaken, time, measured, expected, sigma))
+    if (torque := posterior.model.torque) is not None:
+        time, measured = posterior.torques(index)
+        expected = predicted.torque[np.searchsorted(predicted.time, time)]
+        for k, (joint, sigma) in enumerate(zip(torque.joints, torque.sigma, strict=True)):
+            own = slice(k, k + 1)
+            mistaken = "mN m or at the motor before the gear"
+            found.append(
+                _Comparison(f"torque.{joint}", "N m", mistaken, time, measured[:, own], expected[:, own], sigma)
+            )
+    return found
+
+
+def _refuse_factor(recording: Recording, seen: _Comparison) -> None:
+    first, second = _detrend(seen.time, seen.measured), _detrend(seen.time, seen.expected)
     energy, cross = float((second**2).sum()), float((first * second).sum())
     correlation = cross / np.sqrt(energy * float((first**2).sum()) + 1e-300)
-    loud = float(np.sqrt((first**2).mean())) > 5.0 * float(sensor.noise.sigma(float(np.median(np.diff(time)))).max())
+    loud = float(np.sqrt((first**2).mean())) > 5.0 * seen.sigma
     if not loud or abs(correlation) < 0.8:
         return
     factor = cross / energy
     if abs(factor) > WRONG_UNIT:
-        hint = "degrees per second" if sensor.kind is Kind.RATE else "mm/s2 or micro-g"
         raise InputError(
             f"the readings follow the joints' motion but are {factor:.3g} times what it can cause with this robot",
             file=recording.file or recording.name,
-            place=f"column {sensor.kind.value}.x|y|z",
-            remedy=f"Give them in {sensor.kind.unit}, not in {hint}, or correct the robot",
+            place=f"column {seen.column}",
+            remedy=f"Give them in {seen.unit}, not in {seen.mistaken}, or correct the robot",
         )
     if abs(factor) < 1.0 / WRONG_UNIT:
         raise InputError(
             f"the readings follow the joints' motion but are {1.0 / factor:.3g} times smaller than what it causes",
             file=recording.file or recording.name,
-            place=f"column {sensor.kind.value}.x|y|z",
-            remedy=f"Give them in {sensor.kind.unit} (g or deg?), joint positions in radians, or correct the robot",
+            place=f"column {seen.column}",
+            remedy=f"Give them in {seen.unit}, joint positions in radians, or correct the robot",
         )
 
 

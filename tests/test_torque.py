@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from bayesid.checks import refuse_wrong_units
 from bayesid.effects import EncoderOffset, GravityGradient, JointFriction, LinkInertia, TorqueBias
 from bayesid.errors import InputError
 from bayesid.inertia import InertialParameters
@@ -185,3 +186,12 @@ def test_bad_torque_sensors_are_refused(formula_motion):
         Samples(posterior.model, bare)
     assert posterior.model.without_torque.torque is None
     assert jnp.isfinite(jnp.asarray(posterior.jacobian(start(posterior)))).all()
+
+
+def test_torques_in_other_units_are_refused(formula_motion):
+    urdf = ROBOTS["ets7"]
+    motion, truth = flown(urdf)
+    wrong = truth._replace(torque=1e3 * truth.torque)
+    posterior = posterior_of(urdf, wrong, formula_motion(motion, urdf, Robot.from_urdf(urdf)))
+    with pytest.raises(InputError, match=r"column torque\.joint1.*1e\+03 times.*Give them in N m"):
+        refuse_wrong_units(posterior)
