@@ -25,7 +25,7 @@ KNOWN_MASS = 0.01
 """Relative standard deviation of a mass that is known."""
 
 PUSH, TURN = 1e-3, 1e-4
-"""Of a pulse of thrust and torque: acceleration of the whole [m/s2] and change of rate by each of its parts [rad/s2]."""
+"""Of a pulse of thrust and of torque: acceleration of the whole robot [m/s2] and of its rate [rad/s2]."""
 
 SPIN = 2e-3
 """Change of rate by a wheel pulse [rad/s]."""

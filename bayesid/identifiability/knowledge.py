@@ -64,7 +64,7 @@ class Knowledge:
     @cached_property
     def prior_factor(self) -> Floats:
         """Lower-triangular L with L L' the prior covariance of the quantities, shape (n, n)."""
-        upper = np.linalg.qr(self.slope.T, mode="r")
+        upper = _upper(self.slope.T)
         return (upper * np.where(np.diag(upper) < 0.0, -1.0, 1.0)[:, None]).T
 
     @property
@@ -91,7 +91,7 @@ class Knowledge:
     def conditional_sd(self) -> Floats:
         """Posterior standard deviations if all other quantities of the bodies were known exactly, shape (n,)."""
         scaled = self.factor / self.sd[:, None]
-        inverse = np.linalg.inv(np.linalg.qr(scaled.T, mode="r"))  # of C = R'R in units of sd
+        inverse = np.linalg.inv(_upper(scaled.T))  # of C = R'R in units of sd
         return self.sd / np.linalg.norm(inverse, axis=1)
 
     @property
@@ -108,5 +108,10 @@ class Knowledge:
     @cached_property
     def _inverse_root(self) -> Floats:
         """Inverse of R of J = QR: exact where some directions are known a million times better than others."""
-        upper = np.linalg.qr(self.jacobian, mode="r")
+        upper = _upper(self.jacobian)
         return np.asarray(sla.solve_triangular(upper, np.eye(len(upper))))
+
+
+def _upper(matrix: Floats) -> Floats:
+    """R of matrix = QR."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"))

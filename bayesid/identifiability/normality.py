@@ -86,8 +86,8 @@ def draw(
         return Draws(Method.IMPORTANCE, values, weighted.weights, True, weighted.pareto_k)
 
     def report(state: Progress) -> None:
-        done = max(state.effective_samples / state.wanted, state.steps / state.limit)
-        progress(min(done, 1.0), f"sampling, step {state.steps}")
+        found = state.effective_samples / state.wanted if state.r_hat < 1.05 else 0.0
+        progress(min(max(found, state.steps / state.limit), 1.0), f"sampling, step {state.steps}")
 
     chains = sample(chart, optimum, walk, effective_samples=effective_samples, max_steps=STEPS, progress=report)
     values = _quantities(posterior, chains.flat)

@@ -1,4 +1,4 @@
-"""Practical identifiability: what manoeuvres, sensors and priors of a study tell of the bodies, in the posterior's eyes."""
+"""Practical identifiability: what manoeuvres, sensors and priors of a study tell of its bodies."""
 
 from __future__ import annotations
 

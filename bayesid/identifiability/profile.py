@@ -2,8 +2,8 @@
 
 The posterior is maximised over everything else with the quantity held (Raue et al., Bioinformatics 2009; the prior
 counts as a measurement). An interval holds the values whose maximum is less than half a chi-square quantile below the
-mode. A quantity is held by a strong penalty: where the penalised fit ends it has some value, and for that value it is the
-constrained optimum, however strong the penalty was.
+mode. A quantity is held by a strong penalty: where the penalised fit ends it has some value, and for that value this is
+the constrained optimum, however strong the penalty was.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ def subject(direction: Direction, values: Floats, prior_sd: Floats, whole: bool 
     for index, body in enumerate(bodies):
         if _cosine(moved, np.where(owner == index, factor, 0.0) / prior_sd) > ALIKE:
             return f"mass and inertia of {body} in proportion"
-    phrases = []
+    phrases: list[str] = []
     for sign, name in parts_of(direction, prior_sd):
         text = _noun(name, len(bodies) > 1)
         phrases.append(text if not phrases else f"{sign.value} {text}")

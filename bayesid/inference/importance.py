@@ -22,6 +22,9 @@ TRUSTED = 0.7
 TRIAL = 512
 """Draws that decide between coordinates."""
 
+INSIDE = 0.3
+"""Share of the draws that must be physical bodies: an ensemble starts from them."""
+
 
 @dataclass(frozen=True)
 class Evidence:
@@ -62,7 +65,7 @@ def importance_sample(chart: Chart, optimum: Optimum, rng: np.random.Generator, 
         value=float(drawn.top + np.log(drawn.raw.mean())),
         error=float(drawn.raw.std() / drawn.raw.mean() / np.sqrt(draws)),
         pareto_k=drawn.pareto_k,
-        effective_samples=float(1.0 / (drawn.weights**2).sum()),
+        effective_samples=drawn.effective_samples,
         evaluations=draws,
         mean=mean,
         sd=np.sqrt(drawn.weights @ (drawn.z - mean) ** 2),
@@ -72,7 +75,8 @@ def importance_sample(chart: Chart, optimum: Optimum, rng: np.random.Generator, 
 class WeightedDraws(NamedTuple):
     """Draws of a Student-t about the mode: z (n, size), Pareto-smoothed weights (n,) of sum one, and their k-hat.
 
-    ``raw`` are the weights as they are over the largest, whose logarithm is ``top``.
+    ``raw`` are the weights as they are over the largest, whose logarithm is ``top``; ``inside`` is the share of the
+    draws that have a density.
     """
 
     z: Floats
@@ -80,6 +84,12 @@ class WeightedDraws(NamedTuple):
     pareto_k: float
     raw: Floats
     top: float
+    inside: float
+
+    @property
+    def effective_samples(self) -> float:
+        """Kish's; 0 where no draw has a density."""
+        return float(1.0 / (self.weights**2).sum()) if self.inside > 0.0 else 0.0
 
     @property
     def trusted(self) -> bool:
@@ -95,14 +105,20 @@ def weighted_draws(chart: Chart, optimum: Optimum, rng: np.random.Generator, dra
     z = np.nan_to_num(chart.to_z(y))
     top = float(log_weights.max())
     if not np.isfinite(top):
-        return WeightedDraws(z, np.full(draws, 1.0 / draws), np.inf, np.zeros(draws), top)
+        return WeightedDraws(z, np.full(draws, 1.0 / draws), np.inf, np.zeros(draws), top, 0.0)
+    inside = float(np.isfinite(log_weights).mean())
     log_weights = np.maximum(log_weights, top - 700.0)
     smoothed, pareto_k = az.psislw(log_weights)
     weights = np.exp(np.asarray(smoothed))
-    return WeightedDraws(z, weights / weights.sum(), float(pareto_k), np.exp(log_weights - top), top)
+    return WeightedDraws(z, weights / weights.sum(), float(pareto_k), np.exp(log_weights - top), top, inside)
 
 
 def choose_chart(posterior: Posterior, optimum: Optimum, rng: np.random.Generator) -> Chart:
     """Return the coordinates in which the Student-t about the mode is the better proposal."""
+
+    def merit(chart: Chart) -> tuple[bool, float]:
+        drawn = weighted_draws(chart, optimum, rng, TRIAL)
+        return drawn.inside > INSIDE, drawn.effective_samples
+
     charts: list[Chart] = [LogCholeskyChart(posterior), LinearChart(posterior)]
-    return max(charts, key=lambda chart: importance_sample(chart, optimum, rng, draws=TRIAL).effective_samples)
+    return max(charts, key=merit)
