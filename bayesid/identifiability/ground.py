@@ -73,9 +73,9 @@ def _predicted(study: Study, model: Model, manoeuvres: Sequence[Manoeuvre], lack
     centre = np.zeros(posterior.size)
     posterior = posterior.at(centre)
     statement = (
-        f"This is a prediction: {_count(manoeuvres)} without {', '.join(lacking)} cannot be fitted, so the motion counts "
-        "as planned. "
-        "The sensors are supposed to read what the prior's centre predicts, with the declared noise."
+        f"This is a prediction: {_count(manoeuvres)} without {', '.join(lacking)} cannot be fitted; its motion "
+        "is taken as planned. The sensors are supposed to read what the prior's centre predicts, with the declared "
+        "noise."
     )
     if guessed := assumed_encoders(study, robot):
         statement += f" The study gives no encoder noise of {', '.join(guessed)}: {ASSUMED:g} rad or m is assumed."

@@ -24,8 +24,11 @@ LEVELS = {0.025: -1.959963984540054, 0.16: -0.994457883209753, 0.84: 0.994457883
 NORMAL = 0.3
 """Largest difference of a quantile from the normal one that passes for normal, in standard deviations."""
 
-STEPS = 2000
-"""Of the ensembles where importance sampling may not be trusted, at most."""
+STEPS, LARGEST = 2000, 40
+"""Of the ensembles where importance sampling may not be trusted: most steps, and most unknowns.
+
+With more unknowns tied together sharply, ensembles need more time than the question is worth.
+"""
 
 
 class Method(Enum):
@@ -76,14 +79,14 @@ def draw(
     effective_samples: float,
     progress: Callable[[float, str], None],
 ) -> Draws:
-    """Draw from a posterior: by importance sampling, or by emcee where that may not be trusted."""
+    """Draw from a posterior: by importance sampling, or by emcee where that may not be trusted and can be afforded."""
     weigh, walk = seed.spawn(2)
     rng = np.random.default_rng(weigh)
     chart = choose_chart(posterior, optimum, rng)
     weighted = weighted_draws(chart, optimum, rng)
-    if weighted.trusted:
+    if weighted.trusted or posterior.size > LARGEST:
         values = _quantities(posterior, weighted.z)
-        return Draws(Method.IMPORTANCE, values, weighted.weights, True, weighted.pareto_k)
+        return Draws(Method.IMPORTANCE, values, weighted.weights, weighted.trusted, weighted.pareto_k)
 
     def report(state: Progress) -> None:
         found = state.effective_samples / state.wanted if state.r_hat < 1.05 else 0.0

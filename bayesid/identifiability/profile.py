@@ -8,7 +8,7 @@ the constrained optimum, however strong the penalty was.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from bayesid.arrays import Floats
 
 __all__ = ["Profile", "Target", "profile"]
 
-Residual = Callable[[Floats], Floats]
+Vector = Callable[[Floats], Floats]
 
 LEVELS = {"68 %": 1.0, "95 %": 1.959963984540054}
 """Square roots of the chi-square quantiles of one degree of freedom."""
@@ -32,9 +32,15 @@ STIFF = 30.0
 """Of the penalty, per standard deviation of the quantity."""
 
 MOST = 24
-"""Points on each side."""
+"""Refits on each side."""
 
 TOLERANCE = 1e-8
+HUGE = 1e12
+"""Stands for residuals that are not finite, so that the step is refused."""
+
+SHORTEST = 1e-3
+"""Step, in standard deviations, below which a jump of the profile counts as one."""
+
 GROWTH = 3.0
 """By which a step at most grows or shrinks from one point to the next."""
 
@@ -43,7 +49,7 @@ class Target(NamedTuple):
     """A scalar function of the coordinates with its gradient (n,)."""
 
     value: Callable[[Floats], float]
-    gradient: Callable[[Floats], Floats]
+    gradient: Vector
 
 
 @dataclass(frozen=True)
@@ -74,9 +80,7 @@ class Profile:
         return {level: list(self.interval(root)) for level, root in LEVELS.items()}
 
 
-def profile(
-    residual: Residual, jacobian: Callable[[Floats], Floats], mode: Floats, covariance: Floats, target: Target
-) -> Profile:
+def profile(residual: Vector, jacobian: Vector, mode: Floats, covariance: Floats, target: Target) -> Profile:
     """Profile a quantity about the mode.
 
     Parameters
@@ -90,63 +94,78 @@ def profile(
         Of the normal approximation; for the first step and the strength of the penalty.
     target : Target
     """
-    best = 0.5 * float((residual(mode) ** 2).sum())
-    sides = [_march(residual, jacobian, mode, covariance, target, best, sign) for sign in (-1.0, 1.0)]
-    points = [*sides[0][::-1], (target.value(mode), 0.0), *sides[1]]
+    fit = _Held(residual, jacobian, mode, covariance, target)
+    points = [*fit.march(-1.0)[::-1], _Point(target.value(mode), 0.0, mode), *fit.march(1.0)]
+    for root in (sign * level for level in LEVELS.values() for sign in (-1.0, 1.0)):
+        curve = _curve(_increasing(points))
+        if curve.x[0] < root < curve.x[-1]:  # once more, where the interval ends
+            nearest = points[int(np.argmin([abs(point.root - root) for point in points]))]
+            points = sorted([*points, fit.at(float(curve(root)), nearest.z)], key=lambda point: point.value)
+    values, roots, _ = zip(*_increasing(points), strict=True)
+    return Profile(np.array(values), np.array(roots))
+
+
+class _Point(NamedTuple):
+    value: float
+    root: float
+    z: Floats
+
+
+class _Held:
+    """The posterior maximised with a quantity held."""
+
+    def __init__(self, residual: Vector, jacobian: Vector, mode: Floats, covariance: Floats, target: Target) -> None:
+        self.residual, self.jacobian, self.mode, self.target = residual, jacobian, mode, target
+        slope = target.gradient(mode)
+        self.sd = float(np.sqrt(slope @ covariance @ slope))
+        self.along = covariance @ slope / self.sd**2
+        self.centre, self.best = target.value(mode), float((residual(mode) ** 2).sum())
+
+    def at(self, wanted: float, start: Floats) -> _Point:
+        """Fit with the quantity held near a value."""
+        stiffness = STIFF / self.sd
+
+        def held(z: Floats) -> Floats:
+            r = np.append(self.residual(z), stiffness * (self.target.value(z) - wanted))
+            return np.where(np.isfinite(r), r, HUGE)
+
+        def slope(z: Floats) -> Floats:
+            return np.vstack([self.jacobian(z), stiffness * self.target.gradient(z)])
+
+        options: Any = {"method": "lm", "x_scale": "jac", "ftol": TOLERANCE, "xtol": TOLERANCE, "gtol": TOLERANCE}
+        z = np.asarray(least_squares(held, start, slope, **options).x)
+        value, loss = self.target.value(z), float((self.residual(z) ** 2).sum()) - self.best
+        return _Point(value, float(np.sign(value - self.centre) * np.sqrt(max(loss, 0.0))), z)
+
+    def march(self, sign: float) -> list[_Point]:
+        """Go from the mode to one side until the 95 % interval ends."""
+        last, step = _Point(self.centre, 0.0, self.mode), STEP * self.sd
+        found: list[_Point] = []
+        for _ in range(MOST):
+            start = last.z + sign * step * self.along
+            point = self.at(last.value + sign * step, start)
+            gained = abs(point.root) - abs(last.root)
+            if not np.isfinite(point.root) or sign * (point.value - last.value) <= 0.0:
+                break
+            if gained > 2.0 * STEP and step > SHORTEST * self.sd:
+                step *= 0.5
+                continue
+            found.append(point)
+            if abs(point.root) >= max(LEVELS.values()):
+                break
+            step = abs(point.value - last.value) * min(STEP / max(gained, STEP / GROWTH), GROWTH)
+            last = point
+        return found
+
+
+def _increasing(points: Sequence[_Point]) -> list[_Point]:
+    """Leave out points of refits that ended in rounding."""
     kept = [points[0]]
-    for point in points[1:]:  # refits that ended in rounding are no curve
-        if point[0] > kept[-1][0] and point[1] > kept[-1][1]:
+    for point in points[1:]:
+        if point.value > kept[-1].value and point.root > kept[-1].root:
             kept.append(point)
-    values, roots = np.array(kept).T
-    return Profile(values, roots)
+    return kept
 
 
-def _march(
-    residual: Residual,
-    jacobian: Callable[[Floats], Floats],
-    mode: Floats,
-    covariance: Floats,
-    target: Target,
-    best: float,
-    sign: float,
-) -> list[tuple[float, float]]:
-    """Go from the mode to one side until the 95 % interval ends."""
-    slope = target.gradient(mode)
-    along = covariance @ slope
-    sd = float(np.sqrt(slope @ along))
-    stiffness = STIFF / sd
-    z, value, root, step = mode, target.value(mode), 0.0, STEP * sd
-    found: list[tuple[float, float]] = []
-    while abs(root) < max(LEVELS.values()) and len(found) < MOST:
-        wanted = value + sign * step
-        z, moved = _refit(residual, jacobian, target, z + along * (sign * step / sd**2), wanted, stiffness), value
-        value, before = target.value(z), root
-        loss = 0.5 * float((residual(z) ** 2).sum()) - best
-        root = sign * float(np.sqrt(max(2.0 * loss, 0.0)))
-        if not np.isfinite(root) or sign * (value - moved) <= 0.0:
-            break
-        found.append((value, root))
-        gained = max(abs(root - before), STEP / GROWTH)
-        step = abs(value - moved) * min(STEP / gained, GROWTH)
-    return found
-
-
-def _refit(
-    residual: Residual,
-    jacobian: Callable[[Floats], Floats],
-    target: Target,
-    start: Floats,
-    wanted: float,
-    stiffness: float,
-) -> Floats:
-    def held(z: Floats) -> Floats:
-        r = np.append(residual(z), stiffness * (target.value(z) - wanted))
-        return np.where(np.isfinite(r), r, 1e12)
-
-    def slope(z: Floats) -> Floats:
-        return np.vstack([jacobian(z), stiffness * target.gradient(z)])
-
-    solution = least_squares(
-        held, start, slope, method="lm", x_scale="jac", ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE
-    )
-    return np.asarray(solution.x)
+def _curve(points: Sequence[_Point]) -> PchipInterpolator:
+    return PchipInterpolator([point.root for point in points], [point.value for point in points])

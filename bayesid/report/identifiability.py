@@ -86,13 +86,18 @@ def _add_directions(document: Document, result: Practical) -> None:
 def _add_parameters(document: Document, result: Practical) -> None:
     document.section("Parameters")
     document.items(text.confidence_sentences(result))
+    header = ["parameter", "unit", "value ± sd", "prior sd", "learnt", "verdict", "confused with", "95 % profile"]
+    rows = [_parameter_row(item) for item in result.parameters]
+    align = ["left", "left", "right", "right", "right", "left", "left", "left"]
+    kept = [column for column in range(len(header)) if any(row[column] for row in rows)]
     document.table(
-        ["parameter", "unit", "value ± sd", "prior sd", "learnt", "verdict", "confused with", "95 % profile"],
-        [_parameter_row(item) for item in result.parameters],
+        [header[column] for column in kept],
+        [[row[column] for column in kept] for row in rows],
         "Parameters of the bodies to identify, in the axes of the link, inertias about the own centre of mass: value "
-        "and sd of the normal approximation, prior sd, shrinkage (one minus sd over prior sd), parameters with which "
-        "the correlation is above 0.9 in size, and the profile interval where the posterior is not normal.",
-        ["left", "left", "right", "right", "right", "left", "left", "left"],
+        "and sd of the normal approximation, prior sd, and shrinkage (one minus sd over prior sd); parameters with "
+        "which the correlation is above 0.9 in size, and the profile interval where the posterior is not normal, if "
+        "there are any.",
+        [align[column] for column in kept],
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from bayesid.identifiability.advice import WORST, Advice
 from bayesid.identifiability.base_parameters import BaseParameters
-from bayesid.identifiability.normality import NORMAL
+from bayesid.identifiability.normality import NORMAL, Method
 from bayesid.identifiability.practical import Parameter, Practical
 from bayesid.identifiability.untold import listed
 from bayesid.inference.learnt import LEARNT, PRIOR_ONLY, Verdict
@@ -36,10 +36,10 @@ def practical_sentences(result: Practical) -> list[str]:
     total = len(result.parameters)
     sentences = [
         f"Of {total} parameters of the bodies to identify {count[Verdict.LEARNT]} are learnt, {count[Verdict.WEAKLY]} "
-        f"weakly, {count[Verdict.NOT]} not: of these the posterior is the prior."
+        f"weakly, {count[Verdict.NOT]} not."
     ]
     if names := [item.name for item in result.parameters if item.verdict is Verdict.NOT]:
-        sentences.append(f"Not learnt: {listed(names)}.")
+        sentences.append(f"Not learnt, so that the posterior is the prior: {listed(names)}.")
     directions = sum(item.verdict is Verdict.NOT for item in result.directions)
     if directions:
         plural = "direction is" if directions == 1 else "directions are"
@@ -69,10 +69,13 @@ def confidence_sentences(result: Practical) -> list[str]:
     """Return how the normal approximation was checked."""
     draws = result.draws
     if not draws.trusted:
+        also = "with so many unknowns emcee was not tried"
+        if draws.method is Method.ENSEMBLE:
+            also = "emcee has not converged"
         return [
             f"Whether the posterior is normal is not evaluated: importance sampling may not be trusted (Pareto k-hat "
-            f"{draws.pareto_k:.2f}) and the ensembles have not converged. All widths are those of the normal "
-            "approximation; profile intervals are given for the parameters of which least was learnt."
+            f"{draws.pareto_k:.2f}), and {also}. All widths are those of the normal approximation; profile intervals "
+            "are given for the parameters of which least was learnt."
         ]
     skewed = [item.name for item in result.parameters if not item.normal]
     how = f"{draws.method.value}, {len(draws.values)} draws, Pareto k-hat of importance sampling {draws.pareto_k:.2f}"
