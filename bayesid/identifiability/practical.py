@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
+import jax
 import numpy as np
 
-from bayesid.arrays import Floats
 from bayesid.identifiability.advice import Advice, advise
 from bayesid.identifiability.candidates import candidates
 from bayesid.identifiability.directions import Direction, directions
@@ -18,7 +18,7 @@ from bayesid.identifiability.knowledge import Knowledge
 from bayesid.identifiability.normality import NORMAL, Draws, draw, shape_errors
 from bayesid.identifiability.profile import Profile, Target, profile
 from bayesid.identifiability.words import describe
-from bayesid.inference.identification import BODY_QUANTITIES, linearise
+from bayesid.inference.identification import BODY_QUANTITIES, quantities_of
 from bayesid.inference.learnt import Verdict
 from bayesid.inference.optimum import Optimum
 from bayesid.posterior import Posterior
@@ -233,8 +233,11 @@ def _profiled(
     most: int,
     progress: Show,
 ) -> list[Parameter]:
-    """Profile the least normal quantities; where draws say nothing of that, those of which least was learnt."""
-    errors = shape_errors(draws, knowledge) if draws.trusted else -knowledge.shrinkage
+    """Profile the least normal quantities; where draws do not tell, the worst known of which something was learnt."""
+    errors = shape_errors(draws, knowledge)
+    if not draws.trusted:  # the profile of what was not learnt is the prior
+        told = np.array([item.verdict is not Verdict.NOT for item in parameters])
+        errors = told - knowledge.shrinkage
     order = [int(k) for k in np.argsort(-errors) if not parameters[int(k)].normal][:most]
     result = list(parameters)
     for number, k in enumerate(order):
@@ -248,12 +251,10 @@ def _profiled(
 
 def quantity_of(posterior: Posterior, index: int) -> Target:
     """Return one reported quantity of the bodies as a function of the coordinates."""
-
-    def row(z: Floats) -> tuple[float, Floats]:
-        linear = linearise(posterior, z)
-        return float(linear.values[index]), linear.slope[index]
-
-    return Target(lambda z: row(z)[0], lambda z: row(z)[1])
+    quantities = quantities_of(posterior.unknowns)
+    value = jax.jit(lambda z: quantities(z)[index])
+    gradient = jax.jit(jax.grad(value))
+    return Target(lambda z: float(value(z)), lambda z: np.asarray(gradient(z)))
 
 
 def _part(progress: Show, start: float, end: float) -> Show:

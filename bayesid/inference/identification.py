@@ -23,6 +23,7 @@ from bayesid.inference.importance import Evidence, choose_chart, importance_samp
 from bayesid.inference.learnt import Learnt, compare
 from bayesid.inference.optimum import Optimum, maximise
 from bayesid.posterior import Posterior
+from bayesid.unknowns import Unknowns
 
 __all__ = ["BODY_QUANTITIES", "BodyDraws", "Identification", "Linearised", "identify", "linearise"]
 
@@ -253,15 +254,19 @@ class Linearised(NamedTuple):
 
 def linearise(posterior: Posterior, z: Floats) -> Linearised:
     """Linearise the reported quantities of the identified bodies in the coordinates."""
-    priors = posterior.model.priors
-    own = jnp.asarray([index for index, prior in enumerate(priors) if not prior.nuisance], dtype=int)
+    names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
+    quantities, point = quantities_of(posterior.unknowns), jnp.asarray(z)
+    return Linearised(names, np.asarray(quantities(point)), np.asarray(jax.jacfwd(quantities)(point)))
+
+
+def quantities_of(unknowns: Unknowns) -> Callable[[Array], Array]:
+    """Return the function from coordinates (size,) to the reported quantities of all identified bodies (n,)."""
+    own = jnp.asarray([index for index, prior in enumerate(unknowns.bodies) if not prior.nuisance], dtype=int)
 
     def quantities(z: Array) -> Array:
-        return jnp.ravel(mass_com_inertia(posterior.unknowns.values(z).inertial.reshape(-1, 10)[own]))
+        return jnp.ravel(mass_com_inertia(unknowns.values(z).inertial.reshape(-1, 10)[own]))
 
-    names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
-    point = jnp.asarray(z)
-    return Linearised(names, np.asarray(quantities(point)), np.asarray(jax.jacfwd(quantities)(point)))
+    return quantities
 
 
 def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:

@@ -108,7 +108,8 @@ def weighted_draws(chart: Chart, optimum: Optimum, rng: np.random.Generator, dra
         return WeightedDraws(z, np.full(draws, 1.0 / draws), np.inf, np.zeros(draws), top, 0.0)
     inside = float(np.isfinite(log_weights).mean())
     log_weights = np.maximum(log_weights, top - 700.0)
-    smoothed, pareto_k = az.psislw(log_weights)
+    with np.errstate(over="ignore"):  # where the weights hardly overlap; k-hat says so
+        smoothed, pareto_k = az.psislw(log_weights)
     weights = np.exp(np.asarray(smoothed))
     return WeightedDraws(z, weights / weights.sum(), float(pareto_k), np.exp(log_weights - top), top, inside)
 

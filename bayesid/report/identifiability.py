@@ -7,6 +7,7 @@ from pathlib import Path
 from bayesid.identifiability.advice import WORST
 from bayesid.identifiability.base_parameters import BaseParameters
 from bayesid.identifiability.practical import Parameter, Practical
+from bayesid.inference.learnt import Verdict
 from bayesid.report import figures
 from bayesid.report import identifiability_text as text
 from bayesid.report.assumed import model_sentences
@@ -106,15 +107,16 @@ def _parameter_row(item: Parameter) -> list[str]:
     if item.profile is not None:
         ends = item.profile.to_dict()["95 %"]
         interval = " to ".join("beyond" if end is None else format_number(end, 3) for end in ends)
-    verdict = item.verdict.value if item.verdict.value != "not learnt" else "not learnt: prior only"
+    body = item.name.partition(".")[0]
+    confused = (f"{name.removeprefix(f'{body}.')} ({_signed(value)})" for name, value in item.correlated_with)
     return [
         item.name,
         format_unit(item.unit),
         format_quantity(item.mean, item.sd),
         format_number(item.prior_sd, 2),
         text.share(item.shrinkage),
-        verdict,
-        ", ".join(f"{name} ({value:+.2f})" for name, value in item.correlated_with).replace("-0", "−0"),
+        "prior only" if item.verdict is Verdict.NOT else item.verdict.value,
+        ", ".join(confused),
         interval,
     ]
 
@@ -165,6 +167,10 @@ def _add_structure(document: Document, structure: BaseParameters) -> None:
     )
     if alone:
         document.paragraph(f"These stand for themselves: {', '.join(alone)}.")
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.2f}".replace("-", "−")
 
 
 def _term(value: float, name: str) -> str:

@@ -61,8 +61,8 @@ def advice_sentences(result: Practical) -> list[str]:
     if not usable or usable[0].directions[0] > 0.95 * now:
         return ["None of the candidates narrows the worst direction by more than 5 %."]
     best = [item for item in usable if item.directions[0] <= 0.95 * now][:WORST]
-    texts = "; ".join(f"{item.text} ({share(item.directions[0])})" for item in best)
-    return [f"Of the worst direction {share(now)} of the prior's width is left. It would be with: {texts}."]
+    texts = "; ".join(f"{share(item.directions[0])} with {item.text}" for item in best)
+    return [f"Of the worst direction {share(now)} of the prior's width is left. It would be {texts}."]
 
 
 def confidence_sentences(result: Practical) -> list[str]:
@@ -75,7 +75,7 @@ def confidence_sentences(result: Practical) -> list[str]:
         return [
             f"Whether the posterior is normal is not evaluated: importance sampling may not be trusted (Pareto k-hat "
             f"{draws.pareto_k:.2f}), and {also}. All widths are those of the normal approximation; profile intervals "
-            "are given for the parameters of which least was learnt."
+            "are given for the worst known parameters of which something was learnt."
         ]
     skewed = [item.name for item in result.parameters if not item.normal]
     how = f"{draws.method.value}, {len(draws.values)} draws, Pareto k-hat of importance sampling {draws.pareto_k:.2f}"
@@ -98,6 +98,8 @@ def method_sentences(result: Practical) -> list[str]:
         "that of the parameters. Initial rates, effects and links that are known to a few percent are marginalised.",
         f"A parameter or direction is learnt if the data narrow the prior by at least {100 * LEARNT:.0f} %, and not "
         f"learnt if by less than {100 * PRIOR_ONLY:.0f} %.",
+        "Learning counts what the data carry over: a mass tied by the data to others is known as well as the priors of "
+        "all of these together say.",
         "A direction is a combination of parameters whose weights are scaled so that the largest, times the prior sd "
         "of its parameter, is one. Its displacement is the change of all parameters by one posterior sd of the "
         "combination: the data cannot tell whether it happened. Directions of which the data tell less than 1 % have "
