@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.linalg as sla
-from conftest import ENCODER, ORBIT, PLANAR, POINT, SIGMA
+from conftest import ENCODER, ORBIT, PLANAR, POINT, SIGMA, STEP
 
 from bayesid.effects import GravityGradient
 from bayesid.identifiability.candidates import NotEvaluated, Swung, candidates
@@ -192,6 +192,7 @@ def test_a_profile_of_a_linear_problem_is_the_normal_interval() -> None:
 # ---- experiments ----
 
 
+@pytest.mark.usefixtures("slow")
 def test_a_prediction_without_change_is_the_posterior_itself(planar_case) -> None:
     posterior = planar_case.posterior
     z = np.random.default_rng(4).normal(size=posterior.size) * 0.1
@@ -239,9 +240,9 @@ def test_an_added_swing_is_a_motion_within_the_joint_range(planar_case) -> None:
 # ---- MuJoCo: motion alone never gives the scale ----
 
 
-def whole_robot(truth: mj.Truth, rng: np.random.Generator) -> Posterior:
-    """Every body of the planar robot unknown, recorded by MuJoCo with noise."""
-    robot, channels = Robot.from_urdf(PLANAR), {}
+def recorded(truth: mj.Truth, robot: Robot, rng: np.random.Generator) -> Manoeuvre:
+    """A manoeuvre recorded by MuJoCo, with noise."""
+    channels = {}
     for index in range(2):
         channels[f"position.joint{index + 1}"] = truth.position[:, index] + ENCODER * rng.normal(size=len(truth.times))
     for family, values in (("rate", truth.rate), ("accel", truth.accel)):
@@ -251,15 +252,20 @@ def whole_robot(truth: mj.Truth, rng: np.random.Generator) -> Posterior:
         if np.any(values):
             channels |= {f"{family}.{axis}": values[:, index] for index, axis in enumerate("xyz")}
     recording = Recording("planar", None, truth.times, channels)
+    return Manoeuvre(recording, MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODER}))
+
+
+def whole_robot(rng: np.random.Generator) -> Model:
+    """Every body of the planar robot unknown, and guessed wrong by some 10 %."""
+    robot = Robot.from_urdf(PLANAR)
     links = ("base_link", "link1", "link2")
-    model = Model(
+    return Model(
         robot,
         (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT)),
         tuple(BodyPrior(name, robot.perturbed(name, 0.05, rng).link(name).inertial, 0.2) for name in links),
         Orbit(ORBIT.radius),
         (GravityGradient(),),
     )
-    return Posterior(model, [Manoeuvre(recording, MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODER}))])
 
 
 def thrust_truth() -> mj.Truth:
@@ -269,10 +275,13 @@ def thrust_truth() -> mj.Truth:
     return model.run(motion, np.arange(0.0, 40.01, 0.5), rate0=(0.01, -0.02, 0.015), step=0.1)
 
 
+@pytest.mark.usefixtures("slow")
 def test_motion_alone_leaves_the_scale_and_a_known_thrust_gives_it(planar_truth: mj.Truth) -> None:
-    known, total = {}, {}
+    known, total, rng, like = {}, {}, np.random.default_rng(5), None
+    model = whole_robot(rng)
     for name, truth in (("motion", planar_truth), ("thrust", thrust_truth())):
-        posterior, optimum = maximise(whole_robot(truth, np.random.default_rng(5)), np.random.default_rng(6))
+        like = Posterior(model, [recorded(truth, model.robot, rng)], step=STEP, like=like)
+        posterior, optimum = maximise(like, np.random.default_rng(6))
         assert covers_all(posterior)
         assert optimum.chi2 / posterior.samples == pytest.approx(1.0, abs=0.15)
         known[name] = Knowledge.at(posterior, optimum.z)
