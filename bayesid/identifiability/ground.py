@@ -22,6 +22,10 @@ from bayesid.study import Study
 __all__ = ["Ground", "missing_part", "prepare"]
 
 
+MISFIT = 3.0
+"""Deviation of chi-square, in its own standard deviations, that noise alone rarely reaches."""
+
+
 @dataclass(frozen=True)
 class Ground:
     """A posterior with its mode.
@@ -58,6 +62,8 @@ def prepare(study: Study, seed: int) -> Ground:
         f"The model was fitted to {_count(manoeuvres)} with {refined.samples} scalar sensor samples; chi-square is "
         f"{optimum.chi2 / refined.samples:.3f} per sample."
     )
+    if optimum.chi2 - refined.samples > MISFIT * np.sqrt(2.0 * refined.samples):
+        statement += " The model does not explain the data: what follows supposes that it does, so diagnose them first."
     return Ground(Basis.FIT, statement, refined, optimum)
 
 
