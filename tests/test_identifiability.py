@@ -283,7 +283,8 @@ def test_motion_alone_leaves_the_scale_and_a_known_thrust_gives_it(planar_truth:
         like = Posterior(model, [recorded(truth, model.robot, rng)], step=STEP, like=like)
         posterior, optimum = maximise(like, np.random.default_rng(6))
         assert covers_all(posterior)
-        assert optimum.chi2 / posterior.samples == pytest.approx(1.0, abs=0.15)
+        noise = 4.0 * np.sqrt(2.0 * posterior.samples)
+        assert posterior.samples - posterior.size - noise < optimum.chi2 < posterior.samples + noise
         known[name] = Knowledge.at(posterior, optimum.z)
         weights = np.array([item.endswith(".mass") for item in known[name].names], dtype=float)
         total[name] = (weights @ known[name].values, np.linalg.norm(weights @ known[name].factor))
