@@ -13,7 +13,8 @@ from bayesid.identifiability.directions import Direction, directions
 from bayesid.identifiability.experiment import Predictor
 from bayesid.identifiability.knowledge import Knowledge
 from bayesid.identifiability.normality import Draws, Method, shape_errors, weighted_quantile
-from bayesid.identifiability.practical import covers_all, quantity_of
+from bayesid.identifiability.parameters import quantity_of
+from bayesid.identifiability.practical import covers_all
 from bayesid.identifiability.profile import Target, profile
 from bayesid.identifiability.words import describe, subject
 from bayesid.inference import maximise

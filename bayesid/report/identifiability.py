@@ -6,7 +6,8 @@ from pathlib import Path
 
 from bayesid.identifiability.advice import WORST
 from bayesid.identifiability.base_parameters import BaseParameters
-from bayesid.identifiability.practical import Parameter, Practical
+from bayesid.identifiability.parameters import Parameter
+from bayesid.identifiability.practical import Practical
 from bayesid.inference.learnt import Verdict
 from bayesid.report import figures
 from bayesid.report import identifiability_text as text

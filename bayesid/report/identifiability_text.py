@@ -7,7 +7,8 @@ import numpy as np
 from bayesid.identifiability.advice import WORST, Advice
 from bayesid.identifiability.base_parameters import BaseParameters
 from bayesid.identifiability.normality import NORMAL, Method
-from bayesid.identifiability.practical import Parameter, Practical
+from bayesid.identifiability.parameters import Parameter
+from bayesid.identifiability.practical import Practical
 from bayesid.identifiability.untold import listed
 from bayesid.inference.learnt import LEARNT, PRIOR_ONLY, Verdict
 from bayesid.report.numbers import format_number, format_unit
