@@ -1,4 +1,4 @@
-"""The command line: ``bayesid check|identify|diagnose|design|simulate|predict|loop STUDY.toml``, and ``demo``."""
+"""The command line: ``bayesid COMMAND STUDY.toml --output DIR``, and ``bayesid demo``, which needs no study."""
 
 from __future__ import annotations
 
@@ -84,6 +84,26 @@ def design(
     keep_compiled()
     with _reported(), _progress() as show:
         for line in run_design(study, output, seed=seed, starts=starts, iterations=iterations, progress=show):
+            console.print(line)
+
+
+@app.command()
+def identifiability(
+    study: StudyFile,
+    output: Output,
+    seed: Seed = 0,
+    samples: Annotated[float, typer.Option(help="Effective samples wanted where emcee is needed.")] = 500.0,
+    profiles: Annotated[int, typer.Option(min=0, help="Parameters that are profiled at most.")] = 6,
+) -> None:
+    """Say what robot, manoeuvres and sensors can tell of the bodies, and what would tell more: identifiability.json."""
+    from bayesid.compiled import keep_compiled
+    from bayesid.identifiability_command import run_identifiability
+
+    keep_compiled()
+    with _reported(), _progress() as show:
+        for line in run_identifiability(
+            study, output, seed=seed, effective_samples=samples, profiles=profiles, progress=show
+        ):
             console.print(line)
 
 

@@ -1,15 +1,11 @@
 """What the commands do, apart from the terminal: each yields sentences to show and writes its files.
 
-Files are written to a temporary folder and moved when complete, so that nothing is left half-written.
+Files are complete or absent (`bayesid.output`).
 """
 
 from __future__ import annotations
 
-import json
-import shutil
-import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -23,10 +19,12 @@ from bayesid.design import Search, Store, best_design, design
 from bayesid.design.from_study import ASSUMED, assumed_encoders, encoders, fingerprint, load_problem
 from bayesid.diagnosis import Diagnosis, diagnose, identify_extended
 from bayesid.errors import InputError
+from bayesid.identifiability.untold import untold_sentences
 from bayesid.identified import write_identified
 from bayesid.inference import Identification
 from bayesid.inference import identify as identify_posterior
 from bayesid.inference.ensemble import Progress
+from bayesid.output import complete_folder, write_json
 from bayesid.posterior import Posterior
 from bayesid.predict import Predictor
 from bayesid.recording import Recording
@@ -57,8 +55,8 @@ def run_check(file: Path, output: Path) -> Iterator[str]:
     count = len(posterior.manoeuvres)
     yield f"{study.title}: {count} recordings, {posterior.samples} samples, {posterior.size} unknowns."
     checks = [check_recording(posterior, index) for index in range(len(posterior.manoeuvres))]
-    with _complete(output) as folder:
-        _write_json(
+    with complete_folder(output) as folder:
+        write_json(
             folder / "check.json", {"title": study.title, "recordings": [_check_dict(check) for check in checks]}
         )
         check_report(posterior, checks, study.title, folder / "report.pdf")
@@ -106,8 +104,8 @@ def run_diagnose(
     if sample and result.posterior.size:
         progress(0.9, "sampling the extended model")
         identification = identify_extended(result, seed, effective_samples=effective_samples)
-    with _complete(output) as folder:
-        _write_json(folder / "diagnosis.json", result.to_dict(identification))
+    with complete_folder(output) as folder:
+        write_json(folder / "diagnosis.json", result.to_dict(identification))
         result.unexplained.write(folder / "unexplained.csv")
         if identification is not None:
             write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
@@ -120,7 +118,7 @@ def run_simulate(file: Path, output: Path, *, seed: int, noise: bool) -> Iterato
     study, posterior = _read(file)
     recordings = simulate_recordings(posterior, np.random.default_rng(seed) if noise else None)
     error = posterior.integration_error(posterior.initial_point())
-    with _complete(output) as folder:
+    with complete_folder(output) as folder:
         for recording in recordings:
             recording.write(folder / f"{recording.name}.csv")
         content = {
@@ -140,7 +138,7 @@ def run_simulate(file: Path, output: Path, *, seed: int, noise: bool) -> Iterato
             "noise": noise,
             "integration": {"step": posterior.step, "error_in_sigma": error},
         }
-        _write_json(folder / "simulation.json", content)
+        write_json(folder / "simulation.json", content)
         simulation_report(posterior, recordings, study.title, folder / "report.pdf")
     yield f"Simulated {len(recordings)} recordings; integration step {posterior.step:g} s, error {error:.2g} sigma."
     yield f"Wrote {output / 'report.pdf'}."
@@ -166,8 +164,8 @@ def run_predict(
         progress(index / len(manoeuvres), f"predicting {manoeuvre.recording.name}")
         predictors.append(Predictor(model, manoeuvre, tip))
         predictions.append(predictors[-1].predict(draws, np.random.default_rng(stream)))
-    with _complete(output) as folder:
-        _write_json(folder / "prediction.json", {"recordings": [prediction.to_dict() for prediction in predictions]})
+    with complete_folder(output) as folder:
+        write_json(folder / "prediction.json", {"recordings": [prediction.to_dict() for prediction in predictions]})
         prediction_report(predictors[0].posterior, manoeuvres, predictions, study.title, folder / "report.pdf")
     for prediction in predictions:
         final = prediction.tip.pose().millimetres
@@ -195,9 +193,9 @@ def run_design(file: Path, output: Path, *, seed: int, starts: int, iterations: 
         best = best_design(designs)
     except InputError as error:
         raise error.within(file=file) from None
-    with _complete(output) as folder:
+    with complete_folder(output) as folder:
         content = {"title": study.title, "seed": seed, "manoeuvres": [item.to_dict() for item in designs]}
-        _write_json(folder / "design.json", {**content, "best": best.name})
+        write_json(folder / "design.json", {**content, "best": best.name})
         for item in designs:
             joints = {key: values for key, values in item.manoeuvre.recording.channels.items() if "position." in key}
             Recording(item.name, None, item.manoeuvre.recording.time, joints).write(folder / f"{item.name}.csv")
@@ -246,7 +244,7 @@ def _identify(posterior: Posterior, output: Path, seed: int, wanted: float, show
 
 
 def _write_identification(result: Identification, title: str, output: Path, seed: int) -> None:
-    with _complete(output) as folder:
+    with complete_folder(output) as folder:
         result.write_json(folder / "identification.json")
         write_netcdf(result, folder / "posterior.nc", np.random.default_rng(seed))
         if result.posterior.model.priors:
@@ -259,6 +257,7 @@ def _summary(result: Identification) -> Iterator[str]:
     yield f"chi-square {result.optimum.chi2:.0f} over {result.posterior.samples} samples."
     for name, body in result.bodies.items():
         yield f"{name}: mass {body.mean[0]:.6g} +- {body.sd[0]:.2g} kg"
+    yield from untold_sentences(result)
     yield from result.disagreements
 
 
@@ -268,22 +267,3 @@ def _check_dict(check: RecordingCheck) -> dict[str, Any]:
         sensor["kind"] = sensor["kind"].value
     content["warnings"] = list(check.warnings)
     return content
-
-
-def _write_json(file: Path, content: dict[str, Any]) -> None:
-    file.write_text(json.dumps(content, indent=1, default=lambda value: np.asarray(value).tolist()), encoding="utf-8")
-
-
-@contextmanager
-def _complete(output: Path) -> Iterator[Path]:
-    """Yield a folder whose files appear in the output together, or not at all."""
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"cannot create the folder: {error.strerror}", file=output, remedy="Choose another output"
-        ) from None
-    with tempfile.TemporaryDirectory(dir=output, prefix=".part-") as name:
-        yield Path(name)
-        for item in sorted(Path(name).iterdir()):
-            shutil.move(str(item), output / item.name)

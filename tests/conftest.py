@@ -46,7 +46,7 @@ def pytest_configure(config: pytest.Config) -> None:
     keep_compiled(Path(os.environ[COMPILED]))
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")  # so that it skips before costly fixtures of modules are made
 def slow(request: pytest.FixtureRequest) -> None:
     """Leave a test to ``pytest --catalogue``."""
     if not request.config.getoption("--catalogue"):

@@ -5,21 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
 from bayesid.arrays import Floats
-from bayesid.inertia import mass_com_inertia
-from bayesid.inference.identification import BODY_QUANTITIES
+from bayesid.inference.identification import linearise
 from bayesid.model import Manoeuvre, Model
 from bayesid.motion import MeasuredMotion, Motion, sample_joints
 from bayesid.posterior import Posterior
 from bayesid.recording import Recording
 from bayesid.simulation import blank_channels, simulate_recordings
 
-__all__ = ["Encoder", "Predicted", "describe", "planned_manoeuvre", "planned_posterior", "predict"]
+__all__ = ["Encoder", "Predicted", "describe", "planned_manoeuvre", "planned_posterior", "predict", "simulated"]
 
 Encoder = Mapping[int, float | Mapping[str, float | None] | None]
 """Noise of joint position (0), velocity (1) and acceleration (2), for all joints or by joint."""
@@ -99,15 +95,26 @@ def planned_manoeuvre(
     return Manoeuvre(recording, measured, begin, **start)
 
 
-def planned_posterior(model: Model, manoeuvres: Sequence[Manoeuvre], like: Posterior | None = None) -> Posterior:
-    """Return the posterior of planned manoeuvres if the sensors read what the prior's centre predicts.
+def planned_posterior(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    like: Posterior | None = None,
+    z: Floats | None = None,
+    step: float | None = None,
+) -> Posterior:
+    """Return the posterior of planned manoeuvres if the sensors read what ``z``, or the prior's centre, predicts.
 
     Compiled functions are shared with those of ``like``, where they fit.
     """
-    blank = Posterior(model, manoeuvres, like=like)
-    recordings = simulate_recordings(blank, z=np.zeros(blank.size))
-    return blank.with_manoeuvres(
-        [replace(manoeuvre, recording=own) for manoeuvre, own in zip(manoeuvres, recordings, strict=True)]
+    blank = Posterior(model, manoeuvres, like=like, step=step)
+    return simulated(blank, np.zeros(blank.size) if z is None else z)
+
+
+def simulated(posterior: Posterior, z: Floats) -> Posterior:
+    """Return a posterior whose sensors read what ``z`` predicts."""
+    recordings = simulate_recordings(posterior, z=z)
+    return posterior.with_manoeuvres(
+        [replace(manoeuvre, recording=own) for manoeuvre, own in zip(posterior.manoeuvres, recordings, strict=True)]
     )
 
 
@@ -121,19 +128,13 @@ def predict(posterior: Posterior) -> Predicted:
 def describe(posterior: Posterior, z: Floats, coordinates: Floats) -> Predicted:
     """Carry a covariance of the coordinates over to the quantities that are reported."""
     own = [index for index, prior in enumerate(posterior.model.priors) if not prior.nuisance]
-
-    def quantities(z: Array) -> Array:
-        inertial = posterior.unknowns.values(z).inertial.reshape(-1, 10)[jnp.asarray(own, dtype=int)]
-        return jnp.ravel(mass_com_inertia(inertial))
-
-    slope = np.asarray(jax.jacfwd(quantities)(jnp.asarray(z)))
-    names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
+    names, values, slope = linearise(posterior, z)
     rows = [10 * index + k for index in own for k in range(10)]
     widths = np.asarray(posterior.unknowns.widths)[rows]
     count = widths.shape[1]
     return Predicted(
         names=names,
-        mean=np.asarray(quantities(jnp.asarray(z))),
+        mean=values,
         covariance=slope @ coordinates @ slope.T,
         relative=widths @ coordinates[:count, :count] @ widths.T,
     )

@@ -1,4 +1,4 @@
-"""What recordings can tell at all: which combinations of the inertial parameters, and when their scale."""
+"""What can be identified: by the structure of the robot, and by a study's manoeuvres, sensors and priors."""
 
 from bayesid.identifiability.base_parameters import BaseParameters, base_parameters, standard_names
 from bayesid.identifiability.equations import Base

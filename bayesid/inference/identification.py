@@ -8,21 +8,24 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from bayesid.arrays import Floats
 from bayesid.effects.base import Effect
 from bayesid.inertia import mass_com_inertia
 from bayesid.inference.ensemble import Chains, Progress, sample
 from bayesid.inference.importance import Evidence, choose_chart, importance_sample
+from bayesid.inference.learnt import Learnt, compare
 from bayesid.inference.optimum import Optimum, maximise
 from bayesid.posterior import Posterior
+from bayesid.unknowns import Unknowns
 
-__all__ = ["BODY_QUANTITIES", "BodyDraws", "Identification", "identify"]
+__all__ = ["BODY_QUANTITIES", "BodyDraws", "Identification", "Linearised", "identify", "linearise"]
 
 
 BODY_QUANTITIES = {
@@ -38,6 +41,9 @@ BODY_QUANTITIES = {
     "inertia.yz": "kg m2",
 }
 """What is reported of a body, with units; the inertia is about its own centre of mass, in the link's axes."""
+
+PRIOR_DRAWS = 4000
+"""From the prior, to compare its widths with the posterior's; always the same ones."""
 
 MEAN_TOLERANCE, WIDTH_TOLERANCE = 0.25, 0.2
 """How far two methods may differ before the result says so: in standard deviations, and relative in their width."""
@@ -98,6 +104,16 @@ class Identification:
         }
 
     @cached_property
+    def learnt(self) -> dict[str, Learnt]:
+        """What the data told of every quantity of the bodies, by its name in `names`."""
+        z = np.random.default_rng(0).normal(size=(PRIOR_DRAWS, self.posterior.size))
+        prior = bodies_of(self.posterior, z)
+        if not prior:
+            return {}
+        both = (np.concatenate([body.values for body in draws.values()], axis=1) for draws in (prior, self.bodies))
+        return compare(self.names, *both)
+
+    @cached_property
     def integration_error(self) -> float:
         """Largest error of any sample from the integration step, in its standard deviations."""
         return self.posterior.integration_error(self.optimum.z)
@@ -148,6 +164,7 @@ class Identification:
         return {
             "bodies": {name: body_dict(body) for name, body in self.bodies.items()},
             "effects": self._effects_dict(),
+            "learnt": {name: item.to_dict() for name, item in self.learnt.items()},
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
             "fit": {"chi2": self.optimum.chi2, "samples": self.posterior.samples, "unknowns": self.posterior.size},
             "sampler": {
@@ -225,6 +242,31 @@ def identify(
         chart, optimum, walkers, effective_samples=effective_samples, max_steps=max_steps, file=file, progress=progress
     )
     return Identification(refined, optimum, evidence, chains, time.perf_counter() - began)
+
+
+class Linearised(NamedTuple):
+    """Reported quantities of all identified bodies at one point: names, values (n,), derivative by z (n, size)."""
+
+    names: tuple[str, ...]
+    values: Floats
+    slope: Floats
+
+
+def linearise(posterior: Posterior, z: Floats) -> Linearised:
+    """Linearise the reported quantities of the identified bodies in the coordinates."""
+    names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
+    quantities, point = quantities_of(posterior.unknowns), jnp.asarray(z)
+    return Linearised(names, np.asarray(quantities(point)), np.asarray(jax.jacfwd(quantities)(point)))
+
+
+def quantities_of(unknowns: Unknowns) -> Callable[[Array], Array]:
+    """Return the function from coordinates (size,) to the reported quantities of all identified bodies (n,)."""
+    own = jnp.asarray([index for index, prior in enumerate(unknowns.bodies) if not prior.nuisance], dtype=int)
+
+    def quantities(z: Array) -> Array:
+        return jnp.ravel(mass_com_inertia(unknowns.values(z).inertial.reshape(-1, 10)[own]))
+
+    return quantities
 
 
 def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import arviz as az
 import numpy as np
@@ -12,7 +13,7 @@ from bayesid.inference.charts import Chart, LinearChart, LogCholeskyChart
 from bayesid.inference.optimum import Optimum
 from bayesid.posterior import Posterior
 
-__all__ = ["Evidence", "choose_chart", "importance_sample"]
+__all__ = ["Evidence", "WeightedDraws", "choose_chart", "importance_sample", "weighted_draws"]
 
 
 TRUSTED = 0.7
@@ -20,6 +21,9 @@ TRUSTED = 0.7
 
 TRIAL = 512
 """Draws that decide between coordinates."""
+
+INSIDE = 0.3
+"""Share of the draws that must be physical bodies: an ensemble starts from them."""
 
 
 @dataclass(frozen=True)
@@ -53,31 +57,69 @@ def importance_sample(chart: Chart, optimum: Optimum, rng: np.random.Generator, 
     draws : int
         Evaluations of the posterior density.
     """
+    drawn = weighted_draws(chart, optimum, rng, draws)
+    if not np.isfinite(drawn.top):
+        return Evidence(-np.inf, np.inf, np.inf, 0.0, draws, optimum.z, np.zeros_like(optimum.z))
+    mean = drawn.weights @ drawn.z
+    return Evidence(
+        value=float(drawn.top + np.log(drawn.raw.mean())),
+        error=float(drawn.raw.std() / drawn.raw.mean() / np.sqrt(draws)),
+        pareto_k=drawn.pareto_k,
+        effective_samples=drawn.effective_samples,
+        evaluations=draws,
+        mean=mean,
+        sd=np.sqrt(drawn.weights @ (drawn.z - mean) ** 2),
+    )
+
+
+class WeightedDraws(NamedTuple):
+    """Draws of a Student-t about the mode: z (n, size), Pareto-smoothed weights (n,) of sum one, and their k-hat.
+
+    ``raw`` are the weights as they are over the largest, whose logarithm is ``top``; ``inside`` is the share of the
+    draws that have a density.
+    """
+
+    z: Floats
+    weights: Floats
+    pareto_k: float
+    raw: Floats
+    top: float
+    inside: float
+
+    @property
+    def effective_samples(self) -> float:
+        """Kish's; 0 where no draw has a density."""
+        return float(1.0 / (self.weights**2).sum()) if self.inside > 0.0 else 0.0
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the weights may be used."""
+        return bool(self.pareto_k < TRUSTED)
+
+
+def weighted_draws(chart: Chart, optimum: Optimum, rng: np.random.Generator, draws: int = 4000) -> WeightedDraws:
+    """Draw from the Student-t about the mode and weigh by the posterior."""
     proposal = chart.proposal(optimum)
     y = proposal.draw(draws, rng)
     log_weights = chart.log_density(y) - proposal.log_density(y)
-    top = log_weights.max()
-    if not np.isfinite(top):
-        return Evidence(-np.inf, np.inf, np.inf, 0.0, draws, optimum.z, np.zeros_like(optimum.z))
-    log_weights = np.maximum(log_weights, top - 700.0)
-    smoothed, pareto_k = az.psislw(log_weights)
-    raw = np.exp(log_weights - top)
-    weights = np.exp(np.asarray(smoothed))
-    weights /= weights.sum()
     z = np.nan_to_num(chart.to_z(y))
-    mean = weights @ z
-    return Evidence(
-        value=float(top + np.log(raw.mean())),
-        error=float(raw.std() / raw.mean() / np.sqrt(draws)),
-        pareto_k=float(pareto_k),
-        effective_samples=float(1.0 / (weights**2).sum()),
-        evaluations=draws,
-        mean=mean,
-        sd=np.sqrt(weights @ (z - mean) ** 2),
-    )
+    top = float(log_weights.max())
+    if not np.isfinite(top):
+        return WeightedDraws(z, np.full(draws, 1.0 / draws), np.inf, np.zeros(draws), top, 0.0)
+    inside = float(np.isfinite(log_weights).mean())
+    log_weights = np.maximum(log_weights, top - 700.0)
+    with np.errstate(over="ignore"):  # where the weights hardly overlap; k-hat says so
+        smoothed, pareto_k = az.psislw(log_weights)
+    weights = np.exp(np.asarray(smoothed))
+    return WeightedDraws(z, weights / weights.sum(), float(pareto_k), np.exp(log_weights - top), top, inside)
 
 
 def choose_chart(posterior: Posterior, optimum: Optimum, rng: np.random.Generator) -> Chart:
     """Return the coordinates in which the Student-t about the mode is the better proposal."""
+
+    def merit(chart: Chart) -> tuple[bool, float]:
+        drawn = weighted_draws(chart, optimum, rng, TRIAL)
+        return drawn.inside > INSIDE, drawn.effective_samples
+
     charts: list[Chart] = [LogCholeskyChart(posterior), LinearChart(posterior)]
-    return max(charts, key=lambda chart: importance_sample(chart, optimum, rng, draws=TRIAL).effective_samples)
+    return max(charts, key=merit)

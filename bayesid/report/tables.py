@@ -9,6 +9,7 @@ from bayesid.arrays import Floats
 from bayesid.effects import Effect
 from bayesid.inertia import mass_com_inertia
 from bayesid.inference.identification import BODY_QUANTITIES, Identification, reported_effect
+from bayesid.inference.learnt import Learnt, Verdict
 from bayesid.motion import MeasuredMotion
 from bayesid.posterior import Posterior
 from bayesid.report.fit import SensorFit, TorqueFit
@@ -23,7 +24,7 @@ FAMILIES = ("position", "velocity", "acceleration")
 
 
 def parameter_rows(result: Identification) -> Rows:
-    """Quantity, unit, prior centre, posterior, relative sd of every identified body."""
+    """Quantity, unit, prior centre, posterior, relative sd, shrinkage of the prior of every identified body."""
     rows = []
     for prior in result.posterior.model.bodies:
         body, centre = result.bodies[prior.name], mass_com_inertia(prior.centre.vector)
@@ -36,6 +37,7 @@ def parameter_rows(result: Identification) -> Rows:
                     format_number(centre[index], 4),
                     format_quantity(mean, sd),
                     _relative(mean, sd),
+                    _shrinkage(result.learnt[f"{prior.name}.{key}"]),
                 ]
             )
     return rows
@@ -155,6 +157,13 @@ def joint_rows(posterior: Posterior) -> Rows:
 def _span(values: list[float]) -> str:
     low, high = format_number(min(values), 2), format_number(max(values), 2)
     return low if low == high else f"{low} to {high}"
+
+
+def _shrinkage(learnt: Learnt) -> str:
+    if learnt.verdict is Verdict.NOT:
+        return "prior only"
+    text = f"{format_number(100.0 * learnt.shrinkage, 3)} %"
+    return text if learnt.verdict is Verdict.LEARNT else f"{text} (weakly)"
 
 
 def _relative(mean: float, sd: float) -> str:

@@ -9,6 +9,7 @@ from bayesid.report.figures.diagnosis import (
     wrench_histories,
     wrench_spectrum,
 )
+from bayesid.report.figures.identifiability import direction_widths, displacements
 from bayesid.report.figures.prediction import course_bands, final_positions
 from bayesid.report.figures.robot import manoeuvre, robot_pose
 from bayesid.report.figures.sampler import convergence
@@ -23,6 +24,8 @@ __all__ = [
     "correlations",
     "course_bands",
     "covariance_ellipses",
+    "direction_widths",
+    "displacements",
     "final_positions",
     "joints_within_limits",
     "manoeuvre",

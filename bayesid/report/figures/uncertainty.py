@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
 from bayesid.arrays import Floats
 from bayesid.inference.identification import BODY_QUANTITIES, BodyDraws, Identification, bodies_of, reported_effect
+from bayesid.inference.learnt import half_range
 from bayesid.report.figures.style import COLOURS, WIDTH, styled, wide_figure
 from bayesid.report.numbers import format_number, format_quantity, format_unit
 
@@ -174,7 +175,7 @@ def _half_ranges(bodies: dict[str, BodyDraws]) -> dict[str, float]:
     return {
         f"{body.name}.{key}": width
         for body in bodies.values()
-        for key, width in zip(BODY_QUANTITIES, _half_range(body.values), strict=True)
+        for key, width in zip(BODY_QUANTITIES, half_range(body.values), strict=True)
     }
 
 
@@ -184,9 +185,4 @@ def _effect_ranges(result: Identification, label: str, draws: Floats) -> dict[st
         [f"{label}[{item.recording.name}]" for item in result.posterior.manoeuvres] if effect.per_recording else [label]
     )
     names = [f"{copy}.{key}" for copy in copies for key, _ in effect.quantities]
-    return dict(zip(names, _half_range(draws.reshape(len(draws), -1)), strict=True))
-
-
-def _half_range(draws: Floats) -> list[float]:
-    low, high = np.quantile(draws, [0.16, 0.84], axis=0)
-    return [float(value) for value in 0.5 * (high - low)]
+    return dict(zip(names, half_range(draws.reshape(len(draws), -1)), strict=True))

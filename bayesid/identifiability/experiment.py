@@ -1,0 +1,142 @@
+"""An experiment that could be made: manoeuvres, sensors and what else is known; and what it would tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from bayesid.arrays import Floats
+from bayesid.design.predicted import planned_posterior, simulated
+from bayesid.identifiability.knowledge import Knowledge
+from bayesid.inference.identification import BODY_QUANTITIES
+from bayesid.model import Manoeuvre, Model
+from bayesid.posterior import Posterior
+from bayesid.recording import Recording
+from bayesid.sensors import Kind, Noise, Scaled, Sensor, White
+
+__all__ = ["TYPICAL", "Experiment", "Predictor", "blanked"]
+
+TYPICAL: dict[Kind, Sensor] = {
+    Kind.RATE: Sensor(Kind.RATE, White(1e-5)),
+    Kind.ACCEL: Sensor(Kind.ACCEL, White(1e-5)),
+    Kind.ATTITUDE: Sensor(Kind.ATTITUDE, White(2.4e-5)),
+}
+"""Sensors that could be added: a gyro of 1e-5 rad/s, 1e-5 m/s2 (1 micro-g) at the base origin, 5 arcsec, per sample."""
+
+ABSENT, FINEST = 1e6, 0.1
+"""Factors on the noise of a sensor that is not there, and of the best that is asked for."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What a candidate may change.
+
+    Attributes
+    ----------
+    manoeuvres : tuple of Manoeuvre
+    sensors : tuple of Sensor
+        Those that are there.
+    weighed : mapping of str to float
+        Relative standard deviation of bodies whose mass is known beyond the prior.
+    times : int
+        How often every manoeuvre is flown.
+    """
+
+    manoeuvres: tuple[Manoeuvre, ...]
+    sensors: tuple[Sensor, ...]
+    weighed: tuple[tuple[str, float], ...] = ()
+    times: int = 1
+
+
+class Predictor:
+    """Predict what experiments tell about a model at one point.
+
+    All sensors are simulated in all experiments, those that are absent with enormous noise, so that experiments share
+    one compiled Jacobian.
+
+    Parameters
+    ----------
+    model : Model
+    manoeuvres : sequence of Manoeuvre
+        As flown or planned; sensors that are not recorded are read as often as the first that is.
+    z : (N,) array
+        Coordinates of the model's posterior.
+    step : float
+        Of the integration [s].
+    """
+
+    def __init__(self, model: Model, manoeuvres: tuple[Manoeuvre, ...], z: Floats, step: float) -> None:
+        declared = {sensor.kind for sensor in model.sensors}
+        self.z, self.step, self.flown = z, step, Experiment(manoeuvres, model.sensors)
+        everything = (*model.sensors, *(sensor for kind, sensor in TYPICAL.items() if kind not in declared))
+        # the best sensors show most of the encoders' correlated noise and so set the length of the whitening
+        self.model = replace(model, sensors=tuple(scaled(sensor, FINEST) for sensor in everything))
+        self._plain = {sensor.kind: sensor for sensor in everything}
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """Of the manoeuvres as flown, read by all sensors at their best."""
+        return planned_posterior(self.model, self._read(self.flown.manoeuvres), z=self.z, step=self.step)
+
+    def knowledge(self, experiment: Experiment) -> Knowledge:
+        """Return what an experiment would tell."""
+        posterior, there = self.posterior, {sensor.kind: sensor for sensor in experiment.sensors}
+        if experiment.manoeuvres is not self.flown.manoeuvres:
+            blank = self.posterior.with_manoeuvres(self._read(experiment.manoeuvres))
+            # what is read changes the Jacobian of attitudes only
+            posterior = blank if Kind.ATTITUDE not in there else simulated(blank, self.z)
+        sensors = [there.get(kind) or scaled(sensor, ABSENT) for kind, sensor in self._plain.items()]
+        posterior = posterior.with_sensors(sensors, self.z, like=self.posterior)
+        known = Knowledge.at(posterior, self.z)
+        known = _repeated(known, posterior.unknowns.names, experiment.times)
+        for body, relative in experiment.weighed:
+            mass = known.names.index(f"{body}.{next(iter(BODY_QUANTITIES))}")
+            known = known.having(known.slope[mass : mass + 1] / (relative * known.values[mass]))
+        return known
+
+    def _read(self, manoeuvres: tuple[Manoeuvre, ...]) -> list[Manoeuvre]:
+        return [blanked(manoeuvre, self.model.sensors) for manoeuvre in manoeuvres]
+
+
+def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...]) -> Manoeuvre:
+    """Return a manoeuvre with blanks to be simulated for the sensors that its recording lacks."""
+    recording = manoeuvre.recording
+    present = [sensor.kind for sensor in sensors if has(recording, sensor.kind)]
+    when = np.ones(len(recording.time), dtype=bool)
+    if present:
+        when = np.isfinite(recording.channels[f"{present[0].value}.x"])
+    channels = dict(recording.channels)
+    for sensor in sensors:
+        if sensor.kind not in present:
+            for axis in "xyzw" if sensor.kind is Kind.ATTITUDE else "xyz":
+                channels[f"{sensor.kind.value}.{axis}"] = np.where(when, 1.0 if axis == "w" else 0.0, np.nan)
+    return replace(manoeuvre, recording=Recording(recording.name, recording.file, recording.time, channels))
+
+
+def has(recording: Recording, kind: Kind) -> bool:
+    """Whether a recording holds a sensor's channels."""
+    return f"{kind.value}.x" in recording.channels
+
+
+def scaled(sensor: Sensor, factor: float) -> Sensor:
+    """Return a sensor with its noise multiplied."""
+    noise: Noise = Scaled(sensor.noise, (factor, factor, factor))
+    return replace(sensor, noise=noise)
+
+
+def _repeated(known: Knowledge, names: tuple[str, ...], times: int) -> Knowledge:
+    """Let everything happen again, with initial values and effects of each recording unknown anew."""
+    own = np.array(["[" in name for name in names])
+    data, count = known.jacobian[: -len(names)], int(own.sum())
+    shared = known.jacobian.shape[1] - count
+    size = shared + times * count
+    blocks = []
+    for number in range(times):
+        block = np.zeros((len(data), size))
+        block[:, :shared] = data[:, ~own]
+        block[:, shared + number * count : shared + (number + 1) * count] = data[:, own]
+        blocks.append(block)
+    slope = np.concatenate([known.slope[:, ~own], np.zeros((len(known.slope), times * count))], axis=1)
+    return Knowledge(known.names, known.values, slope, np.concatenate([*blocks, np.eye(size)]))

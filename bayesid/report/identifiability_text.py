@@ -1,0 +1,134 @@
+"""Sentences on what can be identified."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesid.identifiability.advice import WORST, Advice
+from bayesid.identifiability.base_parameters import BaseParameters
+from bayesid.identifiability.normality import NORMAL, Method
+from bayesid.identifiability.parameters import Parameter
+from bayesid.identifiability.practical import Practical
+from bayesid.identifiability.untold import listed
+from bayesid.inference.learnt import LEARNT, PRIOR_ONLY, Verdict
+from bayesid.report.numbers import format_number, format_unit
+
+__all__ = [
+    "advice_sentences",
+    "confidence_sentences",
+    "method_sentences",
+    "practical_sentences",
+    "share",
+    "structure_sentence",
+]
+
+
+def structure_sentence(structure: BaseParameters) -> str:
+    """Return how many parameters the robot has, and how many can be told at all."""
+    return (
+        f"Of {len(structure.standard)} standard inertial parameters of the robot, motion and torques depend on "
+        f"{len(structure.independent)} combinations, the base parameters."
+    )
+
+
+def practical_sentences(result: Practical) -> list[str]:
+    """Return what the study tells, and what it does not."""
+    count = {verdict: sum(item.verdict is verdict for item in result.parameters) for verdict in Verdict}
+    total = len(result.parameters)
+    sentences = [
+        f"Of {total} parameters of the bodies to identify {count[Verdict.LEARNT]} are learnt, {count[Verdict.WEAKLY]} "
+        f"weakly, {count[Verdict.NOT]} not."
+    ]
+    if names := [item.name for item in result.parameters if item.verdict is Verdict.NOT]:
+        sentences.append(f"Not learnt, so that the posterior is the prior: {listed(names)}.")
+    directions = sum(item.verdict is Verdict.NOT for item in result.directions)
+    if directions:
+        plural = "direction is" if directions == 1 else "directions are"
+        sentences.append(f"{directions} of {len(result.directions)} {plural} not learnt.")
+    sentences.append(f"The worst known direction: {result.words[0]}.")
+    worst = min(result.parameters, key=lambda item: item.shrinkage)
+    sentences.append(
+        f"The worst known parameter: {worst.name}, {share(1.0 - worst.shrinkage)} of the prior's width is left"
+        f"{_confused(worst)}."
+    )
+    return sentences
+
+
+def advice_sentences(result: Practical) -> list[str]:
+    """Return what would help most."""
+    usable = [item for item in result.advice if not item.reason]
+    worst = result.directions[0]
+    now = worst.sd / worst.prior_sd
+    if not usable or usable[0].directions[0] > 0.95 * now:
+        return ["None of the candidates narrows the worst direction by more than 5 %."]
+    best = [item for item in usable if item.directions[0] <= 0.95 * now][:WORST]
+    texts = "; ".join(f"{share(item.directions[0])} with {item.text}" for item in best)
+    return [f"Of the worst direction {share(now)} of the prior's width is left. It would be {texts}."]
+
+
+def confidence_sentences(result: Practical) -> list[str]:
+    """Return how the normal approximation was checked."""
+    draws = result.draws
+    if not draws.trusted:
+        also = "with so many unknowns emcee was not tried"
+        if draws.method is Method.ENSEMBLE:
+            also = "emcee has not converged"
+        return [
+            f"Whether the posterior is normal is not evaluated: importance sampling may not be trusted (Pareto k-hat "
+            f"{draws.pareto_k:.2f}), and {also}. All widths are those of the normal approximation; profile intervals "
+            "are given for the worst known parameters of which something was learnt."
+        ]
+    skewed = [item.name for item in result.parameters if not item.normal]
+    how = f"{draws.method.value}, {len(draws.values)} draws, Pareto k-hat of importance sampling {draws.pareto_k:.2f}"
+    if not skewed:
+        return [
+            f"The posterior of every parameter is normal within {NORMAL:g} sd at its 2.5, 16, 84 and 97.5 % ({how})."
+        ]
+    profiled = sum(item.profile is not None for item in result.parameters)
+    return [
+        f"The posterior of {listed(skewed)} is not normal: a quantile is off by more than {NORMAL:g} sd ({how}). "
+        f"{profiled} of {len(skewed)} were profiled, the least normal first."
+    ]
+
+
+def method_sentences(result: Practical) -> list[str]:
+    """Return how to read the figures."""
+    return [
+        "Prior and posterior are compared in the normal approximation about the fit (for a prediction, about the "
+        "prior's centre): C = D (J'J)⁻¹ D' and C₀ = D D', with J the derivative of whitened residuals and prior and D "
+        "that of the parameters. Initial rates, effects and links that are known to a few percent are marginalised.",
+        f"A parameter or direction is learnt if the data narrow the prior by at least {100 * LEARNT:.0f} %, and not "
+        f"learnt if by less than {100 * PRIOR_ONLY:.0f} %.",
+        "Learning counts what the data carry over: a mass tied by the data to others is known as well as the priors of "
+        "all of these together say.",
+        "A direction is a combination of parameters whose weights are scaled so that the largest, times the prior sd "
+        "of its parameter, is one. Its displacement is the change of all parameters by one posterior sd of the "
+        "combination: the data cannot tell whether it happened. Directions of which the data tell less than 1 % have "
+        "no order; they are turned so that each moves few parameters.",
+        "The words for a direction are read off its displacement in units of the prior's widths and name only its "
+        "largest parts; the numbers are in identifiability.json.",
+        "Advice is computed as one more prediction for each candidate, linearised at the same point.",
+    ]
+
+
+def share(ratio: float) -> str:
+    """Return a ratio in percent."""
+    return f"{format_number(100.0 * ratio, 2 if ratio < 0.995 else 3)} %"
+
+
+def advice_row(item: Advice, unit: str) -> list[str]:
+    """Return text, what is left of the worst directions, sd of the worst parameter and the information."""
+    if item.reason:
+        return [item.text, f"not evaluated: {item.reason}", "", "", "", ""]
+    ratios = [share(ratio) for ratio in item.directions] + [""] * (WORST - len(item.directions))
+    return [item.text, *ratios, f"{format_number(item.sd, 2)} {format_unit(unit)}", f"{item.information:.1f}"]
+
+
+def _confused(item: Parameter) -> str:
+    if not item.correlated_with:
+        return ""
+    alone = 1.0 - item.conditional_sd / item.prior_sd
+    names = listed([name for name, _ in item.correlated_with])
+    if np.isfinite(alone) and alone > item.shrinkage + PRIOR_ONLY:
+        return f", as it is confused with {names}; were these known, {share(1.0 - alone)} would be"
+    return f"; it is correlated with {names}"
