@@ -23,6 +23,7 @@ from bayesid.model import Manoeuvre, Model
 from bayesid.samples import Samples
 from bayesid.sensors import Kind, Sensor
 from bayesid.simulator import Simulator
+from bayesid.torque import TorqueSensor
 from bayesid.unknowns import Unknowns, Values
 from bayesid.whitening import Whitening
 
@@ -164,15 +165,19 @@ class Posterior:
         new.data = new._stack_noise(self.data)
         return new
 
-    def with_sensors(self, sensors: Sequence[Sensor], z: Floats, like: Posterior | None = None) -> Posterior:
+    def with_sensors(
+        self, sensors: Sequence[Sensor], z: Floats, like: Posterior | None = None, torque: TorqueSensor | None = None
+    ) -> Posterior:
         """Return the posterior with other noise of the same sensors, the encoder noise carried through at ``z``.
 
-        Whitening windows are searched for where noise is coloured, or are those of ``like``.
+        Whitening windows are searched for where noise is coloured, or are those of ``like``. Joint torques keep their
+        noise unless ``torque`` is given.
         """
+        torque = self.model.torque if torque is None else torque
         new = object.__new__(Posterior)
         new.__dict__.update({key: value for key, value in self.__dict__.items() if key != "data"})
-        new.model = replace(self.model, sensors=tuple(sensors))
-        new._samples = [samples.with_sensors(sensors) for samples in self._samples]
+        new.model = replace(self.model, sensors=tuple(sensors), torque=torque)
+        new._samples = [samples.with_sensors(sensors, torque) for samples in self._samples]
         coloured = any(sensor.coloured is not None for sensor in sensors)
         known = self.whitenings if like is None else like.whitenings
         search = coloured and like is None

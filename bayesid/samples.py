@@ -17,6 +17,7 @@ from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.sensitivity import joint_sensitivity
 from bayesid.sensors import Filter, Kind, Sensor
+from bayesid.torque import TorqueSensor
 from bayesid.whitening import Channel, NoiseModel
 
 __all__ = ["Samples"]
@@ -50,7 +51,7 @@ class Samples:
         self.torque: tuple[Floats, Floats] = (np.zeros(0), np.zeros((0, 0)))
         if model.torque is not None:
             self.torque = _series(recording, "torque", model.torque.joints)
-        self.torque_sigma = () if model.torque is None else model.torque.sigma
+        self.torque_sigma: tuple[float, ...] = () if model.torque is None else model.torque.sigma
         self.time = np.unique(np.concatenate([*(time for time, _ in self.series.values()), self.torque[0]]))
         self.rows = {kind: np.searchsorted(self.time, time) for kind, (time, _) in self.series.items()}
         rows, base = np.searchsorted(self.time, self.torque[0]), 3 * len(self.sensors)
@@ -65,11 +66,11 @@ class Samples:
             else:
                 self.measured[self.rows[sensor.kind], 3 * slot : 3 * slot + 3] = values
 
-    def with_sensors(self, sensors: Sequence[Sensor]) -> Samples:
+    def with_sensors(self, sensors: Sequence[Sensor], torque: TorqueSensor | None) -> Samples:
         """Return the samples of the same sensors with other noise."""
         new = object.__new__(Samples)
         new.__dict__.update(self.__dict__)
-        new.sensors = tuple(sensors)
+        new.sensors, new.torque_sigma = tuple(sensors), () if torque is None else torque.sigma
         return new
 
     @property

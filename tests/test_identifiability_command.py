@@ -59,7 +59,6 @@ def made(study: Path) -> tuple[dict, str, str]:
     return json.loads((study.parent / "out" / "identifiability.json").read_text()), text, "".join(told)
 
 
-@pytest.mark.usefixtures("slow")
 def test_the_json_is_that_of_the_contract(made: tuple[dict, str, str]) -> None:
     content = made[0]
     assert (content["standard_parameters"], content["base_parameters"], content["basis"]) == (30, 24, "fit")
@@ -68,6 +67,9 @@ def test_the_json_is_that_of_the_contract(made: tuple[dict, str, str]) -> None:
     assert np.shape(content["regrouping"]) == (24, 6)
     assert len(content["directions"]) == len(content["parameters"]) == 10
     prior, own = (np.array(content[key]["matrix"]) for key in ("prior_covariance", "covariance"))
+    told = {advice["name"]: advice for advice in content["advice"]}
+    assert {"better-rate", "add-attitude", "add-torque", "known-mass:base_link", "thrust", "swing:joint1"} <= set(told)
+    assert all(advice["evaluated"] for advice in told.values() if not advice["name"].startswith("swing"))
     ratios = []
     for direction in content["directions"]:
         assert list(direction["combination"]) == content["covariance"]["names"]
@@ -108,7 +110,6 @@ def test_identify_agrees_on_every_direction_and_says_what_it_learnt(made: tuple[
         assert 1.0 - learnt["shrinkage"] == pytest.approx(1.0 - parameter["shrinkage"], rel=0.5)
 
 
-@pytest.mark.usefixtures("slow")
 def test_the_report_says_what_was_found(made: tuple[dict, str, str]) -> None:
     content, text, report = made
     worst = content["directions"][0]["words"]
@@ -138,13 +139,17 @@ def test_joint_motion_alone_gives_a_prediction_that_the_fit_bears_out(
     recording = Recording.read(study.parent / "planar.csv")
     joints = {name: values for name, values in recording.channels.items() if name.startswith("position.")}
     Recording("planar", None, recording.time, joints).write(tmp_path / "planar.csv")
-    (tmp_path / "study.toml").write_text(STUDY)
+    torques = STUDY.replace(
+        "[[recordings]]", "[sensors.torque]\nsigma = 10.0\n[[recordings]]"
+    )  # too coarse to tell much
+    (tmp_path / "study.toml").write_text(torques)
     status, output = run("identifiability", tmp_path / "study.toml", "--output", tmp_path / "out", "--profiles", 0)
     assert status == 0, output
     content = json.loads((tmp_path / "out" / "identifiability.json").read_text())
     assert content["basis"] == "prediction"
-    assert "This is a prediction: 1 recording without rate, accel" in content["statement"]
+    assert "This is a prediction: 1 recording without rate, accel, torque" in content["statement"]
     assert "This is a prediction" in output
+    assert "better-torque" in {advice["name"] for advice in content["advice"]}
     # the flight also tumbled, which the plan does not know: it tells less
     predicted, flown = ({p["name"]: p["sd"] for p in data["parameters"]} for data in (content, made[0]))
     assert flown["base_link.mass"] * 0.5 < predicted["base_link.mass"] < flown["base_link.mass"] * 3.0

@@ -11,13 +11,14 @@ import numpy as np
 from bayesid.arrays import Floats
 from bayesid.errors import InputError
 from bayesid.grid import Actions
-from bayesid.identifiability.experiment import FINEST, TYPICAL, Experiment, scaled
+from bayesid.identifiability.experiment import FINEST, TYPICAL, Experiment, rescaled, scaled, typical_torque
 from bayesid.model import Manoeuvre, Model
 from bayesid.motion import JointState, MeasuredMotion
 from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.sensors import Kind, Sensor
 from bayesid.tables import composite_rows, kinematics
+from bayesid.torque import TorqueSensor
 
 __all__ = ["Candidate", "NotEvaluated", "Swung", "candidates"]
 
@@ -83,6 +84,12 @@ def candidates(model: Model) -> list[Candidate]:
         for kind, sensor in TYPICAL.items()
         if kind not in declared
     ]
+    if model.torque is not None:
+        text = "torque sensors with a tenth of their noise"
+        found.append(Candidate("better-torque", text, partial(_torqued, rescaled(model.torque, FINEST))))
+    elif (torques := typical_torque(model)) is not None:
+        text = f"added torque sensors of {torques.sigma[0]:g} N m per sample in all joints, their friction known"
+        found.append(Candidate("add-torque", text, partial(_torqued, torques)))
     found += [
         Candidate(f"known-mass:{body.name}", f"mass of {body.name} known to 1 %", partial(_weighed, body.name))
         for body in model.bodies
@@ -114,6 +121,10 @@ def _better(kind: Kind, experiment: Experiment) -> Experiment:
 
 def _added(sensor: Sensor, experiment: Experiment) -> Experiment:
     return replace(experiment, sensors=(*experiment.sensors, sensor))
+
+
+def _torqued(sensor: TorqueSensor, experiment: Experiment) -> Experiment:
+    return replace(experiment, torque=sensor)
 
 
 def _weighed(body: str, experiment: Experiment) -> Experiment:

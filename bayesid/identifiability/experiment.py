@@ -15,8 +15,9 @@ from bayesid.model import Manoeuvre, Model
 from bayesid.posterior import Posterior
 from bayesid.recording import Recording
 from bayesid.sensors import Kind, Noise, Scaled, Sensor, White
+from bayesid.torque import TorqueSensor
 
-__all__ = ["TYPICAL", "Experiment", "Predictor", "blanked"]
+__all__ = ["TYPICAL", "Experiment", "Predictor", "blanked", "rescaled", "typical_torque"]
 
 TYPICAL: dict[Kind, Sensor] = {
     Kind.RATE: Sensor(Kind.RATE, White(1e-5)),
@@ -24,6 +25,9 @@ TYPICAL: dict[Kind, Sensor] = {
     Kind.ATTITUDE: Sensor(Kind.ATTITUDE, White(2.4e-5)),
 }
 """Sensors that could be added: a gyro of 1e-5 rad/s, 1e-5 m/s2 (1 micro-g) at the base origin, 5 arcsec, per sample."""
+
+TYPICAL_TORQUE = 0.1
+"""Noise per sample of torque sensors that could be added to all joints [N m, N]."""
 
 ABSENT, FINEST = 1e6, 0.1
 """Factors on the noise of a sensor that is not there, and of the best that is asked for."""
@@ -38,6 +42,8 @@ class Experiment:
     manoeuvres : tuple of Manoeuvre
     sensors : tuple of Sensor
         Those that are there.
+    torque : TorqueSensor, optional
+        Of the joints, if there is one.
     weighed : mapping of str to float
         Relative standard deviation of bodies whose mass is known beyond the prior.
     times : int
@@ -46,6 +52,7 @@ class Experiment:
 
     manoeuvres: tuple[Manoeuvre, ...]
     sensors: tuple[Sensor, ...]
+    torque: TorqueSensor | None = None
     weighed: tuple[tuple[str, float], ...] = ()
     times: int = 1
 
@@ -69,10 +76,12 @@ class Predictor:
 
     def __init__(self, model: Model, manoeuvres: tuple[Manoeuvre, ...], z: Floats, step: float) -> None:
         declared = {sensor.kind for sensor in model.sensors}
-        self.z, self.step, self.flown = z, step, Experiment(manoeuvres, model.sensors)
+        self.z, self.step, self.flown = z, step, Experiment(manoeuvres, model.sensors, model.torque)
         everything = (*model.sensors, *(sensor for kind, sensor in TYPICAL.items() if kind not in declared))
         # the best sensors show most of the encoders' correlated noise and so set the length of the whitening
-        self.model = replace(model, sensors=tuple(scaled(sensor, FINEST) for sensor in everything))
+        self._torque = typical_torque(model) if model.torque is None else model.torque
+        finest = None if self._torque is None else rescaled(self._torque, FINEST)
+        self.model = replace(model, sensors=tuple(scaled(sensor, FINEST) for sensor in everything), torque=finest)
         self._plain = {sensor.kind: sensor for sensor in everything}
 
     @cached_property
@@ -88,7 +97,10 @@ class Predictor:
             # what is read changes the Jacobian of attitudes only
             posterior = blank if Kind.ATTITUDE not in there else simulated(blank, self.z)
         sensors = [there.get(kind) or scaled(sensor, ABSENT) for kind, sensor in self._plain.items()]
-        posterior = posterior.with_sensors(sensors, self.z, like=self.posterior)
+        torque = experiment.torque
+        if torque is None and self._torque is not None:
+            torque = rescaled(self._torque, ABSENT)
+        posterior = posterior.with_sensors(sensors, self.z, like=self.posterior, torque=torque)
         known = Knowledge.at(posterior, self.z)
         known = _repeated(known, posterior.unknowns.names, experiment.times)
         for body, relative in experiment.weighed:
@@ -97,10 +109,10 @@ class Predictor:
         return known
 
     def _read(self, manoeuvres: tuple[Manoeuvre, ...]) -> list[Manoeuvre]:
-        return [blanked(manoeuvre, self.model.sensors) for manoeuvre in manoeuvres]
+        return [blanked(manoeuvre, self.model.sensors, self.model.torque) for manoeuvre in manoeuvres]
 
 
-def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...]) -> Manoeuvre:
+def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...], torque: TorqueSensor | None = None) -> Manoeuvre:
     """Return a manoeuvre with blanks to be simulated for the sensors that its recording lacks."""
     recording = manoeuvre.recording
     present = [sensor.kind for sensor in sensors if has(recording, sensor.kind)]
@@ -112,6 +124,8 @@ def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...]) -> Manoeuvre:
         if sensor.kind not in present:
             for axis in "xyzw" if sensor.kind is Kind.ATTITUDE else "xyz":
                 channels[f"{sensor.kind.value}.{axis}"] = np.where(when, 1.0 if axis == "w" else 0.0, np.nan)
+    for joint in () if torque is None else torque.joints:
+        channels.setdefault(f"torque.{joint}", np.where(when, 0.0, np.nan))
     return replace(manoeuvre, recording=Recording(recording.name, recording.file, recording.time, channels))
 
 
@@ -124,6 +138,19 @@ def scaled(sensor: Sensor, factor: float) -> Sensor:
     """Return a sensor with its noise multiplied."""
     noise: Noise = Scaled(sensor.noise, (factor, factor, factor))
     return replace(sensor, noise=noise)
+
+
+def typical_torque(model: Model) -> TorqueSensor | None:
+    """Return the torque sensor that could be added; None where there are no joints or the model cannot follow it."""
+    joints = tuple(joint.name for joint in model.robot.joints)
+    if not joints or any(effect.uses("table") and effect.link is None for effect in model.effects):
+        return None
+    return TorqueSensor(joints, (TYPICAL_TORQUE,) * len(joints))
+
+
+def rescaled(sensor: TorqueSensor, factor: float) -> TorqueSensor:
+    """Return a torque sensor with its noise multiplied."""
+    return replace(sensor, sigma=tuple(factor * sigma for sigma in sensor.sigma))
 
 
 def _repeated(known: Knowledge, names: tuple[str, ...], times: int) -> Knowledge:

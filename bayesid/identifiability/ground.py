@@ -74,7 +74,7 @@ def _predicted(study: Study, model: Model, manoeuvres: Sequence[Manoeuvre], lack
         refuse_impossible_joints(manoeuvre.recording, robot)
         # a plan has no noise from which the encoders' could be estimated
         motion = MeasuredMotion.from_recording(manoeuvre.recording, robot, sigma=noise, start=section.start)
-        planned.append(blanked(replace(manoeuvre, motion=motion), model.sensors))
+        planned.append(blanked(replace(manoeuvre, motion=motion), model.sensors, model.torque))
     posterior = planned_posterior(model, planned)
     centre = np.zeros(posterior.size)
     posterior = posterior.at(centre)
@@ -90,11 +90,14 @@ def _predicted(study: Study, model: Model, manoeuvres: Sequence[Manoeuvre], lack
 
 def _lacking(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[str]:
     """Return the declared sensors that some recording does not hold."""
-    return [
+    lacking = [
         sensor.kind.value
         for sensor in model.sensors
         if not all(has(manoeuvre.recording, sensor.kind) for manoeuvre in manoeuvres)
     ]
+    columns = [f"torque.{joint}" for joint in (model.torque.joints if model.torque is not None else ())]
+    recorded = all(column in manoeuvre.recording.channels for manoeuvre in manoeuvres for column in columns)
+    return lacking if recorded else [*lacking, "torque"]
 
 
 def _count(manoeuvres: Sequence[Manoeuvre]) -> str:
