@@ -7,12 +7,14 @@ import jax.numpy as jnp
 import numpy as np
 import pinocchio as pin
 import pytest
+import scipy.linalg as sla
 
 from bayesid import InputError
 from bayesid.dynamics import Start, simulate
 from bayesid.effects import GravityGradient
 from bayesid.grid import build_grid
 from bayesid.identifiability import Base, BaseParameters, base_parameters
+from bayesid.identifiability.equations import massive_bodies, stacked_regressor
 from bayesid.inertia import BASIS, InertialParameters, parameters_from_pseudo_inertia
 from bayesid.orbit import Orbit
 from bayesid.robot import Load, Robot
@@ -225,6 +227,32 @@ def test_the_space_does_not_depend_on_what_is_called_dependent():
     assert values[usual.count - 1] > 1e-2
     assert values[usual.count] < 1e-12
     np.testing.assert_allclose(other.projection @ usual.unseen, 0.0, atol=1e-12)
+
+
+def test_identified_directions_do_not_depend_on_what_is_called_dependent():
+    """A posterior of all parameters says the same of K_B, direction by direction, under either choice of K_2."""
+    robot, rng = Robot.shipped("planar"), np.random.default_rng(5)
+    own = base_parameters(robot)
+    other = base_parameters(robot, keep=own.dependent, rng=np.random.default_rng(8))
+    assert set(own.independent) != set(other.independent)
+    bodies = massive_bodies(robot)
+    scale = np.abs(np.concatenate([robot.link(name).inertial.vector for name in bodies])) + 0.1
+    prior = np.diag((0.3 * scale) ** 2)
+    regressor = stacked_regressor(robot, bodies, Base.FREE, rng)[:40]  # few states: some directions are hardly seen
+    posterior = np.linalg.inv(regressor.T @ regressor / 0.05**2 + np.linalg.inv(prior))
+    found = []
+    for base in (own, other):
+        before, after = (base.projection @ covariance @ base.projection.T for covariance in (prior, posterior))
+        ratios, weights = sla.eigh(after, before)
+        found.append((ratios, weights.T @ base.projection))  # a direction as weights of all parameters
+    (ratios, directions), (others, their) = found
+    assert ratios.min() < 0.01
+    assert ratios.max() > 0.3
+    np.testing.assert_allclose(ratios, others, rtol=1e-6)
+    overlap = their @ prior @ directions.T  # of normalised directions: 1 where they are the same
+    distinct = np.min(np.abs(np.diff(ratios, prepend=-1.0)), initial=1.0) > 1e-9
+    assert distinct
+    np.testing.assert_allclose(np.abs(np.diag(overlap)), 1.0, atol=1e-5)
 
 
 def test_the_first_part_follows_from_the_second():

@@ -13,6 +13,7 @@ from bayesid.report import figures
 from bayesid.report import identifiability_text as text
 from bayesid.report.assumed import model_sentences
 from bayesid.report.document import Document
+from bayesid.report.identification import add_joints
 from bayesid.report.numbers import format_number, format_quantity, format_unit
 
 __all__ = ["identifiability_report"]
@@ -55,6 +56,7 @@ def identifiability_report(
         document.section("How to read this, and what was assumed")
         error = result.posterior.integration_error(result.optimum.z)
         document.items([*text.method_sentences(result), *model_sentences(result.posterior, error)])
+        add_joints(document, result.posterior)
     document.write(file)
 
 

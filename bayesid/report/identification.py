@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from bayesid.inference.identification import Identification
+from bayesid.posterior import Posterior
 from bayesid.report import figures, tables, text
 from bayesid.report.assumed import model_sentences
 from bayesid.report.document import Document
 from bayesid.report.figures.style import WIDTH
 from bayesid.report.fit import sensor_fits, torque_fits
 
-__all__ = ["add_identification", "identification_report"]
+__all__ = ["add_identification", "add_joints", "identification_report"]
 
 POSES = 4
 """Instants at which the robot is drawn."""
@@ -176,7 +177,12 @@ def _add_computation(document: Document, result: Identification) -> None:
 def _add_assumptions(document: Document, result: Identification, assumptions: Sequence[str]) -> None:
     document.section("What was assumed")
     document.items([*assumptions, *model_sentences(result.posterior, result.integration_error)])
-    if rows := tables.joint_rows(result.posterior):
+    add_joints(document, result.posterior)
+
+
+def add_joints(document: Document, posterior: Posterior) -> None:
+    """Add the table of the joints' smoothing, where their motion was measured."""
+    if rows := tables.joint_rows(posterior):
         document.table(
             ["joint", "noise per sample", "order", "chi-square per sample"],
             rows,
