@@ -100,6 +100,7 @@ def done(tmp_path_factory: pytest.TempPathFactory):
     return loop_of().run(TRUTH, tmp_path_factory.mktemp("loop"))
 
 
+@pytest.mark.usefixtures("slow")
 def test_every_step_narrows_the_posterior_about_the_truth(done):
     assert done.status == "at-most"
     bodies = [step["identification"]["bodies"]["base_link"] for step in done.steps]
@@ -114,6 +115,7 @@ def test_every_step_narrows_the_posterior_about_the_truth(done):
     assert second[0] < 0.5  # the prior's is 2.4 kg
 
 
+@pytest.mark.usefixtures("slow")
 def test_what_may_break_a_limit_is_shrunk_before_it_is_flown(done):
     attempts = done.steps[0]["plan"]["attempts"]
     assert [attempt["go"] for attempt in attempts] == [False] * (len(attempts) - 1) + [True]
@@ -126,6 +128,7 @@ def test_what_may_break_a_limit_is_shrunk_before_it_is_flown(done):
     assert done.steps[1]["plan"]["attempts"][-1]["limits"]["base_rotation"]["designed_for"] > last["designed_for"]
 
 
+@pytest.mark.usefixtures("slow")
 def test_an_interrupted_loop_ends_with_the_very_same_numbers(done, tmp_path: Path):
     class Tired:
         """It fails in the middle of the second step."""
@@ -157,6 +160,7 @@ def _draws(history) -> list[np.ndarray]:
     return [InertialDraws.read(history.path(number, "identification")).values for number in (1, 2)]
 
 
+@pytest.mark.usefixtures("slow")
 def test_two_steps_tell_what_one_identification_of_both_tells(done):
     loop = loop_of()
     plan = loop.problem.plan
@@ -171,6 +175,7 @@ def test_two_steps_tell_what_one_identification_of_both_tells(done):
     np.testing.assert_array_less(np.abs(mean - joint.mean) / joint.sd, 0.25)
 
 
+@pytest.mark.usefixtures("slow")
 def test_it_stops_where_the_wanted_precision_is_reached_and_goes_on_when_more_is_wanted(done, tmp_path: Path):
     for file in done.folder.iterdir():
         (tmp_path / file.name).write_bytes(file.read_bytes())
@@ -183,6 +188,7 @@ def test_it_stops_where_the_wanted_precision_is_reached_and_goes_on_when_more_is
     assert len(loop_of(wanted=1.0, precision=mass_alone).run(TRUTH, tmp_path).steps) == 1
 
 
+@pytest.mark.usefixtures("slow")
 def test_a_loop_waits_for_a_recording_and_refuses_a_changed_one(done, tmp_path: Path):
     class Nobody:
         def execute(self, plan: Recording) -> Recording:
@@ -201,6 +207,7 @@ def test_a_loop_waits_for_a_recording_and_refuses_a_changed_one(done, tmp_path: 
         loop_of(seed=4).run(Nobody(), tmp_path)
 
 
+@pytest.mark.usefixtures("slow")
 def test_a_no_go_is_not_flown(done, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     for name in ("loop.json", "step-1-plan.csv"):
         (tmp_path / name).write_bytes((done.folder / name).read_bytes())
@@ -225,6 +232,7 @@ def test_a_plan_is_flown_as_it_was_planned():
         PlannedMotion(Recording("bare", None, plan.time, {"position.joint1": plan.time}), joints)
 
 
+@pytest.mark.usefixtures("slow")
 def test_noise_follows_from_seed_and_step(done):
     plan = replace(Recording.read(done.path(1, "plan")), name="step-2")
     first, other = Recording.read(done.path(1, "recording")), TRUTH.execute(plan)

@@ -111,7 +111,7 @@ def compiled(tmp_path_factory) -> Callable[[bool], Posterior]:
 )
 def test_the_uncertainty_of_drawn_systems_holds_the_truth(torque, compiled, tmp_path):
     """Squared distances of the truth over fresh systems and fresh noise are chi-square."""
-    count, distances = 16, []
+    count, distances = 12, []
     for stream in np.random.SeedSequence(7).spawn(count):
         rng = np.random.default_rng(stream)
         robot = drawn(rng)
