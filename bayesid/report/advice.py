@@ -41,9 +41,10 @@ ADVICE = {
     "encoder-offset": "It acts as a wrong posture: move that joint through another range with the others still; the "
     "offset stays the same, an error of a mass does not.",
     "joint-flexibility": "It grows with the joint's acceleration: repeat the motion of that joint twice as fast.",
-    "joint-friction": "It changes sign with the joint's speed, not with its acceleration: run that joint at two constant "
-    "speeds, forwards and back, with the others still.",
-    "torque-bias": "It is there when the joint stands free of load: read the torques at rest, before and after the motion.",
+    "joint-friction": "It changes sign with the joint's speed, not with its acceleration: run that joint at two "
+    "constant speeds, forwards and back, with the others still.",
+    "torque-bias": "It is there when the joint stands free of load: read the torques at rest, before and after "
+    "the motion.",
     "latency": "It grows with speed: repeat the same motion twice as fast; errors of bodies keep their ratio to the "
     "motion, a delay's grow with frequency.",
     "bias": "It is there at rest and does not care for motion: record a longer rest before and after the motion, and "
