@@ -106,16 +106,22 @@ def compiled(tmp_path_factory) -> Callable[[bool], Posterior]:
     return get
 
 
-@pytest.mark.parametrize(
-    "torque", [pytest.param(False, marks=pytest.mark.usefixtures("slow")), True], ids=["motion", "torques"]
-)
-def test_the_uncertainty_of_drawn_systems_holds_the_truth(torque, compiled, tmp_path):
+@pytest.mark.usefixtures("slow")
+def test_the_uncertainty_from_motion_alone_holds_the_truth(compiled, tmp_path):
+    check_distances(compiled(False), tmp_path)
+
+
+def test_the_uncertainty_from_motion_and_torques_holds_the_truth(compiled, tmp_path):
+    check_distances(compiled(True), tmp_path)
+
+
+def check_distances(first: Posterior, folder: Path) -> None:
     """Squared distances of the truth over fresh systems and fresh noise are chi-square."""
     count, distances = 12, []
     for stream in np.random.SeedSequence(7).spawn(count):
         rng = np.random.default_rng(stream)
         robot = drawn(rng)
-        posterior = compiled(torque).with_manoeuvres([flown(robot, tmp_path, rng)])
+        posterior = first.with_manoeuvres([flown(robot, folder, rng)])
         z = true_point(posterior, robot)
         optimum = fit(posterior.at(z), z)  # from the truth, to save time; the next test starts at the prior's centre
         square, bodies = squared_distance(posterior, LinearChart(posterior).proposal(optimum), z)
