@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesid.arrays import Floats
 from bayesid.effects.base import Effect
+from bayesid.effects.place import OnJoint
 from bayesid.errors import InputError
 from bayesid.motion import Motion
 from bayesid.orbit import Orbit
@@ -101,11 +102,19 @@ class Model:
             self.robot.link(prior.name)
         if self.mixing is not None:
             check_mixing(self.mixing, len(self.priors))
-        if self.torque is not None:
-            self._check_torque(self.torque)
+        self._check_torque()
 
-    def _check_torque(self, sensor: TorqueSensor) -> None:
-        sensor.columns(self.robot)
+    def _check_torque(self) -> None:
+        measured = () if self.torque is None else self.torque.joints
+        for effect in self.effects:
+            if effect.uses("friction") and isinstance(effect, OnJoint) and effect.place not in measured:
+                raise InputError(
+                    f"effect {effect.label!r} shows in the joint's torque only, which is not measured",
+                    remedy="Add [sensors.torque] or leave the effect out",
+                )
+        if self.torque is None:
+            return
+        self.torque.columns(self.robot)
         for effect in self.effects:
             if effect.uses("table") and effect.link is None:
                 raise InputError(

@@ -179,6 +179,8 @@ def test_bad_torque_sensors_are_refused(formula_motion):
         TorqueSensor(("elbow",), (0.1,)).columns(robot)
     with pytest.raises(InputError, match=r"encoder-offset:joint1.*not carried"):
         posterior_of(urdf, truth, motion, effects=(EncoderOffset("joint1"),))
+    with pytest.raises(InputError, match=r"joint-friction:joint2.*not measured"):
+        posterior_of(urdf, truth, motion, joints=("joint1",), effects=(JointFriction("joint2"),))
     posterior = posterior_of(urdf, truth, formula_motion(motion, urdf, robot), joints=("joint1",))
     channels = {k: v for k, v in posterior.manoeuvres[0].recording.channels.items() if "torque" not in k}
     bare = Manoeuvre(Recording("bare", None, TIMES, channels), posterior.manoeuvres[0].motion)
