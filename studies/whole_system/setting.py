@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import BodyPrior, InertialParameters, Kind, Model, Orbit, Robot, Sensor, White
 from bayesid.effects import Effect, GravityGradient, JointFriction
-from bayesid.inertia import log_cholesky_factor, parameters_from_pseudo_inertia, upper_cholesky
 from bayesid.robot import Load
 from bayesid.torque import TorqueSensor
+from studies.planning.world import guess_about
 
 __all__ = ["BASE", "LOAD", "bodies", "drawn", "friction_effects", "model_of", "spreads", "true_robot"]
 
@@ -58,14 +57,8 @@ def drawn(truth: Robot, seed: int) -> Robot:
     rng = np.random.default_rng(seed)
     robot = truth
     for name, spread in spreads(truth).items():
-        robot = robot.with_inertial(name, _about(truth.link(name).inertial, spread, rng))
+        robot = robot.with_inertial(name, guess_about(truth.link(name).inertial, spread, rng))
     return robot
-
-
-def _about(truth: InertialParameters, spread: float, rng: np.random.Generator) -> InertialParameters:
-    factor = np.asarray(log_cholesky_factor(jnp.asarray(spread * rng.normal(size=10))))
-    guess = upper_cholesky(truth.pseudo_inertia) @ np.linalg.inv(factor)
-    return InertialParameters.from_vector(np.asarray(parameters_from_pseudo_inertia(jnp.asarray(guess @ guess.T))))
 
 
 def friction_effects(robot: Robot) -> tuple[Effect, ...]:
