@@ -214,6 +214,7 @@ def test_gradients_are_those_of_finite_differences(flywheel: Problem) -> None:
     np.testing.assert_allclose(slopes, differences, rtol=1e-4, atol=1e-6)
 
 
+@pytest.mark.usefixtures("slow")  # the command's tests check limits by independent kinematics
 def test_designs_keep_the_limits_between_the_optimisers_instants(flywheel: Problem) -> None:
     found = design(flywheel, 3, {0: 1e-6}, Search(starts=1, iterations=8))
     family, own = flywheel.plan.family, flywheel.plan.model.robot

@@ -135,6 +135,7 @@ def test_the_far_tail_of_chi_square_goes_on_smoothly(statistic, degrees):
     assert chi2_log_sf(1e5, degrees) < chi2_log_sf(5e4, degrees)
 
 
+@pytest.mark.usefixtures("slow")  # an event is among the hidden causes
 def test_an_event_is_no_outlier(tmp_path):
     """A mass that moves inside the base for two seconds leaves a few large residuals side by side."""
     study = Study.load(CASES["shifting-mass"].make(tmp_path, 246))

@@ -87,6 +87,7 @@ def test_the_contracts_example_is_identified() -> None:
     assert miss @ np.linalg.solve(result.covariance, miss) < chi2.ppf(0.999, 10)
 
 
+@pytest.mark.usefixtures("slow")  # whole systems drawn from the prior show the same
 def test_an_arm_known_to_five_percent_widens_the_answer_and_still_covers(tmp_path: Path) -> None:
     """The truth's arm is off by its declared spread; an exact arm would then exclude the true base."""
     made = write_study(

@@ -22,6 +22,7 @@ def trials(kept):
     return run(PLANS, kept)
 
 
+@pytest.mark.usefixtures("slow")
 def test_what_was_hidden_is_compared_with_what_is_said(trials):
     bias, null = trials
     assert bias.named_rightly
@@ -37,6 +38,7 @@ def test_what_was_hidden_is_compared_with_what_is_said(trials):
     assert len(null.body_errors) == 10
 
 
+@pytest.mark.usefixtures("slow")
 def test_a_run_goes_on_where_it_was_cut_off(trials, kept, monkeypatch):
     lines = kept.read_text(encoding="utf-8").splitlines()
     kept.write_text(lines[0] + "\n" + lines[1][:40], encoding="utf-8")
@@ -48,6 +50,7 @@ def test_a_run_goes_on_where_it_was_cut_off(trials, kept, monkeypatch):
     assert [json.loads(line)["case"] for line in kept.read_text(encoding="utf-8").splitlines() if line[-1] == "}"]
 
 
+@pytest.mark.usefixtures("slow")
 def test_wrong_names_are_counted(trials):
     bias = trials[0]
     wrong = replace(bias, causes=("rate-drift",), sets=(("rate-drift",),))
@@ -72,6 +75,7 @@ def test_the_plans_hide_everything_and_nothing():
     assert sum(item.case.startswith("null") for item in plans) == 1000
 
 
+@pytest.mark.usefixtures("slow")
 def test_the_report_is_written(trials, tmp_path):
     outside = Trial(**{**vars(trials[0]), "kind": "unknown", "hidden": (), "true_frame": "base", "correlation": 0.9})
     write_report([*trials, outside], tmp_path / "blind.pdf")
