@@ -20,7 +20,7 @@ from studies.whole_system.information import informed
 from studies.whole_system.report import Result, write_report
 from studies.whole_system.sampled import sampled
 from studies.whole_system.setting import drawn, true_robot
-from studies.whole_system.world import START_RATE, flights, fly, record
+from studies.whole_system.world import START_RATE, flights, fly, hand_speed, record
 
 __all__ = ["Result", "main", "run"]
 
@@ -78,7 +78,7 @@ def run(
                 )
             )
         coverage = covered(drawings, repeats, seed, torques=False, duration=0.5 * duration, progress=tell)
-    return Result(truth, drawings, known, tuple(cases), coverage, methods, duration)
+    return Result(truth, drawings, known, tuple(cases), coverage, methods, duration, hand_speed(best, truth))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

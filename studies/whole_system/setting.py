@@ -14,11 +14,11 @@ from bayesid.robot import Load
 from bayesid.torque import TorqueSensor
 from studies.planning.world import guess_about
 
-__all__ = ["BASE", "LOAD", "bodies", "drawn", "friction_effects", "model_of", "spreads", "true_robot"]
+__all__ = ["BASE", "LOAD", "TIP", "bodies", "drawn", "friction_effects", "model_of", "spreads", "true_robot"]
 
 Floats = NDArray[np.floating]
 
-BASE, LOAD, HAND = "base_link", "load", "link6"
+BASE, LOAD, HAND, TIP = "base_link", "load", "link6", "tip"
 
 ARM, BASE_SPREAD, LOAD_SPREAD = 0.05, 0.3, 1.0
 """Relative widths of the priors in log-Cholesky coordinates: drawings of the arm, a base partly out of fuel, a load."""

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, MeasuredMotion, Recording, Robot
+from bayesid.motion import JointState
+from bayesid.tables import joint_motion, kinematics
 from studies.ets7_drift.world import simulator
 from studies.whole_system.setting import (
     ACCEL,
@@ -18,11 +20,12 @@ from studies.whole_system.setting import (
     POINT,
     RADIUS,
     RATE,
+    TIP,
     TORQUE,
     VISCOUS,
 )
 
-__all__ = ["START_RATE", "flights", "fly", "record"]
+__all__ = ["START_RATE", "flights", "fly", "hand_speed", "record"]
 
 Floats = NDArray[np.floating]
 
@@ -80,6 +83,14 @@ def fly(
     motion = truth.smooth_motion(len(size), duration, seed, amplitude=size, centre=centre)
     time = np.arange(0.0, duration + 1e-9, INTERVAL)
     return model.run(motion, time, rate0=START_RATE, step=STEP)
+
+
+def hand_speed(run: Any, robot: Robot) -> float:
+    """Return the largest speed of the end-effector relative to the base [m/s]."""
+    moved = kinematics(robot, JointState(run.position, run.speed, run.acceleration))
+    link = robot.link(TIP)
+    _, flow, _ = joint_motion(moved, link.joint)
+    return float(np.linalg.norm((flow @ link.placement)[:, :3, 3], axis=1).max())
 
 
 def record(run: Any, robot: Robot, name: str, rng: np.random.Generator | None, *, friction: bool = True) -> Manoeuvre:
