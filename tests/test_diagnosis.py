@@ -84,6 +84,7 @@ def test_an_effect_of_the_user_becomes_a_candidate(tmp_path):
     assert any(name.startswith("payload:") for name in names)
 
 
+@pytest.mark.usefixtures("slow")  # the hidden causes of the catalogue, with another simulator
 def test_slosh_in_basilisk_is_found(tmp_path):
     result = run(write_basilisk_study(tmp_path, 3, hidden=BasiliskHidden(slosh=Slosh())))
     names = {result.verdict.causes, *(rival.labels for rival in result.verdict.rivals)}

@@ -242,12 +242,12 @@ def test_laplace_importance_and_ensemble_agree_on_a_nearly_normal_posterior(plan
     assert error @ np.linalg.solve(optimum.covariance[:10, :10], error) < chi2_distribution(10).ppf(0.9999)
 
 
-def test_the_optimum_is_reached_from_random_starts(planar_posterior):
-    """From 100 draws of a prior of relative width one, at least 95 reach the lowest cost found to 1e-3."""
+def test_the_optimum_is_reached_from_random_starts(planar_posterior, request):
+    """From draws of a prior of relative width one, at least 95 % reach the lowest cost found to 1e-3."""
     posterior = planar_posterior(np.random.default_rng(2), spread=1.0, step=0.5)
     rng, first = np.random.default_rng(3), posterior.initial_point()
-    costs = []
-    for _ in range(100):
+    costs, count = [], 100 if request.config.getoption("--catalogue") else 40
+    for _ in range(count):
         start = first.copy()
         start[:10] = rng.normal(size=10)
         costs.append(fit(posterior, start).cost)
@@ -255,7 +255,7 @@ def test_the_optimum_is_reached_from_random_starts(planar_posterior):
     reached = int((np.array(costs) < best + 1e-3).sum())
     print("reached", reached, "best", best)
     assert min(costs) > best - 1e-3  # nothing better than from the prior's centre
-    assert reached >= 95
+    assert reached >= 0.95 * count
 
 
 def test_the_truth_is_covered_as_often_as_stated(planar_case, noisy):
