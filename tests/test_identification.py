@@ -55,7 +55,16 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+LONG = ("ets7", "known thrust")
+"""Cases left to ``--catalogue``."""
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    if "name" in metafunc.fixturenames:
+        every = metafunc.config.getoption("--catalogue")
+        metafunc.parametrize("name", [name for name in CASES if every or name not in LONG])
+
+
 def test_truth_lies_inside_the_posterior_and_noise_is_all_that_is_left(name: str, tmp_path: Path) -> None:
     case = CASES[name]
     made = write_study(

@@ -21,6 +21,7 @@ def result() -> load.Result:
     return load.run()
 
 
+@pytest.mark.usefixtures("slow")
 def test_the_load_is_found_from_a_guess_of_a_thirtieth(result):
     assert len(result.iterations) == 2
     for iteration, printed in zip(result.iterations, paper.RESULTS, strict=True):
@@ -28,6 +29,7 @@ def test_the_load_is_found_from_a_guess_of_a_thirtieth(result):
         assert np.abs(errors(printed)).max() > 1e3 * iteration.worst
 
 
+@pytest.mark.usefixtures("slow")
 def test_the_second_manoeuvre_is_another_and_both_keep_the_limits(result):
     first, second = (iteration.parameters for iteration in result.iterations)
     assert np.abs(first - second).max() > 0.01
@@ -50,6 +52,7 @@ def test_only_one_reading_of_the_printed_inertia_is_a_body():
         assert [reading.physical for reading in paper.readings(printed)] == [True, False]
 
 
+@pytest.mark.usefixtures("slow")
 def test_the_report_is_written(result, tmp_path: Path):
     write(result.iterations, result.flights, tmp_path / "load.pdf")
     assert (tmp_path / "load.pdf").read_bytes().startswith(b"%PDF")
