@@ -8,6 +8,8 @@ from studies.ets7_drift import CAUSES, run
 from studies.ets7_drift.report import write_report
 from studies.ets7_drift.world import ATTITUDE_SIGMA
 
+pytestmark = pytest.mark.usefixtures("slow")  # a hidden pair is named in the tests of the catalogue
+
 NAMES = ("gravity-gradient", "wheel-momentum", "aerodynamic-drag", "thruster-leak", "rate-bias", "rate-drift")
 
 

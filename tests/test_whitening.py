@@ -197,6 +197,7 @@ def trajectory_basis(joint) -> np.ndarray:
     return root @ right[singular > 2e-2 * singular[0]].T
 
 
+@pytest.mark.usefixtures("slow")  # a fit of every joint sample beside the bodies
 def test_marginalised_encoder_noise_equals_errors_in_variables():
     """Minimise over the base and over both joints' whole trajectories at once, and compare.
 
