@@ -5,30 +5,33 @@ A study names a robot, its sensors and recordings; its posterior is identified b
     study = bayesid.Study.load("study.toml")
     result = bayesid.identify(bayesid.load_posterior(study), seed=1)
     print(result.bodies["base_link"].mean)
+
+Names are loaded when they are first used (PEP 562), so that the import itself costs nothing.
 """
 
+from __future__ import annotations
+
+import importlib
+import os
+import sys
 import warnings
+from typing import TYPE_CHECKING
 
-import jax
-
-jax.config.update("jax_enable_x64", True)
-# the pinned ArviZ announces its successor at every import
-warnings.filterwarnings("ignore", message="\\s*ArviZ is undergoing", category=FutureWarning)
-
-from bayesid.assemble import load_posterior  # noqa: E402
-from bayesid.effects import Effect, register  # noqa: E402
-from bayesid.errors import InputError  # noqa: E402
-from bayesid.inertia import InertialParameters  # noqa: E402
-from bayesid.inference import Identification, identify  # noqa: E402
-from bayesid.model import Manoeuvre, Model  # noqa: E402
-from bayesid.motion import Excitation, MeasuredMotion  # noqa: E402
-from bayesid.orbit import Orbit  # noqa: E402
-from bayesid.posterior import Posterior  # noqa: E402
-from bayesid.recording import Recording  # noqa: E402
-from bayesid.robot import Load, Robot  # noqa: E402
-from bayesid.sensors import Kind, Sensor, White  # noqa: E402
-from bayesid.study import Study  # noqa: E402
-from bayesid.unknowns import BodyPrior  # noqa: E402
+if TYPE_CHECKING:
+    from bayesid._io.errors import InputError
+    from bayesid.app.schema import Study
+    from bayesid.app.study_to_model import load_manoeuvres, load_model, load_posterior
+    from bayesid.inference.identification import Identification, identify
+    from bayesid.inference.posterior import Posterior
+    from bayesid.recording.joint_motion import Excitation, MeasuredMotion
+    from bayesid.recording.recording import Recording
+    from bayesid.robot.body_prior import BodyPrior
+    from bayesid.robot.inertial_parameters import InertialParameters
+    from bayesid.robot.robot import Load, Robot
+    from bayesid.simulation.effects import Effect, Parameter, Wrench, register
+    from bayesid.simulation.model import Manoeuvre, Model
+    from bayesid.simulation.orbit import Orbit
+    from bayesid.simulation.sensors import Kind, Sensor, White
 
 __all__ = [
     "BodyPrior",
@@ -43,13 +46,64 @@ __all__ = [
     "MeasuredMotion",
     "Model",
     "Orbit",
+    "Parameter",
     "Posterior",
     "Recording",
     "Robot",
     "Sensor",
     "Study",
     "White",
+    "Wrench",
     "identify",
+    "load_manoeuvres",
+    "load_model",
     "load_posterior",
     "register",
 ]
+
+_PLACES = {
+    "BodyPrior": "robot.body_prior",
+    "Effect": "simulation.effects",
+    "Excitation": "recording.joint_motion",
+    "Identification": "inference.identification",
+    "InertialParameters": "robot.inertial_parameters",
+    "InputError": "_io.errors",
+    "Kind": "simulation.sensors",
+    "Load": "robot.robot",
+    "Manoeuvre": "simulation.model",
+    "MeasuredMotion": "recording.joint_motion",
+    "Model": "simulation.model",
+    "Orbit": "simulation.orbit",
+    "Parameter": "simulation.effects",
+    "Posterior": "inference.posterior",
+    "Recording": "recording.recording",
+    "Robot": "robot.robot",
+    "Sensor": "simulation.sensors",
+    "Study": "app.schema",
+    "White": "simulation.sensors",
+    "Wrench": "simulation.effects",
+    "identify": "inference.identification",
+    "load_manoeuvres": "app.study_to_model",
+    "load_model": "app.study_to_model",
+    "load_posterior": "app.study_to_model",
+    "register": "simulation.effects",
+}
+
+# JAX computes in 64 bits; set without importing it
+if "jax" in sys.modules:
+    sys.modules["jax"].config.update("jax_enable_x64", True)
+else:
+    os.environ["JAX_ENABLE_X64"] = "True"
+# the pinned ArviZ announces its successor at every import
+warnings.filterwarnings("ignore", message="\\s*ArviZ is undergoing", category=FutureWarning)
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name."""
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

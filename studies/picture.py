@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from bayesid import Study, load_posterior
-from bayesid.demo import write_demo
+from bayesid.app.demonstration import write_demo
 from bayesid.inference import maximise
 from bayesid.report import figures
 

@@ -12,17 +12,18 @@ import jax
 import numpy as np
 import pytest
 
-from bayesid.compiled import keep_compiled
-from bayesid.effects import GravityGradient
-from bayesid.inertia import InertialParameters
-from bayesid.model import Manoeuvre, Model
-from bayesid.motion import JointState, MeasuredMotion
-from bayesid.orbit import Orbit
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.unknowns import BodyPrior
+from bayesid.app.compilation_cache import keep_compiled
+from bayesid.inference.posterior import Posterior
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import GravityGradient
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Kind, Sensor, White
 from tests import mujoco_truth as mj
 from tests.reference import moving_joints
 
@@ -54,7 +55,7 @@ def slow(request: pytest.FixtureRequest) -> None:
 
 
 ROOT = Path(__file__).resolve().parents[1]
-PLANAR = ROOT / "bayesid" / "robots" / "planar.urdf"
+PLANAR = ROOT / "bayesid" / "robot" / "models" / "planar.urdf"
 
 SIGMA = 1e-5
 """Of the small case's rate [rad/s] and accelerometer [m/s2]."""

@@ -10,15 +10,15 @@ import pytest
 import scipy.linalg as sla
 
 from bayesid import InputError
-from bayesid.dynamics import Start, simulate
-from bayesid.effects import GravityGradient
-from bayesid.grid import build_grid
 from bayesid.identifiability import Base, BaseParameters, base_parameters
-from bayesid.identifiability.equations import massive_bodies, stacked_regressor
-from bayesid.inertia import BASIS, InertialParameters, parameters_from_pseudo_inertia
-from bayesid.orbit import Orbit
-from bayesid.robot import Load, Robot
-from bayesid.tables import configuration, joint_twist
+from bayesid.identifiability.stacked_regressor import massive_bodies, stacked_regressor
+from bayesid.robot.inertial_parameters import BASIS, InertialParameters, parameters_from_pseudo_inertia
+from bayesid.robot.kinematics import configuration, joint_twist
+from bayesid.robot.robot import Load, Robot
+from bayesid.simulation.dynamics import Start, simulate
+from bayesid.simulation.effects import GravityGradient
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.time_grid import build_grid
 from tests import mujoco_truth as mj
 from tests.trees import random_body, random_tree
 

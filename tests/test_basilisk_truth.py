@@ -33,10 +33,10 @@ from mujoco_truth import (
 from scipy.interpolate import make_interp_spline
 from scipy.stats import chi2
 
-from bayesid.assemble import load_posterior
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_posterior
 from bayesid.inference import maximise
-from bayesid.inference.identification import bodies_of
-from bayesid.study import Study
+from bayesid.inference.body_quantities import bodies_of
 
 ACCEL_POSITION = (0.1, -0.15, 0.3)
 SHORT = Manoeuvres(count=2, duration=80.0)

@@ -12,20 +12,21 @@ from conftest import PLANAR
 from scipy.optimize import least_squares
 from test_unknowns import CENTRE, OTHER
 
-from bayesid.assemble import load_model, load_robot
-from bayesid.carry import InertialDraws, joint_prior
-from bayesid.change import BodyChange
-from bayesid.errors import InputError
-from bayesid.inertia import InertialParameters
-from bayesid.model import Manoeuvre, Model
-from bayesid.motion import JointState
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.simulation import blank_channels, simulate_recordings
-from bayesid.study import Study
-from bayesid.unknowns import BodyPrior, Unknowns, draw_inertial
+from bayesid._io.errors import InputError
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_model, load_robot
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.posterior_as_prior import InertialDraws, joint_prior
+from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
+from bayesid.inference.unknowns import Unknowns
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior, draw_inertial
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.mass_property_change import BodyChange
+from bayesid.robot.robot import Robot
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import Kind, Sensor, White
 
 NAMES = ("base_link", "load")
 

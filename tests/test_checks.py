@@ -22,8 +22,8 @@ from bayesid import (
     Sensor,
     White,
 )
-from bayesid.checks import check_recording
-from bayesid.simulation import simulate_manoeuvre
+from bayesid.inference.recording_check import check_recording
+from bayesid.inference.simulated_recordings import simulate_manoeuvre
 
 SIGMA = 1e-5
 TIME = np.arange(0.0, 140.01, 0.5)  # at rest from 100 s

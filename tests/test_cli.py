@@ -12,7 +12,7 @@ import pytest
 from mujoco_truth import Manoeuvres, TruthModel, write_study
 from typer.testing import CliRunner
 
-from bayesid.cli import app
+from bayesid.app.command_line import app
 
 ROBOTS = Path(__file__).parent / "robots"
 

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from bayesid._io.errors import InputError
 from bayesid.design import (
     AOptimal,
     BSplines,
@@ -26,19 +27,21 @@ from bayesid.design import (
     Search,
     Separation,
     Tip,
-    design,
 )
-from bayesid.design.planned import Outcome, Trajectory
-from bayesid.effects import Effect, Parameter
-from bayesid.errors import InputError
-from bayesid.inertia import InertialParameters, log_cholesky_vector, mass_com_inertia
-from bayesid.model import Model
-from bayesid.motion import Motion
-from bayesid.regressors import balance_regressor
-from bayesid.robot import Robot
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.tables import configuration, kinematics, link_table
-from bayesid.unknowns import BodyPrior
+from bayesid.design import (
+    designed as design,
+)
+from bayesid.design.plan import Outcome, Trajectory
+from bayesid.recording.joint_motion import Motion
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.composite_tables import link_table
+from bayesid.robot.inertial_parameters import InertialParameters, log_cholesky_vector, mass_com_inertia
+from bayesid.robot.kinematics import configuration, kinematics
+from bayesid.robot.regressors import balance_regressor
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import Effect, Parameter
+from bayesid.simulation.model import Model
+from bayesid.simulation.sensors import Kind, Sensor, White
 
 BASE_INERTIA, WHEEL_INERTIA, MASS, SLIDER = 3.0, 0.5, 20.0, 5.0
 SIGMA = 1e-4

@@ -12,17 +12,17 @@ from conftest import PLANAR
 from scipy.interpolate import make_interp_spline
 from test_cli import run
 
-from bayesid import commands
+from bayesid._io.errors import InputError
+from bayesid.app import commands
+from bayesid.app.schema import Study
+from bayesid.app.study_to_design import encoders, load_problem
 from bayesid.design import Store
-from bayesid.design.from_study import encoders, load_problem
-from bayesid.design.optimise import _Run
-from bayesid.design.planned import Tip
-from bayesid.design.posture import extended_posture
-from bayesid.errors import InputError
-from bayesid.recording import Recording
-from bayesid.report import design as report
-from bayesid.robot import Robot
-from bayesid.study import Study
+from bayesid.design.extended_posture import extended_posture
+from bayesid.design.trajectory_search import _Run
+from bayesid.recording.recording import Recording
+from bayesid.report import design_report as report
+from bayesid.robot.end_effector import Tip
+from bayesid.robot.robot import Robot
 from studies.base_body.setting import extended_wrist
 
 TIP_SPEED, TIP_RATE = 0.15, 0.12

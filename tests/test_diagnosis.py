@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bayesid.assemble import load_manoeuvres, load_model
-from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
-from bayesid.diagnosis.diagnosis import extended_start
-from bayesid.diagnosis.engine import Engine
-from bayesid.diagnosis.faults import noise_fault
-from bayesid.diagnosis.scale import SCALES, log_mixture
-from bayesid.diagnosis.scores import chi2_log_sf
-from bayesid.effects import create
-from bayesid.posterior import Posterior
-from bayesid.study import Study
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.diagnosis import Diagnosis, Status, diagnose
+from bayesid.diagnosis import candidate_effects as candidates
+from bayesid.diagnosis.amplitude_scale import SCALES, log_mixture
+from bayesid.diagnosis.diagnose import extended_start
+from bayesid.diagnosis.noise_faults import noise_fault
+from bayesid.diagnosis.perturbed_fit import Engine
+from bayesid.diagnosis.score_tests import chi2_log_sf
+from bayesid.inference.posterior import Posterior
+from bayesid.simulation.effects import create
 from tests import hidden
 from tests.basilisk_truth import BasiliskHidden, Slosh, write_basilisk_study
 

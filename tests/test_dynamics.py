@@ -11,19 +11,20 @@ import pinocchio as pin
 import pytest
 from scipy.linalg import expm
 
-from bayesid.dynamics import Start, simulate
-from bayesid.effects import GravityGradient, Readings, WheelMomentum
-from bayesid.grid import Actions, build_grid, pad_grids
-from bayesid.orbit import Orbit
-from bayesid.recording import Recording
-from bayesid.robot import Robot
+from bayesid.recording.actions import Actions
+from bayesid.recording.recording import Recording
+from bayesid.robot.robot import Robot
+from bayesid.simulation.dynamics import Start, simulate
+from bayesid.simulation.effects import GravityGradient, Readings, WheelMomentum
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.time_grid import build_grid, pad_grids
 from tests import mujoco_truth as mj
 from tests import reference as ref
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS = {
-    "ets7": ROOT / "bayesid" / "robots" / "ets7.urdf",
-    "planar": ROOT / "bayesid" / "robots" / "planar.urdf",
+    "ets7": ROOT / "bayesid" / "robot" / "models" / "ets7.urdf",
+    "planar": ROOT / "bayesid" / "robot" / "models" / "planar.urdf",
     "branched": ROOT / "tests" / "robots" / "branched.urdf",
     "servicer4": ROOT / "tests" / "robots" / "servicer4.urdf",
 }

@@ -11,21 +11,21 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from bayesid.effects import Effect, Parameter, Readings, Wrench, create, register
-from bayesid.effects.base import _REGISTER, Composite, Environment, Moment
-from bayesid.errors import InputError
-from bayesid.inference.optimum import maximise
-from bayesid.model import Manoeuvre, Model
-from bayesid.motion import MeasuredMotion
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.unknowns import BodyPrior
+from bayesid._io.errors import InputError
+from bayesid.inference.mode import maximise
+from bayesid.inference.posterior import Posterior
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import Effect, Parameter, Readings, Wrench, create, register
+from bayesid.simulation.effects.effect import _REGISTER, Composite, Environment, Moment
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import Kind, Sensor, White
 from tests import mujoco_truth as mj
 from tests import reference as ref
 
-PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robots" / "planar.urdf"
+PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf"
 HOOKS = ("momentum", "wrench", "derivative", "field", "read", "tide", "friction")
 
 

@@ -7,27 +7,27 @@ import pytest
 import scipy.linalg as sla
 from conftest import ENCODER, ORBIT, PLANAR, POINT, SIGMA, STEP
 
-from bayesid.effects import GravityGradient
-from bayesid.identifiability.candidates import NotEvaluated, Swung, candidates
+from bayesid.identifiability.added_information import NotEvaluated, Swung, candidates
+from bayesid.identifiability.direction_words import describe, subject
 from bayesid.identifiability.directions import Direction, directions
-from bayesid.identifiability.experiment import Experiment, Predictor
-from bayesid.identifiability.knowledge import Knowledge
+from bayesid.identifiability.hypothetical_experiment import Experiment, Predictor
+from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.identifiability.normality import Draws, Method, shape_errors, weighted_quantile
-from bayesid.identifiability.parameters import quantity_of
-from bayesid.identifiability.practical import covers_all
-from bayesid.identifiability.profile import Target, profile
-from bayesid.identifiability.words import describe, subject
+from bayesid.identifiability.parameter_table import quantity_of
+from bayesid.identifiability.practical_identifiability import covers_all
+from bayesid.identifiability.profile_interval import Target, profile
 from bayesid.inference import maximise
-from bayesid.inference.identification import linearise
-from bayesid.inference.learnt import Learnt, Verdict, compare
-from bayesid.model import Manoeuvre, Model
-from bayesid.motion import MeasuredMotion
-from bayesid.orbit import Orbit
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.unknowns import BodyPrior
+from bayesid.inference.body_quantities import linearise
+from bayesid.inference.contraction import Learnt, Verdict, compare
+from bayesid.inference.posterior import Posterior
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import GravityGradient
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Kind, Sensor, White
 from tests import mujoco_truth as mj
 
 KEYS = ("mass", "com.x", "com.y", "com.z", *(f"inertia.{pair}" for pair in ("xx", "yy", "zz", "xy", "xz", "yz")))

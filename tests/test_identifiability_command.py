@@ -11,7 +11,7 @@ import pytest
 from conftest import ENCODER, ORBIT, PLANAR, POINT, SIGMA
 from test_cli import run
 
-from bayesid.recording import Recording
+from bayesid.recording.recording import Recording
 from bayesid.report import document
 
 STUDY = f"""

@@ -12,10 +12,10 @@ from scipy.stats import chi2
 
 import bayesid
 from bayesid.inference import maximise
-from bayesid.inference.identification import bodies_of
+from bayesid.inference.body_quantities import bodies_of
 
 ROBOTS = Path(__file__).parent / "robots"
-SHIPPED = Path(bayesid.__file__).parent / "robots"
+SHIPPED = Path(bayesid.__file__).parent / "robot" / "models"
 EXAMPLES = Path(__file__).parents[2] / "shared" / "examples"
 
 

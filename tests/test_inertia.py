@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bayesid.errors import InputError
-from bayesid.inertia import (
+from bayesid._io.errors import InputError
+from bayesid.robot.inertial_parameters import (
     BASIS,
     InertialParameters,
     log_cholesky_factor,

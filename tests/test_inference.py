@@ -10,16 +10,16 @@ import pytest
 from scipy.stats import chi2 as chi2_distribution
 from scipy.stats import kstest, norm
 
-from bayesid.errors import InputError
-from bayesid.inference.charts import LogCholeskyChart
+from bayesid._io.errors import InputError
 from bayesid.inference.ensemble import BLOCK, LaplaceMove, sample
 from bayesid.inference.identification import identify
 from bayesid.inference.importance import importance_sample
-from bayesid.inference.optimum import Optimum, fit, maximise
+from bayesid.inference.mode import Optimum, fit, maximise
 from bayesid.inference.proposal import StudentT
-from bayesid.model import Manoeuvre
-from bayesid.motion import MeasuredMotion
-from bayesid.unknowns import coordinates_of
+from bayesid.inference.sampling_coordinates import LogCholeskyChart
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.robot.body_prior import coordinates_of
+from bayesid.simulation.model import Manoeuvre
 
 # a posterior known in closed form -------------------------------------------------------------------------------------
 

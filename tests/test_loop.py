@@ -13,7 +13,7 @@ import pytest
 from conftest import PLANAR
 from jax import Array
 
-from bayesid.carry import InertialDraws
+from bayesid._io.errors import InputError
 from bayesid.design import (
     BSplines,
     Laplace,
@@ -28,18 +28,18 @@ from bayesid.design import (
     Tip,
 )
 from bayesid.design.criteria import covariance
-from bayesid.design.loop import flown
-from bayesid.design.planned import Outcome
-from bayesid.design.spacecraft import plan_recording
-from bayesid.design.update import bodies_of_draws, known_of
-from bayesid.errors import InputError
-from bayesid.inertia import InertialParameters
-from bayesid.model import Model
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.unknowns import BodyPrior
+from bayesid.design.excitation_loop import flown
+from bayesid.design.knowledge_update import bodies_of_draws, known_of
+from bayesid.design.plan import Outcome
+from bayesid.design.simulated_spacecraft import plan_recording
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.posterior_as_prior import InertialDraws
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.robot import Robot
+from bayesid.simulation.model import Model
+from bayesid.simulation.sensors import Kind, Sensor, White
 
 ENCODER = {0: 1e-6}
 SENSORS = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(2e-5), position=(0.1, -0.15, 0.3)))

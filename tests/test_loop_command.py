@@ -10,11 +10,11 @@ import pytest
 from conftest import PLANAR
 from test_cli import run
 
+from bayesid.app.loop_command import load_spacecraft, problem_of
+from bayesid.app.schema import Study
 from bayesid.design import Loop
-from bayesid.design.history import History
-from bayesid.loop_command import load_spacecraft, problem_of
-from bayesid.recording import Recording
-from bayesid.study import Study
+from bayesid.design.loop_history import History
+from bayesid.recording.recording import Recording
 
 STUDY = f"""
 title = "Loop"

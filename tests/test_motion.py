@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesid.errors import InputError
-from bayesid.motion import Excitation, MeasuredMotion, sample_joints
-from bayesid.recording import Recording
-from bayesid.robot import Robot
+from bayesid._io.errors import InputError
+from bayesid.recording.joint_motion import Excitation, MeasuredMotion, sample_joints
+from bayesid.recording.recording import Recording
+from bayesid.robot.robot import Robot
 
 BRANCHED = Path(__file__).parent / "robots" / "branched.urdf"
 EXCITATION = Excitation([0.3, -0.5], [0.6, 0.2], 0.25, periods=2, ramp=10.0, start=[0.1, 0.0])

@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from bayesid.dynamics import composite, rotation
-from bayesid.effects import GravityGradient
-from bayesid.effects.base import Environment, Moment
-from bayesid.errors import InputError
-from bayesid.motion import JointState
-from bayesid.orbit import EARTH, Orbit
-from bayesid.robot import Robot
-from bayesid.tables import kinematics, link_table
+from bayesid._io.errors import InputError
+from bayesid._math.rotation import rotation
+from bayesid.robot.composite_tables import link_table
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.robot import Robot
+from bayesid.simulation.dynamics import composite
+from bayesid.simulation.effects import GravityGradient
+from bayesid.simulation.effects.effect import Environment, Moment
+from bayesid.simulation.orbit import EARTH, Orbit
 from tests.reference import Reference, circular_zenith
 
 TIME = np.linspace(0.0, 6000.0, 41)

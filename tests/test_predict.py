@@ -11,17 +11,17 @@ from conftest import ORBIT, PLANAR
 from scipy.spatial.transform import Rotation
 from test_cli import run
 
-from bayesid.effects import GravityGradient
-from bayesid.errors import InputError
-from bayesid.model import Manoeuvre, Model
-from bayesid.motion import MeasuredMotion
-from bayesid.orbit import Orbit
-from bayesid.pose import REACH, Region
-from bayesid.predict import Predictor
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.unknowns import BodyPrior
+from bayesid._io.errors import InputError
+from bayesid.design.base_prediction import Predictor
+from bayesid.design.pose_region import REACH, Region
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import GravityGradient
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Kind, Sensor, White
 from tests import mujoco_truth as mj
 
 ATTITUDE = Rotation.from_euler("xyz", [0.3, -0.5, 1.1]).as_quat()

@@ -9,8 +9,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from bayesid.errors import InputError
-from bayesid.recording import Recording
+from bayesid._io.errors import InputError
+from bayesid.recording.recording import Recording
 
 EXAMPLES = Path(__file__).parents[2] / "shared" / "examples"
 ROWS = 10

@@ -21,8 +21,8 @@ from tests.reference import Response, circular_zenith, moving_joints, simulate
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT.parent / "shared" / "examples"
 ROBOTS = {
-    "ets7": ROOT / "bayesid" / "robots" / "ets7.urdf",
-    "planar": ROOT / "bayesid" / "robots" / "planar.urdf",
+    "ets7": ROOT / "bayesid" / "robot" / "models" / "ets7.urdf",
+    "planar": ROOT / "bayesid" / "robot" / "models" / "planar.urdf",
     "branched": ROOT / "tests" / "robots" / "branched.urdf",
     "servicer4": ROOT / "tests" / "robots" / "servicer4.urdf",
 }

@@ -7,10 +7,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bayesid.motion import JointState
-from bayesid.regressors import balance_regressor, gradient_regressor, momentum_regressor, torque_regressor
-from bayesid.robot import Robot
-from bayesid.tables import configuration, kinematics, link_table
+from bayesid.robot.composite_tables import link_table
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import configuration, kinematics
+from bayesid.robot.regressors import balance_regressor, gradient_regressor, momentum_regressor, torque_regressor
+from bayesid.robot.robot import Robot
 from tests.trees import random_tree
 
 TREES = {

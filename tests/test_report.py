@@ -10,25 +10,25 @@ import pytest
 import typst
 from matplotlib.figure import Figure
 
-from bayesid.effects import AccelBias, GravityGradient
-from bayesid.errors import InputError
+from bayesid._io.errors import InputError
 from bayesid.inference import identify
-from bayesid.model import Manoeuvre, Model
-from bayesid.motion import Excitation, sample_joints
-from bayesid.orbit import Orbit
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
+from bayesid.inference.posterior import Posterior
+from bayesid.recording.joint_motion import Excitation, sample_joints
+from bayesid.recording.recording import Recording
 from bayesid.report import Document, figures, format_quantity, identification_report
-from bayesid.report.assumed import model_sentences
+from bayesid.report.assumptions import model_sentences
 from bayesid.report.document import literal
-from bayesid.report.figures.robot import equivalent_box
-from bayesid.report.figures.uncertainty import widths
-from bayesid.report.fit import sensor_fits
+from bayesid.report.figures.robot_figures import equivalent_box
+from bayesid.report.figures.uncertainty_figures import widths
+from bayesid.report.identification_text import verdict
 from bayesid.report.numbers import format_number, format_unit
-from bayesid.report.text import verdict
-from bayesid.robot import Robot
-from bayesid.sensors import Filter, Kind, Sensor, White
-from bayesid.unknowns import BodyPrior
+from bayesid.report.sensor_fit import sensor_fits
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import AccelBias, GravityGradient
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Filter, Kind, Sensor, White
 
 ROOT = Path(__file__).resolve().parents[1]
 

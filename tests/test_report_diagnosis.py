@@ -8,19 +8,31 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bayesid.diagnosis import Candidate, Frame, Gain, Hypothesis, Status, Unexplained, Verdict, candidates, diagnose
-from bayesid.effects import known_effects
-from bayesid.effects.base import Quantity
-from bayesid.model import Manoeuvre
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
+from bayesid.diagnosis import (
+    Candidate,
+    Frame,
+    Gain,
+    Hypothesis,
+    Status,
+    Unexplained,
+    Verdict,
+    diagnose,
+)
+from bayesid.diagnosis import (
+    candidate_effects as candidates,
+)
+from bayesid.inference.posterior import Posterior
+from bayesid.recording.recording import Recording
 from bayesid.report import diagnosis_report, figures
 from bayesid.report import diagnosis_tables as tables
 from bayesid.report import diagnosis_text as text
-from bayesid.report.advice import adequate_too, advice, imitation, moves_with, unseen
-from bayesid.report.diagnosis import diagnosis_sentences
-from bayesid.report.figures.diagnosis import torque_amplitudes
-from bayesid.report.residuals import Residuals
+from bayesid.report.diagnosis_advice import adequate_too, advice, imitation, moves_with, unseen
+from bayesid.report.diagnosis_report import diagnosis_sentences
+from bayesid.report.figures.diagnosis_figures import torque_amplitudes
+from bayesid.report.residual_series import Residuals
+from bayesid.simulation.effects import known_effects
+from bayesid.simulation.effects.effect import Quantity
+from bayesid.simulation.model import Manoeuvre
 
 BIAS = 4e-5
 HIDDEN = ["accel-bias", "accel-drift", "rate-bias", "rate-noise", "wheel-momentum", "thruster-leak"]
@@ -257,7 +269,9 @@ def test_reports_of_all_verdicts_are_pdfs(biased, clean, disturbance, tmp_path, 
 
 def test_the_identification_follows_the_diagnosis(biased, tmp_path, monkeypatch):
     added = []
-    monkeypatch.setattr("bayesid.report.diagnosis.add_identification", lambda _, result, said: added.append(result))
+    monkeypatch.setattr(
+        "bayesid.report.diagnosis_report.add_identification", lambda _, result, said: added.append(result)
+    )
     sampled = SimpleNamespace()
     diagnosis_report(biased, sampled, "Study", tmp_path / "report.pdf")
     assert added == [sampled]

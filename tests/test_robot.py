@@ -9,18 +9,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bayesid.errors import InputError
-from bayesid.inertia import InertialParameters
-from bayesid.motion import JointState
-from bayesid.robot import Load, Robot
-from bayesid.tables import ENTRIES, kinematics, link_table
-from bayesid.unknowns import BodyPrior, coordinates_of
+from bayesid._io.errors import InputError
+from bayesid.robot.body_prior import BodyPrior, coordinates_of
+from bayesid.robot.composite_tables import ENTRIES, link_table
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.robot import Load, Robot
 from tests import mujoco_truth as mj
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS = {
-    "ets7": ROOT / "bayesid" / "robots" / "ets7.urdf",
-    "planar": ROOT / "bayesid" / "robots" / "planar.urdf",
+    "ets7": ROOT / "bayesid" / "robot" / "models" / "ets7.urdf",
+    "planar": ROOT / "bayesid" / "robot" / "models" / "planar.urdf",
     "branched": ROOT / "tests" / "robots" / "branched.urdf",
     "servicer4": ROOT / "tests" / "robots" / "servicer4.urdf",
 }
@@ -85,7 +86,7 @@ def test_composite_body_agrees_with_both_witnesses(name):
 
 
 def test_every_shipped_robot_loads():
-    folder = ROOT / "bayesid" / "robots"
+    folder = ROOT / "bayesid" / "robot" / "models"
     names = sorted(file.stem for file in folder.glob("*.urdf"))
     assert {"ets7", "planar"} <= set(names)
     for name in names:

@@ -7,11 +7,12 @@ import pinocchio as pin
 import pytest
 
 from bayesid.identifiability import base_parameters, consistent_accelerations, determined, rates_at_rest
-from bayesid.identifiability.equations import massive_bodies, random_motion
-from bayesid.motion import JointState
-from bayesid.regressors import balance_regressor, gradient_regressor, torque_regressor
-from bayesid.robot import Robot
-from bayesid.tables import configuration, kinematics, link_table
+from bayesid.identifiability.stacked_regressor import massive_bodies, random_motion
+from bayesid.robot.composite_tables import link_table
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import configuration, kinematics
+from bayesid.robot.regressors import balance_regressor, gradient_regressor, torque_regressor
+from bayesid.robot.robot import Robot
 from tests.reference import Reference
 from tests.trees import random_tree
 

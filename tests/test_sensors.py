@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import periodogram
 
-from bayesid.errors import InputError
-from bayesid.sensors import AngleRandomWalk, Filter, Kind, NoiseDensity, Sensor, StarTracker, White
+from bayesid._io.errors import InputError
+from bayesid.simulation.sensors import AngleRandomWalk, Filter, Kind, NoiseDensity, Sensor, StarTracker, White
 
 AXES = (1.0e-5, 2.0e-5, 3.0e-5)
 

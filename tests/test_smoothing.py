@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from bayesid.smoothing import JointSamples, smooth
+from bayesid.recording.smoothing import JointSamples, smooth
 
 SIGMA = 1e-5
 

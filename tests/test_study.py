@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from bayesid.errors import InputError
-from bayesid.study import AccelSensor, AttitudeSensor, RateSensor, Study
+from bayesid._io.errors import InputError
+from bayesid.app.schema import AccelSensor, AttitudeSensor, RateSensor, Study
 
 EXAMPLES = Path(__file__).parents[2] / "shared" / "examples"
 

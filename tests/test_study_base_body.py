@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesid.model import Manoeuvre
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Kind
+from bayesid.inference.posterior import Posterior
+from bayesid.recording.recording import Recording
+from bayesid.robot.robot import Robot
+from bayesid.simulation.model import Manoeuvre
+from bayesid.simulation.sensors import Kind
 from studies import base_body
 from studies.base_body import noise_free, paper, setting
 from studies.base_body.report import write

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bayesid.identifiability import base_parameters
-from bayesid.robot import Robot
+from bayesid.robot.robot import Robot
 from studies.base_parameters import Result, run
 from studies.base_parameters.peers import compare
 from studies.base_parameters.report import write_report

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesid.robot import Robot
+from bayesid.robot.robot import Robot
 from studies.planning.analysis import flight_of, plan, predictor_of
 from studies.planning.world import BASE, START, Guess, Swing, fly, model_of
 

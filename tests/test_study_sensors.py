@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bayesid.inertia import mass_com_inertia
+from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.base_body import paper
 from studies.sensors import Effort, run
 from studies.sensors.draws import Draws

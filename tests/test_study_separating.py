@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesid.motion import JointState
+from bayesid.robot.joint_state import JointState
 from studies.ets7_limits.setting import START
 from studies.separating.expected import Linearised
 from studies.separating.factors import flown, noisy

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesid.inertia import InertialParameters
+from bayesid.robot.inertial_parameters import InertialParameters
 from studies.whole_system import run, write_report
 from studies.whole_system.information import Information, Sensors
 from studies.whole_system.linear import linear_prior, regress

@@ -3,9 +3,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from bayesid.motion import JointState
-from bayesid.robot import Robot
-from bayesid.tables import composite_rows, kinematics, link_table
+from bayesid.robot.composite_tables import composite_rows, link_table
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.robot import Robot
 
 BRANCHED = """<robot name="branched">
   <link name="body"><inertial>

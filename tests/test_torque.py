@@ -9,28 +9,28 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bayesid.checks import refuse_wrong_units
-from bayesid.effects import EncoderOffset, GravityGradient, JointFriction, LinkInertia, TorqueBias
-from bayesid.errors import InputError
-from bayesid.inertia import InertialParameters
-from bayesid.model import Manoeuvre, Model
-from bayesid.motion import JointState
-from bayesid.orbit import Orbit
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.samples import Samples
-from bayesid.sensitivity import joint_sensitivity
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.simulation import simulate_recordings
-from bayesid.torque import TorqueSensor
-from bayesid.unknowns import BodyPrior
+from bayesid._io.errors import InputError
+from bayesid.inference.encoder_noise import joint_sensitivity
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.recording_check import refuse_wrong_units
+from bayesid.inference.sample_grid import Samples
+from bayesid.inference.simulated_recordings import simulate_recordings
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import EncoderOffset, GravityGradient, JointFriction, LinkInertia, TorqueBias
+from bayesid.simulation.joint_torques import TorqueSensor
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Kind, Sensor, White
 from tests import mujoco_truth as mj
 from tests.conftest import ROOT
 from tests.reference import moving_joints
 
 ROBOTS = {
-    "ets7": ROOT / "bayesid" / "robots" / "ets7.urdf",
+    "ets7": ROOT / "bayesid" / "robot" / "models" / "ets7.urdf",
     "branched": ROOT / "tests" / "robots" / "branched.urdf",
 }
 ORBIT = mj.Orbit(6.9e6)

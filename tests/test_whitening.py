@@ -11,22 +11,22 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 
-from bayesid.dynamics import Start, simulate
-from bayesid.errors import InputError
-from bayesid.grid import build_grid
-from bayesid.inference.optimum import maximise
-from bayesid.model import Manoeuvre, Model
-from bayesid.motion import MeasuredMotion
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Filter, Kind, Sensor, White
-from bayesid.smoothing import JointSamples, smooth
-from bayesid.unknowns import BodyPrior
-from bayesid.whitening import Channel, NoiseModel, Whitening, apply, build
+from bayesid._io.errors import InputError
+from bayesid.inference.mode import maximise
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.whitening import Channel, NoiseModel, Whitening, apply, build
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
+from bayesid.recording.smoothing import JointSamples, smooth
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.robot import Robot
+from bayesid.simulation.dynamics import Start, simulate
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import Filter, Kind, Sensor, White
+from bayesid.simulation.time_grid import build_grid
 from tests import mujoco_truth as mj
 
-PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robots" / "planar.urdf"
+PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf"
 TIME = np.arange(0.0, 20.0, 0.5)
 
 

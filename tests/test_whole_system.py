@@ -11,17 +11,17 @@ import pytest
 from scipy import stats
 
 from bayesid.inference import identify
-from bayesid.inference.charts import LinearChart
-from bayesid.inference.optimum import fit
+from bayesid.inference.mode import fit
+from bayesid.inference.posterior import Posterior
 from bayesid.inference.proposal import StudentT
-from bayesid.model import Manoeuvre, Model
-from bayesid.motion import MeasuredMotion
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.torque import TorqueSensor
-from bayesid.unknowns import BodyPrior, draw_inertial
+from bayesid.inference.sampling_coordinates import LinearChart
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior, draw_inertial
+from bayesid.robot.robot import Robot
+from bayesid.simulation.joint_torques import TorqueSensor
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import Kind, Sensor, White
 from tests import mujoco_truth as mj
 from tests.conftest import ENCODER, PLANAR, POINT, SIGMA, STEP
 

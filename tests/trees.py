@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bayesid.inertia import InertialParameters
-from bayesid.robot import Load, Robot
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.robot import Load, Robot
 
 BODY = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
 LIMIT = '<limit lower="-3" upper="3" effort="1" velocity="1"/>'

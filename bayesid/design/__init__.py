@@ -16,17 +16,18 @@ from bayesid.design.criteria import (
     Paper26Intended,
     Separation,
 )
-from bayesid.design.design import Design, best_design, design, evaluate
-from bayesid.design.limits import Limit, Limits
-from bayesid.design.loop import Loop, NotFlown
-from bayesid.design.optimise import Found, Search, optimise
-from bayesid.design.parameterisation import BSplines, Fourier, Linear, PaperExcitation, Parameterisation
-from bayesid.design.planned import Plan, Tip
-from bayesid.design.predicted import Predicted, planned_manoeuvre, planned_posterior, predict
-from bayesid.design.problem import Problem
-from bayesid.design.spacecraft import PlannedMotion, SimulatedSpacecraft, Spacecraft
-from bayesid.design.store import Store
-from bayesid.design.update import Laplace, Sampled, worst_relative_sd
+from bayesid.design.design_problem import Problem
+from bayesid.design.designed import Design, best_design, design, evaluate
+from bayesid.design.excitation_loop import Loop, NotFlown
+from bayesid.design.knowledge_update import Laplace, Sampled, worst_relative_sd
+from bayesid.design.motion_limits import Limit, Limits
+from bayesid.design.plan import Plan
+from bayesid.design.predicted_posterior import Predicted, planned_manoeuvre, planned_posterior, predict
+from bayesid.design.search_store import Store
+from bayesid.design.simulated_spacecraft import PlannedMotion, SimulatedSpacecraft, Spacecraft
+from bayesid.design.trajectories import BSplines, Fourier, Linear, PaperExcitation, Parameterisation
+from bayesid.design.trajectory_search import Found, Search, optimise
+from bayesid.robot.end_effector import Tip
 
 __all__ = [
     "AOptimal",

@@ -13,8 +13,8 @@ from typing import ClassVar, Protocol
 import jax.numpy as jnp
 from jax import Array
 
-from bayesid.design.planned import Outcome, Plan
-from bayesid.errors import InputError
+from bayesid._io.errors import InputError
+from bayesid.design.plan import Outcome, Plan
 
 __all__ = [
     "AOptimal",

@@ -1,11 +1,11 @@
 """What the simulation gets wrong: candidates, tests, search, verdict and gain."""
 
-from bayesid.diagnosis.candidates import candidates
-from bayesid.diagnosis.diagnosis import Diagnosis, diagnose, identify_extended
-from bayesid.diagnosis.evidence import Candidate
+from bayesid.diagnosis.candidate_effects import candidates
+from bayesid.diagnosis.candidate_table import Candidate
+from bayesid.diagnosis.cause_search import Hypothesis, Search
+from bayesid.diagnosis.diagnose import Diagnosis, diagnose, identify_extended
+from bayesid.diagnosis.disturbing_wrench import Frame, Unexplained
 from bayesid.diagnosis.gain import Gain
-from bayesid.diagnosis.search import Hypothesis, Search
-from bayesid.diagnosis.unexplained import Frame, Unexplained
 from bayesid.diagnosis.verdict import Status, Verdict
 
 __all__ = [

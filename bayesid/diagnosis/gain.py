@@ -8,10 +8,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bayesid.arrays import Floats
-from bayesid.diagnosis.search import Hypothesis
-from bayesid.inertia import mass_com_inertia
-from bayesid.inference.identification import BODY_QUANTITIES
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.cause_search import Hypothesis
+from bayesid.inference.body_quantities import BODY_QUANTITIES
+from bayesid.robot.inertial_parameters import mass_com_inertia
 
 __all__ = ["BodyFigures", "Gain", "body_figures", "measure_gain"]
 

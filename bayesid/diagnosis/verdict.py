@@ -8,9 +8,9 @@ from enum import Enum
 
 import numpy as np
 
-from bayesid.arrays import Floats
-from bayesid.diagnosis.search import Hypothesis, Search
-from bayesid.diagnosis.unexplained import Unexplained, unexplained_wrench
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.cause_search import Hypothesis, Search
+from bayesid.diagnosis.disturbing_wrench import Unexplained, unexplained_wrench
 
 __all__ = ["Status", "Verdict", "judge"]
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from bayesid.errors import InputError
-from bayesid.identifiability.candidates import Candidate, NotEvaluated
+from bayesid._io.errors import InputError
+from bayesid.identifiability.added_information import Candidate, NotEvaluated
 from bayesid.identifiability.directions import Direction
-from bayesid.identifiability.experiment import Predictor
-from bayesid.identifiability.knowledge import Knowledge
+from bayesid.identifiability.hypothetical_experiment import Predictor
+from bayesid.identifiability.local_knowledge import Knowledge
 
 __all__ = ["WORST", "Advice", "advise"]
 

@@ -10,7 +10,7 @@ also hides what never moves: a free flyer has no parameters without effect, a fi
 Osuka, IEEE Trans. Robotics and Automation 1990; Khalil and Dombre 2002, section 9.4).
 
 The method is Gautier's (J. Robotic Systems 1991): QR decompositions of the regressor in random states
-(`bayesid.identifiability.decomposition`).
+(`bayesid.identifiability.rank_decomposition`).
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
-from bayesid.arrays import Floats
-from bayesid.errors import InputError
-from bayesid.identifiability.decomposition import ZERO, checked_rank, equilibrated, regrouping, spanning
-from bayesid.identifiability.equations import GRAVITY, Base, massive_bodies, stacked_regressor
-from bayesid.robot import Robot
-from bayesid.tables import joint_twist
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.identifiability.rank_decomposition import ZERO, checked_rank, equilibrated, regrouping, spanning
+from bayesid.identifiability.stacked_regressor import GRAVITY, Base, massive_bodies, stacked_regressor
+from bayesid.robot.kinematics import joint_twist
+from bayesid.robot.robot import Robot
 
 __all__ = ["LINEAR", "BaseParameters", "base_parameters", "standard_names"]
 

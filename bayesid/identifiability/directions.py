@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from bayesid.arrays import Floats
-from bayesid.identifiability.knowledge import Knowledge
-from bayesid.inference.identification import BODY_QUANTITIES
-from bayesid.inference.learnt import Verdict
+from bayesid._math.arrays import Floats
+from bayesid.identifiability.local_knowledge import Knowledge
+from bayesid.inference.body_quantities import BODY_QUANTITIES
+from bayesid.inference.contraction import Verdict
 
 __all__ = ["Direction", "common_factor", "directions"]
 

@@ -8,13 +8,13 @@ from enum import Enum
 
 import numpy as np
 
-from bayesid.arrays import Floats
-from bayesid.identifiability.knowledge import Knowledge
+from bayesid._math.arrays import Floats
+from bayesid.identifiability.local_knowledge import Knowledge
+from bayesid.inference.body_quantities import bodies_of
 from bayesid.inference.ensemble import Progress, sample
-from bayesid.inference.identification import bodies_of
 from bayesid.inference.importance import choose_chart, weighted_draws
-from bayesid.inference.optimum import Optimum
-from bayesid.posterior import Posterior
+from bayesid.inference.mode import Optimum
+from bayesid.inference.posterior import Posterior
 
 __all__ = ["Draws", "Method", "draw", "shape_errors", "weighted_quantile"]
 

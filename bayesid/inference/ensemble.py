@@ -19,12 +19,12 @@ from emcee.autocorr import integrated_time
 from emcee.moves import DEMove, DESnookerMove
 from emcee.moves.red_blue import RedBlueMove
 
-from bayesid.arrays import Floats
-from bayesid.errors import InputError
-from bayesid.inference.charts import Chart
-from bayesid.inference.optimum import Optimum
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.inference.mode import Optimum
+from bayesid.inference.posterior import BATCH, Posterior
 from bayesid.inference.proposal import StudentT
-from bayesid.posterior import BATCH, Posterior
+from bayesid.inference.sampling_coordinates import Chart
 
 __all__ = ["Chains", "LaplaceMove", "Progress", "sample"]
 

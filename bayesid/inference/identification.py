@@ -8,63 +8,33 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
-from bayesid.arrays import Floats
-from bayesid.effects.base import Effect
-from bayesid.inertia import mass_com_inertia
+from bayesid._math.arrays import Floats
+from bayesid.inference.body_quantities import (
+    BODY_QUANTITIES,
+    BodyDraws,
+    bodies_of,
+    body_dict,
+    quantity,
+    reported_effect,
+)
+from bayesid.inference.contraction import Learnt, compare
 from bayesid.inference.ensemble import Chains, Progress, sample
 from bayesid.inference.importance import Evidence, choose_chart, importance_sample
-from bayesid.inference.learnt import Learnt, compare
-from bayesid.inference.optimum import Optimum, maximise
-from bayesid.posterior import Posterior
-from bayesid.unknowns import Unknowns
+from bayesid.inference.mode import Optimum, maximise
+from bayesid.inference.posterior import Posterior
 
-__all__ = ["BODY_QUANTITIES", "BodyDraws", "Identification", "Linearised", "identify", "linearise"]
+__all__ = ["Identification", "identify"]
 
-
-BODY_QUANTITIES = {
-    "mass": "kg",
-    "com.x": "m",
-    "com.y": "m",
-    "com.z": "m",
-    "inertia.xx": "kg m2",
-    "inertia.yy": "kg m2",
-    "inertia.zz": "kg m2",
-    "inertia.xy": "kg m2",
-    "inertia.xz": "kg m2",
-    "inertia.yz": "kg m2",
-}
-"""What is reported of a body, with units; the inertia is about its own centre of mass, in the link's axes."""
 
 PRIOR_DRAWS = 4000
 """From the prior, to compare its widths with the posterior's; always the same ones."""
 
 MEAN_TOLERANCE, WIDTH_TOLERANCE = 0.25, 0.2
 """How far two methods may differ before the result says so: in standard deviations, and relative in their width."""
-
-
-@dataclass(frozen=True)
-class BodyDraws:
-    """Draws of one body's quantities, shape (draws, 10), in the order of `BODY_QUANTITIES`."""
-
-    name: str
-    values: Floats
-
-    @property
-    def mean(self) -> Floats:
-        """Posterior mean, shape (10,)."""
-        return self.values.mean(axis=0)
-
-    @property
-    def sd(self) -> Floats:
-        """Posterior standard deviation, shape (10,)."""
-        return self.values.std(axis=0, ddof=1)
 
 
 @dataclass(frozen=True)
@@ -242,61 +212,3 @@ def identify(
         chart, optimum, walkers, effective_samples=effective_samples, max_steps=max_steps, file=file, progress=progress
     )
     return Identification(refined, optimum, evidence, chains, time.perf_counter() - began)
-
-
-class Linearised(NamedTuple):
-    """Reported quantities of all identified bodies at one point: names, values (n,), derivative by z (n, size)."""
-
-    names: tuple[str, ...]
-    values: Floats
-    slope: Floats
-
-
-def linearise(posterior: Posterior, z: Floats) -> Linearised:
-    """Linearise the reported quantities of the identified bodies in the coordinates."""
-    names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
-    quantities, point = quantities_of(posterior.unknowns), jnp.asarray(z)
-    return Linearised(names, np.asarray(quantities(point)), np.asarray(jax.jacfwd(quantities)(point)))
-
-
-def quantities_of(unknowns: Unknowns) -> Callable[[Array], Array]:
-    """Return the function from coordinates (size,) to the reported quantities of all identified bodies (n,)."""
-    own = jnp.asarray([index for index, prior in enumerate(unknowns.bodies) if not prior.nuisance], dtype=int)
-
-    def quantities(z: Array) -> Array:
-        return jnp.ravel(mass_com_inertia(unknowns.values(z).inertial.reshape(-1, 10)[own]))
-
-    return quantities
-
-
-def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
-    """Return the reported quantities of the identified bodies at many points, shape (draws, size)."""
-    inertial = np.asarray(posterior.values_of(z).inertial).reshape(len(z), -1, 10)
-    return {
-        prior.name: BodyDraws(prior.name, mass_com_inertia(inertial[:, index]))
-        for index, prior in enumerate(posterior.model.priors)
-        if not prior.nuisance
-    }
-
-
-def reported_effect(effect: Effect, values: Floats) -> Floats:
-    """Values of an effect's parameters (..., n) to what is reported of it (..., m)."""
-    flat = jnp.asarray(values.reshape(-1, values.shape[-1]))
-    return np.asarray(jax.vmap(effect.report)(flat)).reshape(*values.shape[:-1], len(effect.quantities))
-
-
-def quantity(mean: float, sd: float, unit: str) -> dict[str, Any]:
-    """Return the form every quantity has in JSON."""
-    return {"mean": float(mean), "sd": float(sd), "unit": unit}
-
-
-def body_dict(body: BodyDraws) -> dict[str, Any]:
-    """Return a body as it stands in identification.json."""
-    entries = [
-        quantity(mean, sd, unit) for mean, sd, unit in zip(body.mean, body.sd, BODY_QUANTITIES.values(), strict=True)
-    ]
-    return {
-        "mass": entries[0],
-        "com": entries[1:4],
-        "inertia": dict(zip(("xx", "yy", "zz", "xy", "xz", "yz"), entries[4:], strict=True)),
-    }

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import arviz as az
 import numpy as np
 
-from bayesid.arrays import Floats
-from bayesid.inference.charts import Chart, LinearChart, LogCholeskyChart
-from bayesid.inference.optimum import Optimum
-from bayesid.posterior import Posterior
+from bayesid._math.arrays import Floats
+from bayesid.inference.mode import Optimum
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.sampling_coordinates import Chart, LinearChart, LogCholeskyChart
 
 __all__ = ["Evidence", "WeightedDraws", "choose_chart", "importance_sample", "weighted_draws"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import gammaln
 
-from bayesid.arrays import Floats
+from bayesid._math.arrays import Floats
 
 __all__ = ["StudentT"]
 

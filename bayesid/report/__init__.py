@@ -1,13 +1,13 @@
 """Reports as PDF."""
 
-from bayesid.report.check import check_report
-from bayesid.report.design import design_report
-from bayesid.report.diagnosis import diagnosis_report
+from bayesid.report.check_report import check_report
+from bayesid.report.design_report import design_report
+from bayesid.report.diagnosis_report import diagnosis_report
 from bayesid.report.document import Document
-from bayesid.report.identification import identification_report
+from bayesid.report.identification_report import identification_report
 from bayesid.report.numbers import format_quantity
-from bayesid.report.prediction import prediction_report
-from bayesid.report.simulation import simulation_report
+from bayesid.report.prediction_report import prediction_report
+from bayesid.report.simulation_report import simulation_report
 
 __all__ = [
     "Document",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bayesid.design import Design
-from bayesid.inference.identification import BODY_QUANTITIES
+from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report.design_text import reference_design
 from bayesid.report.numbers import format_number, format_unit
 

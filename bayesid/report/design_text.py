@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from bayesid.design import Design
-from bayesid.report.assumed import planning_sentences, span
+from bayesid.report.assumptions import planning_sentences, span
 from bayesid.report.numbers import format_number, format_unit
 
 __all__ = ["MEANING", "assumption_sentences", "design_sentences", "reference_design", "summary"]

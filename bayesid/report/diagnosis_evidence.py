@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from bayesid.diagnosis import Diagnosis, Frame, Status, Unexplained
-from bayesid.diagnosis.battery import FALSE_ALARM
+from bayesid.diagnosis.test_suite import FALSE_ALARM
 from bayesid.report import diagnosis_tables as rows
 from bayesid.report import diagnosis_text as text
 from bayesid.report import figures
-from bayesid.report.advice import moves_with
+from bayesid.report.diagnosis_advice import moves_with
 from bayesid.report.document import Document
-from bayesid.report.residuals import Residuals
+from bayesid.report.residual_series import Residuals
 
 __all__ = ["add_candidates", "add_causes", "add_disturbance", "add_hypotheses", "add_residuals"]
 

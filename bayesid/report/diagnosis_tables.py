@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bayesid.arrays import Floats
+from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Candidate, Diagnosis, Hypothesis
-from bayesid.diagnosis.evidence import effect_amplitude
-from bayesid.effects.base import Effect, Prior, Quantity
-from bayesid.inference.identification import BODY_QUANTITIES
-from bayesid.report.advice import differing, imitation
+from bayesid.diagnosis.candidate_table import effect_amplitude
+from bayesid.inference.body_quantities import BODY_QUANTITIES
+from bayesid.report.diagnosis_advice import differing, imitation
 from bayesid.report.numbers import format_number, format_quantity, format_unit
-from bayesid.report.tables import prior_range
+from bayesid.report.report_tables import prior_range
+from bayesid.simulation.effects.effect import Effect, Prior, Quantity
 
 __all__ = ["amplitude_text", "amplitudes_of", "cause_rows", "format_p"]
 

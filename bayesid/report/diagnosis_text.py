@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, Status, Unexplained
-from bayesid.diagnosis.battery import FALSE_ALARM
-from bayesid.diagnosis.faults import SUMMARIES
-from bayesid.diagnosis.scale import SCALES
+from bayesid.diagnosis.amplitude_scale import SCALES
+from bayesid.diagnosis.noise_faults import SUMMARIES
+from bayesid.diagnosis.test_suite import FALSE_ALARM
 from bayesid.diagnosis.verdict import RIVALRY
-from bayesid.report.advice import advice, differing
+from bayesid.report.diagnosis_advice import advice, differing
 from bayesid.report.diagnosis_tables import amplitude_text, amplitudes_of, format_p, largest_shift, signed
 from bayesid.report.numbers import format_number
 

@@ -18,7 +18,7 @@ from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from bayesid.errors import InputError
+from bayesid._io.errors import InputError
 
 __all__ = ["Document"]
 

@@ -7,10 +7,10 @@ import numpy as np
 from bayesid.identifiability.advice import WORST, Advice
 from bayesid.identifiability.base_parameters import BaseParameters
 from bayesid.identifiability.normality import NORMAL, Method
-from bayesid.identifiability.parameters import Parameter
-from bayesid.identifiability.practical import Practical
-from bayesid.identifiability.untold import listed
-from bayesid.inference.learnt import LEARNT, PRIOR_ONLY, Verdict
+from bayesid.identifiability.parameter_table import Parameter
+from bayesid.identifiability.practical_identifiability import Practical
+from bayesid.identifiability.unidentifiable import listed
+from bayesid.inference.contraction import LEARNT, PRIOR_ONLY, Verdict
 from bayesid.report.numbers import format_number, format_unit
 
 __all__ = [

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from bayesid.inference.identification import BODY_QUANTITIES
+from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report.figures import corner
-from bayesid.report.figures.style import COLOURS, curve_style, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, curve_style, styled, wide_figure
 from studies.base_body import paper
 from studies.base_body.result import GRADES, BaseBody
 from studies.base_body.setting import BASE

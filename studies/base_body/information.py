@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.effects import AccelBias, GravityGradient
-from bayesid.model import Manoeuvre, Model, spread_links
-from bayesid.motion import Excitation
-from bayesid.orbit import Orbit
-from bayesid.posterior import Posterior, Predictions
-from bayesid.sensors import ARCSEC, Kind, Sensor, White
-from bayesid.simulation import simulate_recordings
-from bayesid.unknowns import BodyPrior
+from bayesid.inference.posterior import Posterior, Predictions
+from bayesid.inference.simulated_recordings import simulate_recordings
+from bayesid.recording.joint_motion import Excitation
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.simulation.effects import AccelBias, GravityGradient
+from bayesid.simulation.model import Manoeuvre, Model, spread_links
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import ARCSEC, Kind, Sensor, White
 from studies.base_body import paper
 from studies.base_body.noise_free import ACCELEROMETER, STEP
 from studies.base_body.physical import physical_sd, physical_slope

@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.effects import GravityGradient
-from bayesid.inertia import mass_com_inertia
-from bayesid.inference.optimum import fit
-from bayesid.model import Manoeuvre, Model
-from bayesid.motion import Excitation
-from bayesid.orbit import Orbit
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.simulation import simulate_recordings
-from bayesid.unknowns import BodyPrior
+from bayesid.inference.mode import fit
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.simulated_recordings import simulate_recordings
+from bayesid.recording.joint_motion import Excitation
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import GravityGradient
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Kind, Sensor, White
 from studies.base_body import paper
 from studies.base_body.physical import physical_sd, physical_slope
 from studies.base_body.setting import BASE, POOR, blank, excitation, heavy_arm, ship

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.inertia import InertialParameters
+from bayesid.robot.inertial_parameters import InertialParameters
 
 __all__ = ["EXCITATION", "GUESS", "LIMIT", "RADIUS", "RESULT_POOR", "RESULT_WELL", "TRUTH", "body"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.inertia import mass_com_inertia
-from bayesid.posterior import Posterior
+from bayesid.inference.posterior import Posterior
+from bayesid.robot.inertial_parameters import mass_com_inertia
 
 __all__ = ["physical_sd", "physical_slope"]
 

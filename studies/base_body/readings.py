@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.sensors import Kind
+from bayesid.simulation.sensors import Kind
 from studies.base_body.information import ACCEL_BIAS, ARM, TILT, UNIT, Information
 
 __all__ = ["SIGMAS", "Reading", "read_sigmas"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from bayesid.report import Document
 from bayesid.report.numbers import format_number
-from bayesid.sensors import Kind
+from bayesid.simulation.sensors import Kind
 from studies.base_body import paper, rows
 from studies.base_body.result import BaseBody
 from studies.base_body.setting import PERIOD, RAMP, extended_wrist, limits_broken

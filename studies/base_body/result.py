@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bayesid.inference import Identification
-from bayesid.sensors import Kind, StarTracker
+from bayesid.simulation.sensors import Kind, StarTracker
 from studies.base_body import paper
 from studies.base_body.information import ARM, ARM_SPREAD, STAR, Information
 from studies.base_body.noise_free import NoiseFree, run_noise_free

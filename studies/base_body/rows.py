@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.inference.identification import BODY_QUANTITIES
+from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report.numbers import format_number, format_quantity, format_unit
-from bayesid.sensors import Kind
+from bayesid.simulation.sensors import Kind
 from studies.base_body import paper
 from studies.base_body.information import ARM, STAR
 from studies.base_body.noise_free import NoiseFree

@@ -9,18 +9,18 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.effects import AccelBias, GravityGradient
-from bayesid.inertia import InertialParameters
 from bayesid.inference import Identification, choose_chart, importance_sample, maximise, sample
-from bayesid.inference.optimum import fit
-from bayesid.model import Manoeuvre, Model, spread_links
-from bayesid.motion import MeasuredMotion
-from bayesid.orbit import Orbit
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
-from bayesid.sensors import Kind, Sensor, White
-from bayesid.simulation import simulate_recordings
-from bayesid.unknowns import BodyPrior
+from bayesid.inference.mode import fit
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.simulated_recordings import simulate_recordings
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.simulation.effects import AccelBias, GravityGradient
+from bayesid.simulation.model import Manoeuvre, Model, spread_links
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Kind, Sensor, White
 from studies.base_body import paper
 from studies.base_body.information import BIAS, STAR
 from studies.base_body.noise_free import ACCELEROMETER

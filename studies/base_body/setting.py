@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from bayesid.inertia import InertialParameters
-from bayesid.motion import Excitation, JointState, sample_joints
-from bayesid.recording import Recording
-from bayesid.robot import Robot
-from bayesid.sensors import Kind
-from bayesid.tables import kinematics
+from bayesid.recording.joint_motion import Excitation, sample_joints
+from bayesid.recording.recording import Recording
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.robot import Robot
+from bayesid.simulation.sensors import Kind
 from studies.base_body import paper
 
 __all__ = [

@@ -15,7 +15,7 @@ from scipy.linalg import subspace_angles
 
 from bayesid import Robot
 from bayesid.identifiability import Base, base_parameters, standard_names
-from bayesid.identifiability.equations import GRAVITY
+from bayesid.identifiability.stacked_regressor import GRAVITY
 
 __all__ = ["Comparison", "compare"]
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from bayesid import Robot
 from bayesid.identifiability import base_parameters, consistent_accelerations
-from bayesid.identifiability.equations import massive_bodies
-from bayesid.motion import JointState
-from bayesid.regressors import torque_regressor
-from bayesid.tables import configuration, kinematics
+from bayesid.identifiability.stacked_regressor import massive_bodies
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import configuration, kinematics
+from bayesid.robot.regressors import torque_regressor
 from studies.base_parameters.structure import standard_parameters
 
 __all__ = ["Recovery", "identify_by_torques"]

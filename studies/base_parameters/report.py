@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid.report import Document
-from bayesid.report.figures.style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number
 from studies.base_parameters.peers import Comparison
 from studies.base_parameters.recovery import STATES, WRONG, Recovery

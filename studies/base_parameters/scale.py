@@ -16,10 +16,11 @@ from bayesid.identifiability import (
     determined,
     rates_at_rest,
 )
-from bayesid.identifiability.equations import massive_bodies, random_motion
-from bayesid.inertia import InertialParameters
-from bayesid.regressors import gradient_regressor, torque_regressor
-from bayesid.tables import Kinematics, link_table
+from bayesid.identifiability.stacked_regressor import massive_bodies, random_motion
+from bayesid.robot.composite_tables import link_table
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.kinematics import Kinematics
+from bayesid.robot.regressors import gradient_regressor, torque_regressor
 from studies.base_parameters.structure import standard_parameters
 
 __all__ = ["ScaleCase", "scale_cases"]

@@ -17,8 +17,8 @@ from bayesid import (
     Sensor,
     White,
 )
-from bayesid.effects import GravityGradient
-from bayesid.simulation import simulate_manoeuvre
+from bayesid.inference.simulated_recordings import simulate_manoeuvre
+from bayesid.simulation.effects import GravityGradient
 
 SIGMA = 1.0e-5
 """Noise of rate [rad/s] and accelerometer [m/s2]."""

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from scipy import stats
 
 from bayesid.report import Document
-from bayesid.report.figures.style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from studies.blind_injections.trials import Trial, plan, read, run
 
 __all__ = ["confusion", "main", "rates", "write_report"]

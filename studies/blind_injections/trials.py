@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
-from bayesid.arrays import Floats
-from bayesid.assemble import load_manoeuvres, load_model
+from bayesid._math.arrays import Floats
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Frame, diagnose
-from bayesid.diagnosis.engine import Fit
-from bayesid.diagnosis.evidence import detection_power, effect_amplitude
-from bayesid.study import Study
+from bayesid.diagnosis.candidate_table import detection_power, effect_amplitude
+from bayesid.diagnosis.perturbed_fit import Fit
 from tests import hidden, mujoco_truth
 
 __all__ = ["Plan", "Trial", "make", "plan", "read", "run"]

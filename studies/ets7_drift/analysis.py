@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from bayesid import Kind, Model, Posterior, Sensor, White
 from bayesid.diagnosis import Diagnosis, Hypothesis, diagnose
-from bayesid.effects import create
 from bayesid.report.diagnosis_tables import amplitudes_of
+from bayesid.simulation.effects import create
 from studies.ets7_drift.world import ATTITUDE_SIGMA, World, model_of
 
 __all__ = ["CAUSES", "Amplitude", "Attitude", "Case", "Result", "analyse"]

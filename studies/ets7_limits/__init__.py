@@ -12,7 +12,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from bayesid.compiled import keep_compiled
+from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import Search, Store
 from studies.ets7_limits.analysis import ACCELS, CHECKED, RATES, answers, design_manoeuvre, knowledge_of, tell
 from studies.ets7_limits.check import check

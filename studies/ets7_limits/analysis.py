@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import White
-from bayesid.design import Found, Problem, Search, Store, optimise
-from bayesid.design.parameterisation import ParameterisedMotion
-from bayesid.design.planned import Trajectory
-from bayesid.design.problem import Reached
-from bayesid.sensors import Noise, StarTracker
+from bayesid.design import Found, Problem, Search, Store
+from bayesid.design import trajectory_search as optimise
+from bayesid.design.design_problem import Reached
+from bayesid.design.plan import Trajectory
+from bayesid.design.trajectories import ParameterisedMotion
+from bayesid.simulation.sensors import Noise, StarTracker
 from studies.ets7_limits.flight import Flight
 from studies.ets7_limits.information import LONGEST, Grade, Knowledge, wide_posterior
 from studies.ets7_limits.setting import ACCEL, ARM_SPREAD, RATE, START

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Posterior
-from bayesid.inertia import mass_com_inertia
 from bayesid.inference import maximise
-from bayesid.motion import Motion
+from bayesid.recording.joint_motion import Motion
+from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.base_body.physical import physical_sd, physical_slope
 from studies.ets7_limits.setting import model_of
 from studies.ets7_limits.truth import fly, record

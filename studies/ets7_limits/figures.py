@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from bayesid.design.planned import Trajectory
-from bayesid.report.figures.style import COLOURS, styled, wide_figure
+from bayesid.design.plan import Trajectory
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from studies.ets7_limits.setting import LIMITS
 
 __all__ = ["manoeuvre_figure", "repetition_figure"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.motion import JointState
+from bayesid.robot.joint_state import JointState
 
 __all__ = ["EXCURSION", "Flight"]
 
@@ -25,7 +25,7 @@ ROUNDING = 4.0
 
 @dataclass(frozen=True)
 class Flight:
-    """The motion of the flight; a `bayesid.motion.Motion`.
+    """The motion of the flight; a `bayesid.recording.joint_motion.Motion`.
 
     Parameters
     ----------

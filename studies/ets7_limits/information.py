@@ -11,11 +11,11 @@ from scipy.optimize import brentq
 
 from bayesid import Kind, Sensor, White
 from bayesid.design import planned_manoeuvre, planned_posterior
-from bayesid.design.design import sample_times
-from bayesid.inertia import mass_com_inertia
-from bayesid.motion import Motion
-from bayesid.posterior import Posterior
-from bayesid.sensors import Noise
+from bayesid.design.designed import sample_times
+from bayesid.inference.posterior import Posterior
+from bayesid.recording.joint_motion import Motion
+from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.simulation.sensors import Noise
 from studies.base_body.physical import physical_sd, physical_slope
 from studies.ets7_limits.setting import ARM_SPREAD, DURATION, ENCODER, INTERVAL, POINT, model_of
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesid.inference.identification import BODY_QUANTITIES
+from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report import Document
 from bayesid.report.numbers import format_number
 from studies.ets7_limits.analysis import Answer, Designed, Telling

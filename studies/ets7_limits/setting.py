@@ -8,8 +8,8 @@ import numpy as np
 
 from bayesid import BodyPrior, Kind, Model, Orbit, Robot, Sensor, White
 from bayesid.design import BSplines, DOptimal, Limits, Plan, Problem, Tip
-from bayesid.effects import AccelBias, GravityGradient
-from bayesid.model import spread_links
+from bayesid.simulation.effects import AccelBias, GravityGradient
+from bayesid.simulation.model import spread_links
 
 __all__ = ["ACCEL", "ARM_SPREAD", "BASE", "BIAS", "DURATION", "ENCODER", "INTERVAL", "LIMITS", "POINT", "RADIUS"]
 __all__ += ["RATE", "START", "TIP", "limits_problem", "model_of"]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, MeasuredMotion, Recording, Robot
-from bayesid.motion import Motion
+from bayesid.recording.joint_motion import Motion
 from studies.ets7_drift.world import simulator
 from studies.ets7_limits.setting import ACCEL, ENCODER, INTERVAL, POINT, RADIUS, RATE
 

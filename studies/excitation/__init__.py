@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesid.compiled import keep_compiled
+from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import Search
 from studies.excitation.cloud import Cloud, Sensitivity, random_cloud, sensitivity
 from studies.excitation.contest import Contest, compete

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from bayesid.design import DOptimal, Paper26, Paper26Intended, Problem
-from bayesid.design.planned import Outcome
+from bayesid.design.plan import Outcome
 
 __all__ = ["Cloud", "Sensitivity", "random_cloud", "sensitivity"]
 

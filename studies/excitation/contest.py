@@ -22,11 +22,15 @@ from bayesid.design import (
     Paper26Intended,
     Problem,
     Search,
-    design,
     evaluate,
-    optimise,
 )
-from bayesid.design.problem import Known
+from bayesid.design import (
+    designed as design,
+)
+from bayesid.design import (
+    trajectory_search as optimise,
+)
+from bayesid.design.design_problem import Known
 from studies.base_body import paper
 from studies.base_body.setting import POOR
 from studies.excitation.world import ENCODER, paper_family, problem, splines

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from bayesid import Posterior, identify
 from bayesid.design import Design
-from bayesid.inertia import mass_com_inertia
 from bayesid.inference import maximise
+from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.excitation.world import BASE, fly, recorded
 
 __all__ = ["Realised", "realise"]

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from bayesid import BodyPrior, Kind, Manoeuvre, MeasuredMotion, Model, Orbit, Recording, Robot, Sensor, White
 from bayesid.design import BSplines, Criterion, Limits, PaperExcitation, Parameterisation, Plan, Problem, Tip
-from bayesid.effects import AccelBias, GravityGradient
-from bayesid.motion import Motion
+from bayesid.recording.joint_motion import Motion
+from bayesid.simulation.effects import AccelBias, GravityGradient
 from studies.base_body import paper
 from studies.base_body.setting import extended_wrist
 from studies.ets7_drift.world import simulator

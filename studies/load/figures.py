@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from bayesid.inference.identification import BODY_QUANTITIES
-from bayesid.report.figures.style import COLOURS, curve_style, styled, wide_figure
+from bayesid.inference.body_quantities import BODY_QUANTITIES
+from bayesid.report.figures.figure_style import COLOURS, curve_style, styled, wide_figure
 from studies.load import paper
 from studies.load.noise_free import Iteration, errors
 from studies.load.sampled import Flight

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.design import Criterion, Paper26Intended, PlannedMotion, Search, optimise
-from bayesid.design.problem import Known
-from bayesid.design.spacecraft import plan_recording
-from bayesid.inertia import mass_com_inertia
-from bayesid.inference.optimum import fit
-from bayesid.model import Manoeuvre
-from bayesid.posterior import Posterior
-from bayesid.recording import Recording
+from bayesid.design import Criterion, Paper26Intended, PlannedMotion, Search
+from bayesid.design import trajectory_search as optimise
+from bayesid.design.design_problem import Known
+from bayesid.design.simulated_spacecraft import plan_recording
+from bayesid.inference.mode import fit
+from bayesid.inference.posterior import Posterior
+from bayesid.recording.recording import Recording
+from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.simulation.model import Manoeuvre
 from studies.load import paper
 from studies.load.setting import DURATION, INTERVAL, MuJoCoSpacecraft, excitation, model, problem
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.inertia import InertialParameters
+from bayesid.robot.inertial_parameters import InertialParameters
 
 __all__ = ["GUESS", "RADIUS", "RESULTS", "TRUTH", "Reading", "body", "readings"]
 

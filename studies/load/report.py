@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bayesid.inference.identification import BODY_QUANTITIES
+from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report import Document, format_quantity
 from bayesid.report.numbers import format_number, format_unit
 from studies.load import paper

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.carry import InertialDraws
 from bayesid.design import BSplines, Criterion, DOptimal, Limits, Loop, Paper26Intended, Sampled, Search
-from bayesid.design.update import bodies_of_draws
-from bayesid.inference.identification import BodyDraws
-from bayesid.recording import Recording
+from bayesid.design.knowledge_update import bodies_of_draws
+from bayesid.inference.body_quantities import BodyDraws
+from bayesid.inference.posterior_as_prior import InertialDraws
+from bayesid.recording.recording import Recording
 from studies.base_body.setting import extended_wrist
 from studies.load import paper
 from studies.load.setting import DURATION, ENCODER, LIMITS, LOAD, MuJoCoSpacecraft, excitation, model, problem

@@ -10,17 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import BodyPrior, Kind, Load, Model, Orbit, Recording, Robot, Sensor, White
-from bayesid.design import (
-    Criterion,
-    Limits,
-    PaperExcitation,
-    Parameterisation,
-    Plan,
-    PlannedMotion,
-    Problem,
-    Tip,
-)
-from bayesid.effects import GravityGradient
+from bayesid.design import Criterion, Limits, PaperExcitation, Parameterisation, Plan, PlannedMotion, Problem, Tip
+from bayesid.simulation.effects import GravityGradient
 from studies.base_body.setting import extended_wrist
 from studies.ets7_drift.world import simulator
 from studies.load import paper

@@ -11,9 +11,9 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from bayesid import Identification, InertialParameters, Manoeuvre, Model, Posterior, Recording, Robot, identify
-from bayesid.carry import InertialDraws, joint_prior
-from bayesid.pose import Pose
-from bayesid.predict import Prediction, Predictor
+from bayesid.design.base_prediction import Prediction, Predictor
+from bayesid.design.pose_region import Pose
+from bayesid.inference.posterior_as_prior import InertialDraws, joint_prior
 from studies.planning.world import ATTITUDE, BASE, START, TIP, Flown, Guess, Swing, fly, measure, model_of
 
 __all__ = ["Case", "Flight", "Trial", "analyse", "flight_of", "identified", "plan", "predictor_of"]

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Robot
-from bayesid.pose import Pose
-from bayesid.unknowns import coordinates_of, draw_inertial
+from bayesid.design.pose_region import Pose
+from bayesid.robot.body_prior import coordinates_of, draw_inertial
 from studies.planning.analysis import predictor_of
 from studies.planning.world import BASE, START, Flown, Guess, Swing, guess_about, model_of
 

@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid import InertialParameters
-from bayesid.pose import CONTENT
+from bayesid.design.pose_region import CONTENT
 from bayesid.report import Document, figures, format_quantity
-from bayesid.report.figures.style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number
 from studies.planning.analysis import Case
 from studies.planning.calibration import Calibration

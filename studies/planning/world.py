@@ -26,9 +26,10 @@ from bayesid import (
     Sensor,
     White,
 )
-from bayesid.effects import GravityGradient
-from bayesid.inertia import log_cholesky_factor, parameters_from_pseudo_inertia, upper_cholesky
-from bayesid.motion import JointState, Motion
+from bayesid.recording.joint_motion import Motion
+from bayesid.robot.inertial_parameters import log_cholesky_factor, parameters_from_pseudo_inertia, upper_cholesky
+from bayesid.robot.joint_state import JointState
+from bayesid.simulation.effects import GravityGradient
 from studies.base_body import paper
 from studies.ets7_drift.world import simulator
 

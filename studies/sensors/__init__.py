@@ -11,7 +11,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from bayesid.compiled import keep_compiled
+from bayesid.app.compilation_cache import keep_compiled
 from studies.sensors.report import write_report
 from studies.sensors.result import REALISTIC, Effort, Result, compute
 

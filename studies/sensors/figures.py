@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bayesid.report.figures.style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from studies.sensors.montecarlo import Spread
 
 __all__ = ["treatment_figure"]

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Kind, Manoeuvre, MeasuredMotion, Posterior, Recording
-from bayesid.motion import Motion
-from bayesid.sensitivity import joint_sensitivity
-from bayesid.sensors import Filter
-from bayesid.whitening import Channel, NoiseModel, build
+from bayesid.inference.encoder_noise import joint_sensitivity
+from bayesid.inference.whitening import Channel, NoiseModel, build
+from bayesid.recording.joint_motion import Motion
+from bayesid.simulation.sensors import Filter
 from studies.base_body.physical import physical_slope
 from studies.sensors.setting import POINT, Flight, Noise, model_of, motion
 
@@ -28,7 +28,7 @@ STEP = 1.0
 """Integration step [s]: its nodes and midpoints are the samples."""
 
 LAGS = 32
-"""Samples over which the joints' errors are correlated at most, those of `bayesid.whitening`."""
+"""Samples over which the joints' errors are correlated at most, those of `bayesid.inference.whitening`."""
 
 
 def recording_of(time: Floats, rate: Floats, accel: Floats, position: Floats | None = None) -> Recording:

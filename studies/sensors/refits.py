@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from bayesid import Manoeuvre, Posterior
-from bayesid.inertia import mass_com_inertia
 from bayesid.inference import maximise
-from bayesid.motion import JointState
+from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.robot.joint_state import JointState
 from studies.base_body import paper
 from studies.base_body.physical import physical_sd, physical_slope
 from studies.sensors.draws import Draws

@@ -19,10 +19,11 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.inertia import mass_com_inertia
-from bayesid.motion import JointState
-from bayesid.regressors import balance_regressor
-from bayesid.tables import composite_rows, kinematics, link_table
+from bayesid.robot.composite_tables import composite_rows, link_table
+from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.regressors import balance_regressor
 from studies.base_body import paper
 from studies.base_body.setting import BASE, ship
 from studies.sensors.draws import Draws

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.inference.identification import BODY_QUANTITIES
+from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report.numbers import format_number, format_quantity, format_unit
 from studies.base_body import paper
 from studies.sensors.montecarlo import Spread

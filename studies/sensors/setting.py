@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_simpson
 
 from bayesid import BodyPrior, Kind, Model, Orbit, Robot, Sensor, White
-from bayesid.effects import AccelBias, GravityGradient
-from bayesid.motion import Excitation
-from bayesid.sensors import StarTracker
+from bayesid.recording.joint_motion import Excitation
+from bayesid.simulation.effects import AccelBias, GravityGradient
+from bayesid.simulation.sensors import StarTracker
 from studies.base_body import paper
 from studies.base_body.setting import BASE, excitation, ship
 from studies.ets7_drift.world import simulator

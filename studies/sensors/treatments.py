@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import signal
 from scipy.interpolate import make_smoothing_spline
 
-from bayesid.smoothing import JointSamples, smooth
+from bayesid.recording.smoothing import JointSamples, smooth
 
 __all__ = ["Differences", "LowPass", "Polynomial", "SavitzkyGolay", "SmoothingSpline", "Treatment", "Wiener"]
 
@@ -148,7 +148,7 @@ class SmoothingSpline:
 
 @dataclass(frozen=True)
 class Wiener:
-    """The package's smoother: an integrated Wiener process given the declared noise (`bayesid.smoothing`)."""
+    """The package's smoother: an integrated Wiener process given the declared noise (`bayesid.recording.smoothing`)."""
 
     title: str = "ours"
 

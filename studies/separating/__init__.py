@@ -11,7 +11,7 @@ import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from bayesid.compiled import keep_compiled
+from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import Search, Store
 from studies.ets7_limits.setting import DURATION, POINTS
 from studies.separating.analysis import STAGES, Result, design_stage, expectations, motions_of, realise

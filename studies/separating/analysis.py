@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid.design import Search, Store
-from bayesid.motion import Motion
+from bayesid.recording.joint_motion import Motion
 from studies.ets7_limits.flight import Flight
 from studies.ets7_limits.setting import START
 from studies.separating.expected import Expected, Linearised

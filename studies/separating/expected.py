@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, Model, Recording
 from bayesid.design import planned_posterior
-from bayesid.design.design import sample_times
-from bayesid.motion import Motion
-from bayesid.posterior import Posterior
-from bayesid.simulation import blank_channels
+from bayesid.design.designed import sample_times
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.simulated_recordings import blank_channels
+from bayesid.recording.joint_motion import Motion
 from studies.ets7_limits.setting import INTERVAL
 from studies.separating.setting import RIVALS, drifting
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesid import Manoeuvre, Posterior
 from bayesid.inference import maximise
 from bayesid.inference.importance import choose_chart, importance_sample
-from bayesid.motion import Motion
+from bayesid.recording.joint_motion import Motion
 from studies.ets7_drift.world import WHEEL, simulator
 from studies.ets7_limits.truth import fly, record
 from studies.separating.setting import DRIFT, RIVALS, rival_model

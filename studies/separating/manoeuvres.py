@@ -10,10 +10,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.design import BSplines, DOptimal, Plan, Problem, Search, Separation, Store, Tip, optimise
-from bayesid.design.parameterisation import ParameterisedMotion
-from bayesid.design.planned import Trajectory
-from bayesid.design.problem import Reached
+from bayesid.design import (
+    BSplines,
+    DOptimal,
+    Plan,
+    Problem,
+    Search,
+    Separation,
+    Store,
+    Tip,
+)
+from bayesid.design import (
+    trajectory_search as optimise,
+)
+from bayesid.design.design_problem import Reached
+from bayesid.design.plan import Trajectory
+from bayesid.design.trajectories import ParameterisedMotion
 from studies.ets7_limits.setting import DURATION, INTERVAL, LIMITS, POINTS, START, TIP
 from studies.separating.setting import RIVALS, drifting, rival_model
 

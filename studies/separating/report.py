@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid.report import Document
-from bayesid.report.figures.style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number
 from studies.ets7_limits.figures import manoeuvre_figure
 from studies.ets7_limits.setting import ACCEL, INTERVAL, RATE

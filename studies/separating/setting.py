@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesid import Effect, Model
 from bayesid.design import Linear
-from bayesid.effects import AccelBias, GravityGradient, RateBias, RateDrift, ThrusterLeak, WheelMomentum
+from bayesid.simulation.effects import AccelBias, GravityGradient, RateBias, RateDrift, ThrusterLeak, WheelMomentum
 from studies.ets7_limits.flight import Flight
 from studies.ets7_limits.setting import DURATION, START, model_of
 

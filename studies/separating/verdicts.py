@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from bayesid.diagnosis import diagnose
-from bayesid.motion import Motion
+from bayesid.recording.joint_motion import Motion
 from studies.separating.factors import flown, noisy
 from studies.separating.setting import CANDIDATES, RIVALS, TRUTHS, rival_model
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Posterior
-from bayesid.inference.identification import bodies_of
+from bayesid.inference.body_quantities import bodies_of
 from studies.throws.data import WHEEL_INERTIA, Truth
 
 __all__ = ["Tensor", "object_moments", "tensors", "truth_sd", "wheel_inertia"]

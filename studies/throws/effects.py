@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from bayesid.effects import AccelBias, Effect, Moment, Parameter, Readings, Wrench
+from bayesid.simulation.effects import AccelBias, Effect, Moment, Parameter, Readings, Wrench
 
 __all__ = ["AirDrag", "GyroCross", "SmoothTorque", "ThrowBias", "WheelTilt"]
 

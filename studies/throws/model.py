@@ -7,15 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bayesid import (
-    BodyPrior,
-    InertialParameters,
-    Kind,
-    Model,
-    Robot,
-    Sensor,
-    White,
-)
+from bayesid import BodyPrior, InertialParameters, Kind, Model, Robot, Sensor, White
 from studies.throws.data import WHEEL_INERTIA
 from studies.throws.effects import AirDrag, GyroCross, SmoothTorque, ThrowBias, WheelTilt
 

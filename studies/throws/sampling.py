@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesid import BodyPrior, Manoeuvre, MeasuredMotion, Posterior
 from bayesid.inference import identify
-from bayesid.inference.identification import bodies_of
+from bayesid.inference.body_quantities import bodies_of
 from studies.throws.data import Timing, read_throws
 from studies.throws.model import STEP, Settings, build_model
 from studies.throws.start import guess

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from bayesid.diagnosis import Diagnosis
 from bayesid.report import Document, format_quantity
 from bayesid.report.diagnosis_tables import amplitudes_of, hypothesis_rows
-from bayesid.report.figures.style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number, format_unit
 from studies.throws_drag.analysis import SPREAD, Comparison, Study, Wheel
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Posterior, Robot
-from bayesid.inference.optimum import fit
+from bayesid.inference.mode import fit
 from studies.whole_system.linear import regress
 from studies.whole_system.sampled import true_point
 from studies.whole_system.setting import BASE, LOAD, bodies, model_of

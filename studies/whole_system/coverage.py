@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesid import Posterior, Robot
-from bayesid.inference.charts import LinearChart
-from bayesid.inference.optimum import fit
-from bayesid.unknowns import draw_inertial
+from bayesid.inference.mode import fit
+from bayesid.inference.sampling_coordinates import LinearChart
+from bayesid.robot.body_prior import draw_inertial
 from studies.whole_system.sampled import distance, true_point
 from studies.whole_system.setting import BASE, LOAD, bodies, model_of, spreads
 from studies.whole_system.world import START_RATE, fly, record

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from bayesid import Manoeuvre, Robot
-from bayesid.regressors import torque_regressor
-from bayesid.tables import kinematics
-from bayesid.unknowns import BodyPrior, Unknowns
+from bayesid.inference.unknowns import Unknowns
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.regressors import torque_regressor
 from studies.whole_system.setting import LOAD, POINT, bodies, spreads
 
 __all__ = ["linear_prior", "regress"]

@@ -12,7 +12,7 @@ from scipy import stats
 
 from bayesid import Robot
 from bayesid.report import Document, format_quantity
-from bayesid.report.figures.style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number
 from studies.whole_system.contest import QUANTITIES, Method
 from studies.whole_system.coverage import Coverage

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesid import Identification, Manoeuvre, Posterior, Robot, identify
-from bayesid.inertia import mass_com_inertia
 from bayesid.inference.ensemble import Progress
+from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.whole_system.setting import COULOMB, VISCOUS, bodies, model_of
 
 __all__ = ["Sampled", "distance", "sampled", "true_point"]

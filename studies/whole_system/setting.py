@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import BodyPrior, InertialParameters, Kind, Model, Orbit, Robot, Sensor, White
-from bayesid.effects import Effect, GravityGradient, JointFriction
-from bayesid.robot import Load
-from bayesid.torque import TorqueSensor
+from bayesid.robot.robot import Load
+from bayesid.simulation.effects import Effect, GravityGradient, JointFriction
+from bayesid.simulation.joint_torques import TorqueSensor
 from studies.planning.world import guess_about
 
 __all__ = ["BASE", "LOAD", "TIP", "bodies", "drawn", "friction_effects", "model_of", "spreads", "true_robot"]

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, MeasuredMotion, Recording, Robot
-from bayesid.motion import JointState
-from bayesid.tables import joint_motion, kinematics
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import joint_motion, kinematics
 from studies.ets7_drift.world import simulator
 from studies.whole_system.setting import (
     ACCEL,

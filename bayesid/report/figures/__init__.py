@@ -1,20 +1,20 @@
 """Figures of reports. Every function returns a new matplotlib Figure; none touches pyplot."""
 
-from bayesid.report.figures.agreement import measured_against_simulated, residual_spectrum
-from bayesid.report.figures.design import base_motion, covariance_ellipses, joints_within_limits, tip_motion
-from bayesid.report.figures.diagnosis import (
+from bayesid.report.figures.agreement_figures import measured_against_simulated, residual_spectrum
+from bayesid.report.figures.design_figures import base_motion, covariance_ellipses, joints_within_limits, tip_motion
+from bayesid.report.figures.diagnosis_figures import (
     candidate_strengths,
     residual_histories,
     residual_spectra,
     wrench_histories,
     wrench_spectrum,
 )
-from bayesid.report.figures.identifiability import direction_widths, displacements
-from bayesid.report.figures.prediction import course_bands, final_positions
-from bayesid.report.figures.robot import manoeuvre, robot_pose
-from bayesid.report.figures.sampler import convergence
-from bayesid.report.figures.torques import torques_over_time
-from bayesid.report.figures.uncertainty import corner, correlations, prior_to_posterior
+from bayesid.report.figures.identifiability_figures import direction_widths, displacements
+from bayesid.report.figures.prediction_figures import course_bands, final_positions
+from bayesid.report.figures.robot_figures import manoeuvre, robot_pose
+from bayesid.report.figures.sampler_figures import convergence
+from bayesid.report.figures.torque_figures import torques_over_time
+from bayesid.report.figures.uncertainty_figures import corner, correlations, prior_to_posterior
 
 __all__ = [
     "base_motion",

@@ -1,0 +1,1 @@
+"""Errors that a user meets, and files that are complete or absent."""

@@ -1,0 +1,1 @@
+"""Array types, rotations and small linear algebra, each once."""

@@ -1,0 +1,36 @@
+"""Algebra of vectors and small matrices written out: calls to LAPACK for thousands of them block the processor."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+from jax import Array
+
+__all__ = ["cross", "inverse", "solve_small", "symmetric", "trace_less"]
+
+
+def solve_small(matrix: Array, right: Array) -> Array:
+    """Solve a small positive-definite system by elimination, written out as `inverse` is."""
+    size = len(right)
+    rows = [jnp.concatenate([matrix[i], right[i : i + 1]]) for i in range(size)]
+    for i in range(size):
+        rows[i] = rows[i] / rows[i][i]
+        rows = [row if j == i else row - row[i] * rows[i] for j, row in enumerate(rows)]
+    return jnp.stack([row[-1] for row in rows])
+
+
+def cross(a: Array, b: Array) -> Array:
+    return jnp.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def symmetric(six: Array) -> Array:
+    xx, yy, zz, xy, xz, yz = six
+    return jnp.stack([jnp.stack([xx, xy, xz]), jnp.stack([xy, yy, yz]), jnp.stack([xz, yz, zz])])
+
+
+def trace_less(second: Array) -> Array:
+    return jnp.trace(second) * jnp.eye(3) - second
+
+
+def inverse(m: Array) -> Array:
+    a, b, c = cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])
+    return jnp.stack([a, b, c], axis=1) / (m[0] @ a)

@@ -1,0 +1,1 @@
+"""Commands, study files and what they name, turned into objects."""

@@ -1,0 +1,128 @@
+"""The demonstration: recordings shipped with the package in which MuJoCo hid a cause; and ETS-VII, simulated."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from bayesid.inference.simulated_recordings import simulate_manoeuvre
+from bayesid.recording.joint_motion import Excitation
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import GravityGradient
+from bayesid.simulation.model import Model
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Kind, Sensor, White
+
+__all__ = ["copy_demonstration", "write_demo"]
+
+RATE_SIGMA, ACCEL_SIGMA, ENCODER_SIGMA = 1.0e-5, 1.0e-5, 1.0e-6
+ACCELEROMETER = (0.4, 0.3, 0.8)
+RADIUS = 6.916e6
+INTERVAL = 0.5
+
+# offsets and amplitudes of (27) on the six joints; the wrist moves too, so that three manoeuvres differ in kind
+MANOEUVRES = (
+    ((0.63, -2.18, 0.05, 0.4, -0.3, 0.2), (-0.9, -0.15, -0.56, 0.3, 0.4, 0.2)),
+    ((-0.4, -0.8, 1.0, -0.5, 0.6, 0.0), (0.5, 0.7, -0.4, 0.5, -0.3, 0.4)),
+    ((1.2, -1.2, -0.7, 0.3, 0.2, -0.5), (-0.3, 0.5, 0.8, -0.4, 0.5, 0.3)),
+)
+
+STUDY = """title = "Demonstration: the base of ETS-VII"
+
+[robot]
+urdf = "robot.urdf"
+
+[orbit]
+radius = {radius}
+
+[sensors.rate]
+sigma = {rate}
+
+[sensors.accel]
+sigma = {accel}
+position = {position}
+
+[sensors.encoder]
+sigma = {encoder}
+{recordings}
+[unknowns]
+bodies = ["base_link"]
+
+[model]
+effects = ["gravity-gradient"]
+"""
+
+RECORDING = """
+[[recordings]]
+file = "{file}"
+attitude = {attitude}
+"""
+
+
+def copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
+    """Copy the shipped study into a folder.
+
+    Returns
+    -------
+    dict
+        What is hidden in its recordings: effect -> key -> true value, in SI units.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    shipped = files("bayesid.app") / "demonstration_data"
+    answer: dict[str, dict[str, float]] = {}
+    for item in shipped.iterdir():
+        text = item.read_text(encoding="utf-8")
+        if item.name == "hidden.json":
+            answer = json.loads(text)
+        else:
+            (folder / item.name).write_text(text, encoding="utf-8")
+    return answer
+
+
+def write_demo(folder: Path, seed: int) -> InertialParameters:
+    """Write the study and its recordings; the URDF's base is a wrong guess.
+
+    Returns
+    -------
+    InertialParameters
+        The true base.
+    """
+    rng = np.random.default_rng(seed)
+    robot = Robot.shipped("ets7")
+    truth = robot.link(robot.base).inertial
+    model = Model(
+        robot=robot,
+        sensors=(Sensor(Kind.RATE, White(RATE_SIGMA)), Sensor(Kind.ACCEL, White(ACCEL_SIGMA), position=ACCELEROMETER)),
+        priors=(BodyPrior(robot.base, truth, 1.0),),
+        orbit=Orbit(RADIUS),
+        effects=(GravityGradient(),),
+    )
+    folder.mkdir(parents=True, exist_ok=True)
+    sections = []
+    for number, (offset, amplitude) in enumerate(MANOEUVRES, start=1):
+        motion = Excitation(np.array(offset), np.array(amplitude), 2.0 * np.pi / 30.0, periods=2, ramp=30.0)
+        time = np.arange(0.0, motion.duration + 1e-9, INTERVAL)
+        attitude = rng.normal(size=4)
+        attitude /= np.linalg.norm(attitude)
+        name = f"manoeuvre-{number}"
+        recording = simulate_manoeuvre(
+            model, motion, time, name=name, attitude=attitude, rng=rng, encoder_sigma=ENCODER_SIGMA
+        )
+        recording.write(folder / f"{name}.csv")
+        sections.append(RECORDING.format(file=f"{name}.csv", attitude=[float(f"{value:.12g}") for value in attitude]))
+    robot.perturbed(robot.base, 0.15, rng).write_urdf(folder / "robot.urdf")
+    text = STUDY.format(
+        radius=RADIUS,
+        rate=RATE_SIGMA,
+        accel=ACCEL_SIGMA,
+        position=list(ACCELEROMETER),
+        encoder=ENCODER_SIGMA,
+        recordings="".join(sections),
+    )
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    return truth

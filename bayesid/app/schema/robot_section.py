@@ -1,0 +1,144 @@
+"""Sections of a study file on the robot, its loads and its orbit."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from bayesid._io.errors import InputError
+from bayesid.app.schema.value_types import (
+    FULL_TURN,
+    File,
+    Name,
+    NonNegative,
+    Number,
+    Position,
+    Positive,
+    Section,
+    UnitVector,
+    array_of_tables,
+    distinct,
+    list_of,
+    no_more_than,
+)
+from bayesid.robot.inertial_parameters import InertialParameters
+
+LOWEST_ORBIT = 6.3e6
+"""Radii below this are inside the Earth [m]."""
+
+HIGHEST_ORBIT = 1.5e9
+"""Radii above this are outside the Earth's sphere of influence [m]."""
+
+
+class BodySection(Section):
+    """Inertial parameters of a rigid body, in its link's axes.
+
+    Parameters
+    ----------
+    mass : float
+        [kg]
+    com : (3,)
+        Centre of mass [m].
+    inertia : (6,)
+        About the centre of mass, xx yy zz xy xz yz [kg m2].
+    """
+
+    mass: Positive
+    com: Position
+    inertia: Annotated[tuple[Number, Number, Number, Number, Number, Number], list_of(6)]
+
+    @model_validator(mode="after")
+    def _check_physical(self) -> BodySection:
+        _ = self.parameters
+        return self
+
+    @property
+    def parameters(self) -> InertialParameters:
+        """The same as `InertialParameters`, whose triangle inequality and the like have been checked."""
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return InertialParameters(self.mass, self.com, [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+class LoadSection(BodySection):
+    """A rigid body fixed on a link and not in the URDF, ``[[robot.loads]]``.
+
+    Parameters
+    ----------
+    name, link : str
+        Its own name, and the link's that carries it; for the rest see `BodySection`.
+    """
+
+    name: Name
+    link: Name
+
+
+class RobotSection(Section):
+    """The robot, ``[robot]``.
+
+    Parameters
+    ----------
+    urdf : Path
+        The root link is the base body.
+    link_spread : float, optional
+        Relative uncertainty of all links that are not unknowns; 0 = known exactly.
+    loads : sequence of LoadSection, optional
+        Bodies on links.
+    """
+
+    urdf: File
+    link_spread: Annotated[NonNegative, no_more_than(1.0, "A fraction, not a percentage: 0.05 is 5 %")] = 0.0
+    loads: Annotated[tuple[LoadSection, ...], BeforeValidator(array_of_tables)] = ()
+
+    @field_validator("loads")
+    @classmethod
+    def _distinct_names(cls, loads: tuple[LoadSection, ...]) -> tuple[LoadSection, ...]:
+        distinct(tuple(load.name for load in loads))
+        return loads
+
+
+class OrbitSection(Section):
+    """The orbit about the Earth, ``[orbit]``.
+
+    Parameters
+    ----------
+    radius : float
+        [m]; the semi-major axis if there is an eccentricity.
+    eccentricity : float, optional
+        In [0, 1).
+    inclination : float, optional
+        [rad]
+    argument_of_perigee : float, optional
+        [rad]
+    sun : (3,), optional
+        Unit vector to the Sun, Earth-centred: node, along-orbit, normal.
+    """
+
+    radius: Number
+    eccentricity: Annotated[Number, Field(ge=0.0, lt=1.0)] = 0.0
+    inclination: Annotated[NonNegative, no_more_than(math.pi, "Radians, not degrees?")] | None = None
+    argument_of_perigee: Annotated[Number, FULL_TURN] = 0.0
+    sun: UnitVector | None = None
+
+    @field_validator("radius")
+    @classmethod
+    def _above_ground(cls, radius: float) -> float:
+        if radius < LOWEST_ORBIT:
+            raise InputError(
+                f"{radius:g} m is inside the Earth",
+                remedy="Metres, not kilometres? It is counted from the Earth's centre, not the altitude",
+            )
+        if radius > HIGHEST_ORBIT:
+            raise InputError(f"{radius:g} m is no orbit about the Earth", remedy="Metres, not millimetres?")
+        return radius
+
+    @model_validator(mode="after")
+    def _perigee_above_ground(self) -> OrbitSection:
+        perigee = self.radius * (1.0 - self.eccentricity)
+        if perigee < LOWEST_ORBIT:
+            raise InputError(
+                f"the perigee, radius (1 - eccentricity) = {perigee:g} m, is inside the Earth",
+                remedy="With an eccentricity, radius is the semi-major axis",
+            )
+        return self

@@ -1,0 +1,222 @@
+"""Sections of a study file on its sensors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, model_validator
+
+from bayesid._io.errors import InputError
+from bayesid.app.schema.value_types import (
+    ANGLE_SIGMA,
+    Decimation,
+    PerAxis,
+    PerName,
+    Position,
+    Positive,
+    Quaternion,
+    Section,
+    no_less_than,
+    no_more_than,
+)
+from bayesid.simulation.sensors import ARCSEC, AngleRandomWalk, Noise, NoiseDensity, StarTracker, White
+
+
+def _exactly_one(section: BaseModel, keys: Sequence[str]) -> None:
+    given = [key for key in keys if getattr(section, key) is not None]
+    if len(given) != 1:
+        problem = f"{' and '.join(given)} are given together" if given else "the noise is not given"
+        raise InputError(problem, remedy=f"Give exactly one of {', '.join(keys)}")
+
+
+class RateSensor(Section):
+    """Angular velocity of the base, ``[sensors.rate]``. Exactly one of the first three keys says how noisy it is.
+
+    Parameters
+    ----------
+    sigma : float or (3,)
+        White noise per sample [rad/s].
+    angle_random_walk : float
+        From a gyro's data sheet [rad/sqrt(s)]; per sample it is divided by the square root of the sample interval.
+        1 deg/sqrt(h) is 2.909e-4 rad/sqrt(s).
+    attitude_arcsec : float
+        Accuracy per sample [arcsec] of a star sensor whose attitude was differenced to give the rate: two samples
+        enter, so that sigma is sqrt(2) times the angle over the sample interval.
+    mounting : (4,), optional
+        Quaternion, sensor to base axes.
+    bias_sigma : float or (3,), optional
+        Prior standard deviation of a constant bias [rad/s]; left out, the model has none.
+    low_pass, decimate : optional
+        Filter cut-off [Hz], and every how many samples one is kept; both apply to samples and prediction alike.
+    """
+
+    sigma: Annotated[PerAxis, no_more_than(0.1, "rad/s, not arcsec/s or degrees/s?")] | None = None
+    angle_random_walk: (
+        Annotated[Positive, no_more_than(0.01, "rad/sqrt(s), not deg/sqrt(h)? Multiply that by 2.909e-4")] | None
+    ) = None
+    attitude_arcsec: (
+        Annotated[Positive, no_less_than(1e-3, "arcsec, not rad?"), no_more_than(36000.0, "Is it in arcsec?")] | None
+    ) = None
+    mounting: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    bias_sigma: PerAxis | None = None
+    low_pass: Positive | None = None
+    decimate: Decimation = 1
+
+    @model_validator(mode="after")
+    def _check_noise(self) -> RateSensor:
+        _exactly_one(self, ("sigma", "angle_random_walk", "attitude_arcsec"))
+        return self
+
+    @property
+    def noise(self) -> Noise:
+        """Noise of the recorded samples, before any filter."""
+        if self.sigma is not None:
+            return White(self.sigma)
+        if self.angle_random_walk is not None:
+            return AngleRandomWalk(self.angle_random_walk)
+        return StarTracker(self.attitude_arcsec or math.nan)
+
+
+class AccelSensor(Section):
+    """Non-gravitational acceleration at one point of the base, ``[sensors.accel]``. Give one of the first two keys.
+
+    Parameters
+    ----------
+    sigma : float or (3,)
+        White noise per sample [m/s2].
+    noise_density : float
+        From a data sheet, one-sided [m/s2/sqrt(Hz)]; per sample it is multiplied by the square root of the Nyquist
+        frequency. 1 micro-g/sqrt(Hz) is 9.80665e-6 m/s2/sqrt(Hz).
+    position : (3,)
+        Base axes, from the base origin [m].
+    mounting : (4,), optional
+        Quaternion, sensor to base axes.
+    bias_sigma : float or (3,), optional
+        Prior standard deviation of a constant bias [m/s2]; left out, the model has none.
+    low_pass, decimate : optional
+        Filter cut-off [Hz], and every how many samples one is kept; both apply to samples and prediction alike.
+    """
+
+    sigma: Annotated[PerAxis, no_more_than(1.0, "m/s2, not milli-g or micro-g?")] | None = None
+    noise_density: (
+        Annotated[Positive, no_more_than(0.1, "m/s2/sqrt(Hz), not micro-g/sqrt(Hz)? Multiply that by 9.80665e-6")]
+        | None
+    ) = None
+    position: Position
+    mounting: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    bias_sigma: PerAxis | None = None
+    low_pass: Positive | None = None
+    decimate: Decimation = 1
+
+    @model_validator(mode="after")
+    def _check_noise(self) -> AccelSensor:
+        _exactly_one(self, ("sigma", "noise_density"))
+        return self
+
+    @property
+    def noise(self) -> Noise:
+        """Noise of the recorded samples, before any filter."""
+        return White(self.sigma) if self.sigma is not None else NoiseDensity(self.noise_density or math.nan)
+
+
+class AttitudeSensor(Section):
+    """Star sensor, base to orbit axes, ``[sensors.attitude]``. Exactly one of the first two keys is given.
+
+    Parameters
+    ----------
+    sigma : float or (3,)
+        White noise per sample, a small rotation in base axes [rad].
+    arcsec : float
+        The same in seconds of arc.
+    low_pass, decimate : optional
+        Filter cut-off [Hz], and every how many samples one is kept; both apply to samples and prediction alike.
+    """
+
+    sigma: Annotated[PerAxis, ANGLE_SIGMA] | None = None
+    arcsec: (
+        Annotated[Positive, no_less_than(1e-3, "arcsec, not rad?"), no_more_than(36000.0, "Is it in arcsec?")] | None
+    ) = None
+    low_pass: Positive | None = None
+    decimate: Decimation = 1
+
+    @model_validator(mode="after")
+    def _check_noise(self) -> AttitudeSensor:
+        _exactly_one(self, ("sigma", "arcsec"))
+        return self
+
+    @property
+    def noise(self) -> Noise:
+        """Noise of the recorded samples, before any filter."""
+        return White(self.sigma if self.sigma is not None else (self.arcsec or math.nan) * ARCSEC)
+
+
+class EncoderSensor(Section):
+    """Joint measurements, ``[sensors.encoder]``. A noise left out is estimated from the data.
+
+    Parameters
+    ----------
+    sigma, velocity_sigma, acceleration_sigma : float or table of joint to float, optional
+        White noise per sample of position [rad, or m for prismatic], velocity and acceleration.
+    """
+
+    sigma: Annotated[PerName, ANGLE_SIGMA] | None = None
+    velocity_sigma: Annotated[PerName, no_more_than(1.0, "rad/s, not degrees/s?")] | None = None
+    acceleration_sigma: PerName | None = None
+
+    def sigma_of(self, family: Literal["position", "velocity", "acceleration"], joint: str) -> float | None:
+        """Noise per sample of one joint's position, velocity or acceleration; None where it is to be estimated."""
+        given = {
+            "position": self.sigma,
+            "velocity": self.velocity_sigma,
+            "acceleration": self.acceleration_sigma,
+        }[family]
+        return given.get(joint) if isinstance(given, Mapping) else given
+
+
+class TorqueSection(Section):
+    """Joint torque sensors, ``[sensors.torque]``.
+
+    Parameters
+    ----------
+    sigma : float or table of joint to float
+        White noise per sample [N m, or N for prismatic]. One number is for every moving joint; a table names the joints
+        that have a sensor.
+    """
+
+    sigma: Annotated[PerName, no_more_than(1e4, "N m")]
+
+
+class SensorsSection(Section):
+    """The sensors, ``[sensors]``; of rate, accel and attitude at least one.
+
+    Parameters
+    ----------
+    rate, accel, attitude : optional
+        Sensors of the base; one that is left out is not used, even if it was recorded.
+    torque : optional
+        Sensors of the joint torques; left out, recorded torques are not used.
+    encoder : EncoderSensor
+        Sensors of the joints.
+    """
+
+    rate: RateSensor | None = None
+    accel: AccelSensor | None = None
+    attitude: AttitudeSensor | None = None
+    torque: TorqueSection | None = None
+    encoder: EncoderSensor = EncoderSensor()
+
+    @model_validator(mode="after")
+    def _check_information(self) -> SensorsSection:
+        if self.rate is None and self.accel is None and self.attitude is None:
+            raise InputError(
+                "no sensor of the base is declared",
+                remedy="Add at least one of [sensors.rate], [sensors.accel], [sensors.attitude]",
+            )
+        if self.rate is not None and self.rate.attitude_arcsec is not None and self.attitude is not None:
+            raise InputError(
+                "a rate differenced from the attitude (rate.attitude_arcsec) is not a second sensor",
+                remedy="Declare either [sensors.rate] or [sensors.attitude]",
+            )
+        return self

@@ -1,0 +1,108 @@
+"""The study file as a whole."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, PrivateAttr, ValidationError, model_validator
+
+from bayesid._io.errors import InputError
+from bayesid.app.schema.design_section import DesignSection
+from bayesid.app.schema.robot_section import OrbitSection, RobotSection
+from bayesid.app.schema.sensor_sections import SensorsSection
+from bayesid.app.schema.study_sections import ModelSection, RecordingSection, UnknownsSection, check_extended
+from bayesid.app.schema.validation_messages import explain, syntax_error
+from bayesid.app.schema.value_types import Section, array_of_tables
+
+
+class Study(Section):
+    """A study file.
+
+    Parameters
+    ----------
+    title : str, optional
+        The file's stem if left out.
+    robot, sensors, unknowns : sections
+        Required.
+    orbit : OrbitSection or None
+        None away from orbit; then no environment effect applies.
+    recordings : sequence of RecordingSection
+        May be empty for commands that only design.
+    model : ModelSection
+        Optional.
+    design : DesignSection or None
+        Optional.
+    """
+
+    title: str = ""
+    robot: RobotSection
+    orbit: OrbitSection | None = None
+    sensors: SensorsSection
+    recordings: Annotated[tuple[RecordingSection, ...], BeforeValidator(array_of_tables)] = ()
+    unknowns: UnknownsSection
+    model: ModelSection = ModelSection()
+    design: DesignSection | None = None
+    # not a key of the file
+    _file: Path | None = PrivateAttr(default=None)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Study:
+        """Read and check a study file; its paths come out relative to the file's folder.
+
+        Raises
+        ------
+        InputError
+            If the file is absent, is no TOML, or breaks a rule; the message names the key, the value and the remedy.
+        """
+        file = Path(path)
+        if not file.is_file():
+            raise InputError("there is no such file", file=file, remedy="Give the path of a study, a TOML file")
+        try:
+            data = tomllib.loads(file.read_text(encoding="utf-8"))
+        except UnicodeDecodeError as error:
+            raise InputError(f"not a text file: {error}", file=file, remedy="Save it as UTF-8 text") from error
+        except tomllib.TOMLDecodeError as error:
+            raise syntax_error(error, file) from error
+        return cls.from_mapping({"title": file.stem} | data, file)
+
+    @classmethod
+    def from_mapping(cls, data: Mapping[str, Any], file: Path | None = None) -> Study:
+        """Check the content of a study file, already parsed; without a file its paths are left as they are."""
+        try:
+            study = cls.model_validate(data, context={"folder": None if file is None else file.parent})
+        except ValidationError as error:
+            raise explain(error, data, cls).within(file=file) from error
+        study._file = file
+        return study
+
+    @property
+    def file(self) -> Path | None:
+        """The file it was loaded from."""
+        return self._file
+
+    def with_posterior(self, posterior: Path) -> Study:
+        """Return the study with the posterior of an earlier one as its prior, whatever it states itself."""
+        unknowns = self.unknowns.model_copy(update={"posterior": posterior, "prior": {}})
+        return self.model_copy(update={"unknowns": unknowns})
+
+    @model_validator(mode="after")
+    def _check_whole(self) -> Study:
+        files = [recording.file for recording in self.recordings]
+        for index, file in enumerate(files):
+            if file in files[:index]:
+                raise InputError(
+                    f"'{file.name}' is listed twice",
+                    place=f"recordings #{index + 1}.file",
+                    remedy="Remove one: the same data would count twice",
+                )
+        for index, load in enumerate(self.robot.loads, start=1):
+            if (
+                self.unknowns.posterior is None
+                and load.name in self.unknowns.bodies
+                and load.name not in self.unknowns.prior
+            ):
+                check_extended(load, place=f"robot.loads #{index} ('{load.name}')")
+        return self

@@ -1,0 +1,118 @@
+"""What is wrong with a study file, in the user's terms."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from bayesid._io.errors import InputError
+
+_WANTED = {
+    "model_type": "a table",
+    "dict_type": "a table",
+    "mapping_type": "a table",
+    "tuple_type": "a list",
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "string_type": "text in quotes",
+    "path_type": "a path in quotes",
+    "string_too_short": "a name",
+}
+"""What to give instead, by pydantic's type of error; for the others its own message serves."""
+
+
+def suggest(name: str, known: Sequence[str]) -> str | None:
+    """Return a hint at the nearest known name, if one is near."""
+    near = difflib.get_close_matches(name, known, n=1)
+    return f"Did you mean '{near[0]}'?" if near else None
+
+
+def syntax_error(error: tomllib.TOMLDecodeError, file: Path) -> InputError:
+    """Return the parser's complaint with the line as the place."""
+    text = str(error)
+    found = re.search(r"\s*\(at (line \d+, column \d+|end of document)\)", text)
+    place = found.group(1) if found else None
+    problem = text.replace(found.group(0), "") if found else text
+    return InputError(f"not valid TOML: {problem}", file=file, place=place, remedy="Correct the syntax there")
+
+
+def explain(error: ValidationError, data: Mapping[str, Any], study: type[BaseModel]) -> InputError:
+    """Return the first error in the user's terms, and the number of the others.
+
+    A misspelt key comes first: it is usually why another one is missing.
+    """
+    faults = sorted(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden")
+    first = _one_error(faults[0], data, study)
+    # one number that stands for three axes is one error
+    others = len({_path_of(fault, data) for fault in faults}) - 1
+    if not others:
+        return first
+    remedy = f"{first.remedy or ''} ({others} more error{'s' if others > 1 else ''} in this file)".lstrip()
+    return InputError(first.problem, place=first.place, remedy=remedy)
+
+
+def _path_of(fault: ErrorDetails, data: Any) -> tuple[str | int, ...]:
+    """Return the part of pydantic's location that is in the file: it names union branches and "[key]" as well."""
+    path: list[str | int] = []
+    last = len(fault["loc"]) - 1
+    for position, part in enumerate(fault["loc"]):
+        is_key = isinstance(data, Mapping) and part in data
+        is_entry = isinstance(data, list) and isinstance(part, int) and part < len(data)
+        if is_key or is_entry:
+            data = data[part]
+            path.append(part)
+        elif fault["type"] == "missing" and position == last:
+            path.append(part)
+    return tuple(path)
+
+
+def _one_error(fault: ErrorDetails, data: Mapping[str, Any], study: type[BaseModel]) -> InputError:
+    kind = fault["type"]
+    path = _path_of(fault, data)
+    place = _place(path)
+    if kind == "extra_forbidden":
+        known = tuple(_table_at(study, path[:-1]).model_fields)
+        remedy = f"{suggest(str(path[-1]), known) or ''} Allowed: {', '.join(known)}".lstrip()
+        return InputError(f"unknown key '{path[-1]}'", place=place, remedy=remedy)
+    if kind == "missing":
+        is_section = _section_in(_table_at(study, path[:-1]).model_fields[str(path[-1])].annotation) is not None
+        problem, remedy = ("section", f"Add [{place}]") if is_section else ("key", f"Add {path[-1]} = ...")
+        return InputError(f"the {problem} is missing", place=place, remedy=remedy)
+    cause = fault.get("ctx", {}).get("error")
+    if isinstance(cause, InputError):
+        within = ".".join(part for part in (place, cause.place) if part)
+        return InputError(cause.problem, place=within or None, remedy=cause.remedy)
+    wanted = fault["msg"].removeprefix("Input should be ")
+    if kind.startswith(("greater_than", "less_than")):
+        wanted = f"a value {wanted}"
+    return InputError(f"got {fault['input']!r}", place=place, remedy=f"Give {_WANTED.get(kind, wanted)}")
+
+
+def _place(path: Sequence[str | int]) -> str:
+    """Write a path as a reader counts: entries of lists from 1."""
+    text = ""
+    for part in path:
+        text += f" #{part + 1}" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def _table_at(section: type[BaseModel], path: Sequence[str | int]) -> type[BaseModel]:
+    """Return the class of the table at a path, below the class of another table."""
+    for part in path:
+        if isinstance(part, str) and part in section.model_fields:
+            section = _section_in(section.model_fields[part].annotation) or section
+    return section
+
+
+def _section_in(annotation: Any) -> type[BaseModel] | None:
+    """Return the section class in an annotation such as ``tuple[LoadSection, ...]`` or ``OrbitSection | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next(filter(None, map(_section_in, get_args(annotation))), None)

@@ -1,0 +1,129 @@
+"""Values of a study file: types that check range, length and unit as they are read."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    AllowInfNan,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Strict,
+    StringConstraints,
+    Tag,
+    ValidationInfo,
+)
+
+from bayesid._io.errors import InputError
+
+UNIT_TOLERANCE = 1e-3
+"""How far the norm of a unit vector or quaternion may be from one before it is taken for an error."""
+
+
+def no_more_than(limit: float, remedy: str) -> AfterValidator:
+    """Reject magnitudes that only a wrong unit explains."""
+
+    def check(value: Any) -> Any:
+        largest = max(np.abs(list(value.values()) if isinstance(value, Mapping) else value).flat, default=0.0)
+        if largest > limit:
+            raise InputError(f"{largest:g} is implausibly large, over {limit:g}", remedy=remedy)
+        return value
+
+    return AfterValidator(check)
+
+
+def no_less_than(limit: float, remedy: str) -> AfterValidator:
+    """Reject values so small that only a wrong unit explains them."""
+
+    def check(value: float) -> float:
+        if value < limit:
+            raise InputError(f"{value:g} is implausibly small, below {limit:g}", remedy=remedy)
+        return value
+
+    return AfterValidator(check)
+
+
+def list_of(size: int, *, or_number: bool = False) -> BeforeValidator:
+    """Require a list of ``size``; with ``or_number``, one number stands for all."""
+
+    def check(value: Any) -> Any:
+        if or_number and isinstance(value, (int, float)) and not isinstance(value, bool):
+            return (value,) * size
+        if not isinstance(value, (list, tuple)) or len(value) != size:
+            count = f"a list of {len(value)}" if isinstance(value, (list, tuple)) else repr(value)
+            raise InputError(
+                f"got {count}", remedy=f"Give {'a number or ' if or_number else ''}a list of {size} numbers"
+            )
+        return value
+
+    return BeforeValidator(check)
+
+
+def _unit(value: tuple[float, ...]) -> tuple[float, ...]:
+    """Normalise; an error where the norm is not one."""
+    norm = math.hypot(*value)
+    if abs(norm - 1.0) > UNIT_TOLERANCE:
+        kind = "quaternion (x, y, z, w)" if len(value) == 4 else "vector"
+        raise InputError(f"the norm of {list(value)} is {norm:.6g}, not 1", remedy=f"Give a unit {kind}")
+    return tuple(component / norm for component in value)
+
+
+def distinct(values: tuple[str, ...]) -> tuple[str, ...]:
+    """Reject a name that appears twice."""
+    for index, value in enumerate(values):
+        if value in values[:index]:
+            raise InputError(f"'{value}' appears twice", remedy="Name each once")
+    return values
+
+
+def _resolve(path: Path, info: ValidationInfo) -> Path:
+    """Make a path relative to the study's folder, not to where the command runs."""
+    if path == Path():
+        raise InputError("the path is empty", remedy="Name a file")
+    folder = (info.context or {}).get("folder")
+    return path if folder is None else Path(os.path.normpath(Path(folder) / path))
+
+
+def array_of_tables(value: Any) -> Any:
+    """Reject a single table where the file may hold several."""
+    if isinstance(value, Mapping):
+        raise InputError("got a single table", remedy="Write its header in double brackets, [[...]]")
+    return value
+
+
+Number = Annotated[float, Strict(), AllowInfNan(False)]
+Positive = Annotated[Number, Field(gt=0.0)]
+NonNegative = Annotated[Number, Field(ge=0.0)]
+Name = Annotated[str, StringConstraints(min_length=1, strip_whitespace=True)]
+Names = Annotated[tuple[Name, ...], AfterValidator(distinct)]
+File = Annotated[Path, AfterValidator(_resolve)]
+Vector = Annotated[tuple[Number, Number, Number], list_of(3)]
+Position = Annotated[Vector, no_more_than(100.0, "Metres, not millimetres?")]
+UnitVector = Annotated[Vector, AfterValidator(_unit)]
+Quaternion = Annotated[tuple[Number, Number, Number, Number], AfterValidator(_unit), list_of(4)]
+PerAxis = Annotated[tuple[Positive, Positive, Positive], list_of(3, or_number=True)]
+Decimation = Annotated[int, Strict(), Field(ge=1)]
+Table = Mapping[Name, Positive]
+PerName = Annotated[
+    Annotated[Positive, Tag("number")] | Annotated[Table, Tag("table")],
+    # without it both branches would complain about the same value
+    Discriminator(lambda value: "table" if isinstance(value, Mapping) else "number"),
+]
+
+FULL_TURN = no_more_than(2.0 * math.pi, "Radians, not degrees?")
+ANGLE_SIGMA = no_more_than(0.1, "Radians, not arcsec or degrees?")
+
+
+class Section(BaseModel):
+    """A table of the study file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)

@@ -1,0 +1,214 @@
+"""From a study file to its design problem."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.app.schema import DesignSection, Study
+from bayesid.app.schema.validation_messages import suggest
+from bayesid.app.study_to_model import encoder_noise, load_model
+from bayesid.design.criteria import (
+    AOptimal,
+    ConditionNumber,
+    Criterion,
+    DOptimal,
+    EOptimal,
+    InformationGain,
+    Paper26,
+    Paper26Intended,
+    Separation,
+)
+from bayesid.design.design_problem import Problem
+from bayesid.design.extended_posture import extended_posture
+from bayesid.design.motion_limits import Limits
+from bayesid.design.plan import Plan
+from bayesid.design.predicted_posterior import Encoder
+from bayesid.design.trajectories import BSplines, Fourier, PaperExcitation, Parameterisation
+from bayesid.robot.end_effector import Tip
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import create
+from bayesid.simulation.model import Model
+
+__all__ = ["ASSUMED", "assumed_encoders", "encoders", "fingerprint", "load_problem"]
+
+SAMPLES = 120
+"""Of a manoeuvre that are simulated, at most, each standing for as many as it takes."""
+
+LONGEST_STEP, STEPS = 2.0, 60
+"""Of the integration: longest step [s] and fewest steps of a manoeuvre."""
+
+FUNCTIONS = 8
+"""Free functions of every joint where a study does not say."""
+
+CRITERIA: tuple[Criterion, ...] = (
+    Paper26(),
+    Paper26Intended(),
+    ConditionNumber(),
+    DOptimal(),
+    AOptimal(),
+    EOptimal(),
+    InformationGain(),
+)
+"""All that need nothing but the plan."""
+
+
+ASSUMED = 1e-6
+"""Noise of an encoder of which the study says nothing, and no data tell [rad or m]."""
+
+
+def load_problem(study: Study) -> Problem:
+    """Return the design problem of a study, which needs no recordings.
+
+    Raises
+    ------
+    InputError
+        Naming file, place, value and remedy.
+    """
+    section, model = study.design or DesignSection(), load_model(study).without_torque
+    try:
+        model = _with_rivals(model, section)
+        if not model.bodies:
+            raise InputError("nothing is unknown", place="unknowns.bodies", remedy="Name a body to identify")
+        tip = Tip.of(model.robot, section.tip_frame)
+        limits = Limits(**section.limits.model_dump())
+        plan = Plan(
+            model=model,
+            family=_family(model.robot, section, tip),
+            interval=section.interval,
+            tip=tip,
+            attitude=np.array(section.attitude),
+            attitude_sigma=section.attitude_sigma,
+            latitude=section.argument_of_latitude,
+            step=_step(model, section, limits),
+            thinning=math.ceil(section.duration / section.interval / SAMPLES),
+        )
+        _check_traceable(plan)
+        return Problem(plan, limits, tuple(_criterion(name, section) for name in section.chosen_criteria))
+    except InputError as error:
+        raise error.within(file=study.file) from None
+
+
+def encoders(study: Study, robot: Robot) -> Encoder:
+    """Return the noise of the joints' recorded positions, `ASSUMED` where the study does not give it."""
+    noise = encoder_noise(study, robot)
+    positions = {joint: ASSUMED if sigma is None else sigma for joint, sigma in noise[0].items()}
+    return {**noise, 0: positions}
+
+
+def assumed_encoders(study: Study, robot: Robot) -> list[str]:
+    """Return the joints whose encoders' noise had to be assumed."""
+    return [joint for joint, sigma in encoder_noise(study, robot)[0].items() if sigma is None]
+
+
+def fingerprint(study: Study) -> str:
+    """Return a hash of all files that define the problem of a study."""
+    files = [study.file, study.robot.urdf, study.unknowns.posterior, *study.model.plugins]
+    content = hashlib.sha256()
+    for file in files:
+        part = b"" if file is None else Path(file).read_bytes()
+        content.update(hashlib.sha256(part).digest())
+    return content.hexdigest()
+
+
+def _with_rivals(model: Model, section: DesignSection) -> Model:
+    """Extend the model by those effects to be told apart that it lacks."""
+    try:
+        for label in section.rivals:
+            if label not in [effect.label for effect in model.effects]:
+                model = model.extend(create(label))
+    except InputError as error:
+        raise error.within(place="design.rivals") from None
+    for effect in model.effects:
+        if effect.label in section.rivals and not effect.parameters:
+            raise InputError(
+                f"effect {effect.label!r} has no unknown size by which it could be told from others",
+                place="design.rivals",
+                remedy="Name effects with parameters",
+            )
+    return model
+
+
+def _criterion(name: str, section: DesignSection) -> Criterion:
+    if name == Separation.name:
+        return Separation(section.rivals)
+    return next(criterion for criterion in CRITERIA if criterion.name == name)
+
+
+def _family(robot: Robot, section: DesignSection, tip: Tip) -> Parameterisation:
+    names = [joint.name for joint in robot.joints]
+    moving = [
+        _joint_index(name, names, f"design.joints #{number}")
+        for number, name in enumerate(names if section.joints is None else section.joints, start=1)
+    ]
+    if not moving:
+        raise InputError("no joint is to move", place="design.joints", remedy="Name at least one joint of the URDF")
+    start, functions = _start(robot, section), section.functions or FUNCTIONS
+    if section.parameterisation == "fourier":
+        return Fourier(start, moving, section.duration, functions // 2 + 1)
+    if section.parameterisation == "b-splines":
+        return BSplines(start, moving, section.duration, functions)
+    swinging = moving[:3]
+    free = [index for index in range(len(names)) if index not in swinging and names[index] not in section.start]
+    posture = extended_posture(robot, start, free, swinging[-1], tip)
+    return PaperExcitation(posture, section.duration, swinging)
+
+
+def _joint_index(name: str, names: list[str], place: str) -> int:
+    if name not in names:
+        hint = suggest(name, names)
+        raise InputError(
+            f"the robot has no moving joint '{name}'", place=place, remedy=hint or f"Choose one of {', '.join(names)}"
+        )
+    return names.index(name)
+
+
+def _start(robot: Robot, section: DesignSection) -> Floats:
+    """Return the positions of all joints before and after the manoeuvre."""
+    start = np.array([np.clip(0.0, joint.lower, joint.upper) for joint in robot.joints])
+    for name, value in section.start.items():
+        index = _joint_index(name, [joint.name for joint in robot.joints], f"design.start.{name}")
+        joint = robot.joints[index]
+        if not joint.lower <= value <= joint.upper:
+            raise InputError(
+                f"{value:g} {joint.unit} is outside the joint's range, {joint.lower:g} to {joint.upper:g}",
+                place=f"design.start.{name}",
+                remedy="Start within the range",
+            )
+        start[index] = value
+    return start
+
+
+def _step(model: Model, section: DesignSection, limits: Limits) -> float:
+    """Return a step of the integration that is short against everything that happens; limits are seen twice a step."""
+    functions = section.functions or FUNCTIONS
+    steps = [LONGEST_STEP, section.duration / STEPS, section.duration / (4 * functions), 4.0 * section.interval]
+    return min(*steps, 2.0 * limits.finest, *(effect.longest_step for effect in model.effects))
+
+
+def _check_traceable(plan: Plan) -> None:
+    """Reject effects whose tables JAX cannot differentiate in the motion."""
+    times = np.linspace(0.0, plan.family.duration, 3)
+    for effect in plan.model.effects:
+        if not effect.uses("table"):
+            continue
+        try:
+            jax.eval_shape(
+                lambda p, own=effect: own.table(plan.model.robot, plan.family.motion(p), times),
+                jnp.asarray(plan.family.centre),
+            )
+        except InputError:
+            raise
+        except (TypeError, ValueError) as error:  # JAX's own, and NumPy's where it is handed a traced array
+            raise InputError(
+                f"effect {effect.label!r} computes the joints' motion outside JAX, so that a design has no gradient",
+                place="model.effects",
+                remedy="Leave it out of the model for the design",
+            ) from error

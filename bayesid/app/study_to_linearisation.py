@@ -1,0 +1,105 @@
+"""What practical identifiability of a study rests on: a fit of its recordings or, for planned motion, a prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesid.app.schema import Study
+from bayesid.app.study_to_design import ASSUMED, assumed_encoders, encoders
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.design.predicted_posterior import planned_posterior
+from bayesid.identifiability.hypothetical_experiment import blanked, has
+from bayesid.identifiability.practical_identifiability import Basis
+from bayesid.inference.mode import Optimum, fit, maximise
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.recording_check import refuse_wrong_units
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.plausibility import refuse_impossible_joints
+from bayesid.simulation.model import Manoeuvre, Model
+
+__all__ = ["Ground", "missing_part", "prepare"]
+
+
+MISFIT = 3.0
+"""Deviation of chi-square, in its own standard deviations, that noise alone rarely reaches."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A posterior with its mode.
+
+    Attributes
+    ----------
+    statement : str
+        What it rests on, in a sentence.
+    """
+
+    basis: Basis
+    statement: str
+    posterior: Posterior
+    optimum: Optimum
+
+
+def missing_part(study: Study) -> str:
+    """Return what a study lacks for a practical part; empty if nothing."""
+    if not study.recordings:
+        return "the study names no [[recordings]], not even a planned motion of the joints"
+    return "" if study.unknowns.bodies else "the study has no [unknowns] bodies"
+
+
+def prepare(study: Study, seed: int) -> Ground:
+    """Fit the recordings of a study, or take its motion for a plan where they lack what a declared sensor reads."""
+    model = load_model(study)
+    manoeuvres = load_manoeuvres(study, model.robot)
+    if lacking := _lacking(model, manoeuvres):
+        return _predicted(study, model, manoeuvres, lacking)
+    posterior = Posterior(model, manoeuvres)
+    refuse_wrong_units(posterior)
+    refined, optimum = maximise(posterior, np.random.default_rng(seed))
+    statement = (
+        f"The model was fitted to {_count(manoeuvres)} with {refined.samples} scalar sensor samples; chi-square is "
+        f"{optimum.chi2 / refined.samples:.3f} per sample."
+    )
+    if optimum.chi2 - refined.samples > MISFIT * np.sqrt(2.0 * refined.samples):
+        statement += " The model does not explain the data: what follows supposes that it does, so diagnose them first."
+    return Ground(Basis.FIT, statement, refined, optimum)
+
+
+def _predicted(study: Study, model: Model, manoeuvres: Sequence[Manoeuvre], lacking: Sequence[str]) -> Ground:
+    robot, noise = model.robot, encoders(study, model.robot)
+    planned = []
+    for section, manoeuvre in zip(study.recordings, manoeuvres, strict=True):
+        refuse_impossible_joints(manoeuvre.recording, robot)
+        # a plan has no noise from which the encoders' could be estimated
+        motion = MeasuredMotion.from_recording(manoeuvre.recording, robot, sigma=noise, start=section.start)
+        planned.append(blanked(replace(manoeuvre, motion=motion), model.sensors, model.torque))
+    posterior = planned_posterior(model, planned)
+    centre = np.zeros(posterior.size)
+    posterior = posterior.at(centre)
+    statement = (
+        f"This is a prediction: {_count(manoeuvres)} without {', '.join(lacking)} cannot be fitted; its motion "
+        "is taken as planned. The sensors are supposed to read what the prior's centre predicts, with the declared "
+        "noise."
+    )
+    if guessed := assumed_encoders(study, robot):
+        statement += f" The study gives no encoder noise of {', '.join(guessed)}: {ASSUMED:g} rad or m is assumed."
+    return Ground(Basis.PREDICTION, statement, posterior, fit(posterior, centre))
+
+
+def _lacking(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[str]:
+    """Return the declared sensors that some recording does not hold."""
+    lacking = [
+        sensor.kind.value
+        for sensor in model.sensors
+        if not all(has(manoeuvre.recording, sensor.kind) for manoeuvre in manoeuvres)
+    ]
+    columns = [f"torque.{joint}" for joint in (model.torque.joints if model.torque is not None else ())]
+    recorded = all(column in manoeuvre.recording.channels for manoeuvre in manoeuvres for column in columns)
+    return lacking if recorded else [*lacking, "torque"]
+
+
+def _count(manoeuvres: Sequence[Manoeuvre]) -> str:
+    return "1 recording" if len(manoeuvres) == 1 else f"{len(manoeuvres)} recordings"

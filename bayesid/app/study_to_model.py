@@ -1,0 +1,244 @@
+"""From a study file to the objects it describes: robot, model, manoeuvres, posterior."""
+
+from __future__ import annotations
+
+import copy
+import importlib.util
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid.app.schema import RecordingSection, Study
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior, Mixing
+from bayesid.robot.robot import Load, Robot
+from bayesid.simulation.effects import AccelBias, Effect, RateBias, create
+from bayesid.simulation.joint_torques import TorqueSensor
+from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Filter, Kind, Sensor
+
+__all__ = ["encoder_noise", "load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
+
+
+CHANGE_SEED = 0
+"""Of the draws of an uncertain change of mass, so that a study always has the same prior."""
+
+
+def load_posterior(study: Study) -> Posterior:
+    """Read everything a study names and build its posterior.
+
+    Raises
+    ------
+    InputError
+        Naming file, place, value and remedy.
+    """
+    model = load_model(study)
+    return Posterior(model, load_manoeuvres(study, model.robot))
+
+
+def load_robot(study: Study) -> Robot:
+    """Read the robot with its loads; bodies whose prior the study gives have that prior's centre."""
+    return _load_robot(study)[0]
+
+
+def _load_robot(study: Study) -> tuple[Robot, JointPrior | None]:
+    """Read the robot, and the joint prior of the bodies of an earlier posterior if the study names one."""
+    robot = Robot.from_urdf(study.robot.urdf)
+    try:
+        for load in study.robot.loads:
+            robot = robot.with_load(Load(load.name, load.link, load.parameters))
+        for name in study.unknowns.bodies:
+            robot.link(name)
+            if name in study.unknowns.prior:
+                robot = robot.with_inertial(name, study.unknowns.prior[name].parameters)
+    except InputError as error:
+        raise InputError(error.problem, file=study.file, place=error.place, remedy=error.remedy) from None
+    carried = _carried(study, robot)
+    for name, centre in zip(carried.names, carried.centres, strict=True) if carried else ():
+        robot = robot.with_inertial(name, centre)
+    return robot, carried
+
+
+def _carried(study: Study, robot: Robot) -> JointPrior | None:
+    """Return the joint prior from an earlier posterior.
+
+    Bodies it holds beside those of the study are carried too if the robot has them: they were not known exactly then,
+    and are correlated with the others.
+    """
+    section = study.unknowns
+    if section.posterior is None:
+        return None
+    draws = InertialDraws.read(section.posterior)
+    rest = [name for name in draws.names if name in robot.links and name not in section.bodies]
+    try:
+        draws, rng = draws.of_bodies([*section.bodies, *rest]), np.random.default_rng(CHANGE_SEED)
+        for change in section.changes:
+            draws = draws.changed(change.change, rng)
+        return joint_prior(draws)
+    except InputError as error:
+        raise error.within(file=section.posterior) from None
+
+
+def load_model(study: Study) -> Model:
+    """Build the model of a study."""
+    for plugin in study.model.plugins:
+        _import(Path(plugin))
+    robot, carried = _load_robot(study)
+    try:
+        priors, mixing = _priors(study, robot, carried)
+        return Model(
+            robot=robot,
+            sensors=_sensors(study),
+            priors=priors,
+            orbit=_orbit(study),
+            effects=_effects(study),
+            rate_sigma=_rate_sigma(study),
+            mixing=mixing,
+            torque=_torque(study, robot),
+        )
+    except InputError as error:
+        raise error.within(file=study.file) from None
+
+
+def _priors(study: Study, robot: Robot, carried: JointPrior | None) -> tuple[tuple[BodyPrior, ...], Mixing | None]:
+    """Return the priors of identified bodies, then of bodies only marginalised, and what correlates them."""
+    section, spread = study.unknowns, study.robot.link_spread
+    if carried is None:
+        own = [BodyPrior(name, robot.link(name).inertial, section.spread_of(name)) for name in section.bodies]
+        return (*own, *spread_links(robot, spread, section.bodies)), None
+    known = carried.bodies([name for name in carried.names if name not in section.bodies])
+    links = spread_links(robot, spread, carried.names)
+    return (*known, *links), carried.mixing(links)
+
+
+def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:
+    """Read all recordings of a study and smooth their joint motion."""
+    if not study.recordings:
+        raise InputError("no [[recordings]]", file=study.file, remedy="Name at least one recording")
+    return [load_manoeuvre(study, section, robot) for section in study.recordings]
+
+
+def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
+    """Read one recording of a study."""
+    recording = Recording.read(section.file)
+    motion = MeasuredMotion.from_recording(recording, robot, sigma=encoder_noise(study, robot), start=section.start)
+    return Manoeuvre(
+        recording=recording,
+        motion=motion,
+        attitude=np.array(section.attitude),
+        attitude_sigma=section.attitude_sigma,
+        latitude=section.argument_of_latitude or 0.0,
+    )
+
+
+def encoder_noise(study: Study, robot: Robot) -> dict[int, dict[str, float | None]]:
+    """Return the noise of position (0), velocity (1), acceleration (2) by joint; None where it is to be estimated."""
+    families: tuple[Literal["position", "velocity", "acceleration"], ...] = ("position", "velocity", "acceleration")
+    return {
+        derivative: {joint.name: study.sensors.encoder.sigma_of(family, joint.name) for joint in robot.joints}
+        for derivative, family in enumerate(families)
+    }
+
+
+def _orbit(study: Study) -> Orbit | None:
+    if study.orbit is None:
+        return None
+    return Orbit(
+        radius=study.orbit.radius,
+        eccentricity=study.orbit.eccentricity,
+        inclination=study.orbit.inclination,
+        argument_of_perigee=study.orbit.argument_of_perigee,
+        sun=study.orbit.sun,
+    )
+
+
+def _sensors(study: Study) -> tuple[Sensor, ...]:
+    sensors = []
+    rate, accel, attitude = study.sensors.rate, study.sensors.accel, study.sensors.attitude
+    if rate is not None:
+        sensors.append(
+            Sensor(Kind.RATE, rate.noise, mounting=rate.mounting, filter=Filter(rate.low_pass, rate.decimate))
+        )
+    if accel is not None:
+        sensors.append(
+            Sensor(
+                Kind.ACCEL,
+                accel.noise,
+                mounting=accel.mounting,
+                position=accel.position,
+                filter=Filter(accel.low_pass, accel.decimate),
+            )
+        )
+    if attitude is not None:
+        sensors.append(Sensor(Kind.ATTITUDE, attitude.noise, filter=Filter(attitude.low_pass, attitude.decimate)))
+    return tuple(sensors)
+
+
+def _torque(study: Study, robot: Robot) -> TorqueSensor | None:
+    section = study.sensors.torque
+    if section is None:
+        return None
+    given = section.sigma
+    sigma = dict(given) if isinstance(given, Mapping) else {joint.name: given for joint in robot.joints}
+    return TorqueSensor(tuple(sigma), tuple(sigma.values()))
+
+
+def _effects(study: Study) -> tuple[Effect, ...]:
+    effects = [create(label) for label in study.model.effects]
+    # a sensor whose study states the prior of its bias has the bias in its model
+    for section, kind in ((study.sensors.rate, RateBias), (study.sensors.accel, AccelBias)):
+        if section is not None and section.bias_sigma is not None and kind.name not in study.model.effects:
+            effects.append(kind(section.bias_sigma))
+    known = [effect.label for effect in effects]
+    for label in study.model.priors:
+        if label not in known:
+            raise InputError(
+                f"prior of an effect that is not in the model: {label!r}",
+                place="model.priors",
+                remedy=f"Effects in the model: {', '.join(known)}",
+            )
+    return tuple(with_prior(effect, study.model.priors.get(effect.label, {})) for effect in effects)
+
+
+def with_prior(effect: Effect, sigma: Mapping[str, float]) -> Effect:
+    """Return the effect with other prior standard deviations of the named parameters."""
+    keys = [parameter.name for parameter in effect.parameters]
+    for key in sigma:
+        if key not in keys:
+            raise InputError(
+                f"effect {effect.label!r} has no parameter {key!r}",
+                place="model.priors",
+                remedy=f"Parameters: {', '.join(keys)}",
+            )
+    changed = copy.copy(effect)
+    changed.parameters = tuple(p._replace(sigma=float(sigma.get(p.name, p.sigma))) for p in effect.parameters)
+    return changed
+
+
+def _rate_sigma(study: Study) -> float:
+    if study.model.initial_rate == "zero":
+        return 0.0
+    return study.model.initial_rate_sigma or RATE_SIGMA
+
+
+def _import(file: Path) -> None:
+    """Run a user's file, which registers the effects it defines."""
+    if not file.is_file():
+        raise InputError("no such file", file=file, place="model.plugins", remedy="Correct the path of the plugin")
+    spec = importlib.util.spec_from_file_location(f"bayesid_plugin_{file.stem}", file)
+    if spec is None or spec.loader is None:
+        raise InputError("not a Python file", file=file, place="model.plugins", remedy="Name a .py file")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise InputError(
+            f"the plugin fails: {type(error).__name__}: {error}", file=file, remedy="Correct the file"
+        ) from error

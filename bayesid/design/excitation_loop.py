@@ -1,0 +1,236 @@
+"""The loop of section 3.3 of the paper: plan from what is known, execute, identify, update, until it is known well.
+
+Every manoeuvre is designed from the posterior of those before it, and flown only if its limits hold with 99 % under it.
+All random numbers follow from one seed and the step's number, and everything between two stages goes through the files
+of the folder: a loop that was killed goes on to the very same result.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid.design.design_problem import Problem
+from bayesid.design.designed import sample_times
+from bayesid.design.go_no_go import plan_to_go
+from bayesid.design.knowledge_update import (
+    Identifier,
+    Sampled,
+    bodies_of_draws,
+    carried_model,
+    describe_bodies,
+    known_of,
+    worst_relative_sd,
+)
+from bayesid.design.loop_history import History
+from bayesid.design.plan import Plan
+from bayesid.design.predicted_posterior import Encoder
+from bayesid.design.search_store import Store
+from bayesid.design.simulated_spacecraft import Spacecraft, plan_recording
+from bayesid.design.trajectory_search import Search, Show
+from bayesid.inference.body_quantities import BodyDraws
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.posterior_as_prior import InertialDraws
+from bayesid.inference.recording_check import refuse_wrong_units
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.plausibility import refuse_impossible_joints
+from bayesid.recording.recording import Recording
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import Kind
+
+__all__ = ["Loop", "NotFlown"]
+
+LOOSE = 10.0
+"""Initial attitude taken from a star sensor's first sample: this many times its noise, as that sample counts again."""
+
+NARROW = 0.5
+"""Width of a prior up to which readings ten times too large are wrong units rather than another body."""
+
+
+class NotFlown(Exception):  # noqa: N818  (nothing went wrong)
+    """A spacecraft raises it where the recording will only come later."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Plan, execute, identify, update.
+
+    Parameters
+    ----------
+    problem : Problem
+        Family of manoeuvres, limits, and the criterion, the first one; its plan's model is what is known at first.
+    encoder : Encoder
+        Noise of the joints' encoders.
+    seed : int
+    wanted : float
+        Where to stop.
+    at_most : int
+        Manoeuvres.
+    precision : callable
+        Draws of the identified bodies, by name -> what must come below ``wanted``.
+    search : Search
+        Effort of each design.
+    identifier : Identifier
+    """
+
+    problem: Problem
+    encoder: Encoder
+    seed: int = 0
+    wanted: float = 0.01
+    at_most: int = 5
+    precision: Callable[[Mapping[str, BodyDraws]], float] = worst_relative_sd
+    search: Search = Search(starts=2, iterations=60)  # noqa: RUF009  (immutable)
+    identifier: Identifier = Sampled()  # noqa: RUF009  (immutable)
+
+    def run(self, spacecraft: Spacecraft, folder: Path, progress: Show = lambda fraction, text: None) -> History:
+        """Go on until the wanted precision, the limit of steps, a no-go, or `NotFlown`.
+
+        Parameters
+        ----------
+        spacecraft : Spacecraft
+        folder : Path
+            Holds ``step-N-plan.csv``, ``step-N-recording.csv``, ``step-N-posterior.nc`` and ``loop.json``.
+
+        Raises
+        ------
+        InputError
+            Where a plan is impossible or a recording does not fit.
+        """
+        history = History.open(folder, self._key())
+        problem, model = self.problem, self.problem.plan.model
+        for number in range(1, self.at_most + 1):
+            progress((number - 1) / self.at_most, f"step {number}: planning")
+            if not self._plan(history, number, problem, progress):
+                history.close("no-go")
+                return history
+            progress((number - 0.5) / self.at_most, f"step {number}: executing")
+            try:
+                self._execute(history, number, spacecraft)
+            except NotFlown:
+                history.close("waiting")
+                return history
+            progress((number - 0.4) / self.at_most, f"step {number}: identifying")
+            self._identify(history, number, model)
+            last = number == len(history.steps)
+            if last and history.steps[-1]["identification"]["precision"] <= self.wanted:
+                history.close("reached")
+                return history
+            if number < self.at_most:
+                draws = InertialDraws.read(history.path(number, "identification"))
+                problem = self.problem.knowing(known_of(self.problem.plan.unknowns, draws))
+                model = carried_model(self.problem.plan.model, draws)
+        history.close("at-most")
+        return history
+
+    def _plan(self, history: History, number: int, problem: Problem, progress: Show) -> bool:
+        """Plan a step unless that is done; return whether it may be flown."""
+        entry = history.entry(number, "plan")
+        if entry is not None:
+            return bool(entry["go"])
+        plan, criterion, stem = problem.plan, problem.criteria[0], f"step-{number}"
+        store = Store.open(history.folder / f".{stem}-search.json", history.key)
+        attempts = plan_to_go(
+            problem, criterion, np.random.SeedSequence([self.seed, number, 0]), self.search, store, progress
+        )
+        best = attempts[-1]
+        motion = plan.family.motion(best.found.parameters)
+        time = sample_times(plan.family.duration, plan.interval)
+        plan_recording(motion, plan.model.robot, time, stem).write(history.path(number, "plan"))
+        content = {
+            "go": best.go,
+            "criterion": criterion.name,
+            "cost": best.found.cost,
+            "parameterisation": plan.family.name,
+            "parameters": dict(zip(plan.family.names, map(float, best.found.parameters), strict=True)),
+            "limits": {
+                item.name: {"limit": item.limit, "largest": item.largest, "unit": item.unit} for item in best.reached
+            },
+            "attempts": [attempt.to_dict() for attempt in attempts],
+        }
+        history.record(number, "plan", content)
+        if store.file is not None:
+            store.file.unlink(missing_ok=True)
+        return best.go
+
+    def _execute(self, history: History, number: int, spacecraft: Spacecraft) -> None:
+        """Fly a step unless there is a recording."""
+        file = history.path(number, "recording")
+        if not file.is_file():
+            plan = replace(Recording.read(history.path(number, "plan")), name=f"step-{number}")
+            recording = spacecraft.execute(plan)
+            self._check(recording)
+            recording.write(file)
+
+    def _check(self, recording: Recording) -> None:
+        """Refuse what cannot be identified from, before it is kept."""
+        model = self.problem.plan.model
+        flown(self.problem.plan, recording, self.encoder)
+        refuse_impossible_joints(recording, model.robot)
+        for sensor in model.sensors:
+            recording.vector(sensor.kind.value)
+
+    def _identify(self, history: History, number: int, model: Model) -> None:
+        """Identify a step unless that is done."""
+        if history.entry(number, "identification") is not None:
+            return
+        file = history.path(number, "identification")
+        recording = Recording.read(history.path(number, "recording"))
+        self._check(recording)
+        posterior = Posterior(model, [flown(self.problem.plan, recording, self.encoder)])
+        if all(prior.spread <= NARROW for prior in model.priors):
+            refuse_wrong_units(posterior)
+        if history.entry(number, "recording") is None:
+            history.record(number, "recording", {})
+        seed = int(np.random.SeedSequence([self.seed, number, 1]).generate_state(1)[0])
+        fit = self.identifier.identify(posterior, seed, file)
+        bodies = bodies_of_draws(model, InertialDraws.read(file))
+        entry = {**fit, "precision": float(self.precision(bodies)), "bodies": describe_bodies(bodies)}
+        history.record(number, "identification", entry)
+
+    def _key(self) -> str:
+        """Return what tells this loop from others; how long it goes on is not part of it."""
+        plan, limits = self.problem.plan, self.problem.applied
+        model = plan.model
+        parts = (
+            model.robot.to_urdf(),
+            [(prior.name, prior.spread, prior.nuisance, prior.centre.vector.tolist()) for prior in model.priors],
+            (
+                model.mixing,
+                model.sensors,
+                model.orbit,
+                [(effect.label, effect.parameters) for effect in model.effects],
+                model.rate_sigma,
+            ),
+            (plan.family.name, plan.family.names, plan.family.duration, plan.interval, plan.tip.name),
+            (plan.attitude.tolist(), plan.attitude_sigma, plan.latitude, plan.step, plan.thinning),
+            [(limit.name, limit.bound) for limit in limits],
+            (self.problem.criteria[0], self.seed, self.search, self.identifier, dict(self.encoder)),
+        )
+        return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+
+
+def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
+    """Return a recording as a manoeuvre, its joints smoothed.
+
+    The attitude at the start is that of the plan unless the recording has one.
+    """
+    attitude, sigma = plan.attitude, plan.attitude_sigma
+    if "attitude.x" in recording.channels:
+        time, values = recording.vector("attitude")
+        if time[0] > 0.0:
+            raise InputError(
+                f"the first attitude is at {time[0]:g} s",
+                file=recording.file,
+                remedy="Give the attitude at time 0, or leave the attitude out",
+            )
+        attitude = values[0]
+        for sensor in plan.model.sensors:
+            if sensor.kind is Kind.ATTITUDE:
+                sigma = max(sigma, LOOSE * float(np.max(sensor.noise.sigma(plan.interval))))
+    motion = MeasuredMotion.from_recording(recording, plan.model.robot, sigma=encoder)
+    return Manoeuvre(recording, motion, attitude, attitude_sigma=sigma, latitude=plan.latitude)

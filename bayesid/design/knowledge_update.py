@@ -1,0 +1,159 @@
+"""How a flown manoeuvre updates what is known: identified by emcee or by its normal approximation, then carried."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+import arviz as az
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.design.design_problem import Known
+from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, quantity
+from bayesid.inference.identification import Identification, identify
+from bayesid.inference.mode import maximise
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.posterior_as_prior import InertialDraws, joint_prior
+from bayesid.inference.posterior_file import write_netcdf
+from bayesid.inference.unknowns import Unknowns
+from bayesid.robot.inertial_parameters import BASIS, mass_com_inertia
+from bayesid.robot.log_cholesky import log_cholesky_coordinates
+from bayesid.simulation.model import Model
+
+__all__ = [
+    "Identifier",
+    "Laplace",
+    "Sampled",
+    "bodies_of_draws",
+    "carried_model",
+    "describe_bodies",
+    "known_of",
+    "worst_relative_sd",
+]
+
+
+class Identifier(Protocol):
+    """How a posterior is found and kept."""
+
+    def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
+        """Write draws to a file that `InertialDraws.read` reads, and return what is to be remembered of the fit."""
+        ...
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """By emcee, as ``bayesid identify`` does; an interrupted run goes on from its samples.
+
+    Parameters
+    ----------
+    effective_samples : float
+    max_steps : int
+    """
+
+    effective_samples: float = 2000.0
+    max_steps: int = 3000
+
+    def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
+        """Write the ``posterior.nc`` of ``bayesid identify``."""
+        samples = file.with_suffix(".samples.h5")
+        result: Identification = identify(
+            posterior, seed, effective_samples=self.effective_samples, max_steps=self.max_steps, file=samples
+        )
+        write_netcdf(result, file, np.random.default_rng(seed))
+        samples.unlink(missing_ok=True)
+        return {
+            "method": "emcee",
+            "chi2": result.optimum.chi2,
+            "samples": posterior.samples,
+            "pareto_k": result.evidence.pareto_k,
+            "disagreements": list(result.disagreements),
+        }
+
+
+@dataclass(frozen=True)
+class Laplace:
+    """By the normal approximation about the mode: seconds, and right where the data determine every body sharply.
+
+    Parameters
+    ----------
+    draws : int
+    """
+
+    draws: int = 4000
+
+    def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
+        """Write draws of the bodies alone."""
+        starts, normal = np.random.SeedSequence(seed).spawn(2)
+        refined, optimum = maximise(posterior, np.random.default_rng(starts))
+        noise = np.random.default_rng(normal).normal(size=(self.draws, posterior.size))
+        z = optimum.z + noise @ np.linalg.cholesky(optimum.covariance).T
+        names = [prior.name for prior in posterior.model.priors]
+        values = np.asarray(refined.values_of(z).inertial).reshape(1, self.draws, len(names), 10)
+        data = az.from_dict(
+            posterior={"inertial": values}, dims={"inertial": ["body", "parameter"]}, coords={"body": names}
+        )
+        part = file.with_name(file.name + ".part")
+        data.to_netcdf(str(part))
+        part.replace(file)
+        return {"method": "laplace", "chi2": optimum.chi2, "samples": posterior.samples, "disagreements": []}
+
+
+def carried_model(model: Model, draws: InertialDraws) -> Model:
+    """Return the model with draws of all its uncertain bodies as their joint prior."""
+    names = [prior.name for prior in model.priors]
+    prior = joint_prior(draws.of_bodies(names))
+    robot = model.robot
+    for name, centre in zip(prior.names, prior.centres, strict=True):
+        robot = robot.with_inertial(name, centre)
+    nuisance = [body.name for body in model.priors if body.nuisance]
+    return replace(model, robot=robot, priors=prior.bodies(nuisance), mixing=prior.mixing())
+
+
+def known_of(unknowns: Unknowns, draws: InertialDraws) -> Known:
+    """Return draws of all uncertain bodies as a normal distribution of a plan's coordinates."""
+    values = draws.of_bodies([body.name for body in unknowns.bodies]).values
+    parts = [
+        log_cholesky_coordinates(body.centre.pseudo_inertia, np.einsum("np,pij->nij", values[:, index], BASIS))
+        for index, body in enumerate(unknowns.bodies)
+    ]
+    z = np.linalg.solve(unknowns.widths, np.concatenate(parts, axis=1).T)
+    centre, precision, count = np.zeros(unknowns.size), np.eye(unknowns.size), len(z)
+    centre[:count], precision[:count, :count] = z.mean(axis=1), np.linalg.inv(np.cov(z))
+    return Known(centre, precision)
+
+
+def bodies_of_draws(model: Model, draws: InertialDraws) -> dict[str, BodyDraws]:
+    """Return the reported quantities of the bodies to identify."""
+    names = [prior.name for prior in model.bodies]
+    values = draws.of_bodies(names).values
+    return {name: BodyDraws(name, mass_com_inertia(values[:, index])) for index, name in enumerate(names)}
+
+
+def worst_relative_sd(bodies: Mapping[str, BodyDraws]) -> float:
+    """Return the largest standard deviation of a mass or a principal moment of inertia, relative to its mean."""
+    if not bodies:
+        raise InputError("nothing is unknown", place="unknowns.bodies", remedy="Name a body to identify")
+    return max(float(np.max(_relative_sd(body.values))) for body in bodies.values())
+
+
+def _relative_sd(values: Floats) -> Floats:
+    """Of mass and principal moments of draws (n, 10), shape (4,)."""
+    xx, yy, zz, xy, xz, yz = values[:, 4:].T
+    tensors = np.stack([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
+    positive = np.column_stack([values[:, 0], np.linalg.eigvalsh(tensors)])
+    return positive.std(axis=0, ddof=1) / positive.mean(axis=0)
+
+
+def describe_bodies(bodies: Mapping[str, BodyDraws]) -> dict[str, Any]:
+    """Return mean and sd of every quantity, by body and name."""
+    return {
+        name: {
+            key: quantity(mean, sd, unit)
+            for (key, unit), mean, sd in zip(BODY_QUANTITIES.items(), body.mean, body.sd, strict=True)
+        }
+        for name, body in bodies.items()
+    }

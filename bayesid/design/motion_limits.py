@@ -1,0 +1,154 @@
+"""What a manoeuvre must respect, checked along all of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bayesid.design.plan import Trajectory
+from bayesid.robot.robot import Robot
+
+__all__ = ["ACTIVE", "Limit", "Limits", "smooth_largest"]
+
+QUIET = 1e-3
+"""Part of the power of the base's motion that may lie in a quiet band."""
+
+NOTHING = 1e-20
+"""Power below which the base does not move; no band is quiet then [(rad/s2)^2 s, (m/s2)^2 s]."""
+
+SHARPNESS = 300.0
+"""Of the smooth maximum: it is above the largest of 500 values by 2 % of the limit at most."""
+
+ACTIVE = 0.97
+"""Part of a limit from which on it is called active."""
+
+REST = 1e-6
+"""Joint speed that counts as rest at the ends [rad/s or m/s]."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One quantity that must not exceed a bound at any instant.
+
+    Parameters
+    ----------
+    name : str
+    bound : float
+    unit : str
+    quantity : callable
+        Trajectory -> values of any shape, each to be at most the bound.
+    depends : bool
+        Whether the quantity depends on the inertial parameters.
+    shrinks : bool
+        Whether a smaller motion reduces it.
+    """
+
+    name: str
+    bound: float
+    unit: str
+    quantity: Callable[[Trajectory], Array]
+    depends: bool = False
+    shrinks: bool = True
+
+    def largest(self, trajectory: Trajectory) -> Array:
+        """Return the largest value along a trajectory."""
+        return jnp.max(self.quantity(trajectory))
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a design; what is left out does not apply. Joint ranges and speeds of the robot always do.
+
+    Parameters
+    ----------
+    tip_speed, tip_rate : float, optional
+        Of the tip frame, relative to the base as well as to inertial space [m/s, rad/s].
+    joint_speed : float, optional
+        [rad/s or m/s]
+    base_rotation : float, optional
+        Of the base since the start, about any axis [rad].
+    quiet_band : (2,) tuple, optional
+        Frequencies between which at most a thousandth of the power of the base's acceleration and angular acceleration
+        may lie [Hz].
+    """
+
+    tip_speed: float | None = None
+    tip_rate: float | None = None
+    joint_speed: float | None = None
+    base_rotation: float | None = None
+    quiet_band: tuple[float, float] | None = None
+
+    def of(self, robot: Robot) -> tuple[Limit, ...]:
+        """Return all that applies to a robot."""
+        limits = [*_joint_limits(robot)]
+        if self.joint_speed is not None:
+            unit = "rad/s" if all(joint.kind != "prismatic" for joint in robot.joints) else "rad/s or m/s"
+            limits.append(Limit("joint_speed", self.joint_speed, unit, lambda t: jnp.abs(t.velocity)))
+        if self.tip_speed is not None:
+            limits.append(Limit("tip_speed", self.tip_speed, "m/s", lambda t: t.tip_speed, depends=True))
+        if self.tip_rate is not None:
+            limits.append(Limit("tip_rate", self.tip_rate, "rad/s", lambda t: t.tip_rate, depends=True))
+        if self.base_rotation is not None:
+            limits.append(Limit("base_rotation", self.base_rotation, "rad", lambda t: t.rotation, depends=True))
+        if self.quiet_band is not None:
+            limits.append(Limit("quiet_band", QUIET, "1", _power_within(self.quiet_band), shrinks=False))
+        limits.append(Limit("rest", REST, "rad/s", lambda trajectory: jnp.abs(trajectory.velocity[jnp.array([0, -1])])))
+        return tuple(limits)
+
+    @property
+    def finest(self) -> float:
+        """Longest step between instants at which they can be judged [s]."""
+        return float("inf") if self.quiet_band is None else 0.25 / self.quiet_band[1]
+
+
+def smooth_largest(limit: Limit, trajectory: Trajectory, bound: Array | float) -> Array:
+    """Largest value over a bound, smooth and never below the true one: at most one is demanded."""
+    values = (limit.quantity(trajectory) / bound).ravel()
+    top = jnp.max(values)
+    return top + jnp.log(jnp.sum(jnp.exp(SHARPNESS * (values - top)))) / SHARPNESS
+
+
+def _joint_limits(robot: Robot) -> Sequence[Limit]:
+    limits = []
+    for index, joint in enumerate(robot.joints):
+        if np.isfinite(joint.lower) and np.isfinite(joint.upper):
+            middle, half = 0.5 * (joint.lower + joint.upper), 0.5 * (joint.upper - joint.lower)
+            limits.append(
+                Limit(
+                    f"joint_range.{joint.name}",
+                    half,
+                    joint.unit,
+                    lambda trajectory, i=index, m=middle: jnp.abs(trajectory.position[:, i] - m),  # type: ignore[misc]
+                )
+            )
+        if np.isfinite(joint.velocity):
+            limits.append(
+                Limit(
+                    f"joint_speed.{joint.name}",
+                    joint.velocity,
+                    f"{joint.unit}/s",
+                    lambda trajectory, i=index: jnp.abs(trajectory.velocity[:, i]),  # type: ignore[misc]
+                )
+            )
+    return limits
+
+
+def _power_within(band: tuple[float, float]) -> Callable[[Trajectory], Array]:
+    """Part of the power of the base's angular acceleration (times 1 m) and acceleration in a band."""
+
+    def quantity(trajectory: Trajectory) -> Array:
+        times = np.asarray(trajectory.time)
+        interval, duration = times[1] - times[0], times[-1]
+        count = max(2, int(np.ceil(2.0 * duration * (band[1] - band[0]))) + 1)
+        frequencies = np.linspace(*band, count)
+        waves = np.exp(-2j * np.pi * frequencies[:, None] * times)
+        signal = jnp.concatenate([trajectory.rate_change, trajectory.acceleration], axis=1)
+        density = jnp.sum(jnp.abs(waves @ signal * interval) ** 2, axis=1)
+        inside, total = 2.0 * jnp.trapezoid(density, frequencies), jnp.sum(signal**2) * interval
+        return ((inside + NOTHING) / (total + NOTHING))[None]
+
+    return quantity

@@ -1,0 +1,269 @@
+"""A manoeuvre as planned: what the robot does, and what its sensors would tell, as functions JAX differentiates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bayesid._math.arrays import Floats
+from bayesid._math.rotation import quaternion_product
+from bayesid.design.trajectories import Parameterisation
+from bayesid.inference.unknowns import Unknowns
+from bayesid.robot.end_effector import Tip
+from bayesid.robot.kinematics import joint_motion, kinematics
+from bayesid.robot.regressors import balance_regressor
+from bayesid.simulation.dynamics import Grid
+from bayesid.simulation.effects.effect import Moment, Readings
+from bayesid.simulation.model import Model
+from bayesid.simulation.sensors import Kind
+from bayesid.simulation.simulator import Simulator
+from bayesid.simulation.time_grid import build_grid
+
+__all__ = ["Outcome", "Plan", "Trajectory"]
+
+
+class Trajectory(NamedTuple):
+    """What the robot does, at T instants.
+
+    position, velocity (T, joints); tip_speed [m/s] and tip_rate [rad/s] (T,), each the larger of those relative to the
+    base and to inertial space; rotation (T,) of the base since the start [rad]; excursion (T, 6): displacement of the
+    base origin [m] and Cardan angles x, y, z [rad] of the base, in the axes of the start; rate, rate_change and
+    acceleration (T, 3) of the base origin in base axes.
+    """
+
+    time: Floats
+    position: Array
+    velocity: Array
+    tip_speed: Array
+    tip_rate: Array
+    rotation: Array
+    excursion: Array
+    rate: Array
+    rate_change: Array
+    acceleration: Array
+
+
+class Outcome(NamedTuple):
+    """What criteria judge.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    information : (n, n) array
+        Fisher information of the unknowns' coordinates, without their prior.
+    regressor : (6 T, b) array
+        Force balance of the base against the bodies' coordinates; torques are over the radius of gyration [N].
+    prior : (n, n) array, optional
+        Precision of the unknowns' coordinates before the manoeuvre; one where left out.
+    """
+
+    trajectory: Trajectory
+    information: Array
+    regressor: Array
+    prior: Array | None = None
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A family of manoeuvres of a model's robot.
+
+    Parameters
+    ----------
+    model : Model
+    family : Parameterisation
+    interval : float
+        Between samples of all sensors [s].
+    tip : Tip
+    attitude : (4,) array
+        Base to orbit axes at time 0.
+    attitude_sigma : float
+        Its standard deviation per axis [rad].
+    latitude : float
+        Argument of latitude at time 0 [rad].
+    step : float
+        Of the integration [s]; limits are looked at every half step.
+    thinning : int
+        Only every n-th sample is simulated, and counts as n.
+    """
+
+    model: Model
+    family: Parameterisation
+    interval: float
+    tip: Tip
+    attitude: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
+    attitude_sigma: float = 0.0
+    latitude: float = 0.0
+    step: float = 2.0
+    thinning: int = 1
+
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        """The unknowns of an identification from this one manoeuvre."""
+        return Unknowns(
+            bodies=self.model.priors,
+            effects=self.model.effects,
+            recordings=1,
+            rate_sigma=self.model.rate_sigma,
+            tilt_sigma=(self.attitude_sigma,),
+            mixing=self.model.mixing,
+        )
+
+    @cached_property
+    def simulator(self) -> Simulator:
+        """Return the forward model."""
+        return Simulator(self.model)
+
+    @cached_property
+    def samples(self) -> Floats:
+        """Times of the samples [s], the last one at the end."""
+        count = max(4, int(np.floor(self.family.duration / (self.interval * self.thinning) + 1e-9)))
+        return np.linspace(0.0, self.family.duration, count + 1)
+
+    @cached_property
+    def sigma(self) -> Floats:
+        """Noise of each sensor's axes, one after the other, shape (3 sensors,)."""
+        weight = np.sqrt((self.family.duration / self.interval + 1.0) / len(self.samples))
+        return np.concatenate([sensor.noise.sigma(self.interval) for sensor in self.model.sensors]) / weight
+
+    def bodies(self) -> Sequence[int]:
+        """Return the indices of the coordinates of the bodies to identify."""
+        return [
+            10 * index + k for index, prior in enumerate(self.model.priors) if not prior.nuisance for k in range(10)
+        ]
+
+    def effect(self, label: str) -> Sequence[int]:
+        """Return the indices of an effect's coordinates."""
+        return [
+            index
+            for index, name in enumerate(self.unknowns.names)
+            if name.startswith((f"{label}.", f"{label}[")) and index >= 10 * len(self.model.priors)
+        ]
+
+    # ---- functions of the parameters of the motion and of the unknowns, both traced ----
+
+    def trajectory(self, parameters: Array, z: Array) -> Trajectory:
+        """Return what the robot does."""
+        stage, _, _ = self.simulator.trace(
+            self.unknowns.values(z), self._grid(parameters), jnp.asarray(self.attitude)[None]
+        )
+        return self._trajectory(parameters, stage)
+
+    def slopes(self, parameters: Array, z: Array) -> Array:
+        """Return derivatives of what the sensors read in sigmas of a sample, (T, 3 sensors, n)."""
+        return self._judged(parameters, z)[1]
+
+    def outcome(self, parameters: Array, z: Array, prior: Array | None = None) -> Outcome:
+        """Return what criteria judge; ``prior`` is the precision (n, n) of the coordinates, one where left out."""
+        grid, slope, stage = self._judged(parameters, z)
+        flat = slope.reshape(-1, slope.shape[-1])
+        trajectory = self._trajectory(parameters, stage)
+        bodies = jnp.asarray(self.bodies(), dtype=int)
+        per_coordinate = jax.jacfwd(lambda z: self.unknowns.values(z).inertial)(z)[:, bodies]
+        tables = grid.stage.unknown[0, :, :, : 10 * len(self.model.priors)]
+        wrench = balance_regressor(tables, trajectory.rate, trajectory.rate_change, trajectory.acceleration)
+        wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / self._gyration)])[:, None]
+        regressor = (wrench @ per_coordinate).reshape(6 * len(wrench), len(bodies))
+        return Outcome(trajectory, flat.T @ flat, regressor, prior)
+
+    def _judged(self, parameters: Array, z: Array) -> tuple[Grid, Array, Moment]:
+        """Return the grid, the whitened derivatives of what the sensors read and the motion, from one simulation."""
+        grid = self._grid(parameters)
+
+        def read(z: Array) -> tuple[Readings, tuple[Moment, Readings]]:
+            stage, _, readings = self.simulator.trace(self.unknowns.values(z), grid, jnp.asarray(self.attitude)[None])
+            return readings, (stage, readings)
+
+        slopes, (stage, readings) = jax.jacfwd(read, has_aux=True)(z)
+        return grid, self._slope(slopes, readings) / jnp.asarray(self.sigma)[:, None], stage
+
+    @property
+    def _gyration(self) -> float:
+        """Mean radius of gyration of the bodies to identify [m]."""
+        moments = [prior.centre.inertia.trace() / prior.centre.mass for prior in self.model.bodies]
+        return float(np.sqrt(0.5 * np.mean(moments))) if moments else 1.0
+
+    def _grid(self, parameters: Array) -> Grid:
+        grid = build_grid(
+            self.model.robot,
+            tuple(prior.name for prior in self.model.priors),
+            self.family.motion(parameters),
+            self.samples,
+            self.step,
+            orbit=self.model.orbit,
+            latitude=self.latitude,
+            effects=self.model.effects,
+        )
+        return jax.tree.map(lambda x: x[None], grid)
+
+    def _slope(self, slopes: Readings, readings: Readings) -> Array:
+        """Return derivatives of what the sensors read, (T, 3 sensors, n); of an attitude as a small rotation."""
+        parts = []
+        for kind in self.simulator.kinds:
+            slope = getattr(slopes, kind.value)[0]
+            parts.append(_turning(readings.attitude[0], slope) if kind is Kind.ATTITUDE else slope)
+        return jnp.concatenate(parts, axis=1)
+
+    def _trajectory(self, parameters: Array, stage: Moment) -> Trajectory:
+        """Return the trajectory at the stages of the integration."""
+        moment = jax.tree.map(lambda x: x[0], stage)
+        # the instants, known beforehand: half steps
+        times = np.linspace(0.0, self.family.duration, moment.rate.shape[0])
+        motion = self.family.motion(parameters)
+        state = motion.evaluate(times)
+        pose, flow, _ = joint_motion(kinematics(self.model.robot, state), self.tip.joint)
+        pose, flow = pose @ self.tip.placement, flow @ self.tip.placement
+        turning = jnp.asarray(flow[:, :3, :3] @ jnp.swapaxes(pose[:, :3, :3], 1, 2))
+        own_rate = jnp.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
+        body = moment.body
+        drift = -body.com_rate - jnp.cross(moment.rate, body.com)  # of the base origin, the centre of mass resting
+        speed = drift + jnp.cross(moment.rate, pose[:, :3, 3]) + flow[:, :3, 3]
+        turned = jnp.einsum("ji,tjk->tik", moment.attitude[0], moment.attitude)
+        displaced = body.com[0] - jnp.einsum("tij,tj->ti", turned, body.com)
+        return Trajectory(
+            time=times,
+            position=jnp.asarray(state.position),
+            velocity=jnp.asarray(state.velocity),
+            tip_speed=jnp.maximum(_norm(speed), _norm(flow[:, :3, 3])),
+            tip_rate=jnp.maximum(_norm(own_rate + moment.rate), _norm(own_rate)),
+            rotation=_angle(turned),
+            excursion=jnp.concatenate([displaced, _cardan(turned)], axis=1),
+            rate=moment.rate,
+            rate_change=moment.rate_change,
+            acceleration=moment.acceleration,
+        )
+
+
+def _turning(quaternion: Array, slope: Array) -> Array:
+    """Small rotations in base axes, (T, 3, n), of changes of a quaternion, (T, 4, n)."""
+    inverse = quaternion * jnp.array([-1.0, -1.0, -1.0, 1.0])
+    product = jax.vmap(jax.vmap(quaternion_product, (None, 1), 1))
+    return 2.0 * product(inverse, slope)[:, :3]
+
+
+def _norm(vectors: Array | Floats) -> Array:
+    """Length of vectors (T, 3); smooth at zero."""
+    return jnp.sqrt(jnp.sum(jnp.asarray(vectors) ** 2, axis=1) + 1e-24)
+
+
+def _angle(turned: Array) -> Array:
+    """Angle of rotation matrices (T, 3, 3); smooth at zero."""
+    vector = jnp.stack(
+        [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]],
+        axis=1,
+    )
+    return jnp.arctan2(_norm(vector), jnp.trace(turned, axis1=1, axis2=2) - 1.0)
+
+
+def _cardan(turned: Array) -> Array:
+    """Angles x, y, z of rotation matrices Rx Ry Rz (T, 3, 3)."""
+    y = jnp.arcsin(jnp.clip(turned[:, 0, 2], -1.0 + 1e-12, 1.0 - 1e-12))
+    x = jnp.arctan2(-turned[:, 1, 2], turned[:, 2, 2])
+    z = jnp.arctan2(-turned[:, 0, 1], turned[:, 0, 0])
+    return jnp.stack([x, y, z], axis=1)

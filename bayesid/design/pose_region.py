@@ -1,0 +1,112 @@
+"""Draws of a pose: mean, standard deviation and 95 % region of its position and of its rotation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from bayesid._math.arrays import Floats
+
+__all__ = ["CONTENT", "Pose", "Region"]
+
+CONTENT = 0.95
+"""Probability that a region holds."""
+
+REACH = float(np.sqrt(chi2.ppf(CONTENT, 3)))
+"""Standard deviations from the mean to the surface of a region in three dimensions."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """Normal approximation of draws in three dimensions.
+
+    Parameters
+    ----------
+    mean : (3,) array
+    covariance : (3, 3) array
+    """
+
+    mean: Floats
+    covariance: Floats
+
+    @classmethod
+    def of(cls, draws: Floats) -> Region:
+        """Fit draws, shape (n, 3)."""
+        return cls(draws.mean(axis=0), np.cov(draws.T))
+
+    @property
+    def sd(self) -> Floats:
+        """Standard deviation per axis, shape (3,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def semi_axes(self) -> Floats:
+        """Lengths of the semi-axes of the ellipsoid, the longest first, shape (3,)."""
+        return REACH * np.sqrt(np.maximum(np.linalg.eigvalsh(self.covariance)[::-1], 0.0))
+
+    @property
+    def directions(self) -> Floats:
+        """Unit vectors of the semi-axes, one per row, shape (3, 3)."""
+        return np.linalg.eigh(self.covariance)[1].T[::-1]
+
+    def distance(self, points: Floats) -> Floats:
+        """Mahalanobis distance from the mean, shape (..., 3) -> (...,); at the surface it is `REACH`."""
+        offset = points - self.mean
+        return np.sqrt(np.einsum("...i,ij,...j", offset, np.linalg.pinv(self.covariance, hermitian=True), offset))
+
+    def holds(self, points: Floats) -> NDArray[np.bool_]:
+        """Whether points lie inside, shape (..., 3) -> (...,)."""
+        return self.distance(points) <= REACH
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Draws of one pose in orbit axes.
+
+    Parameters
+    ----------
+    position : (n, 3) array
+        [m]
+    attitude : (n, 4) array
+        Quaternion x, y, z, w, body axes to orbit axes.
+    start : (4,) array
+        Mean attitude from which the rotation is counted.
+    """
+
+    position: Floats
+    attitude: Floats
+    start: Floats
+
+    @property
+    def mean_attitude(self) -> Floats:
+        """Mean quaternion, shape (4,)."""
+        return Rotation.from_quat(self.attitude).mean().as_quat()
+
+    @property
+    def millimetres(self) -> Region:
+        """Region of the position [mm]."""
+        return Region.of(1e3 * self.position)
+
+    @property
+    def degrees(self) -> Region:
+        """Region of the rotation since the start [degrees], a rotation vector in orbit axes.
+
+        Its covariance is that of the small rotation from the mean attitude to each draw.
+        """
+        mean = Rotation.from_quat(self.mean_attitude)
+        rotation = np.degrees((mean * Rotation.from_quat(self.start).inv()).as_rotvec())
+        return Region(rotation, np.cov(self.turns(self.attitude).T))
+
+    def turns(self, attitude: Floats) -> Floats:
+        """Small rotations from the mean to given attitudes, orbit axes [degrees], shape (..., 4) -> (..., 3)."""
+        mean = Rotation.from_quat(self.mean_attitude)
+        return np.degrees((Rotation.from_quat(attitude) * mean.inv()).as_rotvec())
+
+    def holds(self, position: Floats, attitude: Floats) -> tuple[bool, bool]:
+        """Whether the regions of position [m] and rotation hold a pose."""
+        rotation = Region(np.zeros(3), self.degrees.covariance)
+        return bool(self.millimetres.holds(1e3 * position)), bool(rotation.holds(self.turns(attitude)))

@@ -1,0 +1,140 @@
+"""The posterior that planned manoeuvres would lead to, with the noise of all sensors and encoders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.body_quantities import linearise
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
+from bayesid.recording.joint_motion import MeasuredMotion, Motion, sample_joints
+from bayesid.recording.recording import Recording
+from bayesid.simulation.model import Manoeuvre, Model
+
+__all__ = ["Encoder", "Predicted", "describe", "planned_manoeuvre", "planned_posterior", "predict", "simulated"]
+
+Encoder = Mapping[int, float | Mapping[str, float | None] | None]
+"""Noise of joint position (0), velocity (1) and acceleration (2), for all joints or by joint."""
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Predicted posterior of the bodies to identify (Laplace, at the prior's centre).
+
+    Attributes
+    ----------
+    names : tuple of str
+        Quantities as in identification.json.
+    mean : (n,) array
+    covariance : (n, n) array
+        Of these quantities, in their units.
+    relative : (n, n) array
+        Of the bodies' log-Cholesky coordinates.
+    """
+
+    names: tuple[str, ...]
+    mean: Floats
+    covariance: Floats
+    relative: Floats
+
+    @property
+    def sd(self) -> Floats:
+        """Standard deviations, shape (n,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def log_det(self) -> float:
+        """Logarithm of the determinant of `covariance`, in SI units."""
+        scale = self.sd
+        return float(np.linalg.slogdet(self.covariance / np.outer(scale, scale))[1] + 2.0 * np.log(scale).sum())
+
+    @property
+    def worst(self) -> float:
+        """Standard deviation of the log-Cholesky coordinates along the worst direction."""
+        return float(np.sqrt(np.linalg.eigvalsh(self.relative)[-1]))
+
+    @property
+    def geometric_mean(self) -> float:
+        """Geometric mean of the standard deviations; only ratios of it mean something."""
+        return float(np.exp(np.log(self.sd).mean()))
+
+
+def planned_manoeuvre(
+    model: Model,
+    motion: Motion,
+    time: Floats,
+    name: str,
+    encoder: Encoder,
+    attitude: Floats | None = None,
+    **start: float,
+) -> Manoeuvre:
+    """Return a manoeuvre with joints as they would be recorded without noise, and blanks for the sensors.
+
+    Parameters
+    ----------
+    time : (T,) array
+        Of all samples [s].
+    encoder : Encoder
+    attitude : (4,) array, optional
+        Base to orbit axes at time 0.
+    **start
+        ``attitude_sigma`` and ``latitude`` of `Manoeuvre`.
+    """
+    recording = Recording(
+        name,
+        None,
+        time,
+        {**sample_joints(motion, model.robot, time), **blank_channels(model.sensors, len(time), model.torque)},
+    )
+    measured = MeasuredMotion.from_recording(recording, model.robot, sigma=encoder)
+    begin = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude)
+    return Manoeuvre(recording, measured, begin, **start)
+
+
+def planned_posterior(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    like: Posterior | None = None,
+    z: Floats | None = None,
+    step: float | None = None,
+) -> Posterior:
+    """Return the posterior of planned manoeuvres if the sensors read what ``z``, or the prior's centre, predicts.
+
+    Compiled functions are shared with those of ``like``, where they fit.
+    """
+    blank = Posterior(model, manoeuvres, like=like, step=step)
+    return simulated(blank, np.zeros(blank.size) if z is None else z)
+
+
+def simulated(posterior: Posterior, z: Floats) -> Posterior:
+    """Return a posterior whose sensors read what ``z`` predicts."""
+    recordings = simulate_recordings(posterior, z=z)
+    return posterior.with_manoeuvres(
+        [replace(manoeuvre, recording=own) for manoeuvre, own in zip(posterior.manoeuvres, recordings, strict=True)]
+    )
+
+
+def predict(posterior: Posterior) -> Predicted:
+    """Return what manoeuvres lead to if the prior's centre is the truth."""
+    z = np.zeros(posterior.size)
+    jacobian = posterior.at(z).jacobian(z)
+    return describe(posterior, z, np.linalg.inv(jacobian.T @ jacobian))
+
+
+def describe(posterior: Posterior, z: Floats, coordinates: Floats) -> Predicted:
+    """Carry a covariance of the coordinates over to the quantities that are reported."""
+    own = [index for index, prior in enumerate(posterior.model.priors) if not prior.nuisance]
+    names, values, slope = linearise(posterior, z)
+    rows = [10 * index + k for index in own for k in range(10)]
+    widths = np.asarray(posterior.unknowns.widths)[rows]
+    count = widths.shape[1]
+    return Predicted(
+        names=names,
+        mean=values,
+        covariance=slope @ coordinates @ slope.T,
+        relative=widths @ coordinates[:count, :count] @ widths.T,
+    )

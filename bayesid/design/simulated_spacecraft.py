@@ -1,0 +1,135 @@
+"""Who executes a planned manoeuvre: the one interface of the loop, and a simulated spacecraft behind it.
+
+A plan is a recording with position, velocity and acceleration of every joint at the samples' times, and nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.inference.simulated_recordings import simulate_manoeuvre
+from bayesid.recording.joint_motion import Motion
+from bayesid.recording.recording import Recording
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.robot import Robot
+from bayesid.simulation.model import Model
+
+__all__ = ["PlannedMotion", "SimulatedSpacecraft", "Spacecraft", "plan_recording"]
+
+FAMILIES = ("position", "velocity", "acceleration")
+
+
+class Spacecraft(Protocol):
+    """What a robot, or a simulator of one, must offer to the loop."""
+
+    def execute(self, plan: Recording) -> Recording:
+        """Move the joints as planned and return what was recorded.
+
+        Parameters
+        ----------
+        plan : Recording
+            ``position.``, ``velocity.`` and ``acceleration.<joint>`` of every joint at the samples' times, named after
+            the step. Whoever draws noise draws it from that name, so that a repeated step gives the same recording.
+
+        Returns
+        -------
+        Recording
+            Channels of the model's sensors and of all joints.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class PlannedMotion:
+    """The motion between the samples of a plan: the quintic spline through its positions.
+
+    Its third and fourth derivatives are continuous, so that samples of it can be smoothed well. Velocity and
+    acceleration of the plan are met exactly at its ends.
+
+    Parameters
+    ----------
+    plan : Recording
+    joints : sequence of str
+        In the order wanted of `evaluate`.
+    """
+
+    plan: Recording
+    joints: Sequence[str]
+
+    def __post_init__(self) -> None:
+        for joint in self.joints:
+            for name in (f"{family}.{joint}" for family in FAMILIES):
+                if name not in self.plan.channels:
+                    raise InputError(f"a plan has no {name}", file=self.plan.file, remedy="Give what the loop planned")
+        position, velocity, acceleration = (
+            np.stack([self.plan.channels[f"{family}.{joint}"] for joint in self.joints], axis=1) for family in FAMILIES
+        )
+        ends: Any = tuple([(1, velocity[at]), (2, acceleration[at])] for at in (0, -1))
+        spline = make_interp_spline(self.plan.time, position, k=5, bc_type=ends)
+        object.__setattr__(self, "_splines", [spline, spline.derivative(1), spline.derivative(2)])
+
+    def evaluate(self, time: Floats) -> JointState:
+        """Return the joint state at the times, shape (T,); at rest before and after."""
+        splines: Sequence[BSpline] = self._splines  # type: ignore[attr-defined]
+        inside = np.clip(time, self.plan.time[0], self.plan.time[-1])
+        return JointState(*(np.asarray(spline(inside)) for spline in splines))
+
+
+def plan_recording(motion: Motion, robot: Robot, time: Floats, name: str) -> Recording:
+    """Return a motion as the plan that a spacecraft executes."""
+    state = motion.evaluate(time)
+    channels = {
+        f"{family}.{joint.name}": values[:, index]
+        for family, values in zip(FAMILIES, state, strict=True)
+        for index, joint in enumerate(robot.joints)
+    }
+    return Recording(name, None, time, channels)
+
+
+@dataclass(frozen=True)
+class SimulatedSpacecraft:
+    """A spacecraft simulated by the package itself, at rest before every manoeuvre.
+
+    Parameters
+    ----------
+    truth : Model
+        The robot as it truly is, with its effects and sensors; bodies under ``priors`` are at their prior's centre.
+    encoder_sigma : float
+        Noise of the recorded joint positions [rad or m].
+    seed : int
+        Of all noise, together with the name of the plan.
+    noise : bool
+        Whether sensors and encoders have any.
+    attitude : (4,) array
+        Base to orbit axes at time 0.
+    latitude : float
+        Argument of latitude at time 0 [rad].
+    """
+
+    truth: Model
+    encoder_sigma: float = 0.0
+    seed: int = 0
+    noise: bool = True
+    attitude: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
+    latitude: float = 0.0
+
+    def execute(self, plan: Recording) -> Recording:
+        """Simulate a plan."""
+        joints = [joint.name for joint in self.truth.robot.joints]
+        return simulate_manoeuvre(
+            self.truth,
+            PlannedMotion(plan, joints),
+            plan.time,
+            name=plan.name,
+            attitude=self.attitude,
+            latitude=self.latitude,
+            rng=np.random.default_rng([self.seed, *plan.name.encode()]) if self.noise else None,
+            encoder_sigma=self.encoder_sigma if self.noise else 0.0,
+        )

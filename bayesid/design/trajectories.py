@@ -1,0 +1,271 @@
+"""Joint motions with free parameters, to be designed: the paper's (27), finite Fourier series, B-splines, your own.
+
+A parameterisation is one small class: the names of its parameters, its length in time and the joint positions at one
+instant, as a function that JAX can differentiate. Velocities and accelerations follow from that function. Motions that
+are linear in their parameters, as all three below, give matrices instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from scipy.interpolate import BSpline
+from scipy.linalg import null_space
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.recording.joint_motion import Excitation
+from bayesid.robot.joint_state import JointState
+
+__all__ = ["BSplines", "Fourier", "Linear", "PaperExcitation", "Parameterisation", "ParameterisedMotion"]
+
+
+class Parameterisation:
+    """A family of joint motions. Subclass it, set the attributes and override `position`.
+
+    Attributes
+    ----------
+    name : str
+        For reports and file names.
+    names : tuple of str
+        One per parameter.
+    duration : float
+        Of the whole manoeuvre [s].
+    scale : (n,) array
+        Typical size of each parameter, for random starts and for the optimiser's steps.
+    centre : (n,) array
+        About which random starts are drawn; a motion with these parameters should be slow.
+    """
+
+    name: str
+    names: tuple[str, ...]
+    duration: float
+    scale: Floats
+    centre: Floats
+
+    def position(self, parameters: Array, time: Array) -> Array:
+        """Return positions of all joints at one instant, shape (joints,) [rad or m], in JAX."""
+        raise NotImplementedError
+
+    def state(self, parameters: Array, time: Floats) -> JointState:
+        """Return positions, velocities and accelerations, each (T, joints), differentiable in the parameters."""
+
+        def speed(t: Array) -> Array:
+            return jax.jvp(lambda s: self.position(parameters, s), (t,), (jnp.ones(()),))[1]
+
+        def change(t: Array) -> Array:
+            return jax.jvp(speed, (t,), (jnp.ones(()),))[1]
+
+        instants = jnp.asarray(time, dtype=float)
+        parts = [jax.vmap(part)(instants) for part in (lambda t: self.position(parameters, t), speed, change)]
+        return JointState(*cast("list[Floats]", parts))
+
+    @property
+    def size(self) -> int:
+        """Number of parameters."""
+        return len(self.names)
+
+    def motion(self, parameters: Floats | Array) -> ParameterisedMotion:
+        """Return the motion with some parameters."""
+        return ParameterisedMotion(self, parameters)
+
+
+@dataclass(frozen=True)
+class ParameterisedMotion:
+    """One motion of a family; a `bayesid.recording.joint_motion.Motion` whose parameters may be traced by JAX."""
+
+    family: Parameterisation
+    parameters: Floats | Array
+
+    def evaluate(self, time: Floats) -> JointState:
+        """Return the joint state at the times, shape (T,): as NumPy arrays unless the parameters are traced."""
+        state = self.family.state(jnp.asarray(self.parameters), np.asarray(time, dtype=float))
+        traced = isinstance(self.parameters, jax.core.Tracer)
+        return state if traced else JointState(*(np.array(part) for part in state))
+
+
+class Linear(Parameterisation):
+    """A family of motions linear in its parameters: ``rest(t) + basis(t) parameters``."""
+
+    def matrices(self, time: Floats) -> tuple[Floats, Floats]:
+        """Return rest (3, T, joints) and basis (3, T, joints, n): position, velocity, acceleration."""
+        raise NotImplementedError
+
+    def state(self, parameters: Array, time: Floats) -> JointState:
+        """Return positions, velocities and accelerations, each (T, joints)."""
+        rest, basis = self.matrices(np.asarray(time, dtype=float))
+        position, velocity, acceleration = jnp.asarray(rest) + jnp.asarray(basis) @ parameters
+        return JointState(*cast("tuple[Floats, Floats, Floats]", (position, velocity, acceleration)))
+
+
+class _PerJoint(Linear):
+    """The same basis functions for every moving joint, each zero with two derivatives at both ends."""
+
+    def __init__(self, start: Sequence[float] | Floats, moving: Sequence[int], duration: float, labels: Sequence[str]):
+        self.start = np.array(start, dtype=float)
+        self.moving = tuple(moving)
+        self.duration = float(duration)
+        if not self.moving:
+            raise InputError("no joint is to move", remedy="Name at least one joint under design.joints")
+        self.names = tuple(f"joint{joint + 1}.{label}" for joint in self.moving for label in labels)
+        self.scale = np.full(len(self.names), 0.5)
+        self.centre = np.zeros(len(self.names))
+
+    def functions(self, time: Floats) -> Floats:
+        """Return the basis functions and two derivatives, shape (3, T, m)."""
+        raise NotImplementedError
+
+    def matrices(self, time: Floats) -> tuple[Floats, Floats]:
+        """Return rest (3, T, joints) and basis (3, T, joints, n)."""
+        functions = self.functions(time)
+        count, joints = functions.shape[2], len(self.start)
+        basis = np.zeros((3, len(time), joints, count * len(self.moving)))
+        for slot, joint in enumerate(self.moving):
+            basis[:, :, joint, slot * count : (slot + 1) * count] = functions
+        rest = np.zeros((3, len(time), joints))
+        rest[0] = self.start
+        return rest, basis
+
+
+class Fourier(_PerJoint):
+    """Finite Fourier series (Swevers et al. 1997), at rest at both ends.
+
+    Parameters
+    ----------
+    start : (joints,) array_like
+        Positions before and after [rad or m].
+    moving : sequence of int
+        Indices of the joints that move.
+    duration : float
+        Of the manoeuvre, one period of the series [s].
+    harmonics : int
+        Of every joint. Of its constant, sines and cosines the combinations are kept that leave the joint where it was,
+        at rest and without acceleration, at both ends.
+    """
+
+    name = "fourier"
+
+    def __init__(
+        self, start: Sequence[float] | Floats, moving: Sequence[int], duration: float, harmonics: int = 5
+    ) -> None:
+        if harmonics < 2:
+            raise InputError(f"{harmonics} harmonics cannot start at rest", remedy="Give at least 2")
+        self.orders = np.arange(1, harmonics + 1)
+        ones, none = np.ones(harmonics), np.zeros(harmonics)
+        # of constant, sines, cosines: position, velocity and acceleration at the ends
+        ends = np.array([[1.0, *none, *ones], [0.0, *self.orders, *none], [0.0, *none, *self.orders**2]])
+        self.combinations = null_space(ends)
+        super().__init__(start, moving, duration, [f"c{k + 1}" for k in range(self.combinations.shape[1])])
+
+    def functions(self, time: Floats) -> Floats:
+        """Return the combinations and two derivatives, shape (3, T, m)."""
+        inside = np.clip(time, 0.0, self.duration)
+        w = 2.0 * np.pi / self.duration * self.orders
+        sine, cosine = np.sin(w * inside[:, None]), np.cos(w * inside[:, None])
+        ones, none = np.ones((len(time), 1)), np.zeros((len(time), 1))
+        series = np.stack(
+            [
+                np.hstack([ones, sine, cosine]),
+                np.hstack([none, w * cosine, -w * sine]),
+                np.hstack([none, -(w**2) * sine, -(w**2) * cosine]),
+            ]
+        )
+        return series @ self.combinations
+
+
+class BSplines(_PerJoint):
+    """Quintic B-splines on even knots whose first and last three control points stand at the start.
+
+    Parameters
+    ----------
+    start, moving, duration
+        As for `Fourier`.
+    points : int
+        Free control points of every joint.
+    """
+
+    name = "b-splines"
+    DEGREE = 5
+
+    def __init__(
+        self, start: Sequence[float] | Floats, moving: Sequence[int], duration: float, points: int = 8
+    ) -> None:
+        if points < 1:
+            raise InputError(f"{points} control points cannot move a joint", remedy="Give at least 1")
+        super().__init__(start, moving, duration, [f"p{k + 1}" for k in range(points)])
+        inner = points + 6 - self.DEGREE + 1
+        ends = [0.0] * self.DEGREE, [float(duration)] * self.DEGREE
+        self.knots = np.concatenate([ends[0], np.linspace(0.0, duration, inner), ends[1]])
+        self.points = points
+
+    def functions(self, time: Floats) -> Floats:
+        """Return the free splines and two derivatives, shape (3, T, m)."""
+        inside = np.clip(time, 0.0, self.duration)
+        values = np.zeros((3, len(time), self.points))
+        for k in range(self.points):
+            control = np.zeros(self.points + 6)
+            control[3 + k] = 1.0
+            spline = BSpline(self.knots, control, self.DEGREE)
+            for order in range(3):
+                values[order, :, k] = spline(inside, nu=order)
+        return values
+
+
+class PaperExcitation(Linear):
+    """The paper's (27) with its connecting splines (`bayesid.recording.joint_motion.Excitation`).
+
+    Three joints oscillate, ``q1 + q2 cos(omega t)``; the others rest, the arm extended.
+
+    Parameters
+    ----------
+    posture : (joints,) array_like
+        Positions before and after; the joints that do not oscillate stay there [rad or m].
+    moving : sequence of int
+        The joints that oscillate; the first three where left out.
+    duration : float
+        Of the whole manoeuvre [s].
+    periods : int
+        Of the oscillation, which the paper does not state.
+    ramp : float
+        Part of the duration that each connecting spline takes.
+    """
+
+    name = "paper"
+
+    def __init__(
+        self,
+        posture: Sequence[float] | Floats,
+        duration: float,
+        moving: Sequence[int] | None = None,
+        periods: int = 2,
+        ramp: float = 0.25,
+    ) -> None:
+        self.posture = np.array(posture, dtype=float)
+        self.duration, self.periods, self.ramp = float(duration), periods, float(ramp) * float(duration)
+        self.moving = tuple(range(min(3, len(self.posture)))) if moving is None else tuple(moving)
+        self.names = tuple(f"joint{joint + 1}.{key}" for joint in self.moving for key in ("q1", "q2"))
+        self.scale = np.full(len(self.names), 0.5)
+        self.centre = np.ravel([(self.posture[joint], 0.0) for joint in self.moving])  # it rests
+
+    @property
+    def frequency(self) -> float:
+        """The oscillation's omega [rad/s]."""
+        return 2.0 * np.pi * self.periods / (self.duration - 2.0 * self.ramp)
+
+    def excitation(self, parameters: Floats) -> Excitation:
+        """Return the excitation with q1, q2 of the first joint, of the second, of the third."""
+        offset, amplitude = self.posture.copy(), np.zeros(len(self.posture))
+        offset[list(self.moving)], amplitude[list(self.moving)] = parameters[0::2], parameters[1::2]
+        return Excitation(offset, amplitude, self.frequency, self.periods, self.ramp, self.posture)
+
+    def matrices(self, time: Floats) -> tuple[Floats, Floats]:
+        """Return rest (3, T, joints) and basis (3, T, joints, n)."""
+        rest = np.stack(self.excitation(np.zeros(self.size)).evaluate(time))
+        basis = [np.stack(self.excitation(unit).evaluate(time)) - rest for unit in np.eye(self.size)]
+        return rest, np.stack(basis, axis=-1)

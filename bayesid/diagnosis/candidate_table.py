@@ -1,0 +1,198 @@
+"""What the data say of each candidate by itself: signal-to-noise, p-values, Bayes factor, amplitude, limit, power."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy import stats
+
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.amplitude_scale import effect_mixture
+from bayesid.diagnosis.cause_search import Hypothesis, Search, significance
+from bayesid.diagnosis.perturbation import physical
+from bayesid.diagnosis.score_tests import DRAWS
+from bayesid.diagnosis.test_suite import FALSE_ALARM
+from bayesid.simulation.effects.effect import Effect, Quantity
+
+__all__ = ["Candidate", "candidate_table", "detection_power", "effect_amplitude"]
+
+ONE_SIDED_95 = 1.645
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One candidate cause alone, on top of the present model.
+
+    Attributes
+    ----------
+    name : str
+    signal_to_noise : float
+    p_value, p_value_adjusted : float
+        Local and family-wise.
+    log_bayes_factor : float or None
+        Against the present model; None where not evaluated.
+    quantities : tuple of Quantity
+    mean, sd : arrays
+        Amplitude.
+    power : float or None
+        Probability that an effect of its prior's size would have raised the alarm.
+    refitted : bool
+        Whether the figures come from a fit rather than from the linear response.
+    """
+
+    name: str
+    signal_to_noise: float
+    p_value: float
+    p_value_adjusted: float
+    log_bayes_factor: float | None
+    quantities: tuple[Quantity, ...]
+    mean: Floats
+    sd: Floats
+    power: float | None
+    refitted: bool
+
+    @property
+    def upper_limit(self) -> Floats:
+        """Size that the quantities' magnitudes stay below with 95 %."""
+        return np.abs(self.mean) + ONE_SIDED_95 * self.sd
+
+
+def candidate_table(search: Search) -> list[Candidate]:
+    """Every candidate, the most probable first."""
+    alone = {h.labels[0]: h for h in search.tried if len(h.labels) == 1}
+    rows = []
+    for label, effect in search.candidates.items():
+        if label in alone:
+            rows.append(_fitted(alone[label], search, effect))
+        elif label in search.battery.effects:
+            rows.append(_linear(effect, search))
+        elif effect.modes_count:
+            rows.append(_vibrating(effect, search))
+    for label, log_p in search.base.outcome.log_p.items():
+        if label in search.base.outcome.scores or label == "variance by axis":
+            continue
+        rows.append(_noise(label, log_p, alone.get(label), search))
+    if "initial-rate" in alone:
+        hypothesis = alone["initial-rate"]
+        rows.append(_noise("initial-rate", significance(hypothesis, search.base)[1], hypothesis, search))
+    return sorted(rows, key=lambda row: (row.log_bayes_factor is None, -(row.log_bayes_factor or 0.0)))
+
+
+def effect_amplitude(hypothesis: Hypothesis, index: int) -> tuple[Floats, Floats]:
+    """Mean and standard deviation of what is reported of one effect of a fit; per recording where it has its own."""
+    fit = hypothesis.fit
+    effect = fit.effects[index]
+    first = fit.own.shape[1] + sum(columns.shape[1] for columns in fit.added[:index])
+    count = fit.added[index].shape[1]
+    return _reported(effect, fit.coordinates[index], fit.covariance[first : first + count, first : first + count])
+
+
+def _reported(effect: Effect, coordinates: Floats, covariance: Floats) -> tuple[Floats, Floats]:
+    if not effect.parameters:
+        return np.zeros(0), np.zeros(0)
+    if effect.per_recording:  # the first recording's stand for all in tables
+        count = len(effect.parameters)
+        coordinates, covariance = coordinates[:count], covariance[:count, :count]
+
+    def report(c: jax.Array) -> jax.Array:
+        return effect.report(physical(effect, c))
+
+    point = jnp.asarray(coordinates)
+    slope = np.asarray(jax.jacfwd(report)(point))
+    return np.asarray(report(point)), np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
+
+
+def _fitted(hypothesis: Hypothesis, search: Search, effect: Effect) -> Candidate:
+    snr, log_p = significance(hypothesis, search.base)
+    mean, sd = effect_amplitude(hypothesis, 0)
+    item = search.base.outcome.scores.get(effect.label)
+    return Candidate(
+        effect.label,
+        snr,
+        float(np.exp(log_p)),
+        search.battery.calibration.adjusted(log_p),
+        hypothesis.log_evidence - search.base.log_evidence,
+        tuple(effect.quantities),
+        mean,
+        sd,
+        None if item is None else detection_power(item.degrees, item.information, search),
+        True,
+    )
+
+
+def _linear(effect: Effect, search: Search) -> Candidate:
+    fit = search.base.fit
+    columns = search.battery.effects[effect.label]
+    item = search.base.outcome.scores[effect.label]
+    information = fit.project(columns)
+    gradient = columns.T @ fit.residual
+    if effect.parameters:
+        hessian = information + np.eye(len(information))
+        covariance = np.linalg.inv(hessian)
+        point = np.resize(effect.starts[0], len(information)) - covariance @ gradient
+        mean, sd = _reported(effect, point, covariance)
+        gain = 0.5 * float(gradient @ covariance @ gradient) - 0.5 * float(np.linalg.slogdet(hessian)[1])
+        gain += effect_mixture(effect, point, covariance)
+    else:
+        mean = sd = np.zeros(0)
+        gain = float(-gradient[0] - 0.5 * information[0, 0])  # there at full size, or not
+    return Candidate(
+        effect.label,
+        item.signal_to_noise,
+        float(np.exp(item.log_p)),
+        search.battery.calibration.adjusted(item.log_p),
+        gain,
+        tuple(effect.quantities),
+        mean,
+        sd,
+        detection_power(item.degrees, item.information, search),
+        False,
+    )
+
+
+def _vibrating(effect: Effect, search: Search) -> Candidate:
+    items = [item for name, item in search.base.outcome.scores.items() if name.startswith("vibration")]
+    best = min(items, key=lambda item: item.log_p)
+    log_p = min(0.0, best.log_p + float(np.log(len(items))))
+    power = float(np.mean([detection_power(item.degrees, item.information, search) for item in items]))
+    nothing = np.zeros(0)
+    return Candidate(
+        effect.label,
+        best.signal_to_noise,
+        float(np.exp(log_p)),
+        search.battery.calibration.adjusted(best.log_p),
+        None,
+        (),
+        nothing,
+        nothing,
+        power,
+        False,
+    )
+
+
+def _noise(label: str, log_p: float, hypothesis: Hypothesis | None, search: Search) -> Candidate:
+    fault = hypothesis.faults[0] if hypothesis is not None and hypothesis.faults else None
+    snr = float(max(stats.norm.isf(np.exp(max(log_p, -700.0))), 0.0))
+    return Candidate(
+        label,
+        significance(hypothesis, search.base)[0] if hypothesis is not None and label == "initial-rate" else snr,
+        float(np.exp(log_p)),
+        search.battery.calibration.adjusted(log_p),
+        None if hypothesis is None else hypothesis.log_evidence - search.base.log_evidence,
+        () if fault is None else fault.quantities,
+        np.zeros(0) if fault is None else fault.mean,
+        np.zeros(0) if fault is None else fault.sd,
+        None,
+        hypothesis is not None,
+    )
+
+
+def detection_power(degrees: int, information: float, search: Search) -> float:
+    """Probability of an alarm by an effect with this noncentrality and so many degrees of freedom."""
+    if degrees == 0:
+        return FALSE_ALARM
+    threshold = np.exp(search.battery.calibration.smallest[DRAWS // 100])
+    return float(stats.ncx2.sf(stats.chi2.isf(threshold, degrees), degrees, max(information, 1e-9)))

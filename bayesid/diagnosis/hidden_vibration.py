@@ -1,0 +1,184 @@
+"""Hidden vibrations along a given motion: oscillators driven by the base, and the momentum they carry.
+
+The base yields to its vibrating parts, which shifts their frequency; that is kept, with the base's mass and inertia as
+they are at each instant. What is left out is of second order in the parts' momentum.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+from bayesid._math.arrays import Floats
+from bayesid._math.small_matrices import solve_small
+from bayesid.robot.composite_tables import ENTRIES, WIDTH
+from bayesid.simulation.effects.effect import Effect, Moment
+
+__all__ = ["Vibration"]
+
+FINE = 0.1
+"""Integration step of the oscillators [s]."""
+
+BATCHES = (1, 16)
+"""Sets of oscillators integrated together, whichever fits."""
+
+
+class Vibration(NamedTuple):
+    """What drives oscillators in the base, of all recordings, on a fine grid of N times.
+
+    forcing (R, N, 15): acceleration of the base origin, angular acceleration and ``w w' - w^2 1``; yielding
+    (R, N, 6, 6): the base's acceleration under unit force and torque at its origin; times (R, S) and (R, T) where
+    results are wanted, and the centre of mass there.
+    """
+
+    forcing: Floats
+    yielding: Floats
+    times: tuple[Floats, Floats]
+    com: tuple[Floats, Floats]
+
+    @classmethod
+    def along(cls, stage: Moment, sample: Moment, steps: Floats) -> Vibration:
+        """Prepare the forcing from a motion without vibrations."""
+        times = np.asarray(stage.environment.time)
+        end = float(times.max())
+        fine = FINE * np.arange(int(np.ceil(end / FINE)) + 2)
+        rate = np.asarray(stage.rate)
+        spread = rate[..., :, None] * rate[..., None, :] - (rate**2).sum(axis=-1)[..., None, None] * np.eye(3)
+        parts = [np.asarray(stage.acceleration), np.asarray(stage.rate_change), spread.reshape(*rate.shape[:2], 9)]
+        drive = np.concatenate(parts, axis=-1)
+        forcing, yielding = [], []
+        for index in range(len(times)):
+            own = np.concatenate([[True], np.diff(times[index]) > 0.0])  # padding repeats the last instant
+            inside = np.minimum(fine, times[index].max())
+            forcing.append(CubicSpline(times[index][own], drive[index][own])(inside))
+            soft = _yielding(
+                *(np.asarray(x)[index][own] for x in (stage.body.mass, stage.body.com, stage.body.inverse))
+            )
+            flat = soft.reshape(len(soft), -1)
+            yielding.append(
+                np.stack([np.interp(inside, times[index][own], column) for column in flat.T], axis=-1).reshape(-1, 6, 6)
+            )
+        both = (times, np.asarray(sample.environment.time))
+        com = (np.asarray(stage.body.com), np.asarray(sample.body.com))
+        return cls(np.stack(forcing), np.stack(yielding), both, com)
+
+    def rows(self, effect: Effect, values: Floats) -> tuple[Floats, Floats]:
+        """Return changes of the tables by an effect's modes, for n sets of values: (n, R, S, 28), (n, R, T, 28)."""
+        modes = jax.vmap(effect.modes)(jnp.asarray(values))
+        coupling = np.concatenate([np.asarray(modes.linear), np.asarray(modes.angular)], axis=-1)
+        omega, damping = np.asarray(modes.omega), np.asarray(modes.damping)
+        moments = np.asarray(modes.moment).reshape(*coupling.shape[:2], 9)
+        load = np.concatenate([coupling, moments], axis=-1)
+        pieces = []
+        batch = BATCHES[0] if len(values) == 1 else BATCHES[1]
+        for first in range(0, len(values), batch):
+            chosen = np.minimum(np.arange(first, first + batch), len(values) - 1)
+            found = _oscillate(
+                jnp.asarray(coupling[chosen]),
+                jnp.asarray(load[chosen]),
+                jnp.asarray(omega[chosen]),
+                jnp.asarray(damping[chosen]),
+                jnp.asarray(self.forcing),
+                jnp.asarray(self.yielding),
+            )
+            pieces.append(np.asarray(found)[: len(values) - first])
+        speed, change = np.moveaxis(np.concatenate(pieces), -2, 0)  # each (n, R, N, m)
+        flow = np.einsum("nrtm,nmc->nrtc", speed, coupling)
+        flow_rate = np.einsum("nrtm,nmc->nrtc", change, coupling)
+        return (
+            self._at(self.times[0], self.com[0], flow, flow_rate),
+            self._at(self.times[1], self.com[1], flow, flow_rate),
+        )
+
+    def responses(self, frequency: float, damping: float) -> tuple[Floats, Floats]:
+        """Return modal speed per unit coupling to each of six forcings, and its derivative: fine grid, (R, N, 6)."""
+        coupling = np.eye(6)
+        omega = 2.0 * np.pi * frequency
+        found = _oscillate(
+            jnp.asarray(coupling[:, None]),
+            jnp.asarray(np.eye(6, 15)[:, None]),
+            jnp.full((6, 1), omega),
+            jnp.full((6, 1), damping),
+            jnp.asarray(self.forcing),
+            jnp.zeros_like(jnp.asarray(self.yielding)),
+        )
+        speed, change = np.moveaxis(np.asarray(found), -2, 0)
+        return np.moveaxis(speed[..., 0], 0, -1), np.moveaxis(change[..., 0], 0, -1)
+
+    def flow_rows(self, flow: Floats, flow_rate: Floats) -> tuple[Floats, Floats]:
+        """Return changes of the tables by momenta given on the fine grid, (n, R, N, 6) each."""
+        return (
+            self._at(self.times[0], self.com[0], flow, flow_rate),
+            self._at(self.times[1], self.com[1], flow, flow_rate),
+        )
+
+    def _at(self, times: Floats, com: Floats, flow: Floats, flow_rate: Floats) -> Floats:
+        fine = FINE * np.arange(flow.shape[2])
+        rows = np.zeros((len(flow), *times.shape, WIDTH))
+        if not np.isfinite(flow).all():  # more swings than there is: the fit refuses such a step
+            return np.full_like(rows, np.nan)
+        for r in range(len(times)):
+            curve = CubicHermiteSpline(fine, flow[:, r], flow_rate[:, r], axis=1)
+            p, q = curve(times[r]), curve.derivative()(times[r])
+            rows[:, r, :, ENTRIES["first_rate"]] = p[..., :3]
+            rows[:, r, :, ENTRIES["first_acceleration"]] = q[..., :3]
+            rows[:, r, :, ENTRIES["spin"]] = p[..., 3:]
+            rows[:, r, :, ENTRIES["spin_rate"]] = q[..., 3:]
+            # the flow carries no second moment: its rate about the centre of mass must not change with it
+            outer = com[r][:, :, None] * p[..., None, :3]
+            both = outer + np.swapaxes(outer, -1, -2)
+            rows[:, r, :, ENTRIES["second_rate"]] = both[..., [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        return rows
+
+
+def _yielding(mass: Floats, com: Floats, inverse: Floats) -> Floats:
+    """Acceleration of the base origin and angular acceleration under unit force and torque there, (T, 6, 6)."""
+    cross = np.zeros((len(mass), 3, 3))
+    x, y, z = com.T
+    cross[:, 0, 1], cross[:, 0, 2], cross[:, 1, 2] = -z, y, -x
+    cross -= np.swapaxes(cross, 1, 2)
+    about = np.concatenate([-cross, np.broadcast_to(np.eye(3), cross.shape)], axis=2)
+    result = np.swapaxes(about, 1, 2) @ inverse @ about
+    result[:, :3, :3] += np.eye(3) / mass[:, None, None]
+    return result
+
+
+@jax.jit
+def _oscillate(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, yielding: Array) -> Array:
+    """Speeds and accelerations of modal amplitudes, shape (n, R, N, 2, m)."""
+    one = jax.vmap(jax.vmap(_run, (None, None, None, None, 0, 0)), (0, 0, 0, 0, None, None))
+    return one(coupling, load, omega, damping, forcing, yielding)
+
+
+def _inverse(mass: Array) -> Array:
+    """Inverse of a small positive-definite matrix, column by column."""
+    return jnp.stack([solve_small(mass, unit) for unit in jnp.eye(len(mass))], axis=1)
+
+
+def _run(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, yielding: Array) -> Array:
+    count = len(omega)
+    push = -forcing @ load.T
+    mass = jnp.eye(count) - jnp.einsum("ia,tab,jb->tij", coupling, yielding, coupling)
+    soft = jax.vmap(_inverse)(mass)
+
+    def change(state: Array, push: Array, soft: Array) -> Array:
+        amplitude, speed = state
+        return jnp.stack([speed, soft @ (push - 2.0 * damping * omega * speed - omega**2 * amplitude)])
+
+    def step(state: Array, given: tuple[Array, Array, Array, Array]) -> tuple[Array, Array]:
+        here, there, soft_here, soft_there = given
+        half, soft_half = 0.5 * (here + there), 0.5 * (soft_here + soft_there)
+        k1 = change(state, here, soft_here)
+        k2 = change(state + 0.5 * FINE * k1, half, soft_half)
+        k3 = change(state + 0.5 * FINE * k2, half, soft_half)
+        k4 = change(state + FINE * k3, there, soft_there)
+        return state + FINE / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), jnp.stack([state[1], k1[1]])
+
+    final, found = jax.lax.scan(step, jnp.zeros((2, count)), (push[:-1], push[1:], soft[:-1], soft[1:]))
+    end = jnp.stack([final[1], change(final, push[-1], soft[-1])[1]])
+    return jnp.concatenate([found, end[None]])

@@ -1,0 +1,355 @@
+"""Fits of any set of effects through one compiled simulation.
+
+The simulation of the present model is compiled once. Effects that it lacks act on it as pushes (`drive`), evaluated
+along the motion of the last fit; a few iterations make motion and pushes agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.linalg as sla
+from numpy.typing import NDArray
+
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.amplitude_scale import effect_mixture, log_mixture
+from bayesid.diagnosis.perturbation import (
+    Situation,
+    Table,
+    coordinates_shape,
+    drive,
+    linear_drive,
+    physical,
+    situation_of,
+    tables_of,
+)
+from bayesid.inference.posterior import Data, Posterior, Push, pushed
+from bayesid.simulation.effects.effect import Effect
+
+__all__ = ["Engine", "Fit"]
+
+ITERATIONS = 25
+CLOSE = 0.02
+"""Change of the cost at which a fit has converged."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A mode of the posterior with some effects added.
+
+    Attributes
+    ----------
+    posterior : Posterior
+        Whose noise whitened the residual.
+    effects : tuple of Effect
+    coordinates : tuple of arrays
+        Of each effect, prior standard deviations.
+    z : (size,) array
+        The model's own unknowns.
+    residual : (N,) array
+        Whitened, all recordings.
+    own : (N, n) array
+        Derivatives of the residual in the model's free unknowns.
+    added : tuple of (N, m) arrays
+        And in each effect's coordinates.
+    cost : float
+        Half of chi-square and squared coordinates.
+    situation : Situation
+    converged : bool
+    released : (k,) array of int
+        Which of the model's unknowns the study takes to be zero and this fit does not.
+    """
+
+    posterior: Posterior
+    effects: tuple[Effect, ...]
+    coordinates: tuple[Floats, ...]
+    z: Floats
+    residual: Floats
+    own: Floats
+    added: tuple[Floats, ...]
+    cost: float
+    situation: Situation
+    converged: bool
+    released: NDArray[np.intp]
+
+    @property
+    def chi2(self) -> float:
+        """Chi-square of the data."""
+        return float(self.residual @ self.residual)
+
+    @cached_property
+    def known(self) -> Floats:
+        """Every fitted column, (N, n + m), each with a unit prior."""
+        return np.concatenate([self.own, *self.added], axis=1)
+
+    @cached_property
+    def hessian(self) -> tuple[Floats, bool]:
+        """Cholesky factor of the Gauss-Newton Hessian of all that is fitted."""
+        return sla.cho_factor(self.known.T @ self.known + np.eye(self.known.shape[1]))
+
+    @property
+    def covariance(self) -> Floats:
+        """Of all that is fitted, in the order of `known`."""
+        return sla.cho_solve(self.hessian, np.eye(self.known.shape[1]))
+
+    @cached_property
+    def log_evidence(self) -> float:
+        """Laplace approximation of the log evidence; the scale of every group of amplitudes is unknown (`scale`)."""
+        half_logdet = float(np.log(np.diag(self.hessian[0])).sum())
+        unit = -self.cost - half_logdet + float(self.posterior.log_normalisation.sum())
+        return unit + self._mixtures
+
+    @property
+    def _mixtures(self) -> float:
+        covariance, total, first = self.covariance, 0.0, self.own.shape[1]
+        if len(self.released):
+            total += log_mixture(self.z[self.released], covariance[np.ix_(self.released, self.released)])
+        for effect, coordinates in zip(self.effects, self.coordinates, strict=True):
+            own = slice(first, first + len(coordinates))
+            total += effect_mixture(effect, coordinates, covariance[own, own])
+            first += len(coordinates)
+        return total
+
+    def project(self, columns: Floats) -> Floats:
+        """Inner products of columns after all that is fitted has taken its share, shape (n, n)."""
+        cross = self.known.T @ columns
+        return columns.T @ columns - cross.T @ sla.cho_solve(self.hessian, cross)
+
+    def values(self, index: int) -> Floats:
+        """Physical values of one effect's parameters."""
+        effect = self.effects[index]
+        shape = coordinates_shape(effect, len(self.posterior.manoeuvres))
+        return np.asarray(physical(effect, jnp.asarray(self.coordinates[index]).reshape(shape)))
+
+
+class _Point(NamedTuple):
+    """One point of a fit."""
+
+    z: Floats
+    coordinates: list[Floats]
+    situation: Situation
+    residual: Floats
+    jacobian: Floats
+    cost: float
+
+
+class Engine:
+    """Fits and responses for one model and its recordings.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        The present model, with initial rates free.
+    frozen : iterable of int
+        Coordinates of the model that stay at zero: initial rates that the study takes to be zero.
+    released : iterable of int
+        Coordinates that the study takes to be zero, but that are free here.
+    """
+
+    def __init__(self, posterior: Posterior, frozen: Iterable[int] = (), released: Iterable[int] = ()) -> None:
+        self.posterior = posterior
+        self.frozen = np.array(sorted(frozen), dtype=int)
+        self._released = np.array(sorted(released), dtype=int)
+        self._tables: dict[str, Table] = {}
+
+    def with_posterior(self, posterior: Posterior) -> Engine:
+        """Return an engine for the same data under another noise; tables are shared."""
+        new = Engine(posterior, self.frozen, self._released)
+        new._tables = self._tables
+        return new
+
+    @property
+    def free(self) -> Floats:
+        """Indices of the model's free coordinates."""
+        return np.setdiff1d(np.arange(self.posterior.size), self.frozen)
+
+    def released(self) -> Engine:
+        """Return the engine with nothing frozen."""
+        new = Engine(self.posterior, released=self.frozen)
+        new._tables = self._tables
+        return new
+
+    def start(self) -> Floats:
+        """Return the model's starting point."""
+        z = self.posterior.initial_point()
+        z[self.frozen] = 0.0
+        return z
+
+    def compile(self) -> None:
+        """Compile simulation and derivatives, side by side."""
+        z, data = self.start(), self.posterior.data
+        with ThreadPoolExecutor(1) as other:
+            derivatives = other.submit(self.posterior.responses, z, data, self.push(1))
+            self.posterior.trace(z, data)
+            derivatives.result()
+
+    def fit(
+        self,
+        effects: Sequence[Effect] = (),
+        coordinates: Sequence[Floats] | None = None,
+        z: Floats | None = None,
+        situation: Situation | None = None,
+        iterations: int = ITERATIONS,
+    ) -> Fit:
+        """Fit the model with effects added (Levenberg-Marquardt).
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+        coordinates : sequence of arrays, optional
+            To start from; by default the first of each effect's `Effect.starts`.
+        z : (size,) array, optional
+            To start from.
+        situation : Situation, optional
+            Of an earlier fit nearby.
+        """
+        z = self.start() if z is None else np.array(z)
+        chosen = [np.array(effect.starts[0]) for effect in effects] if coordinates is None else list(coordinates)
+        chosen = [
+            np.broadcast_to(c, coordinates_shape(e, len(self.posterior.manoeuvres))).ravel()
+            if np.ndim(c) == 1 and e.per_recording and len(c) == len(e.parameters)
+            else np.ravel(c)
+            for c, e in zip(chosen, effects, strict=True)
+        ]
+        situation = self.situation(z, ()) if situation is None else situation
+        sizes = [len(c) for c in chosen]
+        ends = np.cumsum([len(self.free), *sizes])
+        damping, cost, converged = 1e-3, np.inf, False
+        best: _Point | None = None
+        for _ in range(iterations):
+            here = self._point(effects, chosen, z, situation)
+            if not np.isfinite(here.jacobian).all() or not np.isfinite(here.cost):
+                break
+            if best is None or here.cost < best.cost:
+                best = here
+            parameters = np.concatenate([z[self.free], *chosen])
+            hessian = here.jacobian.T @ here.jacobian + np.eye(len(parameters))
+            gradient = here.jacobian.T @ here.residual + parameters
+            taken = False
+            for _ in range(8):
+                step = -sla.solve(hessian + damping * np.diag(np.diag(hessian)), gradient, assume_a="pos")
+                trial = parameters + step
+                new_z = z.copy()
+                new_z[self.free] = trial[: ends[0]]
+                new = [trial[a:b] for a, b in pairwise(ends)]
+                with np.errstate(all="ignore"):
+                    there = self._cost(effects, new, new_z, situation)
+                if np.isfinite(there) and there <= here.cost + 1e-9 * abs(here.cost):
+                    taken = True
+                    break
+                damping = max(damping, 1e-6) * 10.0
+            if not taken:
+                converged = True
+                break
+            z, chosen, damping = new_z, new, damping * 0.1
+            situation = self.situation(z, self._pushes(effects, chosen, situation, vibrations=False))
+            if abs(cost - there) < CLOSE and here.cost - there < CLOSE:
+                converged = True
+                break
+            cost = there
+        last = self._point(effects, chosen, z, situation)
+        if best is None or (np.isfinite(last.jacobian).all() and last.cost < best.cost + CLOSE):
+            best = last  # unless motion and pushes came apart on the way
+        counts = np.cumsum([len(self.free), *sizes])[:-1]
+        own, *added = np.split(best.jacobian, counts, axis=1)
+        return Fit(
+            self.posterior,
+            tuple(effects),
+            tuple(best.coordinates),
+            best.z,
+            best.residual,
+            own,
+            tuple(added),
+            best.cost,
+            best.situation,
+            converged,
+            self._released,
+        )
+
+    def _point(
+        self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, situation: Situation
+    ) -> _Point:
+        """Residual and derivatives at one point."""
+        data = self._pushed(self._pushes(effects, coordinates, situation))
+        residual = self.residual(z, data)
+        columns = [self.own_columns(z, data)]
+        for effect, c in zip(effects, coordinates, strict=True):
+            empty = np.zeros((len(residual), 0))
+            columns.append(self.columns(effect, c, situation, z, data) if len(c) else empty)
+        cost = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in coordinates))
+        return _Point(z, list(coordinates), situation, residual, np.concatenate(columns, axis=1), cost)
+
+    def _cost(self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, situation: Situation) -> float:
+        r = self.residual(z, self._pushed(self._pushes(effects, coordinates, situation)))
+        return 0.5 * float(r @ r + z @ z + sum(c @ c for c in coordinates))
+
+    def situation(self, z: Floats, pushes: Sequence[Push]) -> Situation:
+        """Return the motion with the given pushes."""
+        traced = self.posterior.trace(z, self._pushed(pushes))
+        return situation_of(self.posterior, traced.stage, traced.sample, traced.readings)
+
+    def residual(self, z: Floats, data: Data) -> Floats:
+        """Return the whitened residual, (N,)."""
+        return np.asarray(self.posterior.trace(z, data).residual).ravel()
+
+    def own_columns(self, z: Floats, data: Data) -> Floats:
+        """Return derivatives of the residual in the model's free coordinates, (N, n)."""
+        free = self.free
+        unit = np.zeros((len(free), self.posterior.size))
+        unit[np.arange(len(free)), free] = 1.0
+        return self.posterior.responses(z, data, self.push(len(free), z=unit)).reshape(len(free), -1).T
+
+    def columns(self, effect: Effect, coordinates: Floats, situation: Situation, z: Floats, data: Data) -> Floats:
+        """Return derivatives of the residual in an effect's coordinates, (N, n)."""
+        pushes = linear_drive(effect, coordinates, situation, self._table(effect))
+        return self.respond(pushes, z, data)
+
+    def respond(self, pushes: Push, z: Floats, data: Data) -> Floats:
+        """Return derivatives of the residual along pushes with leading axis n, (N, n)."""
+        return self.posterior.responses(z, data, pushes).reshape(len(pushes.z), -1).T
+
+    def push(self, count: int, **parts: Floats) -> Push:
+        """Return ``count`` pushes with the named parts, the others zero."""
+        empty = Push(
+            np.zeros((count, self.posterior.size)), *(np.zeros((count, *shape)) for shape in self._push_shapes())
+        )
+        return empty._replace(**parts)
+
+    def data_of(self, fit: Fit) -> Data:
+        """Return the data with a fit's effects pushed."""
+        return self._pushed(self._pushes(fit.effects, fit.coordinates, fit.situation))
+
+    def _pushes(
+        self, effects: Sequence[Effect], coordinates: Sequence[Floats], situation: Situation, vibrations: bool = True
+    ) -> list[Push]:
+        return [
+            drive(effect, c, situation, self._table(effect))
+            for effect, c in zip(effects, coordinates, strict=True)
+            if vibrations or not effect.modes_count
+        ]
+
+    def _pushed(self, pushes: Sequence[Push]) -> Data:
+        data = self.posterior.data
+        if not pushes:
+            return data
+        return pushed(data, jax.tree.map(lambda *parts: jnp.asarray(sum(parts)), *pushes))
+
+    def _push_shapes(self) -> list[tuple[int, ...]]:
+        grid, data = self.posterior.data.grid, self.posterior.data
+        stage, sample = grid.stage.known.shape, grid.sample.known.shape
+        return [stage, sample, (*stage[:2], 6), (*sample[:2], 6), data.measured.shape]
+
+    def _table(self, effect: Effect) -> Table | None:
+        if not effect.uses("table"):
+            return None
+        if effect.label not in self._tables:
+            self._tables[effect.label] = tables_of(effect, self.posterior)
+        return self._tables[effect.label]

@@ -1,0 +1,99 @@
+"""A direction in words: the pattern that its numbers show, and no more."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.identifiability.directions import Direction, common_factor
+from bayesid.inference.contraction import Verdict
+
+__all__ = ["Part", "describe", "parts_of", "subject"]
+
+ALIKE = 0.95
+"""Cosine, in units of the prior's standard deviations, from which on a displacement counts as a pattern."""
+
+NEGLIGIBLE = 0.25
+"""Share of the largest part below which a part is left out of the words."""
+
+NAMED = 3
+"""Parts that are named at most."""
+
+NOUNS = {"mass": "mass", "com": "centre of mass", "inertia": "inertia"}
+
+
+class Part(Enum):
+    """Which way a part moves."""
+
+    WITH = "with"
+    AGAINST = "against"
+
+
+def describe(direction: Direction, values: Floats, prior_sd: Floats, whole: bool = True) -> str:
+    """Say what a direction is, and what is known of it.
+
+    Parameters
+    ----------
+    values, prior_sd : (n,) array
+        Of the direction's quantities.
+    whole : bool
+        Whether these are the quantities of all bodies that are not known exactly.
+    """
+    what, ratio = subject(direction, values, prior_sd, whole), direction.sd / direction.prior_sd
+    verdict = direction.verdict
+    if verdict is Verdict.NOT:
+        shared = "cannot be told apart" if " against " in what else "not learnt"
+        return f"{what}: {shared}, {_percent(ratio)} of the prior's width is left"
+    if verdict is Verdict.WEAKLY:
+        return f"{what}: weakly learnt, {_percent(ratio)} of the prior's width is left"
+    return f"{what}: known to {_percent(ratio)} of the prior's width"
+
+
+def subject(direction: Direction, values: Floats, prior_sd: Floats, whole: bool = True) -> str:
+    """Say which quantities a direction moves."""
+    moved = direction.displacement / prior_sd
+    bodies = list(dict.fromkeys(name.split(".")[0] for name in direction.names))
+    owner = np.array([bodies.index(name.split(".")[0]) for name in direction.names])
+    factor = common_factor(direction.names, values)
+    if len(bodies) > 1 and _cosine(moved, factor / prior_sd) > ALIKE:
+        return "all masses and inertias in proportion (the scale)" if whole else f"{_list(bodies)} in proportion"
+    for index, body in enumerate(bodies):
+        if _cosine(moved, np.where(owner == index, factor, 0.0) / prior_sd) > ALIKE:
+            return f"mass and inertia of {body} in proportion"
+    phrases: list[str] = []
+    for sign, name in parts_of(direction, prior_sd):
+        text = _noun(name, len(bodies) > 1)
+        phrases.append(text if not phrases else f"{sign.value} {text}")
+    return " ".join(phrases)
+
+
+def parts_of(direction: Direction, prior_sd: Floats) -> list[tuple[Part, str]]:
+    """Return the largest parts of a displacement relative to the prior's widths, as against the first of them."""
+    moved = direction.displacement / prior_sd
+    order = np.argsort(-np.abs(moved))[:NAMED]
+    kept = [k for k in order if abs(moved[k]) >= NEGLIGIBLE * abs(moved[order[0]])]
+    return [(Part.WITH if moved[k] * moved[order[0]] > 0.0 else Part.AGAINST, direction.names[k]) for k in kept]
+
+
+def _noun(name: str, several: bool) -> str:
+    body, _, key = name.partition(".")
+    family, _, axis = key.partition(".")
+    text = f"{NOUNS[family]} {axis}".strip()
+    return f"{text} of {body}" if several else text
+
+
+def _cosine(first: Floats, second: Floats) -> float:
+    size = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(abs(first @ second)) / size if size > 0.0 else 0.0
+
+
+def _percent(ratio: float) -> str:
+    value = 100.0 * ratio
+    return f"{value:.0f} %" if value >= 1.0 else f"{value:.1g} %"
+
+
+def _list(items: Sequence[str]) -> str:
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

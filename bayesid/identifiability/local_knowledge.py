@@ -1,0 +1,117 @@
+"""What a posterior knows of its bodies' quantities, linearised at one point, beside what the prior knew.
+
+With ``J`` the Jacobian of the whitened residuals and of the prior, which is standard normal in ``z``, the coordinates
+have the covariance ``(J'J)^-1``; quantities with the derivative ``D`` by ``z`` have ``C = D (J'J)^-1 D'`` and had
+``C0 = D D'``. Whatever else is unknown (rates, effects, links known to a few percent) is marginalised by the inverse.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as sla
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.body_quantities import linearise
+from bayesid.inference.posterior import Posterior
+
+__all__ = ["Knowledge"]
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """Quantities of bodies as known before and after the data.
+
+    Parameters
+    ----------
+    names : tuple of str
+        As in identification.json, n of them.
+    values : (n,) array
+        At the point of linearisation, in SI units.
+    slope : (n, N) array
+        Derivative by the N coordinates, of full row rank.
+    jacobian : (m, N) array
+        Of whitened residuals and prior, of full column rank.
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+    slope: Floats
+    jacobian: Floats
+
+    @classmethod
+    def at(cls, posterior: Posterior, z: Floats) -> Knowledge:
+        """Linearise a posterior at a point."""
+        return cls(*linearise(posterior, z), posterior.jacobian(z))
+
+    def having(self, rows: Floats) -> Knowledge:
+        """Return what is known with further whitened measurements of the coordinates, shape (k, N)."""
+        return Knowledge(self.names, self.values, self.slope, np.concatenate([self.jacobian, rows]))
+
+    @cached_property
+    def coordinates(self) -> Floats:
+        """Covariance of the coordinates, shape (N, N)."""
+        inverse = self._inverse_root
+        return inverse @ inverse.T
+
+    @cached_property
+    def factor(self) -> Floats:
+        """Return F with F F' the covariance of the quantities, shape (n, N)."""
+        return self.slope @ self._inverse_root
+
+    @cached_property
+    def prior_factor(self) -> Floats:
+        """Lower-triangular L with L L' the prior covariance of the quantities, shape (n, n)."""
+        upper = _upper(self.slope.T)
+        return (upper * np.where(np.diag(upper) < 0.0, -1.0, 1.0)[:, None]).T
+
+    @property
+    def covariance(self) -> Floats:
+        """Posterior covariance of the quantities, shape (n, n)."""
+        return self.factor @ self.factor.T
+
+    @property
+    def prior_covariance(self) -> Floats:
+        """Prior covariance of the quantities, shape (n, n)."""
+        return self.slope @ self.slope.T
+
+    @property
+    def sd(self) -> Floats:
+        """Posterior standard deviations, whatever the other quantities are, shape (n,)."""
+        return np.linalg.norm(self.factor, axis=1)
+
+    @property
+    def prior_sd(self) -> Floats:
+        """Prior standard deviations, shape (n,)."""
+        return np.linalg.norm(self.slope, axis=1)
+
+    @property
+    def conditional_sd(self) -> Floats:
+        """Posterior standard deviations if all other quantities of the bodies were known exactly, shape (n,)."""
+        scaled = self.factor / self.sd[:, None]
+        inverse = np.linalg.inv(_upper(scaled.T))  # of C = R'R in units of sd
+        return self.sd / np.linalg.norm(inverse, axis=1)
+
+    @property
+    def correlation(self) -> Floats:
+        """Posterior correlations, shape (n, n)."""
+        scaled = self.factor / self.sd[:, None]
+        return scaled @ scaled.T
+
+    @property
+    def shrinkage(self) -> Floats:
+        """One minus the ratio of posterior to prior standard deviation, shape (n,); 0 where nothing was learnt."""
+        return 1.0 - self.sd / self.prior_sd
+
+    @cached_property
+    def _inverse_root(self) -> Floats:
+        """Inverse of R of J = QR: exact where some directions are known a million times better than others."""
+        upper = _upper(self.jacobian)
+        return np.asarray(sla.solve_triangular(upper, np.eye(len(upper))))
+
+
+def _upper(matrix: Floats) -> Floats:
+    """R of matrix = QR."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"))

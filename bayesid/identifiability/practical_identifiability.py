@@ -1,0 +1,138 @@
+"""Practical identifiability: what manoeuvres, sensors and priors of a study tell of its bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from bayesid.identifiability.added_information import candidates
+from bayesid.identifiability.advice import Advice, advise
+from bayesid.identifiability.direction_words import describe
+from bayesid.identifiability.directions import Direction, directions
+from bayesid.identifiability.hypothetical_experiment import Predictor
+from bayesid.identifiability.local_knowledge import Knowledge
+from bayesid.identifiability.normality import Draws, draw
+from bayesid.identifiability.parameter_table import Parameter, profiled, tabulate
+from bayesid.inference.mode import Optimum
+from bayesid.inference.posterior import Posterior
+
+__all__ = ["Basis", "Practical", "covers_all", "practical"]
+
+Show = Callable[[float, str], None]
+
+
+class Basis(Enum):
+    """What a statement rests on."""
+
+    FIT = "fit"
+    PREDICTION = "prediction"
+
+
+@dataclass(frozen=True)
+class Practical:
+    """Result of `practical`.
+
+    Attributes
+    ----------
+    basis : Basis
+    posterior : Posterior
+    optimum : Optimum
+    knowledge : Knowledge
+    directions : tuple of Direction
+        From the worst known to the best.
+    words : tuple of str
+        Of each direction.
+    parameters : tuple of Parameter
+    draws : Draws
+    advice : tuple of Advice
+        The most telling first.
+    """
+
+    basis: Basis
+    posterior: Posterior
+    optimum: Optimum
+    knowledge: Knowledge
+    directions: tuple[Direction, ...]
+    words: tuple[str, ...]
+    parameters: tuple[Parameter, ...]
+    draws: Draws
+    advice: tuple[Advice, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Keys of identifiability.json that are about the posterior."""
+        spread = self.draws.covariance if self.draws.trusted else None
+        return {
+            "basis": self.basis.value,
+            "directions": [
+                {
+                    **direction.to_dict(),
+                    "sampled_sd": None
+                    if spread is None
+                    else float(np.sqrt(direction.weights @ spread @ direction.weights)),
+                    "words": words,
+                }
+                for direction, words in zip(self.directions, self.words, strict=True)
+            ],
+            "parameters": [parameter.to_dict() for parameter in self.parameters],
+            "covariance": {"names": list(self.knowledge.names), "matrix": self.knowledge.covariance.tolist()},
+            "prior_covariance": {
+                "names": list(self.knowledge.names),
+                "matrix": self.knowledge.prior_covariance.tolist(),
+            },
+            "draws": {
+                "method": self.draws.method.value,
+                "trusted": self.draws.trusted,
+                "pareto_k": self.draws.pareto_k,
+            },
+            "advice": [item.to_dict() for item in self.advice],
+        }
+
+
+def practical(
+    posterior: Posterior,
+    optimum: Optimum,
+    basis: Basis,
+    seed: int,
+    *,
+    effective_samples: float = 500.0,
+    profiles: int = 6,
+    progress: Show = lambda _fraction, _text: None,
+) -> Practical:
+    """Say what a posterior knows of its bodies, and what would tell more.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        With at least one body to identify; its noise linearised at the mode.
+    optimum : Optimum
+    seed : int
+        Every random number follows from it.
+    effective_samples : float
+        Wanted of emcee where importance sampling may not be trusted.
+    profiles : int
+        Quantities that are profiled at most, the least normal first.
+    """
+    knowledge = Knowledge.at(posterior, optimum.z)
+    found = tuple(directions(knowledge))
+    whole = covers_all(posterior)
+    words = tuple(describe(item, knowledge.values, knowledge.prior_sd, whole) for item in found)
+    draws = draw(posterior, optimum, np.random.SeedSequence(seed), effective_samples, _part(progress, 0.1, 0.4))
+    parameters = tabulate(knowledge, draws)
+    parameters = profiled(posterior, optimum, parameters, draws, knowledge, profiles, _part(progress, 0.4, 0.6))
+    predictor = Predictor(posterior.model, posterior.manoeuvres, optimum.z, posterior.step)
+    advice = advise(predictor, candidates(posterior.model), found, knowledge, _part(progress, 0.6, 1.0))
+    return Practical(basis, posterior, optimum, knowledge, found, words, tuple(parameters), draws, tuple(advice))
+
+
+def covers_all(posterior: Posterior) -> bool:
+    """Whether every body of the robot that has mass is to be identified."""
+    named = {body.name for body in posterior.model.bodies}
+    return {name for name, link in posterior.model.robot.links.items() if link.inertial.mass > 0.0} <= named
+
+
+def _part(progress: Show, start: float, end: float) -> Show:
+    return lambda fraction, text: progress(start + (end - start) * fraction, text)

@@ -1,0 +1,171 @@
+"""Profile intervals: how far one quantity can go if all other unknowns follow it.
+
+The posterior is maximised over everything else with the quantity held (Raue et al., Bioinformatics 2009; the prior
+counts as a measurement). An interval holds the values whose maximum is less than half a chi-square quantile below the
+mode. A quantity is held by a strong penalty: where the penalised fit ends it has some value, and for that value this is
+the constrained optimum, however strong the penalty was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import least_squares
+
+from bayesid._math.arrays import Floats
+
+__all__ = ["Profile", "Target", "profile"]
+
+Vector = Callable[[Floats], Floats]
+
+LEVELS = {"68 %": 1.0, "95 %": 1.959963984540054}
+"""Square roots of the chi-square quantiles of one degree of freedom."""
+
+STEP = 0.5
+"""Between points of a profile, in that square root."""
+
+STIFF = 30.0
+"""Of the penalty, per standard deviation of the quantity."""
+
+MOST = 24
+"""Refits on each side."""
+
+TOLERANCE = 1e-8
+HUGE = 1e12
+"""Stands for residuals that are not finite, so that the step is refused."""
+
+SHORTEST = 1e-3
+"""Step, in standard deviations, below which a jump of the profile counts as one."""
+
+GROWTH = 3.0
+"""By which a step at most grows or shrinks from one point to the next."""
+
+
+class Target(NamedTuple):
+    """A scalar function of the coordinates with its gradient (n,)."""
+
+    value: Callable[[Floats], float]
+    gradient: Vector
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Profile of one quantity.
+
+    Attributes
+    ----------
+    values : (k,) array
+        Of the quantity, increasing.
+    roots : (k,) array
+        Signed square root of twice the loss of log posterior density; minus and plus one are the ends of the 68 %
+        interval, and for a normal posterior it is linear.
+    """
+
+    values: Floats
+    roots: Floats
+
+    def interval(self, root: float) -> tuple[float | None, float | None]:
+        """Return the ends of the interval at a root, None where the profile does not reach it."""
+        curve = PchipInterpolator(self.roots, self.values)
+        return tuple(  # type: ignore[return-value]
+            float(curve(end)) if self.roots[0] <= end <= self.roots[-1] else None for end in (-root, root)
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Intervals, as in JSON."""
+        return {level: list(self.interval(root)) for level, root in LEVELS.items()}
+
+
+def profile(residual: Vector, jacobian: Vector, mode: Floats, covariance: Floats, target: Target) -> Profile:
+    """Profile a quantity about the mode.
+
+    Parameters
+    ----------
+    residual : callable
+        Coordinates (n,) to residuals whose half square sum is minus the log posterior density, up to a constant.
+    jacobian : callable
+        Its derivative.
+    mode : (n,) array
+    covariance : (n, n) array
+        Of the normal approximation; for the first step and the strength of the penalty.
+    target : Target
+    """
+    fit = _Held(residual, jacobian, mode, covariance, target)
+    points = [*fit.march(-1.0)[::-1], _Point(target.value(mode), 0.0, mode), *fit.march(1.0)]
+    for root in (sign * level for level in LEVELS.values() for sign in (-1.0, 1.0)):
+        curve = _curve(_increasing(points))
+        if curve.x[0] < root < curve.x[-1]:  # once more, where the interval ends
+            nearest = points[int(np.argmin([abs(point.root - root) for point in points]))]
+            points = sorted([*points, fit.at(float(curve(root)), nearest.z)], key=lambda point: point.value)
+    values, roots, _ = zip(*_increasing(points), strict=True)
+    return Profile(np.array(values), np.array(roots))
+
+
+class _Point(NamedTuple):
+    value: float
+    root: float
+    z: Floats
+
+
+class _Held:
+    """The posterior maximised with a quantity held."""
+
+    def __init__(self, residual: Vector, jacobian: Vector, mode: Floats, covariance: Floats, target: Target) -> None:
+        self.residual, self.jacobian, self.mode, self.target = residual, jacobian, mode, target
+        slope = target.gradient(mode)
+        self.sd = float(np.sqrt(slope @ covariance @ slope))
+        self.along = covariance @ slope / self.sd**2
+        self.centre, self.best = target.value(mode), float((residual(mode) ** 2).sum())
+
+    def at(self, wanted: float, start: Floats) -> _Point:
+        """Fit with the quantity held near a value."""
+        stiffness = STIFF / self.sd
+
+        def held(z: Floats) -> Floats:
+            r = np.append(self.residual(z), stiffness * (self.target.value(z) - wanted))
+            return np.where(np.isfinite(r), r, HUGE)
+
+        def slope(z: Floats) -> Floats:
+            return np.vstack([self.jacobian(z), stiffness * self.target.gradient(z)])
+
+        options: Any = {"method": "lm", "x_scale": "jac", "ftol": TOLERANCE, "xtol": TOLERANCE, "gtol": TOLERANCE}
+        z = np.asarray(least_squares(held, start, slope, **options).x)
+        value, loss = self.target.value(z), float((self.residual(z) ** 2).sum()) - self.best
+        return _Point(value, float(np.sign(value - self.centre) * np.sqrt(max(loss, 0.0))), z)
+
+    def march(self, sign: float) -> list[_Point]:
+        """Go from the mode to one side until the 95 % interval ends."""
+        last, step = _Point(self.centre, 0.0, self.mode), STEP * self.sd
+        found: list[_Point] = []
+        for _ in range(MOST):
+            start = last.z + sign * step * self.along
+            point = self.at(last.value + sign * step, start)
+            gained = abs(point.root) - abs(last.root)
+            if not np.isfinite(point.root) or sign * (point.value - last.value) <= 0.0:
+                break
+            if gained > 2.0 * STEP and step > SHORTEST * self.sd:
+                step *= 0.5
+                continue
+            found.append(point)
+            if abs(point.root) >= max(LEVELS.values()):
+                break
+            step = abs(point.value - last.value) * min(STEP / max(gained, STEP / GROWTH), GROWTH)
+            last = point
+        return found
+
+
+def _increasing(points: Sequence[_Point]) -> list[_Point]:
+    """Leave out points of refits that ended in rounding."""
+    kept = [points[0]]
+    for point in points[1:]:
+        if point.value > kept[-1].value and point.root > kept[-1].root:
+            kept.append(point)
+    return kept
+
+
+def _curve(points: Sequence[_Point]) -> PchipInterpolator:
+    return PchipInterpolator([point.root for point in points], [point.value for point in points])

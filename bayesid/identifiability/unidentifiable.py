@@ -1,0 +1,41 @@
+"""What an identification did not learn, in sentences: it must not pass the prior for knowledge."""
+
+from __future__ import annotations
+
+from bayesid.identifiability.direction_words import subject
+from bayesid.identifiability.directions import directions
+from bayesid.identifiability.local_knowledge import Knowledge
+from bayesid.identifiability.practical_identifiability import covers_all
+from bayesid.inference.contraction import Verdict
+from bayesid.inference.identification import Identification
+
+__all__ = ["untold_sentences"]
+
+NAMED = 8
+"""Quantities or directions a sentence names at most."""
+
+
+def untold_sentences(result: Identification) -> list[str]:
+    """Name the quantities and the directions of which the posterior is nearly the prior; empty if there are none."""
+    if not result.bodies:
+        return []
+    found = []
+    for verdict, text in ((Verdict.NOT, "is the prior"), (Verdict.WEAKLY, "owes more to the prior than to the data")):
+        names = [name for name, item in result.learnt.items() if item.verdict is verdict]
+        if names:
+            found.append(f"What is said of {listed(names)} {text}.")
+    knowledge = Knowledge.at(result.posterior, result.optimum.z)
+    subjects = [
+        subject(item, knowledge.values, knowledge.prior_sd, covers_all(result.posterior))
+        for item in directions(knowledge)
+        if item.verdict is Verdict.NOT
+    ]
+    if subjects:
+        found.append(f"The data do not tell of these directions: {listed(subjects, '; ')}.")
+    return found
+
+
+def listed(texts: list[str], separator: str = ", ") -> str:
+    """Join texts, the first few by name."""
+    more = len(texts) - NAMED
+    return separator.join(texts[:NAMED]) + (f" and {more} more" if more > 0 else "")

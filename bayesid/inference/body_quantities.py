@@ -1,0 +1,121 @@
+"""What is reported of a body, of draws of it and about a point; and the form of every quantity in JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.unknowns import Unknowns
+from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.simulation.effects.effect import Effect
+
+__all__ = [
+    "BODY_QUANTITIES",
+    "BodyDraws",
+    "Linearised",
+    "bodies_of",
+    "body_dict",
+    "linearise",
+    "quantities_of",
+    "quantity",
+    "reported_effect",
+]
+
+
+BODY_QUANTITIES = {
+    "mass": "kg",
+    "com.x": "m",
+    "com.y": "m",
+    "com.z": "m",
+    "inertia.xx": "kg m2",
+    "inertia.yy": "kg m2",
+    "inertia.zz": "kg m2",
+    "inertia.xy": "kg m2",
+    "inertia.xz": "kg m2",
+    "inertia.yz": "kg m2",
+}
+"""What is reported of a body, with units; the inertia is about its own centre of mass, in the link's axes."""
+
+
+@dataclass(frozen=True)
+class BodyDraws:
+    """Draws of one body's quantities, shape (draws, 10), in the order of `BODY_QUANTITIES`."""
+
+    name: str
+    values: Floats
+
+    @property
+    def mean(self) -> Floats:
+        """Posterior mean, shape (10,)."""
+        return self.values.mean(axis=0)
+
+    @property
+    def sd(self) -> Floats:
+        """Posterior standard deviation, shape (10,)."""
+        return self.values.std(axis=0, ddof=1)
+
+
+class Linearised(NamedTuple):
+    """Reported quantities of all identified bodies at one point: names, values (n,), derivative by z (n, size)."""
+
+    names: tuple[str, ...]
+    values: Floats
+    slope: Floats
+
+
+def linearise(posterior: Posterior, z: Floats) -> Linearised:
+    """Linearise the reported quantities of the identified bodies in the coordinates."""
+    names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
+    quantities, point = quantities_of(posterior.unknowns), jnp.asarray(z)
+    return Linearised(names, np.asarray(quantities(point)), np.asarray(jax.jacfwd(quantities)(point)))
+
+
+def quantities_of(unknowns: Unknowns) -> Callable[[Array], Array]:
+    """Return the function from coordinates (size,) to the reported quantities of all identified bodies (n,)."""
+    own = jnp.asarray([index for index, prior in enumerate(unknowns.bodies) if not prior.nuisance], dtype=int)
+
+    def quantities(z: Array) -> Array:
+        return jnp.ravel(mass_com_inertia(unknowns.values(z).inertial.reshape(-1, 10)[own]))
+
+    return quantities
+
+
+def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
+    """Return the reported quantities of the identified bodies at many points, shape (draws, size)."""
+    inertial = np.asarray(posterior.values_of(z).inertial).reshape(len(z), -1, 10)
+    return {
+        prior.name: BodyDraws(prior.name, mass_com_inertia(inertial[:, index]))
+        for index, prior in enumerate(posterior.model.priors)
+        if not prior.nuisance
+    }
+
+
+def reported_effect(effect: Effect, values: Floats) -> Floats:
+    """Values of an effect's parameters (..., n) to what is reported of it (..., m)."""
+    flat = jnp.asarray(values.reshape(-1, values.shape[-1]))
+    return np.asarray(jax.vmap(effect.report)(flat)).reshape(*values.shape[:-1], len(effect.quantities))
+
+
+def quantity(mean: float, sd: float, unit: str) -> dict[str, Any]:
+    """Return the form every quantity has in JSON."""
+    return {"mean": float(mean), "sd": float(sd), "unit": unit}
+
+
+def body_dict(body: BodyDraws) -> dict[str, Any]:
+    """Return a body as it stands in identification.json."""
+    entries = [
+        quantity(mean, sd, unit) for mean, sd, unit in zip(body.mean, body.sd, BODY_QUANTITIES.values(), strict=True)
+    ]
+    return {
+        "mass": entries[0],
+        "com": entries[1:4],
+        "inertia": dict(zip(("xx", "yy", "zz", "xy", "xz", "yz"), entries[4:], strict=True)),
+    }

@@ -1,0 +1,123 @@
+"""Maximum a posteriori by least squares with the exact Jacobian, and the Laplace approximation there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.posterior import Posterior
+
+__all__ = ["Optimum", "fit", "maximise"]
+
+
+TOLERANCE = 1e-10
+HUGE = 1e12
+"""Stands for residuals that are not finite, so that the step is refused."""
+
+STARTS = 8
+"""Random starts tried when the first optimum does not explain the data."""
+
+SUSPICIOUS = 4.0
+"""chi2 per sample above which an optimum may be a local one."""
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Mode of the posterior and the normal approximation about it.
+
+    Attributes
+    ----------
+    z : (n,) array
+        Standard-normal coordinates of the mode.
+    covariance : (n, n) array
+        Inverse of the Gauss-Newton Hessian; the Laplace approximation's covariance.
+    chi2 : float
+        Of the data alone.
+    cost : float
+        Minus the log posterior, up to a constant.
+    evaluations : int
+    converged : bool
+    """
+
+    z: Floats
+    covariance: Floats
+    chi2: float
+    cost: float
+    evaluations: int
+    converged: bool
+
+    def log_evidence(self, posterior: Posterior) -> float:
+        """Laplace approximation of the log evidence."""
+        n = posterior.size
+        half_logdet = float(np.log(np.diag(np.linalg.cholesky(self.covariance))).sum())
+        return float(posterior.log_density(self.z)[0]) + 0.5 * n * np.log(2.0 * np.pi) + half_logdet
+
+
+def fit(posterior: Posterior, start: Floats) -> Optimum:
+    """Run Levenberg-Marquardt from one point."""
+
+    def finite(z: Floats) -> Floats:
+        r = posterior.least_squares(z)
+        return np.where(np.isfinite(r), r, HUGE)
+
+    solution = least_squares(
+        finite, start, posterior.jacobian, method="lm", x_scale="jac", ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE
+    )
+    jacobian = posterior.jacobian(solution.x)
+    return Optimum(
+        z=solution.x,
+        covariance=_inverse(jacobian.T @ jacobian),
+        chi2=float((posterior.residuals(solution.x) ** 2).sum()),
+        cost=float(solution.cost),
+        evaluations=int(solution.nfev + (solution.njev or 0)),
+        converged=solution.status in (1, 2, 3, 4),
+    )
+
+
+def maximise(posterior: Posterior, rng: np.random.Generator, start: Floats | None = None) -> tuple[Posterior, Optimum]:
+    """Find the mode, then carry the encoder noise through the robot found there and polish.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        For further starts where the first optimum explains the data badly.
+    start : (n,) array, optional
+        The prior's centre where left out.
+
+    Returns
+    -------
+    Posterior, Optimum
+        The posterior with its noise linearised at the mode, and the mode.
+    """
+    first = posterior.initial_point() if start is None else start
+    best = fit(posterior, first)
+    evaluations = best.evaluations
+    if best.chi2 > SUSPICIOUS * posterior.samples:
+        for _ in range(STARTS):
+            other = fit(
+                posterior,
+                first + 0.5 * rng.normal(size=first.size) * (np.arange(first.size) < 10 * len(posterior.model.priors)),
+            )
+            evaluations += other.evaluations
+            if other.cost < best.cost:
+                best = other
+    refined = posterior.at(best.z)
+    polished = fit(refined, best.z)
+    return refined, Optimum(
+        z=polished.z,
+        covariance=polished.covariance,
+        chi2=polished.chi2,
+        cost=polished.cost,
+        evaluations=evaluations + polished.evaluations,
+        converged=polished.converged,
+    )
+
+
+def _inverse(hessian: Floats) -> Floats:
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    scaled = hessian * np.outer(scale, scale)
+    inverse = np.linalg.pinv(scaled, hermitian=True)
+    return inverse * np.outer(scale, scale)

@@ -1,0 +1,178 @@
+"""The posterior of one study as the prior of the next, with a stated change of mass in between.
+
+The draws of all bodies become a correlated Gaussian in their log-Cholesky coordinates about the bodies at the mean
+coordinates. Fuel burnt or a part released in between is a body taken from, or added to, each draw's linear parameters.
+Biases, initial rates and effects are not carried: they belong to their recordings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import arviz as az
+import jax.numpy as jnp
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.inference.identification import Identification
+from bayesid.robot.body_prior import BodyPrior, Mixing
+from bayesid.robot.inertial_parameters import BASIS, InertialParameters, log_cholesky_vector
+from bayesid.robot.log_cholesky import log_cholesky_coordinates
+from bayesid.robot.mass_property_change import BodyChange
+
+__all__ = ["BodyChange", "InertialDraws", "JointPrior", "joint_prior"]
+
+DRAWS_PER_COORDINATE = 4
+"""Fewer draws than this times the coordinates do not give their covariance."""
+
+RECENTRED = 10
+"""Rounds in which the centre moves to the mean; each leaves a small part of the offset of the one before."""
+
+
+@dataclass(frozen=True)
+class InertialDraws:
+    """Draws of the inertial parameters of some bodies.
+
+    Parameters
+    ----------
+    names : tuple of str
+        B bodies.
+    values : (n, B, 10) array
+        Linear parameters, `InertialParameters.vector`, in link axes.
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+
+    @classmethod
+    def of(cls, result: Identification) -> InertialDraws:
+        """Take all draws of a result, bodies that were only marginalised included."""
+        names = tuple(prior.name for prior in result.posterior.model.priors)
+        inertial = np.asarray(result.posterior.values_of(result.chains.flat).inertial)
+        return cls(names, inertial.reshape(len(inertial), len(names), 10))
+
+    @classmethod
+    def read(cls, file: Path) -> InertialDraws:
+        """Read the draws of a ``posterior.nc``.
+
+        Raises
+        ------
+        InputError
+            If the file is absent or holds none.
+        """
+        remedy = "Name the posterior.nc that bayesid identify wrote"
+        if not file.is_file():
+            raise InputError("there is no such file", file=file, remedy=remedy)
+        try:
+            data = az.from_netcdf(str(file))
+            inertial = data.posterior["inertial"]
+            names = tuple(str(name) for name in inertial.coords["body"].values)
+            values = np.array(inertial.transpose("chain", "draw", "body", "parameter").values, dtype=float)
+            data.close()
+        except (OSError, ValueError, KeyError, AttributeError) as error:
+            raise InputError("it holds no draws of inertial parameters", file=file, remedy=remedy) from error
+        return cls(names, values.reshape(-1, len(names), 10))
+
+    def of_bodies(self, names: Sequence[str]) -> InertialDraws:
+        """Return the draws of some bodies, in the order of ``names``."""
+        for name in names:
+            if name not in self.names:
+                raise InputError(
+                    f"it holds no body {name!r}",
+                    remedy=f"It holds {', '.join(self.names)}; leave {name!r} out, or identify it first",
+                )
+        return InertialDraws(tuple(names), self.values[:, [self.names.index(name) for name in names]])
+
+    def changed(self, change: BodyChange, rng: np.random.Generator) -> InertialDraws:
+        """Return the draws with a body added or removed, its mass drawn anew for each.
+
+        Raises
+        ------
+        InputError
+            If no physical body is left in some draw.
+        """
+        self.of_bodies([change.body])
+        index = self.names.index(change.body)
+        mass = change.mass + change.mass_sigma * rng.normal(size=len(self.values))
+        values = self.values.copy()
+        values[:, index] += (mass / change.mass)[:, None] * change.vector
+        # 1e-12: what rounding leaves of a body without extent
+        relative = _pseudo(values[:, index]) / np.abs(_pseudo(self.values[:, index])).max(axis=(1, 2), keepdims=True)
+        bad = int((np.linalg.eigvalsh(relative)[:, 0] <= 1e-12).sum())
+        if bad:
+            raise InputError(
+                f"no physical body is left of {change.body} in {bad} of {len(values)} draws after the change by "
+                f"{change.mass:g} kg",
+                remedy="More is removed than is there: correct mass, com, inertia or mass_sigma of the change",
+            )
+        return InertialDraws(self.names, values)
+
+
+@dataclass(frozen=True)
+class JointPrior:
+    """A correlated Gaussian in the log-Cholesky coordinates of B bodies about their centres.
+
+    Parameters
+    ----------
+    names : tuple of str
+    centres : tuple of InertialParameters
+    covariance : (10 B, 10 B) array
+    """
+
+    names: tuple[str, ...]
+    centres: tuple[InertialParameters, ...]
+    covariance: Floats
+
+    def bodies(self, nuisance: Sequence[str] = ()) -> tuple[BodyPrior, ...]:
+        """Return the bodies for `Model.priors`; those named are marginalised only."""
+        widths = np.sqrt(np.diag(self.covariance).reshape(-1, 10).mean(axis=1))
+        return tuple(
+            BodyPrior(name, centre, float(width), nuisance=name in nuisance)
+            for name, centre, width in zip(self.names, self.centres, widths, strict=True)
+        )
+
+    def mixing(self, others: Sequence[BodyPrior] = ()) -> Mixing:
+        """Return the factor for `Model.mixing`, with independent bodies after those of the prior."""
+        count = len(self.covariance)
+        factor = np.diag(np.concatenate([np.zeros(count), np.repeat([body.spread for body in others], 10)]))
+        factor[:count, :count] = np.linalg.cholesky(self.covariance)
+        return tuple(tuple(float(value) for value in row) for row in factor)
+
+
+def joint_prior(draws: InertialDraws) -> JointPrior:
+    """Fit a joint prior to draws: the mean and covariance of their log-Cholesky coordinates.
+
+    Raises
+    ------
+    InputError
+        If there are too few draws.
+    """
+    count, bodies = draws.values.shape[:2]
+    if count < DRAWS_PER_COORDINATE * 10 * bodies:
+        raise InputError(
+            f"{count} draws do not give the covariance of {10 * bodies} coordinates",
+            remedy=f"Identify with more samples; {DRAWS_PER_COORDINATE * 10 * bodies} are the least",
+        )
+    centres, coordinates = zip(*(_centred(draws.values[:, index]) for index in range(bodies)), strict=True)
+    covariance = np.atleast_2d(np.cov(np.concatenate(coordinates, axis=1).T))
+    return JointPrior(draws.names, centres, covariance)
+
+
+def _centred(vectors: Floats) -> tuple[InertialParameters, Floats]:
+    """Return the body at the mean of its coordinates, and the coordinates of all draws relative to it."""
+    bodies = _pseudo(vectors)
+    centre = InertialParameters.from_vector(vectors.mean(axis=0))
+    for _ in range(RECENTRED):
+        coordinates = log_cholesky_coordinates(centre.pseudo_inertia, bodies)
+        mean = coordinates.mean(axis=0)
+        if (np.abs(mean) < 1e-9 * coordinates.std(axis=0)).all():
+            break
+        centre = InertialParameters.from_vector(np.asarray(log_cholesky_vector(centre, jnp.asarray(mean))))
+    return centre, log_cholesky_coordinates(centre.pseudo_inertia, bodies)
+
+
+def _pseudo(vectors: Floats) -> Floats:
+    return np.einsum("np,pij->nij", vectors, BASIS)

@@ -1,0 +1,181 @@
+"""Results as ArviZ objects: posterior, log likelihood, predictive and observed data, with units and frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import arviz as az
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of, reported_effect
+from bayesid.inference.identification import Identification
+from bayesid.simulation.sensors import Kind
+
+__all__ = ["to_arviz", "write_netcdf"]
+
+
+STORED = 1000
+"""Draws kept per ensemble: samples closer than an autocorrelation time tell nothing new."""
+
+PREDICTED = 50
+"""Draws of the posterior predictive per ensemble."""
+
+LINEAR = ("m", "mc.x", "mc.y", "mc.z", "xx", "xy", "yy", "xz", "yz", "zz")
+"""Names of the linear parameters of every body (`InertialParameters.vector`), from which a later study starts."""
+
+FRAMES = {
+    Kind.RATE: "angular velocity of the base relative to inertial space, sensor axes",
+    Kind.ACCEL: "non-gravitational acceleration of the mounting point, sensor axes",
+    Kind.ATTITUDE: "quaternion x, y, z, w, base axes to orbit axes",
+}
+
+
+def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceData:
+    """Convert a result.
+
+    Chains are independent ensembles. Groups: ``posterior`` (physical quantities; ``inertial``, the linear parameters
+    of all bodies, those only marginalised included; ``z``, the coordinates with a standard-normal prior),
+    ``log_likelihood`` per recording, ``posterior_predictive`` with sensor noise, and ``observed_data``.
+    """
+    z = _thin(result.chains.z, STORED)
+    few = z[:, :: max(1, z.shape[1] // PREDICTED)][:, :PREDICTED]
+    posterior, dims, units = _posterior_group(result, z)
+    data = az.from_dict(
+        posterior=posterior,
+        log_likelihood=_log_likelihood(result, z),
+        posterior_predictive=_predictive(result, few, rng),
+        observed_data=_observed(result),
+        dims={**dims, **_sensor_dims(result)},
+        coords=_coords(result),
+    )
+    for name, unit in units.items():
+        data.posterior[name].attrs.update(unit=unit, frame="link axes; the inertia is about the centre of mass")
+    for group in (data.posterior_predictive, data.observed_data):
+        for sensor in result.posterior.model.sensors:
+            for manoeuvre in result.posterior.manoeuvres:
+                variable = group[_name(sensor.kind, manoeuvre.recording.name)]
+                variable.attrs.update(unit=sensor.kind.unit, frame=FRAMES[sensor.kind])
+        for manoeuvre in result.posterior.manoeuvres if result.posterior.model.torque is not None else ():
+            group[f"torque.{manoeuvre.recording.name}"].attrs.update(unit="N m or N", frame="along the joint's axis")
+    data.posterior.attrs.update(
+        unknowns=list(result.posterior.unknowns.names),
+        log_evidence=result.evidence.value,
+        log_evidence_error=result.evidence.error,
+        pareto_k=result.evidence.pareto_k,
+    )
+    return data
+
+
+def write_netcdf(result: Identification, file: Path, rng: np.random.Generator) -> None:
+    """Write `to_arviz` to a NetCDF file, all or nothing."""
+    part = file.with_name(file.name + ".part")
+    to_arviz(result, rng).to_netcdf(str(part))
+    part.replace(file)
+
+
+def _thin(draws: Floats, count: int) -> Floats:
+    return draws[:, :: max(1, draws.shape[1] // count)][:, :count]
+
+
+def _posterior_group(
+    result: Identification, z: Floats
+) -> tuple[dict[str, Floats], dict[str, list[str]], dict[str, str]]:
+    chains, draws, size = z.shape
+    flat = z.reshape(-1, size)
+    group: dict[str, Floats] = {"z": z}
+    dims: dict[str, list[str]] = {"z": ["unknown"]}
+    units = {"z": "1"}
+    for name, body in bodies_of(result.posterior, flat).items():
+        for column, (key, unit) in enumerate(BODY_QUANTITIES.items()):
+            group[f"{name}.{key}"] = body.values[:, column].reshape(chains, draws)
+            units[f"{name}.{key}"] = unit
+    values = result.posterior.values_of(flat)
+    if result.posterior.model.priors:
+        group["inertial"] = np.asarray(values.inertial).reshape(chains, draws, -1, 10)
+        dims["inertial"], units["inertial"] = ["body", "parameter"], "kg, kg m, kg m2 about the origin of the link"
+    for effect, parameters in zip(result.posterior.model.effects, values.effects, strict=True):
+        reported = reported_effect(effect, np.asarray(parameters)) if effect.parameters else np.zeros((0, 0))
+        for column, (key, unit) in enumerate(effect.quantities):
+            name = f"{effect.label}.{key}"
+            group[name] = reported[..., column].reshape(chains, draws, *reported.shape[1:-1])
+            units[name] = unit
+            if effect.per_recording:
+                dims[name] = ["recording"]
+    group["initial-rate"] = np.asarray(values.rate).reshape(chains, draws, -1, 3)
+    dims["initial-rate"], units["initial-rate"] = ["recording", "axis"], "rad/s"
+    return group, dims, units
+
+
+def _coords(result: Identification) -> dict[str, Any]:
+    coords: dict[str, Any] = {
+        "unknown": list(result.posterior.unknowns.names),
+        "body": [prior.name for prior in result.posterior.model.priors],
+        "parameter": list(LINEAR),
+        "recording": [manoeuvre.recording.name for manoeuvre in result.posterior.manoeuvres],
+        "axis": ["x", "y", "z"],
+        "quaternion": ["x", "y", "z", "w"],
+    }
+    if (torque := result.posterior.model.torque) is not None:
+        coords["joint"] = list(torque.joints)
+    for index, manoeuvre in enumerate(result.posterior.manoeuvres):
+        coords[f"time.{manoeuvre.recording.name}"] = result.posterior.sample_times(index)
+    return coords
+
+
+def _sensor_dims(result: Identification) -> dict[str, list[str]]:
+    recordings = [manoeuvre.recording.name for manoeuvre in result.posterior.manoeuvres]
+    dims = {
+        _name(sensor.kind, name): [f"time.{name}", "quaternion" if sensor.kind is Kind.ATTITUDE else "axis"]
+        for sensor in result.posterior.model.sensors
+        for name in recordings
+    }
+    if result.posterior.model.torque is not None:
+        dims |= {f"torque.{name}": [f"time.{name}", "joint"] for name in recordings}
+    return dims
+
+
+def _name(kind: Kind, recording: str) -> str:
+    return f"{kind.value}.{recording}"
+
+
+def _log_likelihood(result: Identification, z: Floats) -> dict[str, Floats]:
+    chains, draws, size = z.shape
+    values = result.posterior.log_likelihoods(z.reshape(-1, size)).reshape(chains, draws, -1)
+    return {m.recording.name: values[:, :, index] for index, m in enumerate(result.posterior.manoeuvres)}
+
+
+def _observed(result: Identification) -> dict[str, Floats]:
+    observed = {}
+    for index, manoeuvre in enumerate(result.posterior.manoeuvres):
+        times = result.posterior.sample_times(index)
+        for sensor in result.posterior.model.sensors:
+            time, values = result.posterior.measured(index, sensor.kind)
+            grid = np.full((len(times), values.shape[1]), np.nan)
+            grid[np.searchsorted(times, time)] = values
+            observed[_name(sensor.kind, manoeuvre.recording.name)] = grid
+        if result.posterior.model.torque is not None:
+            time, values = result.posterior.torques(index)
+            grid = np.full((len(times), values.shape[1]), np.nan)
+            grid[np.searchsorted(times, time)] = values
+            observed[f"torque.{manoeuvre.recording.name}"] = grid
+    return observed
+
+
+def _predictive(result: Identification, z: Floats, rng: np.random.Generator) -> dict[str, Floats]:
+    """Predictions with fresh white noise of the sensors, for draws of shape (chains, draws, size)."""
+    chains, draws, size = z.shape
+    points = [result.posterior.predict(point) for point in z.reshape(-1, size)]
+    predictive = {}
+    for index, manoeuvre in enumerate(result.posterior.manoeuvres):
+        for sensor in result.posterior.model.sensors:
+            mean = np.stack([np.asarray(getattr(point[index], sensor.kind.value)) for point in points])
+            if sensor.kind is not Kind.ATTITUDE:
+                mean = mean + result.posterior.sigma(index, sensor.kind) * rng.normal(size=mean.shape)
+            predictive[_name(sensor.kind, manoeuvre.recording.name)] = mean.reshape(chains, draws, *mean.shape[1:])
+        if (torque := result.posterior.model.torque) is not None:
+            mean = np.stack([np.asarray(point[index].torque) for point in points])
+            mean = mean + np.array(torque.sigma) * rng.normal(size=mean.shape)
+            predictive[f"torque.{manoeuvre.recording.name}"] = mean.reshape(chains, draws, *mean.shape[1:])
+    return predictive

@@ -1,0 +1,328 @@
+"""What a study's recordings look like before anyone waits for a sampler, and the mistakes that can be seen there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.inference.posterior import Posterior, Predictions
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.plausibility import refuse_impossible_joints
+from bayesid.recording.recording import JOINT_FAMILIES, Recording
+from bayesid.robot.robot import Robot
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import Kind, Sensor
+
+__all__ = ["Channel", "JointCheck", "RecordingCheck", "SensorCheck", "check_recording", "refuse_wrong_units"]
+
+
+STILL = 1e-3
+"""A joint that moves less than this hardly excites anything [rad or m]."""
+
+DEGREES = 180.0 / np.pi
+
+WRONG_UNIT = 15.0
+"""Factor between measured and possible motion that no plausible error of the robot explains."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Sampling of one sensor or joint: samples, median interval [s], longest gap [s]."""
+
+    name: str
+    samples: int
+    interval: float
+    longest_gap: float
+
+
+@dataclass(frozen=True)
+class JointCheck:
+    """A joint's motion: range and largest speed, encoder noise used, misfit of the smoothing, and its uncertainty.
+
+    ``velocity_sd`` and ``acceleration_sd`` are the medians over time of what the smoothing leaves uncertain.
+    """
+
+    name: str
+    unit: str
+    lowest: float
+    highest: float
+    speed: float
+    sigma: float
+    declared: bool
+    chi2_per_sample: float
+    velocity_sd: float
+    acceleration_sd: float
+
+    @property
+    def still(self) -> bool:
+        """Whether the joint hardly moves."""
+        return self.highest - self.lowest < STILL
+
+
+@dataclass(frozen=True)
+class SensorCheck:
+    """A sensor's noise and clock.
+
+    ``measured_sigma`` (3,) is estimated from quiet stretches, with the relative standard error ``sigma_error``; None
+    where there are too few quiet samples. ``delay`` is
+    how far the samples lag behind the joints' motion [s], with its standard deviation, None where the motion is too
+    faint to tell.
+    """
+
+    kind: Kind
+    sigma: Floats
+    measured_sigma: Floats | None
+    sigma_error: float
+    delay: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class RecordingCheck:
+    """Everything `check_recording` found."""
+
+    name: str
+    duration: float
+    channels: tuple[Channel, ...]
+    joints: tuple[JointCheck, ...]
+    sensors: tuple[SensorCheck, ...]
+    rate_is_differenced: bool
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Sentences on what deserves a look."""
+        found = [
+            f"Joint {joint.name} moves by {joint.highest - joint.lowest:.2g} {joint.unit} only."
+            for joint in self.joints
+            if joint.still
+        ]
+        found += [
+            f"The spline does not follow joint {joint.name}: chi-square per sample {joint.chi2_per_sample:.2f}."
+            for joint in self.joints
+            if joint.chi2_per_sample > 1.5
+        ]
+        for sensor in self.sensors:
+            if sensor.measured_sigma is not None:
+                off = np.abs(sensor.measured_sigma / sensor.sigma - 1.0)
+                if (off > max(0.3, 4.0 * sensor.sigma_error)).any():
+                    found.append(
+                        f"The noise of {sensor.kind.value} in quiet stretches is "
+                        f"{', '.join(f'{value:.2g}' for value in sensor.measured_sigma)} {sensor.kind.unit}, declared "
+                        f"{', '.join(f'{value:.2g}' for value in sensor.sigma)}."
+                    )
+            if sensor.delay is not None and abs(sensor.delay[0]) > 4.0 * sensor.delay[1]:
+                found.append(
+                    f"The samples of {sensor.kind.value} seem {sensor.delay[0]:.3g} +- {sensor.delay[1]:.2g} s late "
+                    "against the joints."
+                )
+        if self.rate_is_differenced:
+            found.append("The rate is the difference of the attitude, not a second sensor: declare one of them.")
+        for channel in self.channels:
+            if channel.longest_gap > 5.0 * channel.interval:
+                found.append(f"{channel.name} has a gap of {channel.longest_gap:.3g} s.")
+        return tuple(found)
+
+
+def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
+    """Look at one recording of a posterior, with the robot at the prior's centre."""
+    manoeuvre, model = posterior.manoeuvres[index], posterior.model
+    recording = manoeuvre.recording
+    predicted = posterior.predict(posterior.initial_point())[index]
+    return RecordingCheck(
+        name=recording.name,
+        duration=float(recording.time[-1] - recording.time[0]),
+        channels=_channels(recording, model),
+        joints=_joints(manoeuvre, model.robot),
+        sensors=tuple(_sensor(sensor, manoeuvre, model, predicted) for sensor in model.sensors),
+        rate_is_differenced=_is_differenced(manoeuvre, model),
+    )
+
+
+def refuse_wrong_units(posterior: Posterior) -> None:
+    """Refuse recordings whose numbers cannot be in rad, rad/s, m/s2 or N m.
+
+    Raises
+    ------
+    InputError
+        Where a joint leaves its limits, or a sensor shows many times more or less than the joints can cause.
+    """
+    for manoeuvre in posterior.manoeuvres:
+        refuse_impossible_joints(manoeuvre.recording, posterior.model.robot)
+    predictions = posterior.predict(posterior.initial_point())
+    for index, (manoeuvre, predicted) in enumerate(zip(posterior.manoeuvres, predictions, strict=True)):
+        for seen in _comparisons(posterior, index, predicted):
+            _refuse_factor(manoeuvre.recording, seen)
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """What a channel or a sensor read and what the model expects at the same times, (n, axes)."""
+
+    column: str
+    unit: str
+    mistaken: str
+    time: Floats
+    measured: Floats
+    expected: Floats
+    sigma: float
+
+
+def _comparisons(posterior: Posterior, index: int, predicted: Predictions) -> list[_Comparison]:
+    found = []
+    for sensor in posterior.model.sensors:
+        if sensor.kind is not Kind.ATTITUDE:
+            time, measured = posterior.measured(index, sensor.kind)
+            expected = getattr(predicted, sensor.kind.value)[np.searchsorted(predicted.time, time)]
+            mistaken = "degrees per second" if sensor.kind is Kind.RATE else "mm/s2 or micro-g"
+            sigma = float(sensor.noise.sigma(float(np.median(np.diff(time)))).max())
+            column = f"{sensor.kind.value}.x|y|z"
+            found.append(_Comparison(column, sensor.kind.unit, mistaken, time, measured, expected, sigma))
+    if (torque := posterior.model.torque) is not None:
+        time, measured = posterior.torques(index)
+        expected = predicted.torque[np.searchsorted(predicted.time, time)]
+        for k, (joint, sigma) in enumerate(zip(torque.joints, torque.sigma, strict=True)):
+            own = slice(k, k + 1)
+            mistaken = "mN m or at the motor before the gear"
+            found.append(
+                _Comparison(f"torque.{joint}", "N m", mistaken, time, measured[:, own], expected[:, own], sigma)
+            )
+    return found
+
+
+def _refuse_factor(recording: Recording, seen: _Comparison) -> None:
+    first, second = _detrend(seen.time, seen.measured), _detrend(seen.time, seen.expected)
+    energy, cross = float((second**2).sum()), float((first * second).sum())
+    correlation = cross / np.sqrt(energy * float((first**2).sum()) + 1e-300)
+    loud = float(np.sqrt((first**2).mean())) > 5.0 * seen.sigma
+    if not loud or abs(correlation) < 0.8:
+        return
+    factor = cross / energy
+    if abs(factor) > WRONG_UNIT:
+        raise InputError(
+            f"the readings follow the joints' motion but are {factor:.3g} times what it can cause with this robot",
+            file=recording.file or recording.name,
+            place=f"column {seen.column}",
+            remedy=f"Give them in {seen.unit}, not in {seen.mistaken}, or correct the robot",
+        )
+    if abs(factor) < 1.0 / WRONG_UNIT:
+        raise InputError(
+            f"the readings follow the joints' motion but are {1.0 / factor:.3g} times smaller than what it causes",
+            file=recording.file or recording.name,
+            place=f"column {seen.column}",
+            remedy=f"Give them in {seen.unit}, joint positions in radians, or correct the robot",
+        )
+
+
+def _detrend(time: Floats, values: Floats) -> Floats:
+    basis = np.vander((time - time.mean()) / (np.ptp(time) + 1e-300), 3)
+    return values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
+
+
+def _channels(recording: Recording, model: Model) -> tuple[Channel, ...]:
+    series = [(sensor.kind.value, recording.series(f"{sensor.kind.value}.x")[0]) for sensor in model.sensors]
+    joints = [f"{family}.{joint.name}" for joint in model.robot.joints for family in JOINT_FAMILIES]
+    series += [(name, recording.series(name)[0]) for name in joints if name in recording.channels]
+    return tuple(
+        Channel(name, len(time), float(np.median(np.diff(time))), float(np.diff(time).max())) for name, time in series
+    )
+
+
+def _joints(manoeuvre: Manoeuvre, robot: Robot) -> tuple[JointCheck, ...]:
+    motion = manoeuvre.motion
+    time = manoeuvre.recording.time
+    state = motion.evaluate(time)
+    checks = []
+    for index, joint in enumerate(robot.joints):
+        fit = motion.joints[index] if isinstance(motion, MeasuredMotion) else None
+        sd = np.zeros((3, 1)) if fit is None else fit.standard_deviation(time)
+        checks.append(
+            JointCheck(
+                name=joint.name,
+                unit=joint.unit,
+                lowest=float(state.position[:, index].min()),
+                highest=float(state.position[:, index].max()),
+                speed=float(np.abs(state.velocity[:, index]).max()),
+                sigma=0.0 if fit is None else fit.sigmas[0],
+                declared=True if fit is None else fit.declared[0],
+                chi2_per_sample=0.0 if fit is None else fit.chi2 / fit.samples,
+                velocity_sd=float(np.median(sd[1])) if fit is not None else 0.0,
+                acceleration_sd=float(np.median(sd[2])) if fit is not None else 0.0,
+            )
+        )
+    return tuple(checks)
+
+
+def _sensor(sensor: Sensor, manoeuvre: Manoeuvre, model: Model, predicted: Predictions) -> SensorCheck:
+    if sensor.kind is Kind.ATTITUDE:
+        time, _ = manoeuvre.recording.vector("attitude", ("x", "y", "z", "w"))
+        return SensorCheck(sensor.kind, sensor.noise.sigma(float(np.median(np.diff(time)))), None, 0.0, None)
+    time, measured = manoeuvre.recording.vector(sensor.kind.value)
+    expected = getattr(predicted, sensor.kind.value)[np.searchsorted(predicted.time, time)]
+    measured_sigma, sigma_error = _quiet_sigma(expected, measured)
+    return SensorCheck(
+        kind=sensor.kind,
+        sigma=sensor.noise.sigma(float(np.median(np.diff(time)))),
+        measured_sigma=measured_sigma,
+        sigma_error=sigma_error,
+        delay=_delay(time, expected, measured),
+    )
+
+
+def _is_differenced(manoeuvre: Manoeuvre, model: Model) -> bool:
+    """Whether the rate repeats the attitude's own noise, whichever neighbours it was differenced from."""
+    sensors = {sensor.kind: sensor for sensor in model.sensors}
+    if not {Kind.RATE, Kind.ATTITUDE} <= set(sensors):
+        return False
+    time, quaternion = manoeuvre.recording.vector("attitude", ("x", "y", "z", "w"))
+    rate_time, rate = manoeuvre.recording.vector("rate")
+    common, here, there = np.intersect1d(time, rate_time, return_indices=True)
+    if len(common) < 10:
+        return False
+    turned = Rotation.from_quat(quaternion[here])
+    step = np.diff(common)[:, None]
+    difference = (turned[:-1].inv() * turned[1:]).as_rotvec() / step
+    own = rate[there] @ sensors[Kind.RATE].rotation.T
+    candidates = (own[:-1] - difference, own[1:] - difference, own[1:-1] - 0.5 * (difference[1:] + difference[:-1]))
+    noise = np.sqrt(2.0) * sensors[Kind.ATTITUDE].noise.sigma(1.0).max() / float(np.median(step))
+    return min(float(np.sqrt((miss**2).mean())) for miss in candidates) < 0.3 * noise
+
+
+def _quiet_sigma(expected: Floats, measured: Floats) -> tuple[Floats | None, float]:
+    """Noise, and its relative error, from third differences where the expected signal hardly changes meanwhile."""
+    rough = np.abs(np.diff(expected, n=3, axis=0)).max(axis=1)
+    difference = np.diff(measured, n=3, axis=0)
+    quiet = rough < 0.2 * np.median(np.abs(difference))
+    if quiet.sum() < 30:
+        return None, 0.0
+    # third differences of white noise have 20 times its variance and are correlated over three samples
+    return np.sqrt((difference[quiet] ** 2).mean(axis=0) / 20.0), float(np.sqrt(2.31 / (2.0 * quiet.sum())))
+
+
+def _delay(time: Floats, expected: Floats, measured: Floats) -> tuple[float, float] | None:
+    """Delay of the measured against the expected signal, with gain and trend fitted, axis by axis."""
+    estimates = []
+    for axis in range(3):
+        slope = np.gradient(expected[:, axis], time)
+        basis = np.column_stack(
+            [expected[:, axis], slope, np.vander((time - time.mean()) / (np.ptp(time) + 1e-300), 3)]
+        )
+        scale = np.abs(basis).max(axis=0) + 1e-300
+        solution, *_ = np.linalg.lstsq(basis / scale, measured[:, axis], rcond=None)
+        residual = measured[:, axis] - basis / scale @ solution
+        covariance = np.linalg.pinv((basis / scale).T @ (basis / scale)) * residual.var()
+        gain, delay = solution[0] / scale[0], -solution[1] / scale[1]
+        sd = np.sqrt(covariance[1, 1]) / scale[1]
+        if np.corrcoef(expected[:, axis], measured[:, axis])[0, 1] ** 2 > 0.9 and gain != 0.0:
+            estimates.append((delay / gain, sd / abs(gain)))
+    if not estimates:
+        return None
+    weight = np.array([1.0 / sd**2 for _, sd in estimates])
+    values = np.array([value for value, _ in estimates])
+    mean = float((weight * values).sum() / weight.sum())
+    scatter = float(
+        np.sqrt((weight * (values - mean) ** 2).sum() / weight.sum())
+    )  # the robot's own errors also shift it
+    return mean, float(np.hypot(weight.sum() ** -0.5, scatter))

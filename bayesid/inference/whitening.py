@@ -1,0 +1,257 @@
+"""Whitening of the residual: sensor noise, encoder noise through the dynamics, and filters, as one banded operator.
+
+The error of a sample is its sensor's white noise plus what the joints' smoothed velocity and acceleration leave
+uncertain, which is correlated over a few samples. Each block of scalars is whitened given the blocks shortly before it
+(Vecchia 1988), which tends to the exact Gaussian as the window grows and stays positive definite for any window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.linalg as sla
+from jax import Array
+from numpy.typing import NDArray
+from scipy import sparse
+from threadpoolctl import threadpool_limits
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats, Integers
+from bayesid.simulation.sensors import Filter
+
+__all__ = ["Channel", "NoiseModel", "Whitening", "apply", "build"]
+
+
+WINDOWS = (0, 2, 4, 8, 16, 32)
+"""Earlier blocks to condition on; the first window that changes the log determinant little is taken."""
+
+TOLERANCE = 2e-4
+"""Change of log standard deviation per scalar below which a longer window is not worth its cost."""
+
+
+class Channel(NamedTuple):
+    """One sensor axis: its white noise, the rows of the sample grid where it was sampled, its filter.
+
+    ``coloured`` is the standard deviation and correlation time [s] of exponentially correlated noise beside it.
+    """
+
+    sigma: float
+    rows: Integers
+    filter: Filter
+    coloured: tuple[float, float] = (0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Second moments of one recording's errors.
+
+    Parameters
+    ----------
+    time : (T,) array
+        Sample grid: every time at which some channel has a sample.
+    channels : sequence of Channel
+    sensitivity : (joints, 3, T, C) array
+        Change of each channel per unit error of joint position, velocity and acceleration at that time.
+    joint_covariance : (joints, lags + 1, T, 3, 3) array
+        Of those errors with earlier ones, for the longest window.
+    """
+
+    time: Floats
+    channels: Sequence[Channel]
+    sensitivity: Floats
+    joint_covariance: Floats
+
+
+class Whitening(NamedTuple):
+    """Banded operator: output block o is ``weights[o]`` (C, width, C) applied to residual rows from ``start[o]``.
+
+    ``log_sigma`` is the sum of the log standard deviations taken out, ``samples`` the number of scalars.
+    """
+
+    weights: Floats
+    start: Integers
+    log_sigma: float
+    samples: int
+    outputs: NDArray[np.bool_]  # (O, C): which scalars exist
+    rows: Integers  # (O,): row of the sample grid an output block belongs to
+    window: int
+
+    def without(self, left_out: NDArray[np.bool_]) -> Whitening:
+        """Leave out some outputs, (O, C), and the part of the others that was predicted from their samples.
+
+        Their share of ``log_sigma`` stays: comparisons of evidence are between fits that leave out the same samples.
+        """
+        weights = self.weights.copy()
+        gone = {(int(self.rows[o]), int(c)) for o, c in zip(*np.nonzero(left_out), strict=True)}
+        for block, first in enumerate(self.start):
+            for offset in range(weights.shape[2]):
+                for channel in range(weights.shape[3]):
+                    if (int(first) + offset, channel) in gone:
+                        weights[block, :, offset, channel] = 0.0
+        weights[left_out] = 0.0
+        outputs = self.outputs & ~left_out
+        return self._replace(weights=weights, outputs=outputs, samples=int(outputs.sum()))
+
+
+def apply(weights: Array, start: Array, residual: Array) -> Array:
+    """Whiten a residual (T, C), padded with at least one window of zeros; returns (O, C)."""
+    width = weights.shape[2]
+    if width == 1:
+        return jnp.einsum("oij,oj->oi", weights[:, :, 0], residual[start])
+    windows = jax.vmap(lambda row: jax.lax.dynamic_slice_in_dim(residual, row, width, 0))(start)
+    return jnp.einsum("oiwj,owj->oi", weights, windows)
+
+
+def build(noise: NoiseModel, window: int | None = None) -> Whitening:
+    """Build the whitening of one recording, with the shortest window that is accurate unless one is given."""
+    outputs = _outputs(noise)
+    with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
+        return _shortest(noise, outputs) if window is None else _whiten(noise, outputs, window)
+
+
+def _shortest(noise: NoiseModel, outputs: list[tuple[int, list[_Output]]]) -> Whitening:
+    available = max(WINDOWS) if _is_coloured(noise) else noise.joint_covariance.shape[1] - 1
+    best = _whiten(noise, outputs, 0)
+    for window in WINDOWS[1:]:
+        if window > available:
+            break
+        longer = _whiten(noise, outputs, window)
+        if abs(best.log_sigma - longer.log_sigma) < TOLERANCE * max(longer.samples, 1):
+            break
+        best = longer
+    return best
+
+
+class _Output(NamedTuple):
+    """One filtered scalar: the residual rows that enter it and their weights."""
+
+    channel: int
+    rows: Integers
+    taps: Floats
+
+
+def _outputs(noise: NoiseModel) -> list[tuple[int, list[_Output]]]:
+    """Group the filtered scalars of all channels by their row of the sample grid."""
+    blocks: dict[int, list[_Output]] = {}
+    for index, channel in enumerate(noise.channels):
+        for output in _filtered(noise.time, channel, index):
+            blocks.setdefault(int(output.rows[len(output.rows) // 2]), []).append(output)
+    return sorted(blocks.items())
+
+
+def _filtered(time: Floats, channel: Channel, index: int) -> list[_Output]:
+    own = time[channel.rows]
+    if channel.filter == Filter():
+        return [_Output(index, channel.rows[i : i + 1], np.ones(1)) for i in range(len(own))]
+    interval = float(np.median(np.diff(own)))
+    taps = channel.filter.taps(interval)
+    half = len(taps) // 2
+    centres = range(half, len(own) - half, channel.filter.decimate)
+    even = np.abs(np.diff(own) - interval) < 0.02 * interval  # a filter does not reach across a gap
+    result = [
+        _Output(index, channel.rows[i - half : i + half + 1], taps) for i in centres if even[i - half : i + half].all()
+    ]
+    if not result:
+        raise InputError(
+            f"the low-pass filter needs {len(taps)} evenly spaced samples and none fit",
+            remedy="Raise low_pass or leave it out",
+        )
+    return result
+
+
+def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: int) -> Whitening:
+    channels = len(noise.channels)
+    sigma = np.array([channel.sigma for channel in noise.channels])
+    spans = [(min(o.rows[0] for o in group), max(o.rows[-1] for o in group)) for _, group in blocks]
+    first = np.minimum.accumulate(np.array([span[0] for span in spans])[::-1])[::-1]
+    starts = [int(first[max(0, number - window)]) for number in range(len(blocks))]
+    width = max(spans[number][1] - starts[number] + 1 for number in range(len(blocks)))
+    weights = np.zeros((len(blocks), channels, width, channels))
+    present = np.zeros((len(blocks), channels), dtype=bool)
+    covariance, coloured = _Band(noise), _is_coloured(noise)
+    log_sigma = 0.0
+    for number, (_, group) in enumerate(blocks):
+        start, stop = starts[number], max(spans[k][1] for k in range(max(0, number - window), number + 1)) + 1
+        local = [output for k in range(max(0, number - window), number + 1) for output in blocks[k][1]]
+        raw = covariance.between(start, stop) + np.diag(np.tile(sigma**2, stop - start))
+        if coloured:
+            raw = raw + _correlated(noise, start, stop)
+        combine = _combination(local, start, stop, channels)
+        factor = np.linalg.cholesky(combine @ raw @ combine.T)
+        unit = np.eye(len(local))[:, -len(group) :]
+        # the last rows of the inverse factor: what is new in this block given those before it
+        last = sla.solve_triangular(factor, unit, lower=True, trans="T", check_finite=False).T
+        rows = (combine.T @ last.T).T.reshape(len(group), stop - start, channels)
+        slots = [output.channel for output in group]
+        weights[number, slots, : stop - start] = rows
+        present[number, slots] = True
+        log_sigma += float(np.log(np.diag(factor)[-len(group) :]).sum())
+    return Whitening(
+        weights,
+        np.array(starts, dtype=np.int32),
+        log_sigma,
+        int(present.sum()),
+        present,
+        np.array([row for row, _ in blocks]),
+        window,
+    )
+
+
+def _is_coloured(noise: NoiseModel) -> bool:
+    return any(channel.coloured[0] > 0.0 for channel in noise.channels)
+
+
+def _correlated(noise: NoiseModel, start: int, stop: int) -> Floats:
+    """Covariance of the channels' exponentially correlated noise, rows start to stop."""
+    time = noise.time[start:stop]
+    apart = np.abs(time[:, None] - time[None, :])
+    count = len(noise.channels)
+    result = np.zeros((len(time), count, len(time), count))
+    for index, channel in enumerate(noise.channels):
+        level, memory = channel.coloured
+        result[:, index, :, index] = level**2 * np.exp(-apart / memory)
+    return result.reshape(len(time) * count, -1)
+
+
+def _combination(outputs: list[_Output], start: int, stop: int, channels: int) -> sparse.csr_array:
+    """Return the matrix that makes filtered scalars of the flattened residual rows start to stop."""
+    columns = np.concatenate([(output.rows - start) * channels + output.channel for output in outputs])
+    row = np.repeat(np.arange(len(outputs)), [len(output.rows) for output in outputs])
+    taps = np.concatenate([output.taps for output in outputs])
+    return sparse.csr_array((taps, (row, columns)), shape=(len(outputs), (stop - start) * channels))
+
+
+class _Band:
+    """Covariance that the joints' errors give the residual, between rows of the sample grid."""
+
+    def __init__(self, noise: NoiseModel) -> None:
+        self.lags = noise.joint_covariance.shape[1] - 1
+        count, channels = noise.sensitivity.shape[2:]
+        self.channels = channels
+        self.blocks = np.zeros((self.lags + 1, count, channels, channels))
+        g = noise.sensitivity
+        for lag in range(min(self.lags, count - 1) + 1):
+            self.blocks[lag, lag:] = np.einsum(
+                "jatc,jtab,jbtd->tcd",
+                g[:, :, lag:],
+                noise.joint_covariance[:, lag, lag:],
+                g[:, :, : count - lag],
+                optimize=True,
+            )
+
+    def between(self, start: int, stop: int) -> Floats:
+        """Return the dense covariance of rows start to stop."""
+        row = np.arange(start, stop)
+        later = np.maximum(row[:, None], row[None, :])
+        lag = np.abs(row[:, None] - row[None, :])
+        block = self.blocks[np.minimum(lag, self.lags), later]
+        block[lag > self.lags] = 0.0
+        upper = row[:, None] < row[None, :]
+        block[upper] = np.swapaxes(block[upper], -1, -2)
+        size = len(row) * self.channels
+        return np.swapaxes(block, 1, 2).reshape(size, size)

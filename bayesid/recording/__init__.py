@@ -1,0 +1,1 @@
+"""Recordings: read and written, joint motion smoothed, known actions, impossible values refused."""

@@ -1,0 +1,185 @@
+"""Joint motion: prescribed by a formula, or measured and smoothed.
+
+Everything downstream asks a motion one question: positions, velocities and accelerations of all joints at given times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import BPoly
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.recording.recording import Recording
+from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.robot import Robot
+
+__all__ = ["Excitation", "MeasuredMotion", "Motion"]
+
+
+class Motion(Protocol):
+    """What a joint motion must offer."""
+
+    def evaluate(self, time: Floats) -> JointState:
+        """Return the joint state at the times, shape (T,)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """The paper's excitation (27) with its connecting splines.
+
+    Each joint goes from ``start`` at rest to ``offset + amplitude``, oscillates as
+    ``offset + amplitude cos(frequency (t - ramp))`` for a whole number of periods, and returns. The paper
+    connects to the offset itself, where its cosine does not begin; the spline here meets position, velocity and
+    acceleration of (27).
+
+    Parameters
+    ----------
+    offset, amplitude : (joints,) array_like
+        q1 and q2 of (27) [rad].
+    frequency : float
+        omega_e [rad/s]; the paper does not state it.
+    periods : int
+        Oscillations.
+    ramp : float
+        Duration of each connecting spline [s].
+    start : (joints,) array_like, optional
+        Joint positions at rest before and after [rad].
+    """
+
+    offset: Floats
+    amplitude: Floats
+    frequency: float
+    periods: int = 2
+    ramp: float = 20.0
+    start: Floats | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("offset", "amplitude"):
+            object.__setattr__(self, name, np.array(getattr(self, name), dtype=float))
+        start = np.zeros_like(self.offset) if self.start is None else np.array(self.start, dtype=float)
+        object.__setattr__(self, "start", start)
+
+    @property
+    def duration(self) -> float:
+        """Length of the whole manoeuvre [s]."""
+        return 2.0 * self.ramp + self.periods * 2.0 * np.pi / self.frequency
+
+    def evaluate(self, time: ArrayLike) -> JointState:
+        """Return the joint state at the times, shape (T,)."""
+        t = np.asarray(time, dtype=float)
+        w, first, last = self.frequency, self.ramp, self.duration - self.ramp
+        phase = w * (np.clip(t, first, last) - first)[:, None]
+        state = np.stack(
+            [
+                self.offset + self.amplitude * np.cos(phase),
+                -self.amplitude * w * np.sin(phase),
+                -self.amplitude * w**2 * np.cos(phase),
+            ]
+        )
+        assert self.start is not None
+        rest = np.stack([self.start, np.zeros_like(self.start), np.zeros_like(self.start)])
+        swing = np.stack([self.offset + self.amplitude, np.zeros_like(self.offset), -self.amplitude * w**2])
+        for use, interval, ends in (
+            (t < first, [0.0, first], [rest, swing]),
+            (t > last, [last, self.duration], [swing, rest]),
+        ):
+            spline = BPoly.from_derivatives(interval, np.array(ends))
+            inside = np.clip(t[use], interval[0], interval[1])
+            for order in range(3):
+                state[order, use] = spline.derivative(order)(inside) if order else spline(inside)
+        return JointState(*state)
+
+
+@dataclass(frozen=True)
+class MeasuredMotion:
+    """Joint motion smoothed from a recording; joints in the robot's order."""
+
+    joints: tuple[SmoothedJoint, ...]
+    names: tuple[str, ...]
+
+    @classmethod
+    def from_recording(
+        cls,
+        recording: Recording,
+        robot: Robot,
+        *,
+        sigma: Mapping[int, float | Mapping[str, float | None] | None] | None = None,
+        start: Mapping[str, float] | None = None,
+    ) -> MeasuredMotion:
+        """Smooth the joint channels of a recording.
+
+        Parameters
+        ----------
+        sigma : mapping, optional
+            Noise of position (0), velocity (1) and acceleration (2), for all joints or by joint; what is missing is
+            estimated from the data.
+        start : mapping of str to float, optional
+            Position at time 0 of joints recorded by speed only; zero where left out.
+        """
+        _check_names(recording, robot)
+        joints = tuple(
+            smooth(
+                _samples(recording, joint.name, sigma or {}),
+                start=None if f"position.{joint.name}" in recording.channels else (start or {}).get(joint.name, 0.0),
+            )
+            for joint in robot.joints
+        )
+        return cls(joints, tuple(joint.name for joint in robot.joints))
+
+    def evaluate(self, time: Floats) -> JointState:
+        """Return the joint state at the times, shape (T,)."""
+        if not self.joints:
+            return JointState(*np.zeros((3, len(time), 0)))
+        return JointState(*np.stack([joint.evaluate(time) for joint in self.joints], axis=-1))
+
+    def lag_covariance(self, time: Floats, lags: int) -> Floats:
+        """Covariance of the derivatives' errors, shape (joints, lags + 1, T, 3, 3) (`SmoothedJoint.lag_covariance`)."""
+        if not self.joints:
+            return np.zeros((0, lags + 1, len(time), 3, 3))
+        return np.stack([joint.lag_covariance(time, lags) for joint in self.joints])
+
+
+def _samples(
+    recording: Recording, joint: str, sigma: Mapping[int, float | Mapping[str, float | None] | None]
+) -> list[JointSamples]:
+    samples = []
+    for derivative, family in enumerate(("position", "velocity", "acceleration")):
+        channel = f"{family}.{joint}"
+        if channel in recording.channels:
+            level = sigma.get(derivative)
+            if isinstance(level, Mapping):
+                level = level.get(joint)
+            time, value = recording.series(channel)
+            samples.append(JointSamples(derivative, time, value, level))
+    return samples
+
+
+def _check_names(recording: Recording, robot: Robot) -> None:
+    known = [joint.name for joint in robot.joints]
+    missing = [name for name in known if not {f"position.{name}", f"velocity.{name}"} & set(recording.channels)]
+    strangers = [name for name in recording.joints if name not in known]
+    if missing or strangers:
+        parts = []
+        if missing:
+            parts.append(f"no position or velocity of joint {', '.join(missing)}")
+        if strangers:
+            parts.append(f"joint {', '.join(strangers)} is not one of the robot's")
+        raise InputError(
+            "; ".join(parts),
+            file=recording.file or recording.name,
+            remedy=f"Record every moving joint of the robot ({', '.join(known)}), or correct the URDF's path",
+        )
+
+
+def sample_joints(motion: Motion, robot: Robot, time: Sequence[float] | Floats) -> dict[str, Floats]:
+    """Return ``position.<joint>`` channels of a motion, as a recording holds them."""
+    position = motion.evaluate(np.asarray(time, dtype=float)).position
+    return {f"position.{joint.name}": position[:, index] for index, joint in enumerate(robot.joints)}

@@ -1,0 +1,450 @@
+"""Recordings: measured data read from and written to CSV or Parquet, checked completely before anything uses them.
+
+One row per time stamp, one column per channel, SI units. An empty cell (a null in Parquet) means that the channel was
+not sampled at that time; in memory it is NaN. A `Recording` that exists is valid: every rule below is checked when it
+is made, whether from a file or from arrays.
+"""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.parquet as pq  # type: ignore[import-untyped]
+from numpy.typing import ArrayLike
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+
+__all__ = ["JOINT_FAMILIES", "VECTOR_FAMILIES", "Recording"]
+
+Array = Floats
+
+JOINT_FAMILIES = ("position", "velocity", "acceleration", "torque")
+"""Families with one column per joint: ``position.<joint>`` [rad, m], its derivatives, ``torque.<joint>`` [N m, N]."""
+
+VECTOR_FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "rate": ("x", "y", "z"),
+        "accel": ("x", "y", "z"),
+        "attitude": ("x", "y", "z", "w"),
+        "base_force": ("x", "y", "z"),
+        "base_torque": ("x", "y", "z"),
+        "wheel_momentum": ("x", "y", "z"),
+    }
+)
+"""Families with one column per axis, all of which must be present: [rad/s], [m/s2], [1], [N], [N m], [N m s]."""
+
+MINIMUM_ROWS = 8
+"""Fewer rows than this do not determine a motion."""
+
+NORM_TOLERANCE = 1e-3
+"""How far a quaternion's norm may be from one before it is taken for an error."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Measured data of one manoeuvre, with T time stamps.
+
+    Parameters
+    ----------
+    name : str
+        A name for reports; the file's stem if there is a file.
+    file : Path or None
+        The file it came from.
+    time : (T,) array_like
+        Strictly increasing [s]; 0 is the start of the recording.
+    channels : mapping of str to (T,) array_like
+        Column name to samples; NaN where the channel has no sample. Arrays are copied and locked read-only.
+        Attitude quaternions are normalised.
+
+    Raises
+    ------
+    InputError
+        If a rule of the file format is broken; the message names the file, the column, the line and the value.
+    """
+
+    name: str
+    file: Path | None
+    time: Array
+    channels: Mapping[str, Array]
+
+    def __post_init__(self) -> None:
+        channels = {column: np.array(values, dtype=float) for column, values in self.channels.items()}
+        object.__setattr__(self, "time", _locked(self.time))
+        object.__setattr__(self, "channels", MappingProxyType(channels))
+        _check_names(("time", *channels), self.file or self.name)
+        self._check_shapes()
+        self._check_time()
+        self._check_samples()
+        self._normalise_attitude(channels)
+        for values in channels.values():
+            values.setflags(write=False)
+
+    def __reduce__(self) -> tuple[type[Recording], tuple[str, Path | None, Array, dict[str, Array]]]:
+        # a mapping proxy does not pickle, and unpickled arrays would be writable
+        return Recording, (self.name, self.file, self.time, dict(self.channels))
+
+    @classmethod
+    def read(cls, path: str | Path) -> Recording:
+        """Read and check a ``.csv`` or ``.parquet`` file.
+
+        Raises
+        ------
+        InputError
+            If the file is absent, malformed or breaks a rule of the format.
+        """
+        file = Path(path)
+        reader = {".csv": _read_csv, ".parquet": _read_parquet}.get(file.suffix.lower())
+        if not file.is_file():
+            raise InputError("there is no such file", file=file, remedy="Correct the path of the recording")
+        if reader is None:
+            raise InputError(f"a recording cannot be a {file.suffix!r} file", file=file, remedy=_FORMATS)
+        columns = reader(file)
+        return cls(file.stem, file, columns.pop("time"), columns)
+
+    def write(self, path: str | Path) -> None:
+        """Write to ``.csv`` (12 significant digits) or ``.parquet`` (exact), whole or not at all."""
+        file = Path(path)
+        writer = {".csv": _write_csv, ".parquet": _write_parquet}.get(file.suffix.lower())
+        if writer is None:
+            raise InputError(f"a recording cannot be a {file.suffix!r} file", file=file, remedy=_FORMATS)
+        if not file.parent.is_dir():
+            raise InputError(f"there is no folder {file.parent}", file=file, remedy="Create it first")
+        temporary = file.with_name(f".{file.name}.{os.getpid()}.part")
+        try:
+            writer(temporary, {"time": self.time, **self.channels})
+            temporary.replace(file)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Joints whose position, velocity or acceleration is recorded, in the order of the columns."""
+        names = (column.partition(".") for column in self.channels)
+        return tuple(dict.fromkeys(joint for family, _, joint in names if family in JOINT_FAMILIES[:3]))
+
+    def series(self, name: str) -> tuple[Array, Array]:
+        """Return the samples of one channel without the missing ones.
+
+        Parameters
+        ----------
+        name : str
+            A column, for example ``"position.joint1"``.
+
+        Returns
+        -------
+        times, values : (n,) arrays
+        """
+        times, values = self._select((name,))
+        return times, values[:, 0]
+
+    def vector(self, family: str, axes: Sequence[str] = ("x", "y", "z")) -> tuple[Array, Array]:
+        """Return the samples of several columns of one family without the missing ones.
+
+        Parameters
+        ----------
+        family : str
+            For example ``"rate"``; ``"position"`` with joints as the axes works as well.
+        axes : sequence of str
+            The columns' second part, k of them.
+
+        Returns
+        -------
+        times : (n,) array
+            [s]
+        values : (n, k) array
+
+        Raises
+        ------
+        InputError
+            If a column is absent, or a sample lacks some of the axes.
+        """
+        return self._select(tuple(f"{family}.{axis}" for axis in axes))
+
+    def interval(self, name: str) -> float:
+        """Median time between the samples of one channel [s]."""
+        times, _ = self.series(name)
+        if len(times) < 2:
+            raise InputError(
+                "one sample has no sample interval",
+                file=self.file or self.name,
+                place=f"column '{name}'",
+                remedy="Record more samples",
+            )
+        return float(np.median(np.diff(times)))
+
+    def _select(self, names: tuple[str, ...]) -> tuple[Array, Array]:
+        for name in names:
+            if name not in self.channels:
+                raise InputError(
+                    f"there is no column '{name}'",
+                    file=self.file or self.name,
+                    remedy=f"Columns here: {', '.join(self.channels)}",
+                )
+        values = np.stack([self.channels[name] for name in names], axis=1)
+        missing = np.isnan(values)
+        partial = missing.any(axis=1) & ~missing.all(axis=1)
+        if partial.any():
+            row = int(np.argmax(partial))
+            absent = [name for name, gone in zip(names, missing[row], strict=True) if gone]
+            raise self._error(
+                f"the sample is incomplete: {', '.join(absent)} empty, the other axes not",
+                columns=names,
+                row=row,
+                remedy="Fill or empty all axes of a sample",
+            )
+        present = ~missing.all(axis=1)
+        return self.time[present], values[present]
+
+    def _error(self, problem: str, *, columns: Sequence[str], row: int | None = None, remedy: str) -> InputError:
+        place = f"column{'s' if len(columns) > 1 else ''} {', '.join(repr(column) for column in columns)}"
+        if row is not None:
+            place = f"{place}, {_row(self.file, row)}"
+        return InputError(problem, file=self.file or self.name, place=place, remedy=remedy)
+
+    def _check_shapes(self) -> None:
+        if self.time.ndim != 1 or len(self.time) < MINIMUM_ROWS:
+            rows = f"{len(self.time)} rows" if self.time.ndim == 1 else f"time of shape {self.time.shape}"
+            raise InputError(
+                f"{rows}; at least {MINIMUM_ROWS} rows are needed",
+                file=self.file or self.name,
+                remedy="Record for longer or more often",
+            )
+        for column, values in self.channels.items():
+            if values.shape != self.time.shape:
+                raise self._error(
+                    f"shape {values.shape} differs from that of time, {self.time.shape}",
+                    columns=[column],
+                    remedy="Give one sample per time stamp, NaN where there is none",
+                )
+
+    def _check_time(self) -> None:
+        time, column = self.time, ["time"]
+        if not np.isfinite(time).all():
+            row = int(np.argmin(np.isfinite(time)))
+            raise self._error(
+                "the time is missing or not finite", columns=column, row=row, remedy="Give every row a time"
+            )
+        if time[0] < 0.0:
+            raise self._error(
+                f"time {time[0]:.12g} s is negative", columns=column, row=0, remedy="0 is the start of the recording"
+            )
+        falls = np.diff(time) <= 0.0
+        if falls.any():
+            row = int(np.argmax(falls)) + 1
+            fault = "repeats" if time[row] == time[row - 1] else "is earlier than"
+            raise self._error(
+                f"time {time[row]:.12g} s {fault} {time[row - 1]:.12g} s of {_row(self.file, row - 1)}",
+                columns=column,
+                row=row,
+                remedy="Time must strictly increase; sort the rows and join those with the same time",
+            )
+        # a clock that was not reset: nothing is known of the motion between 0 and the first row
+        if time[0] > time[-1] - time[0]:
+            raise self._error(
+                f"the first time, {time[0]:.12g} s, is later than the recording is long ({time[-1] - time[0]:.6g} s)",
+                columns=column,
+                row=0,
+                remedy="0 is the start of the recording; subtract the first time",
+            )
+
+    def _check_samples(self) -> None:
+        for column, values in self.channels.items():
+            if np.isinf(values).any():
+                row = int(np.argmax(np.isinf(values)))
+                raise self._error("the value is infinite", columns=[column], row=row, remedy=_NO_SAMPLE)
+            if np.isnan(values).all():
+                raise self._error("the column has no samples", columns=[column], remedy="Remove the column or fill it")
+            family, _, joint = column.partition(".")
+            measured = f"position.{joint}" in self.channels or f"velocity.{joint}" in self.channels
+            if family in ("acceleration", "torque") and not measured:
+                raise self._error(
+                    f"joint '{joint}' has neither position nor velocity",
+                    columns=[column],
+                    remedy=f"Add position.{joint} or velocity.{joint}",
+                )
+        for family, axes in VECTOR_FAMILIES.items():
+            columns = [f"{family}.{axis}" for axis in axes]
+            absent = [column for column in columns if column not in self.channels]
+            if len(absent) == len(columns):
+                continue
+            if absent:
+                raise InputError(
+                    f"column {', '.join(repr(column) for column in absent)} is missing",
+                    file=self.file or self.name,
+                    remedy=f"Give all of {', '.join(columns)} or none",
+                )
+            self.vector(family, axes)
+
+    def _normalise_attitude(self, channels: dict[str, Array]) -> None:
+        columns = [f"attitude.{axis}" for axis in VECTOR_FAMILIES["attitude"]]
+        if columns[0] not in channels:
+            return
+        norm = np.linalg.norm([channels[column] for column in columns], axis=0)
+        off = np.abs(norm - 1.0) > NORM_TOLERANCE
+        if off.any():
+            row = int(np.argmax(off))
+            raise self._error(
+                f"the quaternion's norm is {norm[row]:.6g}, not 1",
+                columns=columns,
+                row=row,
+                remedy="Give unit quaternions in the order x, y, z, w",
+            )
+        for column in columns:
+            channels[column] /= norm
+
+
+_FORMATS = "Use .csv or .parquet"
+_NO_SAMPLE = "Leave the cell empty where there is no sample"
+
+
+def _locked(values: ArrayLike) -> Array:
+    array = np.array(values, dtype=float)
+    array.setflags(write=False)
+    return array
+
+
+def _row(file: Path | None, row: int) -> str:
+    """Where the reader finds a row (counted from 0): a line of the CSV file, else a row counted from 1."""
+    is_text = file is not None and file.suffix.lower() == ".csv"
+    return f"line {row + 2}" if is_text else f"row {row + 1}"
+
+
+def _is_known(column: str) -> bool:
+    family, _, rest = column.partition(".")
+    if family in JOINT_FAMILIES:
+        return bool(rest)
+    return column == "time" or rest in VECTOR_FAMILIES.get(family, ())
+
+
+def _nearest(column: str) -> str:
+    """Return a remedy for an unknown column: the nearest known name, else all families."""
+    family, _, rest = column.partition(".")
+    vectors = [f"{name}.{axis}" for name, axes in VECTOR_FAMILIES.items() for axis in axes]
+    near = difflib.get_close_matches(column.lower(), ["time", *vectors], n=1, cutoff=0.7)
+    if not near and rest in JOINT_FAMILIES:
+        near = [f"{rest}.{family}"]
+    if not near and rest:
+        near = [f"{name}.{rest}" for name in difflib.get_close_matches(family.lower(), JOINT_FAMILIES, n=1, cutoff=0.5)]
+    if near:
+        return f"Did you mean '{near[0]}'?"
+    families = ["time", *(f"{name}.<joint>" for name in JOINT_FAMILIES)]
+    families += [f"{name}.{'|'.join(axes)}" for name, axes in VECTOR_FAMILIES.items()]
+    return f"Known columns: {', '.join(families)}"
+
+
+def _check_names(columns: Sequence[str], file: Path | str) -> None:
+    """Raise if a column is unnamed, duplicate or unknown, or time is missing."""
+    for number, column in enumerate(columns, start=1):
+        if not column:
+            raise InputError(
+                f"column {number} has no name", file=file, remedy="Name it, or remove a comma at the end of the lines"
+            )
+        if column in columns[: number - 1]:
+            raise InputError(
+                f"the column appears twice, as columns {columns.index(column) + 1} and {number}",
+                file=file,
+                place=f"column '{column}'",
+                remedy="Remove one",
+            )
+        if not _is_known(column):
+            remedy = "Separate the columns by commas" if {";", "\t"} & set(column) else _nearest(column)
+            raise InputError(f"unknown column '{column}'", file=file, remedy=remedy)
+    if "time" not in columns:
+        raise InputError("column 'time' is missing", file=file, remedy="Add the time in seconds, 0 at the start")
+
+
+def _read_csv(file: Path) -> dict[str, Array]:
+    try:
+        with file.open(newline="", encoding="utf-8-sig") as stream:
+            rows = list(csv.reader(stream, strict=True))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(
+            f"not a CSV file: {error}", file=file, remedy="Save it as comma-separated UTF-8 text"
+        ) from error
+    while rows and not rows[-1]:
+        rows.pop()
+    if not rows:
+        raise InputError("the file is empty", file=file, remedy="Write a header line and one row per time stamp")
+    header = [name.strip() for name in rows.pop(0)]
+    _check_names(header, file)
+    _check_rows(len(rows), file)
+    for index, row in enumerate(rows):
+        if len(row) != len(header):
+            raise InputError(
+                f"{len(row)} cells, but the header has {len(header)} columns",
+                file=file,
+                place=_row(file, index),
+                remedy="Give one cell per column, empty where there is no sample",
+            )
+    return {
+        name: _numbers([row[index].strip() for row in rows], name, file, _parse, missing="")
+        for index, name in enumerate(header)
+    }
+
+
+def _read_parquet(file: Path) -> dict[str, Array]:
+    try:
+        # not pq.read_table, which fails obscurely on duplicate columns
+        with pq.ParquetFile(file) as source:
+            table = source.read()
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(f"not a Parquet file: {error}", file=file, remedy="Write it anew") from error
+    _check_names(table.column_names, file)
+    _check_rows(table.num_rows, file)
+    return {
+        name: _numbers(column.to_pylist(), name, file, _number, missing=None)
+        for name, column in zip(table.column_names, table.columns, strict=True)
+    }
+
+
+def _check_rows(rows: int, file: Path) -> None:
+    if rows == 0:
+        raise InputError("the file has a header and no rows", file=file, remedy="Write one row per time stamp")
+
+
+def _parse(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan
+
+
+def _number(cell: object) -> float:
+    return float(cell) if isinstance(cell, (int, float)) and not isinstance(cell, bool) else math.nan
+
+
+def _numbers(cells: Sequence[object], column: str, file: Path, convert: Callable[..., float], missing: object) -> Array:
+    """Convert the cells of one column, NaN where missing; anything but a finite number raises."""
+    absent = np.array([cell == missing for cell in cells])
+    values = np.array([convert(cell) for cell in cells])
+    bad = ~np.isfinite(values) & ~absent
+    if column == "time":
+        bad |= absent
+    if bad.any():
+        row = int(np.argmax(bad))
+        problem = "the time is missing" if absent[row] else f"{cells[row]!r} is not a finite number"
+        remedy = "Give every row a time" if column == "time" else _NO_SAMPLE
+        raise InputError(problem, file=file, place=f"column '{column}', {_row(file, row)}", remedy=remedy)
+    return values
+
+
+def _write_csv(file: Path, columns: Mapping[str, Array]) -> None:
+    with file.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(columns)
+        for row in zip(*columns.values(), strict=True):
+            writer.writerow(["" if math.isnan(value) else f"{value:.12g}" for value in row])
+
+
+def _write_parquet(file: Path, columns: Mapping[str, Array]) -> None:
+    pq.write_table(pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()}), file)

@@ -1,0 +1,169 @@
+"""Sentences on what a model supposes: priors, links, sensors, effects, orbit, joint motion, integration."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bayesid.design import Plan
+from bayesid.inference.posterior import Posterior
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.report.numbers import format_number, format_unit
+from bayesid.report.sensor_fit import sensor_sigma
+from bayesid.simulation.model import Model
+from bayesid.simulation.sensors import Filter, Kind, Sensor
+
+__all__ = ["model_sentences", "planning_sentences", "span"]
+
+
+def model_sentences(posterior: Posterior, integration_error: float) -> list[str]:
+    """Return what the model and the declared noise suppose.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    integration_error : float
+        Largest, in standard deviations of a sample.
+    """
+    model = posterior.model
+    return [
+        *_prior_sentences(posterior),
+        _link_sentence(model),
+        *(_sensor_sentence(posterior, sensor) for sensor in model.sensors),
+        *_torque_sentences(model),
+        *_effect_sentences(model),
+        _orbit_sentence(model),
+        _motion_sentence(posterior),
+        f"Integration step {format_number(posterior.step)} s; the largest error of the integration is "
+        f"{format_number(integration_error, 2)} standard deviations of a sample.",
+        "Nothing else acts: bodies and links are rigid, and momentum changes only by the effects named here and the "
+        "external actions that were recorded.",
+    ]
+
+
+def planning_sentences(planned: Posterior | Plan) -> list[str]:
+    """Return what a prediction supposes of the robot and of what acts on it; it has no sensors."""
+    model = planned.model
+    tilt = max(planned.unknowns.tilt_sigma)
+    attitude = f"uncertain by {format_number(tilt)} rad per axis" if tilt > 0.0 else "known exactly"
+    return [
+        *_body_sentences(model),
+        _link_sentence(model),
+        *_effect_sentences(model),
+        _orbit_sentence(model),
+        f"The initial attitude is {attitude}.",
+    ]
+
+
+def _prior_sentences(posterior: Posterior) -> list[str]:
+    if posterior.flat_prior:
+        return ["No prior: the likelihood alone was used."]
+    sentences = _body_sentences(posterior.model)
+    sigma = posterior.unknowns.rate_sigma
+    rate = "exactly zero"
+    if sigma > 0.0:
+        rate = f"unknown in each recording, prior 0 ± {format_number(sigma)} rad/s per axis"
+    tilt = max(posterior.unknowns.tilt_sigma)
+    attitude = f"uncertain by up to {format_number(tilt)} rad per axis" if tilt > 0.0 else "known exactly"
+    return [*sentences, f"The initial rate is {rate}. The initial attitude is {attitude}."]
+
+
+def _body_sentences(model: Model) -> list[str]:
+    return _carried_sentences(model) or [
+        f"Prior of {body.name}: the log-Cholesky coordinates of its pseudo-inertia are normal about the given values, "
+        f"with a relative width of {format_number(body.spread)}, so that every value is a physical body. The "
+        f"logarithm of the mass has a standard deviation of {format_number(2.0 * body.spread)}."
+        for body in model.bodies
+    ]
+
+
+def _carried_sentences(model: Model) -> list[str]:
+    """Describe a joint prior; empty where bodies are independent."""
+    if model.mixing is None:
+        return []
+    # theta_1 is half the logarithm of the mass
+    widths = np.linalg.norm(np.array(model.mixing)[::10], axis=1)
+    masses = ", ".join(
+        f"{prior.name} {format_number(prior.centre.mass, 5)} kg ± {format_number(200.0 * float(width), 2)} %"
+        for prior, width in zip(model.priors, widths, strict=True)
+        if not prior.nuisance
+    )
+    return [
+        "The prior of the bodies is the posterior of an earlier study, with the changes of mass stated since: a "
+        "correlated Gaussian of their log-Cholesky coordinates, so that every value is a physical body. "
+        f"Masses: {masses}."
+    ]
+
+
+def _link_sentence(model: Model) -> str:
+    nuisance = [prior for prior in model.priors if prior.nuisance]
+    if not nuisance:
+        return "All other links are known exactly: masses, centres of mass, inertias and geometry as given."
+    width = span([prior.spread for prior in nuisance])
+    names = ", ".join(prior.name for prior in nuisance)
+    return (
+        f"The inertial parameters of {names} are uncertain by a relative width of {width}, which the result accounts "
+        "for. The geometry is exact."
+    )
+
+
+def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:
+    width = span(sensor_sigma(posterior, sensor).ravel().tolist())
+    parts = [f"Sensor {sensor.kind.value}: white noise of {width} {format_unit(sensor.kind.unit)} per sample and axis"]
+    if sensor.kind is Kind.ACCEL:
+        position = ", ".join(format_number(float(value)) for value in posterior.model.point)
+        parts.append(f"mounted at ({position}) m in the base frame")
+    if not np.allclose(sensor.rotation, np.eye(3)):
+        parts.append("turned against the base axes as declared")
+    if sensor.filter.low_pass is not None:
+        parts.append(f"low-pass at {format_number(sensor.filter.low_pass)} Hz")
+    if sensor.filter.decimate > 1:
+        parts.append(f"one sample of {sensor.filter.decimate} kept")
+    if sensor.filter != Filter():
+        parts.append("measurement and simulation filtered alike")
+    return "; ".join(parts) + "."
+
+
+def _torque_sentences(model: Model) -> list[str]:
+    if model.torque is None:
+        return []
+    width = span(list(model.torque.sigma))
+    return [
+        f"Joint torques of {', '.join(model.torque.joints)}: white noise of {width} N m (N of prismatic joints) per "
+        "sample, read at the motor's side. A joint's friction acts only as far as an effect of the model says."
+    ]
+
+
+def _effect_sentences(model: Model) -> list[str]:
+    if not model.effects:
+        return ["No effect beyond the motion of rigid bodies is in the model."]
+    return [
+        f"Effect {effect.label}. {effect.summary} "
+        + ("Its parameters are unknowns." if effect.parameters else "It has no free parameter.")
+        for effect in model.effects
+    ]
+
+
+def _orbit_sentence(model: Model) -> str:
+    if model.orbit is None:
+        return "No orbit was given: nothing of the environment acts."
+    return (
+        f"Orbit: semi-major axis {format_number(model.orbit.radius / 1e3, 6)} km, eccentricity "
+        f"{format_number(model.orbit.eccentricity)}."
+    )
+
+
+def _motion_sentence(posterior: Posterior) -> str:
+    if not any(isinstance(manoeuvre.motion, MeasuredMotion) for manoeuvre in posterior.manoeuvres):
+        return "The motion of the joints is prescribed and exact."
+    window = max(item.window for item in posterior.whitenings)
+    reach = f"correlated over up to {window} samples" if window else "which it correlates too little to matter"
+    return (
+        "The motion of the joints is a smoothing spline through the samples of the encoders (last table); its "
+        f"uncertainty is carried into the noise of the sensors, {reach}."
+    )
+
+
+def span(values: list[float]) -> str:
+    """Return smallest and largest of some values, or the one value."""
+    low, high = format_number(min(values)), format_number(max(values))
+    return low if low == high else f"{low} to {high}"

@@ -1,0 +1,169 @@
+"""What a diagnosis advises: how like two causes look in these manoeuvres, and which manoeuvre would tell them apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis import Candidate, Diagnosis, Frame, Hypothesis, Unexplained
+from bayesid.diagnosis.verdict import fit_without
+
+__all__ = ["adequate_too", "advice", "differing", "imitation", "moves_with", "unseen"]
+
+WEAK = 0.5
+"""Power below which a candidate could not have been seen."""
+
+VISIBLE = 1.0
+"""Information, at the prior's scale, from which on a direction of a cause can be seen."""
+
+ADVICE = {
+    "wheel-momentum": "Its torque grows with the base's rate: repeat with the base turning faster, and about other "
+    "axes; a torque that is there at rest is not of wheels.",
+    "gravity-gradient": "It turns with the direction of the Earth: repeat with the base turned to another attitude, "
+    "or with the arm stretched along another axis.",
+    "aerodynamic-drag": "It keeps the direction of flight: repeat with the base turned to another attitude.",
+    "solar-pressure": "It keeps the direction of the Sun and ends in eclipse: repeat with the base turned to another "
+    "attitude, or on the orbit's night side.",
+    "magnetic-dipole": "It follows the Earth's field along the orbit: repeat at another argument of latitude, a "
+    "quarter of an orbit away, and in another attitude.",
+    "thruster-leak": "It keeps its direction in the base: repeat with the base turned to another attitude, so that "
+    "what is fixed in the orbit or in inertial space changes its direction in base axes and the leak does not; record "
+    "with the arm at rest too.",
+    "rotational-drag": "It brakes every rotation: let the base turn freely, with the arm at rest, at two rates.",
+    "flexible-appendage": "It swings on: excite it with one quick motion, then record with the arm at rest.",
+    "fuel-slosh": "It swings on: excite it with one quick motion, then record with the arm at rest.",
+    "payload": "It moves with its link: move that joint through another range with the other joints still, and with "
+    "the wrist in another posture, so that mass, centre of mass and inertia act apart.",
+    "link-inertia": "It moves with its link: move that joint through another range with the other joints still; two "
+    "neighbouring links act apart only if the joint between them moves alone.",
+    "encoder-offset": "It acts as a wrong posture: move that joint through another range with the others still; the "
+    "offset stays the same, an error of a mass does not.",
+    "joint-flexibility": "It grows with the joint's acceleration: repeat the motion of that joint twice as fast.",
+    "joint-friction": "It changes sign with the joint's speed, not with its acceleration: run that joint at two "
+    "constant speeds, forwards and back, with the others still.",
+    "torque-bias": "It is there when the joint stands free of load: read the torques at rest, before and after "
+    "the motion.",
+    "latency": "It grows with speed: repeat the same motion twice as fast; errors of bodies keep their ratio to the "
+    "motion, a delay's grow with frequency.",
+    "bias": "It is there at rest and does not care for motion: record a longer rest before and after the motion, and "
+    "run the motion the other way; what the dynamics do changes its sign, a bias does not.",
+    "drift": "It grows with the clock and does not care for motion: record a longer rest before and after the motion, "
+    "and repeat the motion the other way.",
+    "scale": "It grows with the reading: move the other way and faster, with larger readings about each axis in turn.",
+    "misalignment": "It mixes the axes: turn about one axis at a time, with large readings.",
+    "accel-position": "It grows with the base's rate squared and angular acceleration: turn the base faster about "
+    "each axis in turn.",
+    "initial-rate": "It is there before the arm moves: record a rest before the motion.",
+    "noise": "It is there at rest: record the sensor with the arm at rest.",
+    "outliers": "They are single samples: look at the readings themselves, and record at rest.",
+    "quantisation": "The readings lie on a lattice: record at rest, and look up the sensor's resolution.",
+}
+"""By the name of the catalogue, or its last part: what would bring the cause out."""
+
+
+def advice(name: str) -> str:
+    """Return the manoeuvre that would bring a cause out, as a sentence."""
+    bare = name.partition(":")[0]
+    keys = (bare, *(bare.removeprefix(f"{sensor}-") for sensor in ("rate", "accel", "joint", "coloured", "attitude")))
+    found = next((ADVICE[key] for key in keys if key in ADVICE), None)
+    return found or "Repeat with other amplitudes, other speeds and the base in another attitude."
+
+
+def differing(first: Hypothesis, second: Hypothesis) -> tuple[list[str], list[str]]:
+    """Return the causes that each of two hypotheses has and the other has not."""
+    mine = [label for label in first.labels if label not in second.labels]
+    theirs = [label for label in second.labels if label not in first.labels]
+    return mine, theirs
+
+
+def adequate_too(result: Diagnosis) -> list[Hypothesis]:
+    """Return hypotheses of as many causes that leave nothing but noise either, but are too improbable to be rivals.
+
+    Other names for the same change are left out.
+    """
+    verdict = result.verdict
+    best = verdict.best
+    same = [{*best.labels} - {cause} | {name} for cause, names in verdict.equivalents.items() for name in names]
+    return [
+        other
+        for other in result.search.tried
+        if verdict.causes
+        and other.adequate
+        and len(other.labels) == len(best.labels)
+        and {*other.labels} not in [{*best.labels}, *same, *({*rival.labels} for rival in verdict.rivals)]
+    ]
+
+
+def imitation(best: Hypothesis, rival: Hypothesis, result: Diagnosis) -> float | None:
+    """Cosine between the best's signal and the nearest that a rival can make.
+
+    Of both, only what the model's own unknowns cannot take counts. One if these manoeuvres cannot tell them apart; None
+    where a cause has no columns, as faults of noise.
+    """
+    mine, theirs = differing(best, rival)
+    columns = result.search.battery.effects
+    if not mine or not theirs or not {*mine, *theirs} <= columns.keys():
+        return None
+    base = result.before
+    a = np.concatenate([columns[label] for label in mine], axis=1)
+    b = np.concatenate([columns[label] for label in theirs], axis=1)
+    both = fit_without(base, np.concatenate([a, b], axis=1))
+    return _cosine(both, a.shape[1], -a.T @ base.fit.residual)
+
+
+def _cosine(gram: Floats, count: int, pull: Floats) -> float | None:
+    own, cross, rest = gram[:count, :count], gram[:count, count:], gram[count:, count:]
+    amplitude = np.linalg.solve(own + np.eye(count), pull)
+    energy = float(amplitude @ own @ amplitude)
+    if energy <= 0.0:
+        return None
+    values, vectors = np.linalg.eigh(rest)
+    seen = values > VISIBLE
+    along = (vectors[:, seen].T @ (cross.T @ amplitude)) / np.sqrt(values[seen])
+    return float(np.sqrt(min(1.0, float(along @ along) / energy)))
+
+
+def unseen(rows: Sequence[Candidate]) -> list[Candidate]:
+    """Return the candidates that these manoeuvres could hardly have shown, the least visible first."""
+    found = [row for row in rows if row.power is not None and row.power < WEAK]
+    return sorted(found, key=lambda row: row.power or 0.0)
+
+
+def moves_with(wrench: Unexplained, hypothesis: Hypothesis, most: int = 12) -> list[tuple[str, str, float]]:
+    """Return the largest correlations of the reconstructed torque with motion, orbit and clock, all recordings pooled.
+
+    Returns
+    -------
+    list of (str, str, float)
+        Torque axis, what it moves with, correlation.
+    """
+    known = list(_known_series(wrench, hypothesis))
+    found = []
+    torque = np.concatenate(wrench.torque[Frame.BASE])
+    for axis in range(3):
+        for name, series in known:
+            if np.std(series) > 0.0 and np.std(torque[:, axis]) > 0.0:
+                found.append((f"torque {'xyz'[axis]}", name, float(np.corrcoef(torque[:, axis], series)[0, 1])))
+    return sorted(found, key=lambda item: -abs(item[2]))[:most]
+
+
+def _known_series(wrench: Unexplained, hypothesis: Hypothesis) -> Iterator[tuple[str, Floats]]:
+    posterior, stage = hypothesis.fit.posterior, hypothesis.fit.situation.stage
+    states = [
+        manoeuvre.motion.evaluate(time) for manoeuvre, time in zip(posterior.manoeuvres, wrench.time, strict=True)
+    ]
+    for order, kind in enumerate(("position", "speed", "acceleration")):
+        for column, joint in enumerate(posterior.model.robot.joints):
+            yield f"{kind} of {joint.name}", np.concatenate([state[order][:, column] for state in states])
+    counts = [len(time) for time in wrench.time]
+    for axis in range(3):
+        rates = [np.asarray(stage.rate)[r, :n, axis] for r, n in enumerate(counts)]
+        yield f"rate of the base about {'xyz'[axis]}", np.concatenate(rates)
+    if posterior.model.orbit is not None:
+        phase = np.concatenate([np.asarray(stage.environment.latitude)[r, :n] for r, n in enumerate(counts)])
+        yield "cosine of the argument of latitude", np.cos(phase)
+        yield "sine of the argument of latitude", np.sin(phase)
+    yield "time", np.concatenate(wrench.time)
+    yield "time squared", np.concatenate(wrench.time) ** 2

@@ -1,0 +1,92 @@
+"""Predicted courses of base and end-effector, and where the final position may be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bayesid._math.arrays import Floats
+from bayesid.design.pose_region import REACH, Pose, Region
+from bayesid.design.pose_trajectory import Course
+from bayesid.report.figures.figure_style import curve_style, styled, wide_figure
+
+__all__ = ["course_bands", "final_positions"]
+
+PLANES = ((0, 1), (0, 2), (1, 2))
+
+
+@styled
+def course_bands(course: Course) -> Figure:
+    """Draw the mean course of one body, and beside it the width of its uncertainty, ± 2 sd about the mean."""
+    poses = [course.pose(index) for index in range(len(course.time))]
+    figure = wide_figure(3.2)
+    panels = figure.subplots(2, 2, sharex=True)
+    rows = (("position", "mm", [pose.millimetres for pose in poses]), ("rotation", "deg", [p.degrees for p in poses]))
+    for row, (name, unit, regions) in enumerate(rows):
+        mean, sd = np.stack([region.mean for region in regions]), np.stack([region.sd for region in regions])
+        for axis in range(3):
+            style = curve_style(axis)
+            panels[row, 0].plot(course.time, mean[:, axis], label="xyz"[axis] if row == 0 else None, **style)
+            panels[row, 0].fill_between(
+                course.time,
+                mean[:, axis] - 2.0 * sd[:, axis],
+                mean[:, axis] + 2.0 * sd[:, axis],
+                color=style["color"],
+                alpha=0.25,
+                linewidth=0.0,
+            )
+            panels[row, 1].plot(course.time, 2.0 * sd[:, axis], **style)
+        panels[row, 0].set_ylabel(f"{name} [{unit}]")
+        panels[row, 1].set_ylabel(f"2 sd of {name} [{unit}]")
+        panels[row, 1].set_ylim(bottom=0.0)
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    figure.legend(loc="outside upper center", ncols=3)
+    return figure
+
+
+@styled
+def final_positions(poses: Mapping[str, Pose], truth: Floats | None = None) -> Figure:
+    """Draw draws of the final position in three planes, with the shadow of the 95 % ellipsoid.
+
+    Parameters
+    ----------
+    poses : mapping of str to Pose
+        By what they are called in the legend.
+    truth : (3,) array, optional
+        Where it really was [m]; the offset is then from there, and from the first pose's mean otherwise.
+    """
+    figure = wide_figure(2.4)
+    panels = figure.subplots(1, 3)
+    origin = next(iter(poses.values())).millimetres.mean if truth is None else 1e3 * truth
+    for number, (name, pose) in enumerate(poses.items()):
+        draws, region = 1e3 * pose.position - origin, pose.millimetres
+        moved = Region(region.mean - origin, region.covariance)
+        for axes, plane in zip(panels, PLANES, strict=True):
+            _shadow(axes, draws[:, plane], moved, plane, name if plane == PLANES[0] else None, number)
+    for axes, (first, second) in zip(panels, PLANES, strict=True):
+        if truth is not None:
+            label = "truth" if (first, second) == PLANES[0] else None
+            axes.plot(0.0, 0.0, "+", color="black", markersize=8, markeredgewidth=1.2, label=label, zorder=5)
+        axes.set_xlabel(f"{'xyz'[first]} [mm]")
+        axes.set_ylabel(f"{'xyz'[second]} [mm]")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.locator_params(nbins=5)
+    if len(poses) > 1 or truth is not None:
+        figure.legend(loc="outside upper center", ncols=len(poses) + 1)
+    return figure
+
+
+def _shadow(axes: Axes, draws: Floats, region: Region, plane: tuple[int, int], name: str | None, number: int) -> None:
+    """Draw points and the projection of the ellipsoid onto a plane."""
+    style = curve_style(number)
+    covariance = region.covariance[np.ix_(plane, plane)]
+    values, vectors = np.linalg.eigh(covariance)
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    outline = REACH * (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle + region.mean[list(plane)][:, None]
+    axes.plot(draws[:, 0], draws[:, 1], ".", color=style["color"], markersize=1.5, alpha=0.35, markeredgewidth=0.0)
+    axes.plot(outline[0], outline[1], label=name, **style)

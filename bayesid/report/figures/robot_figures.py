@@ -1,0 +1,140 @@
+"""The robot and its manoeuvre."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.spatial import ConvexHull
+
+from bayesid._math.arrays import Floats
+from bayesid.recording.joint_motion import Motion
+from bayesid.report.figures.figure_style import curve_style, styled, wide_figure
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.robot import Robot
+
+__all__ = ["equivalent_box", "manoeuvre", "robot_pose"]
+
+
+VIEWS = (("seen along −z", 0, 1), ("seen along y", 0, 2), ("seen along −x", 1, 2))
+"""Title, horizontal and vertical axis of each projection."""
+
+
+@styled
+def manoeuvre(motion: Motion, robot: Robot, time: Floats) -> Figure:
+    """Draw positions and speeds of the joints over time, one row for each unit (rad, m).
+
+    Parameters
+    ----------
+    time : (T,) array
+        [s]
+    """
+    state = motion.evaluate(np.asarray(time, dtype=float))
+    units = sorted({joint.unit for joint in robot.joints}, reverse=True) or ["rad"]
+    figure = wide_figure(0.3 + 1.65 * len(units))
+    panels = figure.subplots(len(units), 2, squeeze=False, sharex=True)
+    for row, unit in enumerate(units):
+        curves = ((state.position, f"position [{unit}]"), (state.velocity, f"speed [{unit}/s]"))
+        for column, (values, label) in enumerate(curves):
+            axes = panels[row, column]
+            for index, joint in enumerate(robot.joints):
+                if joint.unit == unit:
+                    name = joint.name if column == 0 else None
+                    axes.plot(time, values[:, index], label=name, **curve_style(index))
+            axes.set_ylabel(label)
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    if robot.joints:
+        longest = max(len(joint.name) for joint in robot.joints)
+        figure.legend(loc="outside upper center", ncols=max(1, min(len(robot.joints), 90 // (longest + 8))))
+    return figure
+
+
+@styled
+def robot_pose(robot: Robot, motion: Motion, times: Floats) -> Figure:
+    """Draw the robot as sticks in three projections of the base frame, darker the later.
+
+    Parameters
+    ----------
+    times : (T,) array
+        [s]
+    """
+    times = np.atleast_1d(np.asarray(times, dtype=float))
+    poses = kinematics(robot, motion.evaluate(times)).pose
+    box = equivalent_box(robot.link(robot.base).inertial)
+    paths = [_sticks(robot, pose) for pose in poses]
+    points = np.concatenate([box, *(np.concatenate(path) for path in paths)])
+    low, high = points.min(axis=0), points.max(axis=0)
+    margin = 0.05 * float((high - low).max())
+    spans = high - low + 2.0 * margin
+    ratios = [spans[across] for _, across, _ in VIEWS]
+    figure = wide_figure(min(5.5, 1.15 + 5.4 * float(spans[1:].max() / sum(ratios))))
+    panels = figure.subplots(1, 3, gridspec_kw={"width_ratios": ratios})
+    colours = colormaps["cividis_r"](np.linspace(0.25, 1.0, len(times)))
+    for axes, (title, across, up) in zip(panels, VIEWS, strict=True):
+        _draw_box(axes, box, (across, up))
+        for path, colour, time, pose in zip(paths, colours, times, poses, strict=True):
+            for stick in path:
+                axes.plot(stick[:, across], stick[:, up], "-o", color=colour, markersize=2.2, linewidth=1.2)
+            centre = _centre_of_mass(robot, pose)
+            axes.plot(centre[across], centre[up], "X", color=colour, markersize=5.5, markeredgecolor="white", mew=0.5)
+            axes.plot([], [], color=colour, linewidth=1.4, label=f"t = {time:.4g} s")
+        axes.set_title(title)
+        axes.set_xlabel(f"{'xyz'[across]} [m]")
+        axes.set_ylabel(f"{'xyz'[up]} [m]")
+        axes.set_xlim(low[across] - margin, high[across] + margin)
+        axes.set_ylim(low[up] - margin, high[up] + margin)
+        axes.set_aspect("equal")
+        axes.locator_params(axis="both", nbins=5)
+    _symbols(panels[0])
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    return figure
+
+
+def equivalent_box(body: InertialParameters) -> Floats:
+    """Corners, shape (8, 3), of the homogeneous box with the body's mass, centre of mass and inertia."""
+    moment = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
+    variances, axes = np.linalg.eigh(moment / body.mass)
+    half = np.sqrt(3.0 * np.maximum(variances, 0.0))
+    signs = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, -1).T
+    return body.com + (signs * half) @ axes.T
+
+
+def _sticks(robot: Robot, pose: Floats) -> list[Floats]:
+    """One polyline per moving joint, from its parent to itself, and one on to the end of every last link."""
+    parents = [robot.model.parents[index + 2] - 2 for index in range(len(robot.joints))]
+    origin = [pose[index, :3, 3] for index in range(len(robot.joints))]
+    sticks = [
+        np.stack([np.zeros(3) if parent < 0 else origin[parent], origin[index]]) for index, parent in enumerate(parents)
+    ]
+    for link in robot.links.values():
+        if link.joint >= 0 and link.joint not in parents and link.inertial.mass > 0.0:
+            end = pose[link.joint] @ link.placement @ np.append(link.inertial.com, 1.0)
+            sticks.append(np.stack([origin[link.joint], end[:3]]))
+    return sticks
+
+
+def _centre_of_mass(robot: Robot, pose: Floats) -> Floats:
+    moment = np.zeros(3)
+    for link in robot.links.values():
+        carrier = np.eye(4) if link.joint < 0 else pose[link.joint]
+        moment += link.inertial.mass * (carrier @ link.placement @ np.append(link.inertial.com, 1.0))[:3]
+    return moment / robot.mass
+
+
+def _draw_box(axes: Axes, box: Floats, plane: tuple[int, int]) -> None:
+    flat = box[:, list(plane)]
+    if min(np.ptp(flat, axis=0)) > 1e-9:
+        hull = flat[ConvexHull(flat, qhull_options="QJ").vertices]
+        axes.fill(hull[:, 0], hull[:, 1], facecolor="#cfe3f1", edgecolor="#0072B2", linewidth=0.8)
+    axes.plot(0.0, 0.0, "+", color="#0072B2", markersize=7)
+
+
+def _symbols(axes: Axes) -> None:
+    """Name the symbols in the legend."""
+    axes.plot([], [], "s", color="#cfe3f1", markeredgecolor="#0072B2", label="base, as a homogeneous box")
+    axes.plot([], [], "+", color="#0072B2", label="origin of the base frame")
+    axes.plot([], [], "X", color="#666666", label="centre of mass of the whole")

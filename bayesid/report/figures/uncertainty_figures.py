@@ -1,0 +1,189 @@
+"""What is known of the parameters: joint distributions, correlations, and how much the data narrowed the prior."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+from scipy.ndimage import gaussian_filter, gaussian_filter1d
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, bodies_of, reported_effect
+from bayesid.inference.contraction import half_range
+from bayesid.inference.identification import Identification
+from bayesid.report.figures.figure_style import COLOURS, WIDTH, styled, wide_figure
+from bayesid.report.numbers import format_number, format_quantity, format_unit
+
+__all__ = ["corner", "correlations", "prior_to_posterior", "widths"]
+
+
+REACH = 3.5
+"""Half width of a corner plot's axes, in posterior standard deviations."""
+
+CELLS = 35
+"""Cells of a corner plot's histograms along one axis."""
+
+PRIOR_DRAWS = 4000
+
+
+@styled
+def corner(body: BodyDraws) -> Figure:
+    """Draw the joint distributions of one body's ten quantities, about their means in posterior standard deviations.
+
+    The contours hold 50 % and 90 % of the draws.
+    """
+    mean, sd = body.mean, body.sd
+    scaled = (body.values - mean) / np.where(sd > 0.0, sd, 1.0)
+    count = scaled.shape[1]
+    figure = Figure(figsize=(WIDTH, 6.2))
+    figure.subplots_adjust(left=0.075, right=0.92, bottom=0.06, top=0.945, wspace=0.08, hspace=0.08)
+    panels = {(i, j): figure.add_subplot(count, count, i * count + j + 1) for i in range(count) for j in range(i + 1)}
+    for (row, column), axes in panels.items():
+        if column == row:
+            _draw_marginal(axes, scaled[:, row])
+        else:
+            _draw_pair(axes, scaled[:, column], scaled[:, row])
+        _corner_ticks(axes, row, column, count)
+    for index, (name, unit) in enumerate(BODY_QUANTITIES.items()):
+        text = f"{name}\n{format_quantity(mean[index], sd[index])} {format_unit(unit)}"
+        axes = panels[index, index]
+        axes.text(0.0, 1.06, text, transform=axes.transAxes, fontsize=6, va="bottom", linespacing=1.15)
+        panels[count - 1, index].set_xlabel(name, fontsize=6, labelpad=2)
+        if index:
+            panels[index, 0].set_ylabel(name, fontsize=6, labelpad=2)
+    return figure
+
+
+def _draw_marginal(axes: Axes, values: Floats) -> None:
+    density, edges = np.histogram(values, bins=CELLS, range=(-REACH, REACH), density=True)
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    axes.fill_between(centres, gaussian_filter1d(density, 0.8), color="#9fcbe6", linewidth=0.0)
+    axes.set_ylim(0.0, None)
+
+
+def _draw_pair(axes: Axes, across: Floats, up: Floats) -> None:
+    density, edges, _ = np.histogram2d(across, up, bins=CELLS, range=[[-REACH, REACH]] * 2)
+    density = gaussian_filter(density.T, 1.2)
+    ordered = np.sort(density.ravel())[::-1]
+    total = np.cumsum(ordered)
+    levels = [float(ordered[np.searchsorted(total, share * total[-1])]) for share in (0.9, 0.5)]
+    if not 0.0 < levels[0] < levels[1] < ordered[0]:
+        axes.plot(across, up, ".", color=COLOURS[0], markersize=1.0, rasterized=True)
+        return
+    centres = 0.5 * (edges[1:] + edges[:-1])
+    axes.contourf(centres, centres, density, levels=[*levels, float(ordered[0])], colors=["#cfe3f1", "#5a9fcb"])
+    axes.contour(centres, centres, density, levels=levels, colors=COLOURS[0], linewidths=0.5)
+
+
+def _corner_ticks(axes: Axes, row: int, column: int, count: int) -> None:
+    axes.grid(False)
+    axes.set_xlim(-REACH, REACH)
+    axes.set_xticks([-2, 0, 2])
+    axes.tick_params(labelsize=5, length=1.5, pad=1.5, labelbottom=row == count - 1, labelleft=column == 0 and row > 0)
+    if column < row:
+        axes.set_ylim(-REACH, REACH)
+        axes.set_yticks([-2, 0, 2])
+    else:
+        axes.set_yticks([])
+
+
+@styled
+def correlations(names: Sequence[str], covariance: ArrayLike) -> Figure:
+    """Draw the correlations of a covariance matrix, with their values where they fit.
+
+    Parameters
+    ----------
+    names : sequence of str
+    covariance : (n, n) array_like
+    """
+    matrix = np.atleast_2d(np.asarray(covariance, dtype=float))
+    sd = np.sqrt(np.diag(matrix))
+    values = matrix / np.outer(np.where(sd > 0.0, sd, 1.0), np.where(sd > 0.0, sd, 1.0))
+    count = len(values)
+    width = min(WIDTH, 1.6 + 0.34 * count)
+    figure = Figure(figsize=(width, 0.88 * width), layout="constrained")
+    axes = figure.subplots()
+    axes.grid(False)
+    image = axes.imshow(values, vmin=-1.0, vmax=1.0, cmap="RdBu_r", interpolation="nearest")
+    size = 6.5 if count <= 16 else 5.0
+    axes.set_xticks(range(count), names, rotation=45, ha="right", rotation_mode="anchor", fontsize=size)
+    axes.set_yticks(range(count), names, fontsize=size)
+    if count <= 24:
+        for row in range(count):
+            for column in range(count):
+                value = float(np.round(values[row, column], 2)) + 0.0
+                colour = "white" if abs(value) > 0.6 else "black"
+                axes.text(
+                    column,
+                    row,
+                    f"{value:.2f}".replace("-", "−"),
+                    ha="center",
+                    va="center",
+                    color=colour,
+                    fontsize=size - 1.0,
+                )
+    figure.colorbar(image, ax=axes, label="correlation", shrink=0.8, aspect=30)
+    return figure
+
+
+@styled
+def prior_to_posterior(result: Identification, seed: int = 0) -> Figure:
+    """Draw posterior width over prior width of every reported quantity, on a logarithmic scale.
+
+    Parameters
+    ----------
+    seed : int
+        Of the draws from the prior.
+    """
+    prior, posterior = widths(result, seed)
+    names = list(posterior)
+    ratio = np.array([posterior[name] / prior[name] for name in names])
+    figure = wide_figure(0.7 + 0.17 * len(names))
+    axes = figure.subplots()
+    rows = np.arange(len(names))
+    low = 10.0 ** np.floor(np.log10(min(float(ratio.min()), 0.5)) - 0.1)
+    axes.barh(rows, np.log10(ratio / low), left=np.zeros(len(names)), color="#5a9fcb", height=0.7)
+    exponents = np.arange(round(float(np.log10(low))), max(1, int(np.ceil(np.log10(ratio.max()))) + 1))
+    axes.set_xticks(exponents - np.log10(low), [f"$10^{{{exponent}}}$" for exponent in exponents])
+    axes.axvline(-np.log10(low), color="black", linewidth=0.8)
+    for row, value in zip(rows, ratio, strict=True):
+        axes.text(float(np.log10(value / low)), float(row), f" {format_number(value, 2)}", va="center", fontsize=6)
+    axes.set_xlim(0.0, max(-np.log10(low), float(np.log10(ratio.max() / low))) + 0.35)
+    axes.set_yticks(rows, names)
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.grid(False, axis="y")
+    axes.set_xlabel("width of the posterior over width of the prior (half the range of the central 68 %)")
+    return figure
+
+
+def widths(result: Identification, seed: int = 0) -> tuple[dict[str, float], dict[str, float]]:
+    """Half the central 68 % range of every reported quantity, in the prior and in the posterior."""
+    z = np.random.default_rng(seed).normal(size=(PRIOR_DRAWS, result.posterior.size))
+    values = result.posterior.values_of(z)
+    prior = _half_ranges(bodies_of(result.posterior, z))
+    posterior = _half_ranges(result.bodies)
+    for effect, draws in zip(result.posterior.model.effects, values.effects, strict=True):
+        if effect.parameters:
+            prior |= _effect_ranges(result, effect.label, reported_effect(effect, np.asarray(draws)))
+            posterior |= _effect_ranges(result, effect.label, result.effects[effect.label])
+    return prior, posterior
+
+
+def _half_ranges(bodies: dict[str, BodyDraws]) -> dict[str, float]:
+    return {
+        f"{body.name}.{key}": width
+        for body in bodies.values()
+        for key, width in zip(BODY_QUANTITIES, half_range(body.values), strict=True)
+    }
+
+
+def _effect_ranges(result: Identification, label: str, draws: Floats) -> dict[str, float]:
+    effect = next(effect for effect in result.posterior.model.effects if effect.label == label)
+    copies = (
+        [f"{label}[{item.recording.name}]" for item in result.posterior.manoeuvres] if effect.per_recording else [label]
+    )
+    names = [f"{copy}.{key}" for copy in copies for key, _ in effect.quantities]
+    return dict(zip(names, half_range(draws.reshape(len(draws), -1)), strict=True))

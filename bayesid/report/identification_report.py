@@ -1,0 +1,194 @@
+"""The report of an identification, for a reader who does not see the code."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bayesid.inference.identification import Identification
+from bayesid.inference.posterior import Posterior
+from bayesid.report import figures
+from bayesid.report import identification_text as text
+from bayesid.report import report_tables as tables
+from bayesid.report.assumptions import model_sentences
+from bayesid.report.document import Document
+from bayesid.report.figures.figure_style import WIDTH
+from bayesid.report.sensor_fit import sensor_fits, torque_fits
+
+__all__ = ["add_identification", "add_joints", "identification_report"]
+
+POSES = 4
+"""Instants at which the robot is drawn."""
+
+CURVE_POINTS = 600
+
+LARGEST_CORRELATIONS = 30
+"""Quantities that one picture of correlations can show."""
+
+
+def identification_report(
+    result: Identification, title: str, assumptions: Sequence[str], file: str | Path, date: str | None = None
+) -> None:
+    """Write the report of an identification as PDF, all or nothing.
+
+    Parameters
+    ----------
+    result : Identification
+    title : str
+        Of the study.
+    assumptions : sequence of str
+        What the user assumed beyond what the model says of itself.
+    file : path
+    date : str, optional
+        Printed under the title; left out, equal results give equal files.
+    """
+    document = Document(title, "Identification of inertial parameters", date)
+    add_identification(document, result, assumptions)
+    document.write(file)
+
+
+def add_identification(document: Document, result: Identification, assumptions: Sequence[str]) -> None:
+    """Add all sections of an identification to a document."""
+    _add_result(document, result)
+    _add_robot(document, result)
+    _add_fit(document, result)
+    _add_uncertainty(document, result)
+    _add_computation(document, result)
+    _add_assumptions(document, result, assumptions)
+
+
+def _add_result(document: Document, result: Identification) -> None:
+    document.section("Result")
+    document.paragraph(text.summary(result))
+    document.paragraph(text.verdict(result))
+    document.table(
+        ["quantity", "unit", "prior centre", "posterior mean ± sd", "sd / |mean|", "learnt"],
+        tables.parameter_rows(result),
+        "Identified bodies, in the axes of the link; inertias are about the body's own centre of mass. Learnt is by "
+        "how much the data narrowed the prior (half the central 68 %); where by less than 10 %, it says prior only.",
+        ["left", "left", "right", "right", "right", "right"],
+    )
+    if rows := tables.effect_rows(result):
+        header = ["parameter", "unit", "prior mean ± sd", "posterior mean ± sd", "|mean| / sd"]
+        caption = "Parameters of the effects in the model."
+        document.table(header, rows, caption, ["left", "left", "right", "right", "right"])
+    if rows := tables.start_rows(result):
+        header = ["recording", "unknown", "unit", "prior", "x", "y", "z"]
+        caption = "State of the base at the start of each recording, base axes."
+        document.table(header, rows, caption, ["left"] * 3 + ["right"] * 4)
+
+
+def _add_robot(document: Document, result: Identification) -> None:
+    document.section("Robot and manoeuvres")
+    robot = result.posterior.model.robot
+    joints = ", ".join(f"{joint.name} ({joint.kind})" for joint in robot.joints) or "none"
+    document.paragraph(
+        f"The robot {robot.name} stands on the base {robot.base}. Moving joints: {joints}. With all links it has a "
+        f"mass of {robot.mass:.6g} kg as given, before the identification."
+    )
+    for number, manoeuvre in enumerate(result.posterior.manoeuvres):
+        motion, time, name = manoeuvre.motion, manoeuvre.recording.time, manoeuvre.recording.name
+        if number == 0:
+            document.figure(
+                figures.robot_pose(robot, motion, np.linspace(time[0], time[-1], POSES + 1)[:-1]),
+                f"The robot as given, during {name}, in the base frame. Sticks join the joints; the last ones end at "
+                "the centre of mass of the last body.",
+            )
+        if robot.joints:
+            curves = figures.manoeuvre(motion, robot, np.linspace(time[0], time[-1], CURVE_POINTS))
+            document.figure(curves, f"Motion of the joints in {name}.")
+
+
+def _add_fit(document: Document, result: Identification) -> None:
+    posterior, z = result.posterior, result.optimum.z
+    document.section("Measured against simulated")
+    document.paragraph(
+        "Residuals are in units of their noise σ: the sensor's own and, through the dynamics, that of the encoders. "
+        "They are taken at the mode and freed of their correlation, so that a right model leaves independent values "
+        "of standard deviation one; the grey band is ± 2 σ."
+    )
+    document.table(
+        ["recording", "sensor", "samples", "chi-square per sample", "largest residual"],
+        tables.misfit_rows(posterior, sensor_fits(posterior, z)),
+        "Misfit by recording and sensor. Noise alone gives one, within the stated ± in two cases of three.",
+        ["left", "left", "right", "right", "right"],
+    )
+    for index, manoeuvre in enumerate(posterior.manoeuvres):
+        document.figure(
+            figures.measured_against_simulated(posterior, z, index),
+            f"Measured and simulated in {manoeuvre.recording.name}, sensor axes; beneath, the residual in σ.",
+        )
+    _add_torques(document, result)
+    document.figure(
+        figures.residual_spectrum(posterior, z),
+        "Residuals of all recordings. Left: mean power by frequency, one for noise alone. Right: distribution, with "
+        "the standard normal one.",
+    )
+
+
+def _add_torques(document: Document, result: Identification) -> None:
+    posterior, fits = result.posterior, torque_fits(result.posterior, result.optimum.z)
+    if posterior.model.torque is None:
+        return
+    document.table(
+        ["recording", "joint", "noise per sample", "samples used", "chi-square per sample", "largest residual"],
+        tables.torque_rows(posterior, fits),
+        "Joint torques. Where a joint with dry friction stands nearly still, its torque says nothing and is left out.",
+        ["left", "left", "right", "right", "right", "right"],
+    )
+    for manoeuvre, own in zip(posterior.manoeuvres, fits, strict=True):
+        document.figure(
+            figures.torques_over_time(own), f"Measured and simulated joint torques in {manoeuvre.recording.name}."
+        )
+
+
+def _add_uncertainty(document: Document, result: Identification) -> None:
+    document.section("Uncertainty")
+    document.figure(
+        figures.prior_to_posterior(result),
+        "How much the data narrowed what was known before. At one (10⁰) the data said nothing.",
+    )
+    for name, body in result.bodies.items():
+        document.figure(
+            figures.corner(body),
+            f"Joint posterior of {name}: contours hold 50 % and 90 %. Axes are offsets from the mean in standard "
+            "deviations; mean and standard deviation stand over the diagonal.",
+        )
+    if len(result.names) <= LARGEST_CORRELATIONS:
+        alone = len(result.bodies) == 1
+        figure = figures.correlations(
+            [name.split(".", 1)[1] if alone else name for name in result.names], result.covariance
+        )
+        width = f"{100.0 * figure.get_figwidth() / WIDTH:.1f}%"
+        document.figure(figure, "Posterior correlations of the identified quantities.", width)
+
+
+def _add_computation(document: Document, result: Identification) -> None:
+    document.section("Computation")
+    document.items(text.agreement_sentences(result))
+    document.figure(
+        figures.convergence(result),
+        "The coordinates in which the ensembles agree least. Left: mean of the draws so far, about the mean of all, "
+        "in posterior standard deviations. Right: ranks of each ensemble's draws among all, which are spread evenly "
+        "where all sample the same distribution.",
+    )
+
+
+def _add_assumptions(document: Document, result: Identification, assumptions: Sequence[str]) -> None:
+    document.section("What was assumed")
+    document.items([*assumptions, *model_sentences(result.posterior, result.integration_error)])
+    add_joints(document, result.posterior)
+
+
+def add_joints(document: Document, posterior: Posterior) -> None:
+    """Add the table of the joints' smoothing, where their motion was measured."""
+    if rows := tables.joint_rows(posterior):
+        document.table(
+            ["joint", "noise per sample", "order", "chi-square per sample"],
+            rows,
+            "Smoothing of the joints: noise of the samples, the derivative of the position that is taken for white "
+            "noise, and the misfit of the samples to the spline, below one as far as the spline follows their noise. "
+            "Orders and misfits are those of each recording in turn.",
+        )

@@ -1,0 +1,1 @@
+"""The robot: its tree of links, inertial parameters, kinematics and regressors."""

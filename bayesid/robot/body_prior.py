@@ -1,0 +1,77 @@
+"""Prior of one body's inertial parameters, in log-Cholesky coordinates about its centre; and draws from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.robot.inertial_parameters import InertialParameters, log_cholesky_vector
+from bayesid.robot.log_cholesky import relative_coordinates
+
+__all__ = ["BodyPrior", "Mixing", "check_mixing", "coordinates_of", "draw_inertial"]
+
+
+Mixing = tuple[tuple[float, ...], ...]
+"""Rows of a lower-triangular factor of the joint prior covariance; a tuple, so that models compare and hash."""
+
+
+@dataclass(frozen=True)
+class BodyPrior:
+    """Prior of one body's inertial parameters.
+
+    Parameters
+    ----------
+    name : str
+        Link or load.
+    centre : InertialParameters
+    spread : float
+        Standard deviation of each log-Cholesky coordinate relative to the centre's pseudo-inertia. The mass is then
+        log-normal with twice that relative width. Where a model has a joint prior (`Model.mixing`), that counts, and
+        this is its root mean square.
+    nuisance : bool
+        Whether the body is marginalised only because it is not known exactly.
+    """
+
+    name: str
+    centre: InertialParameters
+    spread: float
+    nuisance: bool = False
+
+    def __post_init__(self) -> None:
+        if not self.spread > 0.0:
+            raise InputError(
+                f"spread {self.spread:g} of {self.name} is not positive", remedy="Give the prior's relative width"
+            )
+        if not self.centre.is_extended:
+            raise InputError(
+                f"the prior of {self.name} centres on a body without extent (mass {self.centre.mass:g} kg)",
+                place=f"link {self.name}",
+                remedy="Give mass and inertia of a body with volume, or leave it out of the unknowns",
+            )
+
+
+def check_mixing(mixing: Mixing, bodies: int) -> None:
+    """Reject a factor that is not lower-triangular of full rank or does not fit the number of bodies."""
+    count = 10 * bodies
+    square = len(mixing) == count and all(len(row) == count for row in mixing)
+    factor = np.array(mixing) if square else np.zeros((0, 0))
+    if not square or not np.isfinite(factor).all() or np.triu(factor, 1).any() or not (np.diag(factor) > 0.0).all():
+        raise InputError(
+            f"the joint prior of {bodies} bodies is not a lower-triangular factor of {count} rows",
+            remedy="Give the Cholesky factor of the covariance of all their log-Cholesky coordinates",
+        )
+
+
+def coordinates_of(body: BodyPrior, inertial: InertialParameters) -> Floats:
+    """Standard-normal coordinates of a body under its own prior, shape (10,)."""
+    return relative_coordinates(body.centre, inertial) / body.spread
+
+
+def draw_inertial(centre: InertialParameters, spread: float, rng: np.random.Generator) -> InertialParameters:
+    """Draw a body from the log-Cholesky prior about a centre."""
+    vector = log_cholesky_vector(centre, jnp.asarray(spread * rng.normal(size=10)))
+    return InertialParameters.from_vector(np.asarray(vector))

@@ -1,0 +1,213 @@
+"""Inertial parameters of one rigid body, and coordinates in which every value is a physical body.
+
+A body is physical when its 4x4 pseudo-inertia ``[[Sigma, h], [h', m]]`` is positive definite, with ``Sigma`` the second
+moment of mass about the link's origin (Wensing, Kim and Slotine, RA-L 2018). The log-Cholesky coordinates are those of
+Rucker and Wensing (RA-L 2022) in Pinocchio's order: ``alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar, cast
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import ArrayLike
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats, namespace
+
+__all__ = [
+    "BASIS",
+    "LOG_CHOLESKY",
+    "InertialParameters",
+    "log_cholesky_factor",
+    "log_cholesky_vector",
+    "mass_com_inertia",
+    "parameters_from_pseudo_inertia",
+    "upper_cholesky",
+]
+
+A = TypeVar("A", Floats, Array)
+
+LOG_CHOLESKY = ("alpha", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3")
+"""Names of the log-Cholesky coordinates (Rucker & Wensing 2022)."""
+
+PARAMETERS = 10
+"""Inertial parameters of a rigid body."""
+
+
+def _basis() -> Floats:
+    """Return the ten 4x4 matrices E_p with pseudo-inertia = sum_p parameter_p E_p, in Pinocchio's order."""
+    basis = np.zeros((PARAMETERS, 4, 4))
+    basis[0, 3, 3] = 1.0
+    for axis in range(3):
+        basis[1 + axis, axis, 3] = basis[1 + axis, 3, axis] = 1.0
+    # Sigma = tr(I) / 2 - I
+    for index, axis in ((4, 0), (6, 1), (9, 2)):
+        basis[index, :3, :3] = 0.5 * np.eye(3)
+        basis[index, axis, axis] -= 1.0
+    for index, (row, column) in ((5, (0, 1)), (7, (0, 2)), (8, (1, 2))):
+        basis[index, row, column] = basis[index, column, row] = -1.0
+    return basis
+
+
+BASIS = _basis()
+BASIS.setflags(write=False)
+
+
+@dataclass(frozen=True)
+class InertialParameters:
+    """Mass, centre of mass and inertia of one link, in the link's axes.
+
+    Parameters
+    ----------
+    mass : float
+        [kg]
+    com : (3,) array_like
+        Centre of mass [m].
+    inertia : (3, 3) array_like
+        Inertia about the centre of mass [kg m2].
+
+    Raises
+    ------
+    InputError
+        If no rigid body has these parameters; the message states the inequality that fails.
+    """
+
+    mass: float
+    com: Floats
+    inertia: Floats
+
+    def __init__(self, mass: float, com: ArrayLike, inertia: ArrayLike) -> None:
+        centre, tensor = np.array(com, dtype=float), np.array(inertia, dtype=float)
+        for array in (centre, tensor):
+            array.setflags(write=False)
+        object.__setattr__(self, "mass", float(mass))
+        object.__setattr__(self, "com", centre)
+        object.__setattr__(self, "inertia", tensor)
+        self._validate()
+
+    def _validate(self) -> None:
+        if self.com.shape != (3,) or self.inertia.shape != (3, 3):
+            raise InputError(
+                f"centre of mass and inertia have shapes {self.com.shape} and {self.inertia.shape}",
+                remedy="Give three coordinates and a 3x3 tensor",
+            )
+        if not (np.isfinite(self.mass) and np.isfinite(self.com).all() and np.isfinite(self.inertia).all()):
+            raise InputError("an inertial parameter is not finite", remedy="Give finite numbers")
+        remedy = "No rigid body has these values; correct them"
+        if self.mass < 0.0:
+            raise InputError(f"mass >= 0 fails: mass = {self.mass:g} kg", remedy=remedy)
+        if not np.allclose(self.inertia, self.inertia.T, rtol=1e-9, atol=1e-12 * max(1.0, np.abs(self.inertia).max())):
+            raise InputError("the inertia tensor is not symmetric", remedy=remedy)
+        low, middle, high = np.linalg.eigvalsh(self.inertia)
+        slack = 1e-9 * max(high, 1e-300)
+        if low < -slack:
+            raise InputError(f"principal moments >= 0 fails: the smallest is {low:g} kg m2", remedy=remedy)
+        if low + middle < high - slack:
+            raise InputError(
+                f"the triangle inequality I1 + I2 >= I3 of the principal moments fails: "
+                f"{low:g} + {middle:g} < {high:g} kg m2",
+                remedy=remedy,
+            )
+        if self.mass == 0.0 and high > 0.0:
+            raise InputError(f"mass > 0 fails for a body with inertia {high:g} kg m2", remedy=remedy)
+
+    @classmethod
+    def from_vector(cls, parameters: ArrayLike) -> InertialParameters:
+        """Return the body of ten parameters ``m, mc (3), Ixx, Ixy, Iyy, Ixz, Iyz, Izz`` about the link's origin."""
+        vector = np.asarray(parameters, dtype=float)
+        mass = vector[0]
+        com = vector[1:4] / mass if mass else np.zeros(3)
+        xx, xy, yy, xz, yz, zz = vector[4:]
+        about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        return cls(mass, com, about_origin - mass * (com @ com * np.eye(3) - np.outer(com, com)))
+
+    @property
+    def vector(self) -> Floats:
+        """Ten parameters, linear in the dynamics, in Pinocchio's order (`from_vector`)."""
+        c = self.com
+        tensor = self.inertia + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
+        return np.array([self.mass, *(self.mass * c), *tensor[np.tril_indices(3)]])
+
+    @property
+    def pseudo_inertia(self) -> Floats:
+        """Pseudo-inertia, shape (4, 4) [kg m2, kg m, kg]."""
+        return np.einsum("p,pij->ij", self.vector, BASIS)
+
+    @property
+    def is_extended(self) -> bool:
+        """Whether the mass fills a volume, as log-Cholesky coordinates need (a rod or a point does not)."""
+        return self.mass > 0.0 and bool(np.linalg.eigvalsh(self.pseudo_inertia / self.mass)[0] > 1e-12)
+
+
+def log_cholesky_factor(coordinates: Array) -> Array:
+    """Upper-triangular factor U(theta) of ``J = U U'``; theta = 0 gives the identity.
+
+    Parameters
+    ----------
+    coordinates : (10,) array
+        ``alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3``.
+
+    Returns
+    -------
+    (4, 4) array
+    """
+    alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3 = coordinates
+    zero, one = jnp.zeros_like(alpha), jnp.ones_like(alpha)
+    rows = [
+        [jnp.exp(d1), s12, s13, t1],
+        [zero, jnp.exp(d2), s23, t2],
+        [zero, zero, jnp.exp(d3), t3],
+        [zero, zero, zero, one],
+    ]
+    return jnp.exp(alpha) * jnp.stack([jnp.stack(row) for row in rows])
+
+
+def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array:
+    """Ten linear parameters of the body with given log-Cholesky coordinates relative to a centre, shape (10,)."""
+    return _vector(jnp.asarray(upper_cholesky(centre.pseudo_inertia)), coordinates)
+
+
+@jax.jit  # traced once for all bodies
+def _vector(centre: Array, coordinates: Array) -> Array:
+    factor = centre @ log_cholesky_factor(coordinates)
+    return parameters_from_pseudo_inertia(factor @ factor.T)
+
+
+def upper_cholesky(pseudo_inertia: Floats) -> Floats:
+    """Upper-triangular U with ``U U' = pseudo_inertia``, shape (4, 4)."""
+    flipped = np.linalg.cholesky(pseudo_inertia[::-1, ::-1])
+    return flipped[::-1, ::-1]
+
+
+def parameters_from_pseudo_inertia(pseudo_inertia: Array) -> Array:
+    """Ten linear parameters (`InertialParameters.vector`) of a pseudo-inertia, shape (4, 4) -> (10,)."""
+    sigma = pseudo_inertia[:3, :3]
+    tensor = jnp.trace(sigma) * jnp.eye(3) - sigma
+    lower = jnp.stack([tensor[0, 0], tensor[1, 0], tensor[1, 1], tensor[2, 0], tensor[2, 1], tensor[2, 2]])
+    return jnp.concatenate([pseudo_inertia[3, 3][None], pseudo_inertia[:3, 3], lower])
+
+
+def mass_com_inertia(vectors: A) -> A:
+    """Mass, centre of mass and inertia about it (xx, yy, zz, xy, xz, yz) of linear parameters, (..., 10) -> (..., 10).
+
+    Of NumPy arrays as of JAX's.
+    """
+    xp = namespace(vectors)
+    mass, first = vectors[..., :1], vectors[..., 1:4]
+    com = first / mass
+    xx, xy, yy, xz, yz, zz = xp.moveaxis(vectors[..., 4:], -1, 0)
+    m, (x, y, z) = mass[..., 0], xp.moveaxis(com, -1, 0)
+    tensor = [
+        xx - m * (y * y + z * z),
+        yy - m * (x * x + z * z),
+        zz - m * (x * x + y * y),
+        xy + m * x * y,
+        xz + m * x * z,
+        yz + m * y * z,
+    ]
+    return cast("A", xp.concatenate([mass, com, xp.stack(tensor, axis=-1)], axis=-1))

@@ -1,0 +1,85 @@
+"""One body relative to the centre of its prior: log-Cholesky coordinates, and coordinates linear in the parameters.
+
+With ``U0`` the factor of the centre's pseudo-inertia, a body has ``J = U0 U(theta) U(theta)' U0'``; ``theta`` (10,) are
+its log-Cholesky coordinates; the ten entries of ``U U' - 1`` (upper triangle) are linear in its parameters.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bayesid._math.arrays import Floats
+from bayesid.robot.inertial_parameters import InertialParameters, log_cholesky_factor, upper_cholesky
+
+__all__ = ["SLOPE", "absolute", "log_cholesky_coordinates", "log_volume", "relative", "relative_coordinates"]
+
+_ROW, _COLUMN = np.triu_indices(4)
+
+
+def relative(theta: Array) -> Array:
+    """Entries of the relative pseudo-inertia, less the identity, shape (10,)."""
+    factor = log_cholesky_factor(theta)
+    return ((factor @ factor.T) - jnp.eye(4))[_ROW, _COLUMN]
+
+
+def absolute(entries: Array) -> Array:
+    """Inverse of `relative`; not a number where no physical body has these entries."""
+    upper = jnp.zeros((4, 4)).at[_ROW, _COLUMN].set(entries)
+    matrix = jnp.eye(4) + upper + upper.T - jnp.diag(jnp.diag(upper))
+    u = _upper_factor(matrix)
+    unit = u / u[3, 3]
+    d = jnp.log(jnp.diag(unit)[:3])
+    rest = jnp.stack([unit[0, 1], unit[1, 2], unit[0, 2], unit[0, 3], unit[1, 3], unit[2, 3]])
+    return jnp.concatenate([jnp.log(u[3, 3])[None], d, rest])
+
+
+def _upper_factor(matrix: Array) -> Array:
+    """Upper-triangular U with ``U U' = matrix`` (4, 4), not a number where there is none.
+
+    Written out: thousands of factorisations of this size in one call to LAPACK can block the processor's threads.
+    """
+    u = [[jnp.zeros(()) for _ in range(4)] for _ in range(4)]
+    for k in (3, 2, 1, 0):
+        u[k][k] = jnp.sqrt(matrix[k, k] - sum(u[k][j] ** 2 for j in range(k + 1, 4)))
+        for i in range(k):
+            u[i][k] = (matrix[i, k] - sum(u[i][j] * u[k][j] for j in range(k + 1, 4))) / u[k][k]
+    return jnp.stack([jnp.stack(row) for row in u])
+
+
+def log_volume(theta: Array) -> Array:
+    """Logarithm of the determinant of d relative / d theta."""
+    # |d(U U')/dU| = 2^4 prod u_ii^i for upper-triangular U, times |dU/dtheta| = u_11 u_22 u_33 u_44 u_44^6
+    alpha, d = theta[0], theta[1:4]
+    logs = jnp.concatenate([alpha + d, alpha[None]])
+    return 4.0 * jnp.log(2.0) + (jnp.arange(1.0, 5.0) @ logs) + logs.sum() + 6.0 * alpha
+
+
+def _slope() -> Floats:
+    """Return d relative / d theta at the centre, shape (10, 10)."""
+    units = np.zeros((10, 4, 4))
+    units[0] = np.eye(4)
+    for index, place in enumerate([(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)], start=1):
+        units[index][place] = 1.0
+    return (units + units.transpose(0, 2, 1))[:, _ROW, _COLUMN].T
+
+
+SLOPE = _slope()
+SLOPE.setflags(write=False)
+
+
+def relative_coordinates(centre: InertialParameters, inertial: InertialParameters) -> Floats:
+    """Log-Cholesky coordinates of a body relative to a centre, shape (10,)."""
+    return log_cholesky_coordinates(centre.pseudo_inertia, inertial.pseudo_inertia[None])[0]
+
+
+def log_cholesky_coordinates(centre: Floats, bodies: Floats) -> Floats:
+    """Log-Cholesky coordinates of many pseudo-inertias (n, 4, 4) relative to one (4, 4), shape (n, 10)."""
+    factors = np.linalg.cholesky(bodies[:, ::-1, ::-1])[:, ::-1, ::-1]
+    shape = np.linalg.solve(upper_cholesky(centre), factors)
+    alpha = np.log(shape[:, 3, 3])
+    u = shape / shape[:, 3:, 3:]
+    d = [np.log(u[:, k, k]) for k in range(3)]
+    rest = [u[:, row, column] for row, column in ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))]
+    return np.stack([alpha, *d, *rest], axis=1)

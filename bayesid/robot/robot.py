@@ -1,0 +1,333 @@
+"""The robot: a tree of rigid links on a free-flying base, read from and written to URDF through Pinocchio."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+import pinocchio as pin
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.robot.body_prior import draw_inertial
+from bayesid.robot.inertial_parameters import InertialParameters
+
+__all__ = ["Joint", "Link", "Load", "Robot"]
+
+MOVING = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A moving joint with its limits, in rad or m and their rates."""
+
+    name: str
+    kind: str
+    lower: float
+    upper: float
+    velocity: float
+
+    @property
+    def unit(self) -> str:
+        """Unit of the joint's position."""
+        return "m" if self.kind == "prismatic" else "rad"
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid body: its inertial parameters in its own axes, and where those axes are.
+
+    Parameters
+    ----------
+    inertial : InertialParameters
+    joint : int
+        Index into `Robot.joints` of the last moving joint between the base and the link; -1 for the base.
+    placement : (4, 4) array
+        Pose of the link's axes in that joint's axes.
+    """
+
+    inertial: InertialParameters
+    joint: int
+    placement: Floats
+
+
+@dataclass(frozen=True)
+class Load:
+    """A rigid body fixed on a link and not part of the URDF; its parameters are in the link's axes."""
+
+    name: str
+    link: str
+    inertial: InertialParameters
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A free-flying robot.
+
+    Build one with `Robot.from_urdf`; every change returns a new robot.
+
+    Attributes
+    ----------
+    name : str
+    links : mapping of str to Link
+        Every body that may have mass, loads included; the base first.
+    joints : tuple of Joint
+        Moving joints, in Pinocchio's order.
+    model : pinocchio.Model
+        Kinematic tree with a free-flyer base and no gravity. Its inertias are those of the URDF: the links' own
+        parameters are in `links`.
+    """
+
+    name: str
+    file: Path | None
+    urdf: str
+    links: Mapping[str, Link]
+    joints: tuple[Joint, ...]
+    loads: tuple[str, ...]
+    model: pin.Model
+
+    @classmethod
+    def from_urdf(cls, file: str | Path) -> Robot:
+        """Read a robot from a URDF; the root link is the base body.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, a joint type is not supported or a link is not a physical body.
+        """
+        path = Path(file)
+        if not path.is_file():
+            raise InputError("no such file", file=path, remedy="Correct the path of the URDF")
+        return cls.from_string(path.read_text(encoding="utf-8"), file=path)
+
+    @classmethod
+    def shipped(cls, name: str) -> Robot:
+        """Return a robot that comes with the package: ``"ets7"`` or ``"planar"``."""
+        folder = files("bayesid.robot") / "models"
+        known = sorted(Path(str(item)).stem for item in folder.iterdir() if str(item).endswith(".urdf"))
+        if name not in known:
+            raise InputError(f"no shipped robot {name!r}", remedy=f"Choose one of {', '.join(known)}")
+        return cls.from_urdf(Path(str(folder / f"{name}.urdf")))
+
+    @classmethod
+    def from_string(cls, urdf: str, file: Path | None = None) -> Robot:
+        """Read a robot from the text of a URDF (`from_urdf`)."""
+        try:
+            root = ET.fromstring(urdf)
+        except ET.ParseError as error:
+            raise InputError(f"not well-formed XML: {error}", file=file, remedy="Correct the URDF") from error
+        inertials = _inertials(root, file)
+        _check_joints(root, file)
+        try:
+            model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+        except Exception as error:
+            raise InputError(
+                f"Pinocchio cannot read the robot: {error}", file=file, remedy="Correct the URDF"
+            ) from error
+        model.gravity.setZero()
+        links = {}
+        for frame in model.frames:
+            if frame.type == pin.FrameType.BODY:
+                links[frame.name] = Link(inertials[frame.name], frame.parentJoint - 2, frame.placement.homogeneous)
+        base = next(iter(links))
+        if links[base].inertial.mass <= 0.0:
+            raise InputError(
+                "mass > 0 fails: the root link has no mass",
+                file=file,
+                place=f"link {base}",
+                remedy="The root link is the base body: give it its <inertial>",
+            )
+        return cls(
+            name=root.get("name", "robot"),
+            file=file,
+            urdf=urdf,
+            links=MappingProxyType(links),
+            joints=tuple(_joint(model, index, root) for index in range(2, model.njoints)),
+            loads=(),
+            model=model,
+        )
+
+    @property
+    def base(self) -> str:
+        """Name of the base body."""
+        return next(iter(self.links))
+
+    @property
+    def mass(self) -> float:
+        """Mass of the whole system [kg]."""
+        return sum(link.inertial.mass for link in self.links.values())
+
+    def link(self, name: str) -> Link:
+        """Return a link or load by name.
+
+        Raises
+        ------
+        InputError
+            If there is none of that name.
+        """
+        if name not in self.links:
+            raise InputError(
+                f"no link or load named {name!r}", file=self.file, remedy=f"Choose one of {', '.join(self.links)}"
+            )
+        return self.links[name]
+
+    def with_inertial(self, name: str, inertial: InertialParameters) -> Robot:
+        """Return the robot with other inertial parameters of one link or load."""
+        links = dict(self.links)
+        links[name] = replace(self.link(name), inertial=inertial)
+        return replace(self, links=MappingProxyType(links))
+
+    def with_load(self, load: Load) -> Robot:
+        """Return the robot with a rigid body fixed on a link."""
+        if load.name in self.links:
+            raise InputError(
+                f"the name {load.name!r} is taken by a link", file=self.file, remedy="Give the load another name"
+            )
+        carrier = self.link(load.link)
+        links = {**self.links, load.name: Link(load.inertial, carrier.joint, carrier.placement)}
+        return replace(self, links=MappingProxyType(links), loads=(*self.loads, load.name))
+
+    def perturbed(self, name: str, relative: float, rng: np.random.Generator) -> Robot:
+        """Return the robot with one link drawn from its log-Cholesky prior of the given relative width."""
+        return self.with_inertial(name, draw_inertial(self.link(name).inertial, relative, rng))
+
+    def joint_index(self, name: str) -> int:
+        """Return the index of a joint in `joints`."""
+        names = [joint.name for joint in self.joints]
+        if name not in names:
+            raise InputError(
+                f"no moving joint named {name!r}", file=self.file, remedy=f"Choose one of {', '.join(names)}"
+            )
+        return names.index(name)
+
+    def to_urdf(self) -> str:
+        """Return the URDF with the present inertial parameters; every simulator can load it.
+
+        Loads become links on fixed joints. Products of the link frames are kept; inertial frames get the link's axes.
+        """
+        root = ET.fromstring(self.urdf)
+        for name, link in self.links.items():
+            if name in self.loads:
+                element = ET.SubElement(root, "link", name=name)
+                joint = ET.SubElement(root, "joint", name=f"{name}_mount", type="fixed")
+                ET.SubElement(joint, "parent", link=self._carrier(name))
+                ET.SubElement(joint, "child", link=name)
+            else:
+                element = next(item for item in root.findall("link") if item.get("name") == name)
+            _write_inertial(element, link.inertial)
+        ET.indent(root)
+        return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+    def write_urdf(self, file: str | Path) -> None:
+        """Write `to_urdf` to a file."""
+        Path(file).write_text(self.to_urdf(), encoding="utf-8")
+
+    def _carrier(self, load: str) -> str:
+        link = self.links[load]
+        return next(
+            name
+            for name, other in self.links.items()
+            if name not in self.loads and other.joint == link.joint and np.array_equal(other.placement, link.placement)
+        )
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(word) for word in text.split()]
+
+
+def _inertials(root: ET.Element, file: Path | None) -> dict[str, InertialParameters]:
+    inertials = {}
+    for link in root.findall("link"):
+        name = link.get("name", "")
+        try:
+            inertials[name] = _read_inertial(link.find("inertial"))
+        except InputError as error:
+            raise error.within(file=file, place=f"link {name}") from None
+        except (TypeError, ValueError, AttributeError) as error:
+            raise InputError(
+                f"unreadable <inertial>: {error}",
+                file=file,
+                place=f"link {name}",
+                remedy="Give mass and inertia as numbers",
+            ) from None
+    return inertials
+
+
+def _read_inertial(element: ET.Element | None) -> InertialParameters:
+    if element is None:
+        return InertialParameters(0.0, np.zeros(3), np.zeros((3, 3)))
+    origin = element.find("origin")
+    position = _numbers(origin.get("xyz", "0 0 0")) if origin is not None else [0.0] * 3
+    angles = _numbers(origin.get("rpy", "0 0 0")) if origin is not None else [0.0] * 3
+    rotation = pin.rpy.rpyToMatrix(np.array(angles))
+    mass = element.find("mass")
+    tensor = element.find("inertia")
+    if mass is None or tensor is None:
+        raise InputError("<inertial> lacks its <mass> or <inertia>", remedy="Give both, or leave <inertial> out")
+    entry = {key: float(tensor.get(key, "0")) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
+    own = np.array(
+        [
+            [entry["ixx"], entry["ixy"], entry["ixz"]],
+            [entry["ixy"], entry["iyy"], entry["iyz"]],
+            [entry["ixz"], entry["iyz"], entry["izz"]],
+        ]
+    )
+    return InertialParameters(float(mass.get("value", "nan")), position, rotation @ own @ rotation.T)
+
+
+def _write_inertial(link: ET.Element, inertial: InertialParameters) -> None:
+    old = link.find("inertial")
+    if old is not None:
+        link.remove(old)
+    if inertial.mass == 0.0:
+        return
+    element = ET.SubElement(link, "inertial")
+    ET.SubElement(element, "origin", xyz=" ".join(f"{value:.17g}" for value in inertial.com), rpy="0 0 0")
+    ET.SubElement(element, "mass", value=f"{inertial.mass:.17g}")
+    tensor = inertial.inertia
+    entries = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+    ET.SubElement(element, "inertia", {key: f"{tensor[index]:.17g}" for key, index in entries.items()})
+
+
+def _check_joints(root: ET.Element, file: Path | None) -> None:
+    for joint in root.findall("joint"):
+        name, kind = joint.get("name", ""), joint.get("type", "")
+        if kind not in (*MOVING, "fixed"):
+            raise InputError(
+                f"joint type {kind!r} is not supported",
+                file=file,
+                place=f"joint {name}",
+                remedy=f"Use one of {', '.join(MOVING)} or fixed",
+            )
+        if joint.find("mimic") is not None:
+            raise InputError(
+                "mimic joints are not supported",
+                file=file,
+                place=f"joint {name}",
+                remedy="Make it a joint of its own and record it",
+            )
+
+
+def _joint(model: pin.Model, index: int, root: ET.Element) -> Joint:
+    name = model.names[index]
+    element = next(item for item in root.findall("joint") if item.get("name") == name)
+    limit = element.find("limit")
+    kind = element.get("type", "")
+
+    def bound(key: str, default: float) -> float:
+        text = None if limit is None else limit.get(key)
+        return default if text is None else float(text)
+
+    bounded = kind != "continuous"
+    return Joint(
+        name=name,
+        kind=kind,
+        lower=bound("lower", -np.inf) if bounded else -np.inf,
+        upper=bound("upper", np.inf) if bounded else np.inf,
+        velocity=bound("velocity", np.inf),
+    )

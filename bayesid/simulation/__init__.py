@@ -1,0 +1,1 @@
+"""The forward model: orbit, effects, dynamics of the composite body, sensors."""

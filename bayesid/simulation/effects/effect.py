@@ -1,0 +1,313 @@
+"""The unit of extension: a physical effect that a model can carry, and the register of those known by name.
+
+An effect states its parameters with units and a prior on a physical scale, and overrides only the hooks it needs. All
+hooks are pure functions of JAX arrays. ``values`` are the effect's parameters in the order of ``parameters``; ``inner``
+are its own states. Vectors are in base axes unless said otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from enum import Enum
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.scipy.special import erf
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+
+if TYPE_CHECKING:
+    from bayesid.recording.joint_motion import Motion
+    from bayesid.robot.robot import Robot
+
+__all__ = [
+    "Composite",
+    "Effect",
+    "Environment",
+    "Modes",
+    "Moment",
+    "Parameter",
+    "Prior",
+    "Quantity",
+    "Readings",
+    "Wrench",
+    "create",
+    "known_effects",
+    "register",
+]
+
+
+class Prior(Enum):
+    """Shape of a parameter's prior, and what its mean and sigma then are."""
+
+    NORMAL = "normal"
+    LOG_NORMAL = "log-normal"  # mean is the median, sigma the standard deviation of the logarithm
+    UNIFORM = "uniform"  # within sigma of the mean
+
+
+class Quantity(NamedTuple):
+    """A name and a unit."""
+
+    name: str
+    unit: str
+
+
+class Parameter(NamedTuple):
+    """One parameter of an effect, with its prior.
+
+    ``sigma`` is the prior's standard deviation and ``mean`` its centre; see `Prior` for other shapes.
+    """
+
+    name: str
+    unit: str
+    sigma: float
+    mean: float = 0.0
+    prior: Prior = Prior.NORMAL
+
+    @property
+    def is_amplitude(self) -> bool:
+        """Whether zero means that nothing is there."""
+        return self.prior is Prior.NORMAL and self.mean == 0.0
+
+    def value(self, z: Array) -> Array:
+        """Physical value of a coordinate with a standard-normal prior."""
+        if self.prior is Prior.LOG_NORMAL:
+            return self.mean * jnp.exp(self.sigma * z)
+        if self.prior is Prior.UNIFORM:
+            return self.mean + self.sigma * erf(z / jnp.sqrt(2.0))
+        return self.mean + self.sigma * z
+
+
+class Composite(NamedTuple):
+    """The whole system seen as one body, in base axes; derivatives are relative to the base.
+
+    ``com`` is the centre of mass with two derivatives; inertia, second moment and spin (angular momentum relative to
+    the base) are about it.
+    """
+
+    mass: Array
+    com: Array
+    com_rate: Array
+    com_acceleration: Array
+    inertia: Array
+    inertia_rate: Array
+    inverse: Array
+    second_moment: Array
+    spin: Array
+    spin_rate: Array
+
+
+class Environment(NamedTuple):
+    """What is known of an instant beforehand. Orbit vectors are in orbit axes, zero away from orbit."""
+
+    time: Array
+    zenith: Array
+    gradient: Array  # mu / r^3 [1/s2]
+    velocity: Array
+    sun: Array
+    latitude: Array  # argument of latitude [rad]
+    north: Array  # direction of the Earth's north pole
+    wheel_momentum: Array  # recorded [N m s]
+    wheel_torque: Array  # its derivative
+    wrench: Array  # known force and torque about the base origin, base axes (6,)
+
+
+class Moment(NamedTuple):
+    """One instant of a simulation, as an effect sees it.
+
+    ``attitude`` rotates base axes to orbit axes. ``rate`` is zero while momenta are being summed: it follows from
+    them. ``rate_change`` and ``acceleration`` (of the base origin, non-gravitational) are known to `Effect.field` only.
+    """
+
+    environment: Environment
+    body: Composite
+    attitude: Array
+    rate: Array
+    rate_change: Array
+    acceleration: Array
+
+    def to_base(self, vector: Array) -> Array:
+        """Rotate a vector from orbit axes to base axes."""
+        return self.attitude.T @ vector
+
+
+class Wrench(NamedTuple):
+    """An external force and its torque about the base origin."""
+
+    force: Array
+    torque: Array
+
+
+class Modes(NamedTuple):
+    """Vibration modes of parts that move in the base, in mass-normalised (hybrid) coordinates (Likins 1970).
+
+    Mode i follows ``q'' + 2 damping omega q' + omega^2 q = -linear . a - angular . dw/dt - moment : (w w' - w^2 1)``
+    with ``a`` the acceleration of the base origin, and has the momentum ``linear q'`` and, about the base origin,
+    ``angular q'``. With ``phi(r)`` the displacement of unit amplitude, ``linear`` is the integral of phi over the mass,
+    ``angular`` that of r x phi and ``moment`` that of the outer product of phi and r.
+    omega (n,) [rad/s], damping (n,), linear (n, 3) [sqrt(kg)], angular (n, 3) and moment (n, 3, 3) [sqrt(kg) m].
+    """
+
+    omega: Array
+    damping: Array
+    linear: Array
+    angular: Array
+    moment: Array
+
+
+class Readings(NamedTuple):
+    """What the sensors read at their sample times: rate (T, 3), accel (T, 3), attitude quaternion (T, 4), time (T,).
+
+    ``torque`` (T, n) has a column for every joint of the robot, or none where no torque is measured.
+    """
+
+    time: Array
+    rate: Array
+    accel: Array
+    attitude: Array
+    torque: Array
+
+
+class Effect:
+    """A physical effect. Subclass it, set ``name`` and ``parameters``, override the hooks that apply, and `register`.
+
+    Attributes
+    ----------
+    name : str
+        As used in study files; a class that needs a place is written ``name:place``.
+    parameters : tuple of Parameter
+    per_recording : bool
+        Whether every recording has its own values.
+    needs_orbit : bool
+        Whether the effect exists only in orbit.
+    states : int
+        Number of inner states, zero at time 0.
+    modes_count : int
+        Number of vibration modes that `modes` returns.
+    """
+
+    name: ClassVar[str] = ""
+    summary: ClassVar[str] = ""
+    parameters: tuple[Parameter, ...] = ()
+    per_recording: ClassVar[bool] = False
+    needs_orbit: ClassVar[bool] = False
+    states: ClassVar[int] = 0
+    modes_count: ClassVar[int] = 0
+
+    @property
+    def longest_step(self) -> float:
+        """Longest integration step the effect allows [s]."""
+        return float("inf")
+
+    @property
+    def quantities(self) -> Sequence[Quantity]:
+        """What is reported of the effect; by default its parameters."""
+        return [Quantity(parameter.name, parameter.unit) for parameter in self.parameters]
+
+    def report(self, values: Array) -> Array:
+        """Turn values of the parameters into those of `quantities`, shape (n,) -> (m,)."""
+        return values
+
+    def attach(self, robot: Robot) -> Self:
+        """Return the effect as it is on a robot; an `InputError` where it has no such place."""
+        return self
+
+    @property
+    def starts(self) -> Sequence[Floats]:
+        """Coordinates, with a standard-normal prior, from which a fit of the effect is started; by default zero.
+
+        Effects with an inner frequency give a range of them.
+        """
+        return [np.zeros(len(self.parameters))]
+
+    @property
+    def label(self) -> str:
+        """Name with the place, as in study files."""
+        return self.name
+
+    @property
+    def link(self) -> str | None:
+        """Link that `table` is a table of; None where it changes others too, which joint torques do not follow."""
+        return None
+
+    def momentum(self, values: Array, moment: Moment, inner: Array) -> tuple[Array, Array]:
+        """Return angular momentum relative to the base and its derivative, as a free couple [N m s, N m]."""
+        return jnp.zeros(3), jnp.zeros(3)
+
+    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+        """Return the external force and its torque about the base origin [N, N m]."""
+        return Wrench(jnp.zeros(3), jnp.zeros(3))
+
+    def derivative(self, values: Array, moment: Moment, inner: Array) -> Array:
+        """Return the derivative of the inner states, shape (states,)."""
+        return jnp.zeros(self.states)
+
+    def field(self, values: Array, moment: Moment, lever: Array) -> Array:
+        """Return what an accelerometer at ``lever`` from the centre of mass reads beyond wrench and motion [m/s2]."""
+        return jnp.zeros(3)
+
+    def tide(self, values: Array, moment: Moment) -> Array:
+        """Return gravitational acceleration per distance from the centre of mass, shape (3, 3) [1/s2]."""
+        return jnp.zeros((3, 3))
+
+    def modes(self, values: Array) -> Modes:
+        """Return the vibration modes."""
+        raise NotImplementedError
+
+    def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
+        """Return coefficients of changes of the kinematic tables, shape (T, 28, m), see `bayesid.robot.composite_tables`."""
+        return np.zeros((len(time), 28, 0))
+
+    def loads(self, values: Array) -> Array:
+        """Return what multiplies the coefficients of `table`, shape (m,)."""
+        return jnp.zeros(0)
+
+    def read(self, values: Array, readings: Readings) -> Readings:
+        """Return what faulty sensors make of the true readings, in sensor axes."""
+        return readings
+
+    def friction(self, values: Array, velocity: Array) -> Array:
+        """Return torques of the joints' motors beyond those that move the bodies, (T, n), of joint speeds (T, n)."""
+        return jnp.zeros_like(velocity)
+
+    def uses(self, hook: str) -> bool:
+        """Whether the class overrides a hook."""
+        return getattr(type(self), hook) is not getattr(Effect, hook)
+
+
+_REGISTER: dict[str, Callable[..., Effect]] = {}
+
+E = TypeVar("E", bound=type[Effect])
+
+
+def register(effect: E) -> E:
+    """Class decorator: make an effect known to study files by its name."""
+    if not effect.name:
+        raise InputError(f"effect {effect.__name__} has no name", remedy="Set the class attribute `name`")
+    _REGISTER[effect.name] = effect
+    return effect
+
+
+def known_effects() -> dict[str, Callable[..., Effect]]:
+    """Every registered effect by its name."""
+    return dict(_REGISTER)
+
+
+def create(label: str, **options: Any) -> Effect:
+    """Build an effect by the label used in study files, such as ``"gravity-gradient"``.
+
+    Raises
+    ------
+    InputError
+        If no effect of that name is registered.
+    """
+    name, _, place = label.partition(":")
+    if name not in _REGISTER:
+        raise InputError(
+            f"unknown effect {label!r}",
+            remedy=f"Choose from {', '.join(sorted(_REGISTER))}, or name your file under model.plugins",
+        )
+    return _REGISTER[name](place, **options) if place else _REGISTER[name](**options)

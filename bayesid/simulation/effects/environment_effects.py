@@ -1,0 +1,171 @@
+"""What the surroundings do to the robot."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+from jax import Array
+
+from bayesid.simulation.effects.effect import Effect, Moment, Parameter, Prior, Wrench, register
+
+__all__ = ["AerodynamicDrag", "GravityGradient", "MagneticDipole", "RotationalDrag", "SolarPressure", "ThrusterLeak"]
+
+EARTH_FIELD = 3.12e-5 * 6371.2e3**3 / 3.986004418e14
+"""Equatorial field of the Earth's dipole times its radius cubed, over mu: the field is this times mu / r^3 [T s2]."""
+
+REACH = 2.0
+"""Half the size of the space in which a centre of pressure may lie, from the base origin [m]."""
+
+
+@register
+class GravityGradient(Effect):
+    """Gravity gradient on every body, the paper's (12)-(16), for any Kepler orbit; no free parameter.
+
+    Summed over the bodies, the forces of (14) and the torques of (16) are a pure torque about the common centre of mass
+    that depends on the composite second moment alone.
+    """
+
+    name = "gravity-gradient"
+    summary = (
+        "Gravity pulls harder on what is nearer the Earth. The difference over the robot's extent turns it, "
+        "and an accelerometer away from the centre of mass feels it."
+    )
+    needs_orbit = True
+
+    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+        """Return the torque 3 mu/r^3 (Xi u) x u."""
+        up = moment.to_base(moment.environment.zenith)
+        return Wrench(jnp.zeros(3), 3.0 * moment.environment.gradient * jnp.cross(moment.body.second_moment @ up, up))
+
+    def field(self, values: Array, moment: Moment, lever: Array) -> Array:
+        """Return less the tidal acceleration at the accelerometer."""
+        return -self.tide(values, moment) @ lever
+
+    def tide(self, values: Array, moment: Moment) -> Array:
+        """Return mu/r^3 (3 u u' - 1)."""
+        up = moment.to_base(moment.environment.zenith)
+        return moment.environment.gradient * (3.0 * jnp.outer(up, up) - jnp.eye(3))
+
+
+class _Pressure(Effect):
+    """A force of constant size and a known direction at a point of the base."""
+
+    needs_orbit = True
+
+    def __init__(self, force: float, spread: float) -> None:
+        self.parameters = (
+            Parameter("force", "N", spread, force, Prior.LOG_NORMAL),
+            *(Parameter(f"cp.{axis}", "m", REACH, 0.0, Prior.UNIFORM) for axis in "xyz"),
+        )
+
+    def direction(self, moment: Moment) -> Array:
+        """Return the force's direction in orbit axes."""
+        raise NotImplementedError
+
+    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+        """Return the force and its torque about the base origin."""
+        force = values[0] * moment.to_base(self.direction(moment))
+        return Wrench(force, jnp.cross(values[1:], force))
+
+
+@register
+class AerodynamicDrag(_Pressure):
+    """Constant drag against the orbital motion, off the centre of mass.
+
+    The prior's median of 5 mN is ten square metres at 350 km; e-fold 1.5 for density and area. The centre of pressure
+    lies anywhere within two metres of the base origin.
+    """
+
+    name = "aerodynamic-drag"
+    summary = (
+        "The thin air of a low orbit pushes against the direction of flight. Where the push acts beside the "
+        "centre of mass it also turns the robot, and the turn follows the attitude to the direction of flight."
+    )
+
+    def __init__(self, force: float = 5.0e-3, spread: float = 1.5) -> None:
+        super().__init__(force, spread)
+
+    def direction(self, moment: Moment) -> Array:
+        """Return backwards along the orbit."""
+        return -moment.environment.velocity
+
+
+@register
+class SolarPressure(_Pressure):
+    """Constant radiation pressure from the Sun's direction, off the centre of mass.
+
+    The prior's median is 0.3 mN, 45 square metres of absorbing panel; e-fold 2 for area and reflection.
+    """
+
+    name = "solar-pressure"
+    summary = (
+        "Sunlight pushes the robot away from the Sun. Where the push acts beside the centre of mass it also turns "
+        "the robot, about an axis that stays with the stars."
+    )
+
+    def __init__(self, force: float = 3.0e-4, spread: float = 2.0) -> None:
+        super().__init__(force, spread)
+
+    def direction(self, moment: Moment) -> Array:
+        """Return away from the Sun."""
+        return -moment.environment.sun
+
+
+@register
+class MagneticDipole(Effect):
+    """Residual magnetic dipole of the base in the Earth's field, a centred dipole along the Earth's axis.
+
+    The prior of 10 A m2 is that of a small satellite without magnetic cleanliness.
+    """
+
+    name = "magnetic-dipole"
+    summary = "Currents and magnets on board make the base a compass needle in the Earth's magnetic field."
+    needs_orbit = True
+
+    def __init__(self, sigma: float = 10.0) -> None:
+        self.parameters = tuple(Parameter(axis, "A m2", sigma) for axis in "xyz")
+
+    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+        """Return the torque mu x B, with B = -B0 (Re/r)^3 (3 (n.u) u - n)."""
+        north, up = moment.environment.north, moment.environment.zenith
+        field = -EARTH_FIELD * moment.environment.gradient * (3.0 * up * (up @ north) - north)
+        return Wrench(jnp.zeros(3), jnp.cross(values, moment.to_base(field)))
+
+
+@register
+class ThrusterLeak(Effect):
+    """Constant force and torque fixed in the base: a valve that does not close.
+
+    The prior of 50 mN and 50 mN m is a per cent of a small thruster on a lever of a metre.
+    """
+
+    name = "thruster-leak"
+    summary = "A leaking valve pushes steadily with a force and a torque that are fixed in the base."
+
+    def __init__(self, force: float = 0.05, torque: float = 0.05) -> None:
+        self.parameters = tuple(
+            Parameter(f"{key}.{axis}", unit, sigma)
+            for key, unit, sigma in (("force", "N", force), ("torque", "N m", torque))
+            for axis in "xyz"
+        )
+
+    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+        """Return the parameters."""
+        return Wrench(values[:3], values[3:])
+
+
+@register
+class RotationalDrag(Effect):
+    """Torque against the base's rotation, proportional to its rate about each axis: air in a laboratory.
+
+    The prior of 0.1 N m s brakes a body of 1 kg m2 within ten seconds.
+    """
+
+    name = "rotational-drag"
+    summary = "The air of a laboratory, or a bearing, brakes the rotation of the base in proportion to its rate."
+
+    def __init__(self, sigma: float = 0.1) -> None:
+        self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
+
+    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+        """Return the torque, less the rates times the coefficients."""
+        return Wrench(jnp.zeros(3), -values * moment.rate)

@@ -1,0 +1,51 @@
+"""Effects that exist at a place of the robot: a link or a joint, named after a colon."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from bayesid._io.errors import InputError
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects.effect import Effect
+
+__all__ = ["OnJoint", "Placed"]
+
+
+class Placed(Effect):
+    """An effect at a link or a joint."""
+
+    def __init__(self, place: str = "") -> None:
+        if not place:
+            raise InputError(
+                f"effect {self.name!r} does not say where", remedy=f"Write {self.name}:NAME, with a name of the URDF"
+            )
+        self.place = place
+
+    @property
+    def label(self) -> str:
+        """Name and place."""
+        return f"{self.name}:{self.place}"
+
+    def copied(self) -> Self:
+        """Return a copy that may be changed."""
+        changed = type(self).__new__(type(self))
+        changed.__dict__.update(self.__dict__)
+        return changed
+
+
+class OnJoint(Placed):
+    """An effect at one joint."""
+
+    def attach(self, robot: Robot) -> Self:
+        """Check that the joint exists."""
+        self.index_in(robot)
+        return self
+
+    def index_in(self, robot: Robot) -> int:
+        """Return the index of the joint in `Robot.joints`."""
+        names = [joint.name for joint in robot.joints]
+        if self.place not in names:
+            raise InputError(
+                f"effect {self.label!r}: no moving joint {self.place!r}", remedy=f"Joints: {', '.join(names)}"
+            )
+        return names.index(self.place)

@@ -1,0 +1,235 @@
+"""Faults of the sensors, in sensor axes.
+
+``measured = (1 + scale) * (rotation(misalignment) * true(t - latency)) + bias + drift * t``; a positive latency means
+that the sample stamped t shows the past.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jax import Array
+
+from bayesid.simulation.effects.effect import Effect, Moment, Parameter, Readings, register
+from bayesid.simulation.sensors import Kind
+
+__all__ = [
+    "AccelBias",
+    "AccelDrift",
+    "AccelLatency",
+    "AccelMisalignment",
+    "AccelPosition",
+    "AccelScale",
+    "RateBias",
+    "RateDrift",
+    "RateLatency",
+    "RateMisalignment",
+    "RateScale",
+]
+
+
+class SensorFault(Effect):
+    """An effect on what one sensor reads.
+
+    Attributes
+    ----------
+    sensor : Kind
+        The sensor it needs.
+    """
+
+    sensor: ClassVar[Kind]
+
+    def change(self, values: Array, time: Array, reading: Array) -> Array:
+        """Return what the faulty sensor reads, shape (T, 3), of the true reading."""
+        raise NotImplementedError
+
+    def read(self, values: Array, readings: Readings) -> Readings:
+        """Apply the fault to the sensor."""
+        key = self.sensor.value
+        return readings._replace(**{key: self.change(values, readings.time, getattr(readings, key))})
+
+
+class _Axes(SensorFault):
+    """A fault with one parameter per sensor axis."""
+
+    unit: ClassVar[str]
+    sigma: ClassVar[float]
+
+    def __init__(self, sigma: float | tuple[float, float, float] | None = None) -> None:
+        given = self.sigma if sigma is None else sigma
+        values = (given,) * 3 if isinstance(given, int | float) else given
+        self.parameters = tuple(
+            Parameter(axis, self.unit, float(value)) for axis, value in zip("xyz", values, strict=True)
+        )
+
+
+class _Bias(_Axes):
+    def change(self, values: Array, time: Array, reading: Array) -> Array:
+        return reading + values
+
+
+class _Drift(_Axes):
+    def change(self, values: Array, time: Array, reading: Array) -> Array:
+        return reading + values * time[:, None]
+
+
+class _Scale(_Axes):
+    unit = "1"
+
+    def change(self, values: Array, time: Array, reading: Array) -> Array:
+        return (1.0 + values) * reading
+
+
+class _Misalignment(_Axes):
+    unit = "rad"
+
+    def change(self, values: Array, time: Array, reading: Array) -> Array:
+        return reading @ _rotation(values).T
+
+
+class _Latency(SensorFault):
+    def __init__(self, sigma: float = 0.2) -> None:
+        self.parameters = (Parameter("delay", "s", sigma),)
+
+    def change(self, values: Array, time: Array, reading: Array) -> Array:
+        # the interpolation's own error cancels to first order in the delay
+        return reading + _interpolate(time - values[0], time, reading) - reading
+
+
+@register
+class RateBias(_Bias):
+    """Constant error of the measured rate; the default prior is ten degrees per hour."""
+
+    name = "rate-bias"
+    summary = "The rate sensor reads a constant when the base is at rest."
+    sensor, unit, sigma = Kind.RATE, "rad/s", 5.0e-5
+
+
+@register
+class AccelBias(_Bias):
+    """Constant error of the accelerometer; the default prior is 10 micro-g."""
+
+    name = "accel-bias"
+    summary = "The accelerometer reads a constant in free fall."
+    sensor, unit, sigma = Kind.ACCEL, "m/s2", 1.0e-4
+
+
+@register
+class RateDrift(_Drift):
+    """Error of the measured rate that grows with time; the prior is the prior bias gained in a minute."""
+
+    name = "rate-drift"
+    summary = "The rate sensor's zero wanders steadily, as when it warms up."
+    sensor, unit, sigma = Kind.RATE, "rad/s2", 1.0e-6
+
+
+@register
+class AccelDrift(_Drift):
+    """Error of the accelerometer that grows with time; the prior is the prior bias gained in a minute."""
+
+    name = "accel-drift"
+    summary = "The accelerometer's zero wanders steadily, as when it warms up."
+    sensor, unit, sigma = Kind.ACCEL, "m/s3", 2.0e-6
+
+
+@register
+class RateScale(_Scale):
+    """Scale factor of the rate sensor; the prior is 3 %, far outside a calibrated sensor's."""
+
+    name = "rate-scale"
+    summary = "The rate sensor reads in proportion too much or too little."
+    sensor, sigma = Kind.RATE, 0.03
+
+
+@register
+class AccelScale(_Scale):
+    """Scale factor of the accelerometer; the prior is 3 %, far outside a calibrated sensor's."""
+
+    name = "accel-scale"
+    summary = "The accelerometer reads in proportion too much or too little."
+    sensor, sigma = Kind.ACCEL, 0.03
+
+
+@register
+class RateMisalignment(_Misalignment):
+    """Rotation of the rate sensor against its stated mounting; the prior is two degrees per axis."""
+
+    name = "rate-misalignment"
+    summary = "The rate sensor is turned against its stated mounting."
+    sensor, sigma = Kind.RATE, 0.03
+
+
+@register
+class AccelMisalignment(_Misalignment):
+    """Rotation of the accelerometer against its stated mounting; the prior is two degrees per axis."""
+
+    name = "accel-misalignment"
+    summary = "The accelerometer is turned against its stated mounting."
+    sensor, sigma = Kind.ACCEL, 0.03
+
+
+@register
+class AccelPosition(_Axes):
+    """Error of the accelerometer's mounting point: true less stated position, base axes; the prior is 5 cm.
+
+    The gravity gradient over the error is left out: below 1e-7 m/s2 for 5 cm in any orbit.
+    """
+
+    name = "accel-position"
+    summary = "The accelerometer sits elsewhere than stated and feels another part of the base's rotation."
+    sensor, unit, sigma = Kind.ACCEL, "m", 0.05
+
+    def field(self, values: Array, moment: Moment, lever: Array) -> Array:
+        """Return what rotation adds over the error of position."""
+        return jnp.cross(moment.rate_change, values) + jnp.cross(moment.rate, jnp.cross(moment.rate, values))
+
+    read = Effect.read
+
+
+@register
+class RateLatency(_Latency):
+    """Delay of the rate sensor; the prior is a few cycles of a slow data bus."""
+
+    name = "rate-latency"
+    summary = "The rate sensor's samples are stamped late: each shows the past."
+    sensor = Kind.RATE
+
+
+@register
+class AccelLatency(_Latency):
+    """Delay of the accelerometer; the prior is a few cycles of a slow data bus."""
+
+    name = "accel-latency"
+    summary = "The accelerometer's samples are stamped late: each shows the past."
+    sensor = Kind.ACCEL
+
+
+def _rotation(vector: Array) -> Array:
+    """Rotation matrix of a rotation vector, smooth at zero."""
+    x, y, z = vector
+    zero = jnp.zeros(())
+    hat = jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])
+    square = vector @ vector
+    return (
+        jnp.eye(3)
+        + hat * (1.0 - square / 6.0 + square**2 / 120.0)
+        + hat @ hat * (0.5 - square / 24.0 + square**2 / 720.0)
+    )
+
+
+def _interpolate(at: Array, time: Array, values: Array) -> Array:
+    """Cubic Hermite interpolation of samples (T, C) with parabolic slopes; padding repeats the last time."""
+    step = jnp.diff(time)
+    safe = jnp.where(step > 0.0, step, 1.0)[:, None]
+    slope = jnp.where(step[:, None] > 0.0, jnp.diff(values, axis=0) / safe, 0.0)
+    left, right = safe[:-1], safe[1:]
+    inner = (right * slope[:-1] + left * slope[1:]) / (left + right)
+    inner = jnp.where(step[1:, None] > 0.0, inner, slope[:-1])
+    slopes = jnp.concatenate([slope[:1], inner, slope[-1:]])
+    index = jnp.clip(jnp.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
+    index = jnp.where(step[index] > 0.0, index, jnp.maximum(index - 1, 0))
+    h = safe[index]
+    s = (at - time[index])[:, None] / h
+    a, b, p, q = values[index], values[index + 1], slopes[index] * h, slopes[index + 1] * h
+    return a + s * (p + s * (3.0 * (b - a) - 2.0 * p - q + s * (p + q - 2.0 * (b - a))))

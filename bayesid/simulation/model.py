@@ -1,0 +1,157 @@
+"""What is assumed: the robot, its sensors, the effects at work, the priors; and the manoeuvres that were recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.recording.joint_motion import Motion
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior, Mixing, check_mixing
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.placed import OnJoint
+from bayesid.simulation.joint_torques import TorqueSensor
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Kind, Sensor
+
+__all__ = ["Manoeuvre", "Model"]
+
+RATE_SIGMA = 0.1
+"""Default prior standard deviation of an unknown initial rate [rad/s]; wide for anything in orbit."""
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """A recorded (or planned) manoeuvre.
+
+    Parameters
+    ----------
+    recording : Recording
+        What the sensors read; may hold no sensor channels when only simulating.
+    motion : Motion
+        The joints' motion.
+    attitude : (4,) array_like
+        Base to orbit axes at time 0, quaternion x, y, z, w.
+    attitude_sigma : float
+        Its standard deviation per axis [rad]; 0 = exact.
+    latitude : float
+        Argument of latitude at time 0 [rad].
+    """
+
+    recording: Recording
+    motion: Motion
+    attitude: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
+    attitude_sigma: float = 0.0
+    latitude: float = 0.0
+
+
+@dataclass(frozen=True)
+class Model:
+    """A robot with its sensors, the effects in its simulation and the priors of its unknown bodies.
+
+    Parameters
+    ----------
+    robot : Robot
+    sensors : sequence of Sensor
+    priors : sequence of BodyPrior
+        Bodies to identify, and those to marginalise.
+    orbit : Orbit, optional
+        None in a laboratory.
+    effects : sequence of Effect
+    rate_sigma : float
+        Prior standard deviation of the initial rate of each recording [rad/s]; 0 for a start at rest.
+    mixing : (10 B, 10 B) tuple of tuples, optional
+        Joint prior of all B ``priors`` about their centres (`Unknowns`), such as the posterior of an earlier study;
+        left out, bodies and coordinates are independent.
+    torque : TorqueSensor, optional
+        Where joint torques are measured.
+    """
+
+    robot: Robot
+    sensors: tuple[Sensor, ...]
+    priors: tuple[BodyPrior, ...]
+    orbit: Orbit | None = None
+    effects: tuple[Effect, ...] = ()
+    rate_sigma: float = RATE_SIGMA
+    mixing: Mixing | None = None
+    torque: TorqueSensor | None = None
+
+    def __post_init__(self) -> None:
+        if not self.sensors:
+            raise InputError("no sensor is declared", remedy="Declare rate, accel or attitude")
+        kinds = [sensor.kind for sensor in self.sensors]
+        if len(set(kinds)) != len(kinds):
+            raise InputError("two sensors of one kind are declared", remedy="Declare each kind once")
+        for effect in self.effects:
+            if effect.needs_orbit and self.orbit is None:
+                raise InputError(
+                    f"effect {effect.label!r} exists only in orbit and the study has no [orbit]",
+                    remedy="Give the orbit or leave the effect out",
+                )
+        object.__setattr__(self, "effects", tuple(effect.attach(self.robot) for effect in self.effects))
+        labels = [effect.label for effect in self.effects]
+        for label in labels:
+            if labels.count(label) > 1:
+                raise InputError(f"effect {label!r} is in the model twice", remedy="Name it once")
+        for prior in self.priors:
+            self.robot.link(prior.name)
+        if self.mixing is not None:
+            check_mixing(self.mixing, len(self.priors))
+        self._check_torque()
+
+    def _check_torque(self) -> None:
+        measured = () if self.torque is None else self.torque.joints
+        for effect in self.effects:
+            if effect.uses("friction") and isinstance(effect, OnJoint) and effect.place not in measured:
+                raise InputError(
+                    f"effect {effect.label!r} shows in the joint's torque only, which is not measured",
+                    remedy="Add [sensors.torque] or leave the effect out",
+                )
+        if self.torque is None:
+            return
+        self.torque.columns(self.robot)
+        for effect in self.effects:
+            if effect.uses("table") and effect.link is None:
+                raise InputError(
+                    f"effect {effect.label!r} is not carried into the joint torques",
+                    remedy="Leave [sensors.torque] or the effect out",
+                )
+
+    @property
+    def without_torque(self) -> Model:
+        """The model without torque sensors and what only they read."""
+        rest = tuple(effect for effect in self.effects if not effect.uses("friction"))
+        return self if self.torque is None and rest == self.effects else replace(self, torque=None, effects=rest)
+
+    def extend(self, effect: Effect) -> Model:
+        """Return the model with one more effect."""
+        return replace(self, effects=(*self.effects, effect))
+
+    @property
+    def point(self) -> Floats:
+        """Mounting point of the accelerometer in the base [m]; the origin where there is none."""
+        for sensor in self.sensors:
+            if sensor.kind is Kind.ACCEL:
+                return np.asarray(sensor.position, dtype=float)
+        return np.zeros(3)
+
+    @property
+    def bodies(self) -> tuple[BodyPrior, ...]:
+        """The bodies to identify, without those only marginalised."""
+        return tuple(prior for prior in self.priors if not prior.nuisance)
+
+
+def spread_links(robot: Robot, spread: float, known: Sequence[str]) -> tuple[BodyPrior, ...]:
+    """Put every link with mass that is not in ``known`` under a prior of the given relative width."""
+    if spread <= 0.0:
+        return ()
+    return tuple(
+        BodyPrior(name, link.inertial, spread, nuisance=True)
+        for name, link in robot.links.items()
+        if name not in known and link.inertial.mass > 0.0
+    )

@@ -1,0 +1,129 @@
+"""The orbit as the robot feels it: zenith, gravity gradient, velocity and Sun in the recording's orbit axes.
+
+Orbit axes do not rotate: x is the zenith at time 0 of the recording, z the orbit normal, y along-track. The paper notes
+that its equations (14)-(16) hold for any eccentricity; only the zenith's angle and the radius then change with time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+
+__all__ = ["EARTH", "Orbit", "OrbitState"]
+
+EARTH = 3.986004418e14
+"""Earth's gravitational parameter [m3/s2]."""
+
+
+class OrbitState(NamedTuple):
+    """What the orbit gives at some times; vectors in orbit axes, shape (T, 3), scalars shape (T,)."""
+
+    zenith: Floats
+    gradient: Floats  # mu / r^3 [1/s2]
+    velocity: Floats  # direction of motion
+    sun: Floats
+    latitude: Floats  # argument of latitude [rad]
+    north: Floats  # the Earth's north pole
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A Kepler orbit around the Earth.
+
+    Parameters
+    ----------
+    radius : float
+        Semi-major axis [m].
+    eccentricity : float
+    inclination, argument_of_perigee : float
+        [rad]
+    sun : (3,) array_like, optional
+        Unit vector to the Sun in Earth-centred axes: ascending node, along-orbit, normal.
+    """
+
+    radius: float
+    eccentricity: float = 0.0
+    inclination: float | None = None
+    argument_of_perigee: float = 0.0
+    sun: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if not self.radius > 6.3e6:
+            raise InputError(
+                f"orbit radius {self.radius:g} m lies inside the Earth",
+                remedy="Give it in metres, from the Earth's centre",
+            )
+        if not 0.0 <= self.eccentricity < 1.0:
+            raise InputError(f"eccentricity {self.eccentricity:g} is not in [0, 1)", remedy="Give a closed orbit")
+
+    @property
+    def mean_motion(self) -> float:
+        """Mean angular rate [rad/s]."""
+        return float(np.sqrt(EARTH / self.radius**3))
+
+    def state(self, time: ArrayLike, argument_of_latitude: float = 0.0) -> OrbitState:
+        """Evaluate the orbit.
+
+        Parameters
+        ----------
+        time : (T,) array_like
+            Since the start of the recording [s].
+        argument_of_latitude : float
+            At time 0 [rad].
+        """
+        t = np.asarray(time, dtype=float)
+        anomaly_start = argument_of_latitude - self.argument_of_perigee
+        anomaly = self._true_anomaly(t, anomaly_start)
+        angle = anomaly - anomaly_start
+        e = self.eccentricity
+        distance = self.radius * (1.0 - e**2) / (1.0 + e * np.cos(anomaly))
+        zeros = np.zeros_like(t)
+        zenith = np.stack([np.cos(angle), np.sin(angle), zeros], axis=-1)
+        radial, along = e * np.sin(anomaly), 1.0 + e * np.cos(anomaly)
+        transverse = np.stack([-np.sin(angle), np.cos(angle), zeros], axis=-1)
+        velocity = (radial[..., None] * zenith + along[..., None] * transverse) / np.hypot(radial, along)[..., None]
+        return OrbitState(
+            zenith=zenith,
+            gradient=EARTH / distance**3,
+            velocity=velocity,
+            sun=np.broadcast_to(self._sun(argument_of_latitude), zenith.shape),
+            latitude=argument_of_latitude + angle,
+            north=np.broadcast_to(self._north(argument_of_latitude), zenith.shape),
+        )
+
+    def _true_anomaly(self, t: Floats, start: float) -> Floats:
+        e = self.eccentricity
+        if e == 0.0:
+            return start + self.mean_motion * t
+        half = np.sqrt((1.0 - e) / (1.0 + e))
+        turns = np.round(start / (2.0 * np.pi)) * 2.0 * np.pi
+        eccentric_start = 2.0 * np.arctan(half * np.tan((start - turns) / 2.0)) + turns
+        mean = eccentric_start - e * np.sin(eccentric_start) + self.mean_motion * t
+        eccentric = mean + e * np.sin(mean)
+        for _ in range(50):  # Newton's iteration on Kepler's equation
+            step = (eccentric - e * np.sin(eccentric) - mean) / (1.0 - e * np.cos(eccentric))
+            eccentric = eccentric - step
+            if np.abs(step).max() < 1e-15 * (1.0 + np.abs(eccentric).max()):
+                break
+        turns = np.round(eccentric / (2.0 * np.pi)) * 2.0 * np.pi
+        return 2.0 * np.arctan(np.tan((eccentric - turns) / 2.0) / half) + turns
+
+    def _sun(self, latitude: float) -> Floats:
+        return np.zeros(3) if self.sun is None else _from_node(np.asarray(self.sun), latitude)
+
+    def _north(self, latitude: float) -> Floats:
+        i = self.inclination
+        return np.zeros(3) if i is None else _from_node(np.array([0.0, np.sin(i), np.cos(i)]), latitude)
+
+
+def _from_node(vector: Floats, latitude: float) -> Floats:
+    """Turn a direction from axes (ascending node, along-orbit, normal) to orbit axes, as a unit vector."""
+    cos, sin = np.cos(latitude), np.sin(latitude)
+    node, along, normal = vector / np.linalg.norm(vector)
+    return np.array([cos * node + sin * along, -sin * node + cos * along, normal])
