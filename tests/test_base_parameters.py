@@ -195,7 +195,7 @@ def test_motion_does_not_see_the_change(other, formula_motion, tmp_path):
     motion = formula_motion(formula, tmp_path / "robot.urdf", first)
     times = np.arange(0.0, 10.1, 1.0)
     names = tuple(first.links)
-    grid = build_grid(first, names, motion, times, 0.5, orbit=Orbit(6.9e6), latitude=0.3)
+    grid = build_grid(first, names, motion, times, 0.5, orbit=Orbit(6.9e6), argument_of_latitude=0.3)
     start = Start(jnp.array([0.1, 0.2, 0.3, 0.9]), jnp.array([0.01, -0.02, 0.03]))
 
     @jax.jit

@@ -21,17 +21,15 @@ from bayesid.design import (
     Paper26,
     Paper26Intended,
     PaperExcitation,
-    Parameterisation,
     Plan,
     Problem,
     Search,
     Separation,
     Tip,
+    TrajectoryFamily,
+    design,
 )
-from bayesid.design import (
-    designed as design,
-)
-from bayesid.design.plan import Outcome, Trajectory
+from bayesid.design.plan import PlannedOutcome, Trajectory
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.composite_tables import link_table
@@ -146,11 +144,13 @@ def test_base_motion_of_a_slider_in_closed_form() -> None:
     np.testing.assert_allclose(trajectory.acceleration[:, 0], -share * state.acceleration[:, 0], atol=1e-9)
 
 
-def outcome(**parts: np.ndarray) -> Outcome:
+def outcome(**parts: np.ndarray) -> PlannedOutcome:
     """An outcome with given parts."""
     empty = Trajectory(*([np.zeros((1, 3))] * len(Trajectory._fields)))
     trajectory = empty._replace(excursion=jnp.asarray(parts.get("excursion", np.zeros((1, 6)))))
-    return Outcome(trajectory, jnp.asarray(parts.get("information", np.zeros((1, 1)))), jnp.asarray(parts["regressor"]))
+    return PlannedOutcome(
+        trajectory, jnp.asarray(parts.get("information", np.zeros((1, 1)))), jnp.asarray(parts["regressor"])
+    )
 
 
 def test_paper_26_as_printed_reduces_to_signed_squares() -> None:
@@ -260,7 +260,7 @@ def test_limits_that_cannot_be_kept_are_named() -> None:
         design(problem, 0, {0: 1e-6}, Search(starts=1, iterations=3))
 
 
-class Swing(Parameterisation):
+class Swing(TrajectoryFamily):
     """A user's own: one bump."""
 
     name = "bump"
@@ -282,7 +282,7 @@ FAMILIES = (
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
-def test_families_are_smooth_and_start_and_end_at_rest(family: Parameterisation) -> None:
+def test_families_are_smooth_and_start_and_end_at_rest(family: TrajectoryFamily) -> None:
     parameters = family.centre + family.scale * np.random.default_rng(7).normal(size=family.size)
     motion: Motion = family.motion(parameters)
     ends = motion.evaluate(np.array([0.0, family.duration]))

@@ -11,10 +11,9 @@ from scipy import stats
 
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
-from bayesid.diagnosis import Diagnosis, Status, diagnose
-from bayesid.diagnosis import candidate_effects as candidates
+from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
 from bayesid.diagnosis.amplitude_scale import SCALES, log_mixture
-from bayesid.diagnosis.diagnose import extended_start
+from bayesid.diagnosis.diagnosis_run import extended_start
 from bayesid.diagnosis.noise_faults import noise_fault
 from bayesid.diagnosis.perturbed_fit import Engine
 from bayesid.diagnosis.score_tests import chi2_log_sf
@@ -106,7 +105,7 @@ def test_a_push_is_the_effect_in_the_simulation(label, engine_and_fit):
     engine, fit = engine_and_fit
     effect = create(label).attach(engine.posterior.model.robot)
     coordinates = 0.03 * np.ones(len(effect.parameters))
-    pushed = engine.fit((effect,), (coordinates,), z=fit.z, situation=fit.situation, iterations=0)
+    pushed = engine.fit((effect,), (coordinates,), z=fit.z, operating=fit.operating, iterations=0)
     posterior = Posterior(engine.posterior.model.extend(effect), engine.posterior.manoeuvres)
     full = posterior.residuals(np.concatenate([fit.z, coordinates])).ravel()
     change = full - engine.posterior.residuals(fit.z).ravel()

@@ -74,7 +74,7 @@ TORQUE_TIMES = np.array([4.5, 12.0])
 TORQUES = np.array([[0.02, 0.0, -0.05], [0.0, -0.03, 0.01]])
 
 
-def held(times: np.ndarray, values: np.ndarray):
+def zero_order_hold(times: np.ndarray, values: np.ndarray):
     def value(time: float) -> np.ndarray:
         index = np.searchsorted(times, time, side="right") - 1
         return values[index] if index >= 0 else np.zeros(3)
@@ -128,8 +128,8 @@ def test_agrees_with_the_reference(name, tmp_path, formula_motion):
         rate0=RATE,
         attitude0=ATTITUDE,
         accel_position=POINT,
-        base_force=held(FORCE_TIMES, FORCES),
-        base_torque=held(TORQUE_TIMES, TORQUES),
+        base_force=zero_order_hold(FORCE_TIMES, FORCES),
+        base_torque=zero_order_hold(TORQUE_TIMES, TORQUES),
     )
     orbit = Orbit(truth.radius, truth.eccentricity, argument_of_perigee=truth.argument_of_perigee)
     options = {"orbit": orbit, "latitude": truth.argument_of_latitude}
@@ -192,7 +192,7 @@ def test_a_curved_wheel_momentum_is_interpolated(formula_motion):
 
 def test_actions_before_their_first_sample_are_zero_and_held_after_the_last():
     actions = Actions.from_recording(action_recording())
-    wrench = actions.held(np.array([0.0, 2.9, 3.0, 4.4, 4.5, 8.9, 9.0, 29.0]))
+    wrench = actions.zero_order_hold(np.array([0.0, 2.9, 3.0, 4.4, 4.5, 8.9, 9.0, 29.0]))
     force = [FORCES[i] if i >= 0 else np.zeros(3) for i in (-1, -1, 0, 0, 0, 0, 1, 2)]
     torque = [TORQUES[i] if i >= 0 else np.zeros(3) for i in (-1, -1, -1, -1, 0, 0, 0, 1)]
     np.testing.assert_array_equal(wrench, np.concatenate([force, torque], axis=1))

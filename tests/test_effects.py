@@ -19,14 +19,14 @@ from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import Effect, Parameter, Readings, Wrench, create, register
-from bayesid.simulation.effects.effect import _REGISTER, Composite, Environment, Moment
+from bayesid.simulation.effects.effect import _REGISTER, Composite, Environment, Instant
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor, White
 from tests import mujoco_truth as mj
 from tests import reference as ref
 
 PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf"
-HOOKS = ("momentum", "wrench", "derivative", "field", "read", "tide", "friction")
+HOOKS = ("momentum", "wrench", "derivative", "specific_force", "read", "gravity_gradient_tensor", "friction")
 
 
 def instance(name: str) -> Effect:
@@ -42,7 +42,7 @@ def instance(name: str) -> Effect:
         raise
 
 
-def moment() -> Moment:
+def instant() -> Instant:
     """An instant of no symmetry."""
     rng = np.random.default_rng(0)
     tensor = np.diag([3.0, 4.0, 5.0]) + 0.1
@@ -73,7 +73,7 @@ def moment() -> Moment:
         jnp.zeros(6),
     )
     attitude = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-    return Moment(environment, body, jnp.asarray(attitude * np.linalg.det(attitude)), *(vector() * 0.01,) * 3)
+    return Instant(environment, body, jnp.asarray(attitude * np.linalg.det(attitude)), *(vector() * 0.01,) * 3)
 
 
 def readings() -> Readings:
@@ -88,22 +88,22 @@ def call(effect: Effect, hook: str, values):
     inner = jnp.full(effect.states, 0.1)
     if hook == "read":
         return effect.read(values, readings())
-    if hook == "field":
-        return effect.field(values, moment(), jnp.asarray([0.1, -0.2, 0.3]))
-    if hook == "tide":
-        return effect.tide(values, moment())
+    if hook == "specific_force":
+        return effect.specific_force(values, instant(), jnp.asarray([0.1, -0.2, 0.3]))
+    if hook == "gravity_gradient_tensor":
+        return effect.gravity_gradient_tensor(values, instant())
     if hook == "friction":
         return effect.friction(values, jnp.linspace(-0.1, 0.1, 12).reshape(6, 2))
-    return getattr(effect, hook)(values, moment(), inner)
+    return getattr(effect, hook)(values, instant(), inner)
 
 
 SHAPES = {
     "momentum": lambda _: ((3,), (3,)),
     "wrench": lambda _: Wrench((3,), (3,)),
     "derivative": lambda effect: (effect.states,),
-    "field": lambda _: (3,),
+    "specific_force": lambda _: (3,),
     "read": lambda _: Readings((12,), (12, 3), (12, 3), (12, 4), (12, 2)),
-    "tide": lambda _: (3, 3),
+    "gravity_gradient_tensor": lambda _: (3, 3),
     "friction": lambda _: (6, 2),
 }
 
@@ -180,7 +180,7 @@ def test_hooks_can_be_differentiated(effect):
 @pytest.mark.parametrize("effect", WITH_AMPLITUDE, indirect=True)
 def test_zero_values_change_nothing(effect):
     values = jnp.zeros(len(effect.parameters))
-    for hook in ("momentum", "wrench", "field"):
+    for hook in ("momentum", "wrench", "specific_force"):
         for leaf in jax.tree.leaves(call(effect, hook, values)):
             np.testing.assert_array_equal(leaf, 0.0)
     for left, right in zip(call(effect, "read", values), readings(), strict=True):
@@ -215,7 +215,7 @@ class ConstantTorque(Effect):
     name = "constant-torque"
     parameters = tuple(Parameter(axis, "N m", 0.01) for axis in "xyz")
 
-    def wrench(self, values, moment, inner):
+    def wrench(self, values, instant, inner):
         return Wrench(jnp.zeros(3), values)
 
 
@@ -229,10 +229,10 @@ class CreepingTorque(Effect):
     states: ClassVar[int] = 3
     parameters = tuple(Parameter(axis, "N m", 0.01) for axis in "xyz")
 
-    def derivative(self, values, moment, inner):
+    def derivative(self, values, instant, inner):
         return (values - inner) / TAU
 
-    def wrench(self, values, moment, inner):
+    def wrench(self, values, instant, inner):
         return Wrench(jnp.zeros(3), inner)
 
 

@@ -10,7 +10,7 @@ from conftest import ENCODER, ORBIT, PLANAR, POINT, SIGMA, STEP
 from bayesid.identifiability.added_information import NotEvaluated, Swung, candidates
 from bayesid.identifiability.direction_words import describe, subject
 from bayesid.identifiability.directions import Direction, directions
-from bayesid.identifiability.hypothetical_experiment import Experiment, Predictor
+from bayesid.identifiability.hypothetical_experiment import Experiment, InformationPredictor
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.identifiability.normality import Draws, Method, shape_errors, weighted_quantile
 from bayesid.identifiability.parameter_table import quantity_of
@@ -18,7 +18,7 @@ from bayesid.identifiability.practical_identifiability import covers_all
 from bayesid.identifiability.profile_interval import Target, profile
 from bayesid.inference import maximise
 from bayesid.inference.body_quantities import linearise
-from bayesid.inference.contraction import Learnt, Verdict, compare
+from bayesid.inference.contraction import Contraction, ContractionVerdict, compare
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
@@ -55,7 +55,7 @@ def test_directions_of_a_measured_sum_are_those_of_the_closed_form() -> None:
     np.testing.assert_allclose(best.displacement, ratio * wide / np.sqrt(2.0) * np.ones(2), rtol=1e-9)
     assert known.conditional_sd[0] == pytest.approx(1.0 / np.sqrt(1.0 / wide**2 + 1.0 / sigma**2))
     assert known.correlation[0, 1] == pytest.approx(-1.0, abs=5e-3)
-    assert [item.verdict for item in (worst, best)] == [Verdict.NOT, Verdict.LEARNT]
+    assert [item.verdict for item in (worst, best)] == [ContractionVerdict.NOT, ContractionVerdict.CONTRACTED]
 
 
 def test_directions_solve_the_generalised_eigenproblem_and_add_up_to_the_covariance() -> None:
@@ -90,7 +90,7 @@ def test_untold_directions_are_turned_to_the_scale_and_to_single_quantities() ->
     assert subject(found[0], values, np.ones(20)) == "all masses and inertias in proportion (the scale)"
     for item in found[1:19]:  # each moves one quantity alone
         assert np.sort(np.abs(item.displacement))[-1] == pytest.approx(1.0, abs=1e-6)
-    assert found[-1].verdict is Verdict.LEARNT
+    assert found[-1].verdict is ContractionVerdict.CONTRACTED
 
 
 # ---- words ----
@@ -125,8 +125,8 @@ def test_what_is_learnt_is_judged_by_the_central_range() -> None:
     found = compare(("a", "b"), np.stack([prior, prior], axis=1), np.stack([same, narrow / 4.0], axis=1))
     assert found["a"].shrinkage == pytest.approx(0.0, abs=0.05)
     assert found["b"].shrinkage == pytest.approx(0.75, abs=0.02)
-    assert [item.verdict for item in found.values()] == [Verdict.NOT, Verdict.LEARNT]
-    assert Learnt(1.0, 0.2).to_dict() == {"prior_sd": 1.0, "shrinkage": 0.2, "verdict": "weakly"}
+    assert [item.verdict for item in found.values()] == [ContractionVerdict.NOT, ContractionVerdict.CONTRACTED]
+    assert Contraction(1.0, 0.2).to_dict() == {"prior_sd": 1.0, "shrinkage": 0.2, "verdict": "weakly"}
 
 
 # ---- draws and profiles ----
@@ -198,7 +198,7 @@ def test_a_prediction_without_change_is_the_posterior_itself(planar_case) -> Non
     posterior = planar_case.posterior
     z = np.random.default_rng(4).normal(size=posterior.size) * 0.1
     there = posterior.at(z)
-    predictor = Predictor(posterior.model, posterior.manoeuvres, z, posterior.step)
+    predictor = InformationPredictor(posterior.model, posterior.manoeuvres, z, posterior.step)
     predicted, own = predictor.knowledge(predictor.flown), Knowledge.at(there, z)
     np.testing.assert_allclose(predicted.sd, own.sd, rtol=0.02)  # whitening windows may differ
     options = {item.name: item for item in candidates(posterior.model)}

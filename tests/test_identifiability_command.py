@@ -105,9 +105,9 @@ def test_identify_agrees_on_every_direction_and_says_what_it_learnt(made: tuple[
         assert direction["sampled_sd"] == pytest.approx(direction["sd"], rel=0.1)
     assert set(found["learnt"]) == set(names)
     for parameter in made[0]["parameters"]:
-        learnt = found["learnt"][parameter["name"]]
-        assert learnt["verdict"] == parameter["verdict"]
-        assert 1.0 - learnt["shrinkage"] == pytest.approx(1.0 - parameter["shrinkage"], rel=0.5)
+        contraction = found["learnt"][parameter["name"]]
+        assert contraction["verdict"] == parameter["verdict"]
+        assert 1.0 - contraction["shrinkage"] == pytest.approx(1.0 - parameter["shrinkage"], rel=0.5)
 
 
 def test_the_report_says_what_was_found(made: tuple[dict, str, str]) -> None:

@@ -15,8 +15,8 @@ from bayesid.inference.ensemble import BLOCK, LaplaceMove, sample
 from bayesid.inference.identification import identify
 from bayesid.inference.importance import importance_sample
 from bayesid.inference.mode import Optimum, fit, maximise
+from bayesid.inference.parameterisation import LogCholeskyParameterisation
 from bayesid.inference.proposal import StudentT
-from bayesid.inference.sampling_coordinates import LogCholeskyChart
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.robot.body_prior import coordinates_of
 from bayesid.simulation.model import Manoeuvre
@@ -61,7 +61,7 @@ def test_evidence_of_a_linear_gaussian_model(size):
     stub = LinearGaussian(size)
     optimum = stub.optimum
     assert optimum.log_evidence(stub) == pytest.approx(stub.log_evidence, abs=1e-9)
-    found = importance_sample(LogCholeskyChart(stub), optimum, np.random.default_rng(1))
+    found = importance_sample(LogCholeskyParameterisation(stub), optimum, np.random.default_rng(1))
     assert found.trusted
     assert found.error < 0.03
     assert abs(found.value - stub.log_evidence) < 4.0 * found.error
@@ -74,8 +74,8 @@ def test_evidence_of_a_linear_gaussian_model(size):
 def test_the_stated_error_of_the_evidence_is_its_scatter():
     """Over 60 seeds the scatter has a relative standard error of 9 %; four of them."""
     stub = LinearGaussian(6)
-    chart = LogCholeskyChart(stub)
-    runs = [importance_sample(chart, stub.optimum, np.random.default_rng(k), 500) for k in range(60)]
+    parameterisation = LogCholeskyParameterisation(stub)
+    runs = [importance_sample(parameterisation, stub.optimum, np.random.default_rng(k), 500) for k in range(60)]
     values, errors = np.array([(run.value, run.error) for run in runs]).T
     assert values.std() == pytest.approx(np.sqrt((errors**2).mean()), rel=0.37)
     assert abs(values.mean() - stub.log_evidence) < 4.0 * values.std() / np.sqrt(60)
@@ -86,7 +86,7 @@ def test_a_bad_proposal_is_not_trusted():
     stub = LinearGaussian(4)
     good = stub.optimum
     narrow = Optimum(good.z, good.covariance * 0.01, 0.0, 0.0, 1, True)
-    assert not importance_sample(LogCholeskyChart(stub), narrow, np.random.default_rng(0)).trusted
+    assert not importance_sample(LogCholeskyParameterisation(stub), narrow, np.random.default_rng(0)).trusted
 
 
 def test_student_t_is_normalised_and_drawn_as_stated():
@@ -127,8 +127,8 @@ def test_the_laplace_move_leaves_a_non_gaussian_target_as_it_is():
 
 
 def drawn(stub: LinearGaussian, seed: int = 3, **options):
-    chart = LogCholeskyChart(stub)
-    return sample(chart, stub.optimum, seed, **{"effective_samples": 1e9, "max_steps": 150, **options})
+    parameterisation = LogCholeskyParameterisation(stub)
+    return sample(parameterisation, stub.optimum, seed, **{"effective_samples": 1e9, "max_steps": 150, **options})
 
 
 def test_samples_of_a_known_posterior():

@@ -15,7 +15,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects import GravityGradient
-from bayesid.simulation.effects.effect import Environment, Moment
+from bayesid.simulation.effects.effect import Environment, Instant
 from bayesid.simulation.orbit import EARTH, Orbit
 from tests.reference import Reference, circular_zenith
 
@@ -31,15 +31,15 @@ def test_zenith_of_a_circular_orbit():
     np.testing.assert_allclose(state.zenith, np.stack([np.cos(n * TIME), np.sin(n * TIME), zeros], 1), atol=1e-13)
     np.testing.assert_allclose(state.velocity, np.stack([-np.sin(n * TIME), np.cos(n * TIME), zeros], 1), atol=1e-13)
     np.testing.assert_allclose(state.gradient, EARTH / 6.916e6**3, rtol=1e-14)
-    np.testing.assert_allclose(state.latitude, 1.1 + n * TIME, rtol=1e-14)
+    np.testing.assert_allclose(state.argument_of_latitude, 1.1 + n * TIME, rtol=1e-14)
 
 
 @pytest.mark.parametrize("latitude", [-2.0, 0.3, 3.1, 5.9, 40.0])
 @pytest.mark.parametrize("eccentricity", [0.01, 0.3, 0.7])
-def test_an_elliptic_orbit_obeys_newtons_law(eccentricity, latitude):
+def test_an_elliptic_orbit_obeys_newtons_law(eccentricity, argument_of_latitude):
     """Start on the ellipse (vis-viva, from the perigee's angle), integrate r'' = -mu r / r^3 to 1e-12, compare."""
     perigee, axis = 0.8, 2.4e7
-    anomaly = latitude - perigee
+    anomaly = argument_of_latitude - perigee
     semi_latus = axis * (1.0 - eccentricity**2)
     distance = semi_latus / (1.0 + eccentricity * np.cos(anomaly))
     speed = np.sqrt(EARTH / semi_latus)
@@ -50,13 +50,13 @@ def test_an_elliptic_orbit_obeys_newtons_law(eccentricity, latitude):
         return [y[2], y[3], pull * y[0], pull * y[1]]
 
     truth = solve_ivp(newton, (0.0, TIME[-1]), start, t_eval=TIME, rtol=1e-12, atol=1e-6, method="DOP853").y
-    state = Orbit(axis, eccentricity, argument_of_perigee=perigee).state(TIME, latitude)
+    state = Orbit(axis, eccentricity, argument_of_perigee=perigee).state(TIME, argument_of_latitude)
     radius = np.hypot(truth[0], truth[1])
     np.testing.assert_allclose((EARTH / state.gradient) ** (1.0 / 3.0), radius, rtol=1e-9)
     np.testing.assert_allclose(state.zenith[:, :2].T, truth[:2] / radius, atol=1e-8)
     np.testing.assert_allclose(state.velocity[:, :2].T, truth[2:] / np.hypot(truth[2], truth[3]), atol=1e-8)
     angle = np.unwrap(np.arctan2(truth[1], truth[0]))
-    np.testing.assert_allclose(state.latitude - latitude, angle, atol=1e-8)
+    np.testing.assert_allclose(state.argument_of_latitude - argument_of_latitude, angle, atol=1e-8)
     assert not state.zenith[:, 2].any()
 
 
@@ -67,7 +67,9 @@ def test_the_period(eccentricity):
     period = 2.0 * np.pi * np.sqrt(1.2e7**3 / EARTH)
     state = orbit.state([0.0, 0.5 * period, period, 3.0 * period], 0.5)
     np.testing.assert_allclose(state.zenith[:, 0], [1.0, -1.0, 1.0, 1.0], atol=1e-10)
-    np.testing.assert_allclose(state.latitude, 0.5 + np.array([0.0, np.pi, 2.0 * np.pi, 6.0 * np.pi]), atol=1e-9)
+    np.testing.assert_allclose(
+        state.argument_of_latitude, 0.5 + np.array([0.0, np.pi, 2.0 * np.pi, 6.0 * np.pi]), atol=1e-9
+    )
     distance = (EARTH / state.gradient) ** (1.0 / 3.0)
     expected = 1.2e7 * np.array([1 - eccentricity, 1 + eccentricity, 1 - eccentricity, 1 - eccentricity])
     np.testing.assert_allclose(distance, expected, rtol=1e-9)
@@ -81,9 +83,9 @@ def test_the_sun_in_orbit_axes():
     np.testing.assert_allclose(orbit.state([0.0], 0.5 * np.pi).sun, [[0.0, -0.6, 0.8]], atol=1e-15)
     assert not Orbit(7e6).state([0.0]).sun.any()
     # the angle between zenith and Sun does not depend on which axes are used
-    n, latitude = orbit.mean_motion, 0.7
-    state = orbit.state([300.0], latitude)
-    zenith = np.array([np.cos(latitude + n * 300.0), np.sin(latitude + n * 300.0), 0.0])
+    n, argument_of_latitude = orbit.mean_motion, 0.7
+    state = orbit.state([300.0], argument_of_latitude)
+    zenith = np.array([np.cos(argument_of_latitude + n * 300.0), np.sin(argument_of_latitude + n * 300.0), 0.0])
     assert state.zenith[0] @ state.sun[0] == pytest.approx(zenith @ sun, abs=1e-12)
 
 
@@ -107,7 +109,7 @@ def test_impossible_orbits(radius, eccentricity, message):
 # the paper, section 2.3: an error of 1 km in the orbit's radius changes the torque by the order of 1e-6 N m ---------
 
 
-def base_moment(radius: float, quaternion: np.ndarray) -> Moment:
+def base_moment(radius: float, quaternion: np.ndarray) -> Instant:
     """The base of ETS-VII alone on a circular orbit, as the package's effects see it."""
     robot = Robot.shipped("ets7")
     still = JointState(*np.zeros((3, 1, len(robot.joints))))
@@ -115,7 +117,7 @@ def base_moment(radius: float, quaternion: np.ndarray) -> Moment:
     state = Orbit(radius).state(np.zeros(1))
     known = (jnp.zeros(3), jnp.zeros(3), jnp.zeros(6))
     environment = Environment(jnp.zeros(()), *(jnp.asarray(field[0]) for field in state), *known)
-    return Moment(environment, composite(jnp.asarray(row)), rotation(jnp.asarray(quaternion)), *jnp.zeros((3, 3)))
+    return Instant(environment, composite(jnp.asarray(row)), rotation(jnp.asarray(quaternion)), *jnp.zeros((3, 3)))
 
 
 def reference_torque(radius: float, quaternion: np.ndarray, file) -> np.ndarray:

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from test_cli import run
 
 from bayesid._io.errors import InputError
-from bayesid.design.base_prediction import Predictor
+from bayesid.design.base_prediction import BasePredictor
 from bayesid.design.pose_region import REACH, Region
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
@@ -43,7 +43,7 @@ def motion() -> mj.Motion:
 
 
 @pytest.fixture(scope="module")
-def predictor(motion, formula_motion) -> Predictor:
+def predictor(motion, formula_motion) -> BasePredictor:
     robot = Robot.from_urdf(PLANAR)
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.01)
     sensors = (Sensor(Kind.RATE, White(1e-5)),)
@@ -52,7 +52,7 @@ def predictor(motion, formula_motion) -> Predictor:
     planned = formula_motion(motion, PLANAR, robot)
     position = planned.evaluate(time).position
     recording = Recording("plan", None, time, {f"position.joint{k + 1}": position[:, k] for k in range(2)})
-    return Predictor(model, Manoeuvre(recording, planned, ATTITUDE))
+    return BasePredictor(model, Manoeuvre(recording, planned, ATTITUDE))
 
 
 def test_the_final_pose_is_that_of_an_independent_simulator(predictor, motion):
@@ -77,10 +77,10 @@ def test_the_width_is_that_of_a_linearisation(predictor):
     known = np.array([name.startswith("initial-rate") for name in predictor.posterior.unknowns.names])
     steps = 0.1 * np.eye(predictor.posterior.size)[~known]
     ends = [predictor.courses(predictor.centre + sign * steps) for sign in (1.0, -1.0)]
-    for part, course in enumerate((prediction.base, prediction.tip)):
+    for part, trajectory in enumerate((prediction.base, prediction.tip)):
         slopes = (ends[0][part].position[:, -1] - ends[1][part].position[:, -1]) / 0.2
         linear = Region(np.zeros(3), 1e6 * slopes.T @ slopes)
-        pose = course.pose()
+        pose = trajectory.pose()
         np.testing.assert_allclose(pose.millimetres.sd, linear.sd, rtol=0.14, atol=1e-9)
         turns = [Rotation.from_quat(end[part].attitude[:, -1]) for end in ends]
         turned = np.degrees((turns[0] * turns[1].inv()).as_rotvec()) / 0.2
@@ -105,7 +105,7 @@ def test_what_cannot_be_predicted_is_an_error(predictor):
     force = {f"base_force.{axis}": np.ones(9) for axis in "xyz"}
     motion = MeasuredMotion.from_recording(Recording("plan", None, time, joints), model.robot)
     with pytest.raises(InputError, match=r"base_force.x\|y\|z: a known force acts on the base"):
-        Predictor(model, Manoeuvre(Recording("plan", None, time, {**joints, **force}), motion))
+        BasePredictor(model, Manoeuvre(Recording("plan", None, time, {**joints, **force}), motion))
     with pytest.raises(InputError, match="16 or more"):
         predictor.predict(3, np.random.default_rng(0))
 

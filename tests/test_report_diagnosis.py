@@ -16,10 +16,8 @@ from bayesid.diagnosis import (
     Status,
     Unexplained,
     Verdict,
+    candidates,
     diagnose,
-)
-from bayesid.diagnosis import (
-    candidate_effects as candidates,
 )
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.recording import Recording
@@ -66,7 +64,7 @@ def clean(biased):
 def disturbance(biased) -> Unexplained:
     """A torque about x that follows the first joint's position."""
     base = biased.before.fit
-    time = np.asarray(base.situation.stage.environment.time)[0]
+    time = np.asarray(base.operating.node.environment.time)[0]
     position = base.posterior.manoeuvres[0].motion.evaluate(time).position[:, 0]
     torque = np.stack([1e-3 * position, 0.0 * time, 0.0 * time], axis=1)
     same = {frame: [torque] for frame in Frame}

@@ -14,7 +14,7 @@ import scipy.linalg as sla
 from bayesid._io.errors import InputError
 from bayesid.inference.mode import maximise
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.whitening import Channel, NoiseModel, Whitening, apply, build
+from bayesid.inference.whitening import NoiseChannel, NoiseModel, Whitening, apply, build
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.recording.smoothing import JointSamples, smooth
@@ -33,7 +33,7 @@ TIME = np.arange(0.0, 20.0, 0.5)
 # against dense Gaussians ----------------------------------------------------------------------------------------------
 
 
-def noise_model(channels: list[Channel], time: np.ndarray = TIME, encoder: float = 1e-5) -> NoiseModel:
+def noise_model(channels: list[NoiseChannel], time: np.ndarray = TIME, encoder: float = 1e-5) -> NoiseModel:
     """Two joints with a random sensitivity; encoder noise that matters beside channels of 1e-5."""
     rng = np.random.default_rng(0)
     joints = []
@@ -74,9 +74,9 @@ EVERY = np.arange(len(TIME))
 SOME = np.delete(np.arange(0, len(TIME), 2), [3, 4, 5])
 LOW = Filter(0.25, 3)
 CASES = {
-    "plain": [Channel(1e-5, EVERY, Filter()), Channel(2e-5, EVERY, Filter())],
-    "different rows": [Channel(1e-5, EVERY, Filter()), Channel(2e-5, SOME, Filter())],
-    "filtered": [Channel(1e-5, EVERY, LOW), Channel(2e-5, EVERY, Filter(0.4, 2))],
+    "plain": [NoiseChannel(1e-5, EVERY, Filter()), NoiseChannel(2e-5, EVERY, Filter())],
+    "different rows": [NoiseChannel(1e-5, EVERY, Filter()), NoiseChannel(2e-5, SOME, Filter())],
+    "filtered": [NoiseChannel(1e-5, EVERY, LOW), NoiseChannel(2e-5, EVERY, Filter(0.4, 2))],
 }
 
 
@@ -140,7 +140,7 @@ def test_a_filter_does_not_reach_across_a_gap():
     rows = np.delete(np.arange(len(time)), gap)
     plain = Filter(0.25)
     nothing = np.zeros((0, 3, len(time), 1)), np.zeros((0, 1, len(time), 3, 3))
-    noise = NoiseModel(time, [Channel(1.0, rows, plain)], *nothing)
+    noise = NoiseModel(time, [NoiseChannel(1.0, rows, plain)], *nothing)
     result = build(noise, window=0)
     half = len(plain.taps(0.5)) // 2
     expected = [*range(half, 50 - half), *range(60 + half, len(time) - half)]
@@ -153,7 +153,7 @@ def test_a_filter_does_not_reach_across_a_gap():
 
 
 def test_a_filter_longer_than_the_record_is_refused():
-    noise = noise_model([Channel(1e-5, EVERY[:20], Filter(0.05))])
+    noise = noise_model([NoiseChannel(1e-5, EVERY[:20], Filter(0.05))])
     with pytest.raises(InputError, match=r"the low-pass filter needs 133 evenly spaced samples and none fit"):
         build(noise)
 

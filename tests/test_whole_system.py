@@ -12,9 +12,9 @@ from scipy import stats
 
 from bayesid.inference import identify
 from bayesid.inference.mode import fit
+from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.proposal import StudentT
-from bayesid.inference.sampling_coordinates import LinearChart
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, draw_inertial
@@ -124,7 +124,7 @@ def check_distances(first: Posterior, folder: Path) -> None:
         posterior = first.with_manoeuvres([flown(robot, folder, rng)])
         z = true_point(posterior, robot)
         optimum = fit(posterior.at(z), z)  # from the truth, to save time; the next test starts at the prior's centre
-        square, bodies = squared_distance(posterior, LinearChart(posterior).proposal(optimum), z)
+        square, bodies = squared_distance(posterior, LinearParameterisation(posterior).proposal(optimum), z)
         distances.append(square)
     reference = stats.chi2(bodies)
     assert stats.kstest(distances, reference.cdf).pvalue > 0.01

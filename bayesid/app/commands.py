@@ -18,11 +18,10 @@ from bayesid.app.demonstration import copy_demonstration
 from bayesid.app.schema import Study
 from bayesid.app.study_to_design import ASSUMED, assumed_encoders, encoders, fingerprint, load_problem
 from bayesid.app.study_to_model import load_manoeuvres, load_model, load_posterior
-from bayesid.design import Search, Store, best_design
-from bayesid.design import designed as design
-from bayesid.design.base_prediction import Predictor
+from bayesid.design import Search, Store, best_design, design
+from bayesid.design.base_prediction import BasePredictor
 from bayesid.diagnosis import Diagnosis, diagnose, identify_extended
-from bayesid.identifiability.unidentifiable import untold_sentences
+from bayesid.identifiability.unidentifiable import unidentifiable_sentences
 from bayesid.inference import Identification
 from bayesid.inference import identify as identify_posterior
 from bayesid.inference.ensemble import Progress
@@ -164,7 +163,7 @@ def run_predict(
     streams, predictors, predictions = np.random.SeedSequence(seed).spawn(len(manoeuvres)), [], []
     for index, (manoeuvre, stream) in enumerate(zip(manoeuvres, streams, strict=True)):
         progress(index / len(manoeuvres), f"predicting {manoeuvre.recording.name}")
-        predictors.append(Predictor(model, manoeuvre, tip))
+        predictors.append(BasePredictor(model, manoeuvre, tip))
         predictions.append(predictors[-1].predict(draws, np.random.default_rng(stream)))
     with complete_folder(output) as folder:
         write_json(folder / "prediction.json", {"recordings": [prediction.to_dict() for prediction in predictions]})
@@ -259,7 +258,7 @@ def _summary(result: Identification) -> Iterator[str]:
     yield f"chi-square {result.optimum.chi2:.0f} over {result.posterior.samples} samples."
     for name, body in result.bodies.items():
         yield f"{name}: mass {body.mean[0]:.6g} +- {body.sd[0]:.2g} kg"
-    yield from untold_sentences(result)
+    yield from unidentifiable_sentences(result)
     yield from result.disagreements
 
 

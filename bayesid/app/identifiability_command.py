@@ -37,12 +37,12 @@ def run_identifiability(
         content |= {"basis": "not evaluated", "directions": [], "parameters": [], "advice": []}
     else:
         progress(0.0, "fitting")
-        ground = prepare(study, seed)
-        statement = ground.statement
+        linearisation_point = prepare(study, seed)
+        statement = linearisation_point.statement
         result = practical(
-            ground.posterior,
-            ground.optimum,
-            ground.basis,
+            linearisation_point.posterior,
+            linearisation_point.optimum,
+            linearisation_point.basis,
             seed,
             effective_samples=effective_samples,
             profiles=profiles,

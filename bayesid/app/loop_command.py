@@ -81,8 +81,13 @@ def problem_of(study: Study) -> Problem:
     plan = Plan(model, family, INTERVAL, Tip.of(model.robot, section.tip_frame))
     if study.recordings:
         first = study.recordings[0]
-        latitude = first.argument_of_latitude or 0.0
-        plan = replace(plan, attitude=np.array(first.attitude), attitude_sigma=first.attitude_sigma, latitude=latitude)
+        argument_of_latitude = first.argument_of_latitude or 0.0
+        plan = replace(
+            plan,
+            attitude=np.array(first.attitude),
+            attitude_sigma=first.attitude_sigma,
+            argument_of_latitude=argument_of_latitude,
+        )
     return Problem(plan, Limits(**section.limits.model_dump()), (DOptimal(),))
 
 

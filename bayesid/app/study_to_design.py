@@ -31,7 +31,7 @@ from bayesid.design.extended_posture import extended_posture
 from bayesid.design.motion_limits import Limits
 from bayesid.design.plan import Plan
 from bayesid.design.predicted_posterior import Encoder
-from bayesid.design.trajectories import BSplines, Fourier, PaperExcitation, Parameterisation
+from bayesid.design.trajectories import BSplines, Fourier, PaperExcitation, TrajectoryFamily
 from bayesid.robot.end_effector import Tip
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import create
@@ -86,7 +86,7 @@ def load_problem(study: Study) -> Problem:
             tip=tip,
             attitude=np.array(section.attitude),
             attitude_sigma=section.attitude_sigma,
-            latitude=section.argument_of_latitude,
+            argument_of_latitude=section.argument_of_latitude,
             step=_step(model, section, limits),
             thinning=math.ceil(section.duration / section.interval / SAMPLES),
         )
@@ -142,7 +142,7 @@ def _criterion(name: str, section: DesignSection) -> Criterion:
     return next(criterion for criterion in CRITERIA if criterion.name == name)
 
 
-def _family(robot: Robot, section: DesignSection, tip: Tip) -> Parameterisation:
+def _family(robot: Robot, section: DesignSection, tip: Tip) -> TrajectoryFamily:
     names = [joint.name for joint in robot.joints]
     moving = [
         _joint_index(name, names, f"design.joints #{number}")

@@ -20,7 +20,7 @@ from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.simulation.model import Manoeuvre, Model
 
-__all__ = ["Ground", "missing_part", "prepare"]
+__all__ = ["LinearisationPoint", "missing_part", "prepare"]
 
 
 MISFIT = 3.0
@@ -28,7 +28,7 @@ MISFIT = 3.0
 
 
 @dataclass(frozen=True)
-class Ground:
+class LinearisationPoint:
     """A posterior with its mode.
 
     Attributes
@@ -50,7 +50,7 @@ def missing_part(study: Study) -> str:
     return "" if study.unknowns.bodies else "the study has no [unknowns] bodies"
 
 
-def prepare(study: Study, seed: int) -> Ground:
+def prepare(study: Study, seed: int) -> LinearisationPoint:
     """Fit the recordings of a study, or take its motion for a plan where they lack what a declared sensor reads."""
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
@@ -65,10 +65,12 @@ def prepare(study: Study, seed: int) -> Ground:
     )
     if optimum.chi2 - refined.samples > MISFIT * np.sqrt(2.0 * refined.samples):
         statement += " The model does not explain the data: what follows supposes that it does, so diagnose them first."
-    return Ground(Basis.FIT, statement, refined, optimum)
+    return LinearisationPoint(Basis.FIT, statement, refined, optimum)
 
 
-def _predicted(study: Study, model: Model, manoeuvres: Sequence[Manoeuvre], lacking: Sequence[str]) -> Ground:
+def _predicted(
+    study: Study, model: Model, manoeuvres: Sequence[Manoeuvre], lacking: Sequence[str]
+) -> LinearisationPoint:
     robot, noise = model.robot, encoders(study, model.robot)
     planned = []
     for section, manoeuvre in zip(study.recordings, manoeuvres, strict=True):
@@ -86,7 +88,7 @@ def _predicted(study: Study, model: Model, manoeuvres: Sequence[Manoeuvre], lack
     )
     if guessed := assumed_encoders(study, robot):
         statement += f" The study gives no encoder noise of {', '.join(guessed)}: {ASSUMED:g} rad or m is assumed."
-    return Ground(Basis.PREDICTION, statement, posterior, fit(posterior, centre))
+    return LinearisationPoint(Basis.PREDICTION, statement, posterior, fit(posterior, centre))
 
 
 def _lacking(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[str]:

@@ -134,7 +134,7 @@ def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Man
         motion=motion,
         attitude=np.array(section.attitude),
         attitude_sigma=section.attitude_sigma,
-        latitude=section.argument_of_latitude or 0.0,
+        argument_of_latitude=section.argument_of_latitude or 0.0,
     )
 
 

@@ -25,7 +25,7 @@ from bayesid.design.plan import Plan
 from bayesid.design.predicted_posterior import Predicted, planned_manoeuvre, planned_posterior, predict
 from bayesid.design.search_store import Store
 from bayesid.design.simulated_spacecraft import PlannedMotion, SimulatedSpacecraft, Spacecraft
-from bayesid.design.trajectories import BSplines, Fourier, Linear, PaperExcitation, Parameterisation
+from bayesid.design.trajectories import BSplines, Fourier, Linear, PaperExcitation, TrajectoryFamily
 from bayesid.design.trajectory_search import Found, Search, optimise
 from bayesid.robot.end_effector import Tip
 
@@ -49,7 +49,7 @@ __all__ = [
     "Paper26",
     "Paper26Intended",
     "PaperExcitation",
-    "Parameterisation",
+    "TrajectoryFamily",
     "Plan",
     "PlannedMotion",
     "Predicted",

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.design.pose_trajectory import Course
+from bayesid.design.pose_trajectory import PoseTrajectory
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.simulated_recordings import blank_channels
 from bayesid.recording.recording import Recording
@@ -25,7 +25,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor, White
 
-__all__ = ["Prediction", "Predictor", "last_link", "predict"]
+__all__ = ["Prediction", "BasePredictor", "last_link", "predict"]
 
 ATTITUDE = Sensor(Kind.ATTITUDE, White(1e-6))
 """Fixes the integration step: its error is below a hundredth of this angle [rad]."""
@@ -55,8 +55,8 @@ class Prediction:
     name: str
     tip_frame: str
     rate: Floats
-    base: Course
-    tip: Course
+    base: PoseTrajectory
+    tip: PoseTrajectory
 
     def to_dict(self) -> dict[str, Any]:
         """Content of one recording in prediction.json."""
@@ -71,7 +71,7 @@ class Prediction:
         }
 
 
-class Predictor:
+class BasePredictor:
     """Base and end-effector of one manoeuvre as functions of the unknowns.
 
     Parameters
@@ -89,7 +89,7 @@ class Predictor:
     """
 
     def __init__(
-        self, model: Model, manoeuvre: Manoeuvre, tip_frame: str | None = None, like: Predictor | None = None
+        self, model: Model, manoeuvre: Manoeuvre, tip_frame: str | None = None, like: BasePredictor | None = None
     ) -> None:
         self.name, self.tip_frame = manoeuvre.recording.name, tip_frame or last_link(model.robot)
         planned = replace(manoeuvre, recording=_planned(manoeuvre.recording), motion=_Exact(manoeuvre.motion))
@@ -120,18 +120,18 @@ class Predictor:
         z[: 10 * len(bodies)] = 0.0
         return z
 
-    def courses(self, z: Floats) -> tuple[Course, Course]:
+    def courses(self, z: Floats) -> tuple[PoseTrajectory, PoseTrajectory]:
         """Return the courses of base and end-effector at many points, shape (n, size)."""
         moments = [self.posterior.trace(point, self.posterior.data).sample for point in z]
         count = len(self.time)
-        com = np.stack([np.asarray(moment.body.com)[0, :count] for moment in moments])
-        turn = np.stack([np.asarray(moment.attitude)[0, :count] for moment in moments])
+        com = np.stack([np.asarray(instant.body.com)[0, :count] for instant in moments])
+        turn = np.stack([np.asarray(instant.attitude)[0, :count] for instant in moments])
         place = np.einsum("ntij,ntj->nti", turn, com)
         base = place[:, :1] - place
         tip = base + np.einsum("ntij,tj->nti", turn, self._tip[:, :3, 3])
         return (
-            Course(self.time, base, _quaternions(turn)),
-            Course(self.time, tip, _quaternions(turn @ self._tip[:, :3, :3])),
+            PoseTrajectory(self.time, base, _quaternions(turn)),
+            PoseTrajectory(self.time, tip, _quaternions(turn @ self._tip[:, :3, :3])),
         )
 
 
@@ -148,11 +148,11 @@ def predict(
     Parameters
     ----------
     model, manoeuvre, tip_frame
-        See `Predictor`.
+        See `BasePredictor`.
     draws : int
         Of the prior.
     """
-    return Predictor(model, manoeuvre, tip_frame).predict(draws, rng)
+    return BasePredictor(model, manoeuvre, tip_frame).predict(draws, rng)
 
 
 def last_link(robot: Robot) -> str:

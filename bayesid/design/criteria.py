@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from bayesid._io.errors import InputError
-from bayesid.design.plan import Outcome, Plan
+from bayesid.design.plan import Plan, PlannedOutcome
 
 __all__ = [
     "AOptimal",
@@ -46,12 +46,12 @@ class Criterion(Protocol):
         """Points of the prior to average over."""
         ...
 
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return a number to be minimised, differentiable by JAX."""
         ...
 
 
-def covariance(plan: Plan, outcome: Outcome) -> Array:
+def covariance(plan: Plan, outcome: PlannedOutcome) -> Array:
     """Posterior covariance (Laplace) of the log-Cholesky coordinates of the bodies to identify, all else marginalised.
 
     These are relative: a mass is known to twice the coordinate's standard deviation.
@@ -59,7 +59,7 @@ def covariance(plan: Plan, outcome: Outcome) -> Array:
     return _of_bodies(plan, outcome.information + _prior(plan, outcome))
 
 
-def _prior(plan: Plan, outcome: Outcome) -> Array:
+def _prior(plan: Plan, outcome: PlannedOutcome) -> Array:
     return jnp.eye(plan.unknowns.size) if outcome.prior is None else outcome.prior
 
 
@@ -80,7 +80,7 @@ class Paper26:
     name: ClassVar[str] = "paper-26"
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return minus (26)."""
         squares = _largest_squares(outcome)
         value = jnp.sum(squares)
@@ -99,7 +99,7 @@ class Paper26Intended:
     name: ClassVar[str] = "paper-26-intended"
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return minus (26) with the sizes of the differences."""
         squares = _largest_squares(outcome)
         value = jnp.sum(squares)
@@ -119,7 +119,7 @@ class ConditionNumber:
     name: ClassVar[str] = "condition-number"
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return the logarithm of the largest singular value over the smallest."""
         squares = jnp.linalg.eigvalsh(outcome.regressor.T @ outcome.regressor)
         return 0.5 * (jnp.log(squares[-1]) - jnp.log(jnp.maximum(squares[0], 1e-15 * squares[-1])))
@@ -132,7 +132,7 @@ class DOptimal:
     name: ClassVar[str] = "d-optimal"
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return half the log-determinant."""
         return 0.5 * jnp.linalg.slogdet(covariance(plan, outcome))[1]
 
@@ -144,7 +144,7 @@ class AOptimal:
     name: ClassVar[str] = "a-optimal"
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return the logarithm of a standard deviation."""
         return 0.5 * jnp.log(jnp.mean(jnp.diag(covariance(plan, outcome))))
 
@@ -156,7 +156,7 @@ class EOptimal:
     name: ClassVar[str] = "e-optimal"
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return the logarithm of a standard deviation."""
         return 0.5 * jnp.log(jnp.linalg.eigvalsh(covariance(plan, outcome))[-1])
 
@@ -171,7 +171,7 @@ class InformationGain:
     name: ClassVar[str] = "information-gain"
     draws: int = 4
 
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return minus the gain at one draw."""
         prior = jnp.linalg.slogdet(_of_bodies(plan, _prior(plan, outcome)))[1]
         return 0.5 * (jnp.linalg.slogdet(covariance(plan, outcome))[1] - prior)
@@ -200,7 +200,7 @@ class Separation:
                 f"{len(self.rivals)} effects to tell apart", place="design.rivals", remedy="Name at least two"
             )
 
-    def noncentrality(self, plan: Plan, outcome: Outcome) -> Array:
+    def noncentrality(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return the expected lambda (1 - rho^2) of each rival, shape (rivals,)."""
         groups = [jnp.asarray(self._coordinates(plan, label), dtype=int) for label in self.rivals]
         # a rival may have any size: its amplitude has no prior here
@@ -214,7 +214,7 @@ class Separation:
             values.append(jnp.trace(own - cross @ _inverse(total[jnp.ix_(rest, rest)]) @ cross.T))
         return jnp.stack(values)
 
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
+    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return minus the logarithm of the smallest root noncentrality."""
         return -0.5 * jnp.log(jnp.maximum(jnp.min(self.noncentrality(plan, outcome)), 1e-12))
 
@@ -229,7 +229,7 @@ class Separation:
         return found
 
 
-def _largest_squares(outcome: Outcome) -> Array:
+def _largest_squares(outcome: PlannedOutcome) -> Array:
     return jnp.max(jnp.abs(outcome.trajectory.excursion), axis=0) ** 2
 
 

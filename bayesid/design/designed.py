@@ -246,7 +246,7 @@ def evaluate(
         encoder,
         plan.attitude,
         attitude_sigma=plan.attitude_sigma,
-        latitude=plan.latitude,
+        argument_of_latitude=plan.argument_of_latitude,
     )
     posterior = planned_posterior(plan.model, [manoeuvre], like)
     return Design(

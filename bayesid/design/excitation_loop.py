@@ -22,9 +22,9 @@ from bayesid.design.knowledge_update import (
     Identifier,
     Sampled,
     bodies_of_draws,
-    carried_model,
     describe_bodies,
     known_of,
+    updated_model,
     worst_relative_sd,
 )
 from bayesid.design.loop_history import History
@@ -123,7 +123,7 @@ class Loop:
             if number < self.at_most:
                 draws = InertialDraws.read(history.path(number, "identification"))
                 problem = self.problem.knowing(known_of(self.problem.plan.unknowns, draws))
-                model = carried_model(self.problem.plan.model, draws)
+                model = updated_model(self.problem.plan.model, draws)
         history.close("at-most")
         return history
 
@@ -207,7 +207,7 @@ class Loop:
                 model.rate_sigma,
             ),
             (plan.family.name, plan.family.names, plan.family.duration, plan.interval, plan.tip.name),
-            (plan.attitude.tolist(), plan.attitude_sigma, plan.latitude, plan.step, plan.thinning),
+            (plan.attitude.tolist(), plan.attitude_sigma, plan.argument_of_latitude, plan.step, plan.thinning),
             [(limit.name, limit.bound) for limit in limits],
             (self.problem.criteria[0], self.seed, self.search, self.identifier, dict(self.encoder)),
         )
@@ -233,4 +233,4 @@ def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
             if sensor.kind is Kind.ATTITUDE:
                 sigma = max(sigma, LOOSE * float(np.max(sensor.noise.sigma(plan.interval))))
     motion = MeasuredMotion.from_recording(recording, plan.model.robot, sigma=encoder)
-    return Manoeuvre(recording, motion, attitude, attitude_sigma=sigma, latitude=plan.latitude)
+    return Manoeuvre(recording, motion, attitude, attitude_sigma=sigma, argument_of_latitude=plan.argument_of_latitude)

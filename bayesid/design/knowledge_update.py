@@ -29,7 +29,7 @@ __all__ = [
     "Laplace",
     "Sampled",
     "bodies_of_draws",
-    "carried_model",
+    "updated_model",
     "describe_bodies",
     "known_of",
     "worst_relative_sd",
@@ -102,7 +102,7 @@ class Laplace:
         return {"method": "laplace", "chi2": optimum.chi2, "samples": posterior.samples, "disagreements": []}
 
 
-def carried_model(model: Model, draws: InertialDraws) -> Model:
+def updated_model(model: Model, draws: InertialDraws) -> Model:
     """Return the model with draws of all its uncertain bodies as their joint prior."""
     names = [prior.name for prior in model.priors]
     prior = joint_prior(draws.of_bodies(names))

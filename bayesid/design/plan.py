@@ -14,19 +14,19 @@ from jax import Array
 
 from bayesid._math.arrays import Floats
 from bayesid._math.rotation import quaternion_product
-from bayesid.design.trajectories import Parameterisation
+from bayesid.design.trajectories import TrajectoryFamily
 from bayesid.inference.unknowns import Unknowns
 from bayesid.robot.end_effector import Tip
 from bayesid.robot.kinematics import joint_motion, kinematics
 from bayesid.robot.regressors import balance_regressor
 from bayesid.simulation.dynamics import Grid
-from bayesid.simulation.effects.effect import Moment, Readings
+from bayesid.simulation.effects.effect import Instant, Readings
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Kind
 from bayesid.simulation.simulator import Simulator
 from bayesid.simulation.time_grid import build_grid
 
-__all__ = ["Outcome", "Plan", "Trajectory"]
+__all__ = ["PlannedOutcome", "Plan", "Trajectory"]
 
 
 class Trajectory(NamedTuple):
@@ -50,7 +50,7 @@ class Trajectory(NamedTuple):
     acceleration: Array
 
 
-class Outcome(NamedTuple):
+class PlannedOutcome(NamedTuple):
     """What criteria judge.
 
     Attributes
@@ -94,12 +94,12 @@ class Plan:
     """
 
     model: Model
-    family: Parameterisation
+    family: TrajectoryFamily
     interval: float
     tip: Tip
     attitude: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
     attitude_sigma: float = 0.0
-    latitude: float = 0.0
+    argument_of_latitude: float = 0.0
     step: float = 2.0
     thinning: int = 1
 
@@ -150,38 +150,38 @@ class Plan:
 
     def trajectory(self, parameters: Array, z: Array) -> Trajectory:
         """Return what the robot does."""
-        stage, _, _ = self.simulator.trace(
+        node, _, _ = self.simulator.trace(
             self.unknowns.values(z), self._grid(parameters), jnp.asarray(self.attitude)[None]
         )
-        return self._trajectory(parameters, stage)
+        return self._trajectory(parameters, node)
 
     def slopes(self, parameters: Array, z: Array) -> Array:
         """Return derivatives of what the sensors read in sigmas of a sample, (T, 3 sensors, n)."""
         return self._judged(parameters, z)[1]
 
-    def outcome(self, parameters: Array, z: Array, prior: Array | None = None) -> Outcome:
+    def outcome(self, parameters: Array, z: Array, prior: Array | None = None) -> PlannedOutcome:
         """Return what criteria judge; ``prior`` is the precision (n, n) of the coordinates, one where left out."""
-        grid, slope, stage = self._judged(parameters, z)
+        grid, slope, node = self._judged(parameters, z)
         flat = slope.reshape(-1, slope.shape[-1])
-        trajectory = self._trajectory(parameters, stage)
+        trajectory = self._trajectory(parameters, node)
         bodies = jnp.asarray(self.bodies(), dtype=int)
         per_coordinate = jax.jacfwd(lambda z: self.unknowns.values(z).inertial)(z)[:, bodies]
-        tables = grid.stage.unknown[0, :, :, : 10 * len(self.model.priors)]
+        tables = grid.node.unknown[0, :, :, : 10 * len(self.model.priors)]
         wrench = balance_regressor(tables, trajectory.rate, trajectory.rate_change, trajectory.acceleration)
         wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / self._gyration)])[:, None]
         regressor = (wrench @ per_coordinate).reshape(6 * len(wrench), len(bodies))
-        return Outcome(trajectory, flat.T @ flat, regressor, prior)
+        return PlannedOutcome(trajectory, flat.T @ flat, regressor, prior)
 
-    def _judged(self, parameters: Array, z: Array) -> tuple[Grid, Array, Moment]:
+    def _judged(self, parameters: Array, z: Array) -> tuple[Grid, Array, Instant]:
         """Return the grid, the whitened derivatives of what the sensors read and the motion, from one simulation."""
         grid = self._grid(parameters)
 
-        def read(z: Array) -> tuple[Readings, tuple[Moment, Readings]]:
-            stage, _, readings = self.simulator.trace(self.unknowns.values(z), grid, jnp.asarray(self.attitude)[None])
-            return readings, (stage, readings)
+        def read(z: Array) -> tuple[Readings, tuple[Instant, Readings]]:
+            node, _, readings = self.simulator.trace(self.unknowns.values(z), grid, jnp.asarray(self.attitude)[None])
+            return readings, (node, readings)
 
-        slopes, (stage, readings) = jax.jacfwd(read, has_aux=True)(z)
-        return grid, self._slope(slopes, readings) / jnp.asarray(self.sigma)[:, None], stage
+        slopes, (node, readings) = jax.jacfwd(read, has_aux=True)(z)
+        return grid, self._slope(slopes, readings) / jnp.asarray(self.sigma)[:, None], node
 
     @property
     def _gyration(self) -> float:
@@ -197,7 +197,7 @@ class Plan:
             self.samples,
             self.step,
             orbit=self.model.orbit,
-            latitude=self.latitude,
+            argument_of_latitude=self.argument_of_latitude,
             effects=self.model.effects,
         )
         return jax.tree.map(lambda x: x[None], grid)
@@ -210,33 +210,33 @@ class Plan:
             parts.append(_turning(readings.attitude[0], slope) if kind is Kind.ATTITUDE else slope)
         return jnp.concatenate(parts, axis=1)
 
-    def _trajectory(self, parameters: Array, stage: Moment) -> Trajectory:
+    def _trajectory(self, parameters: Array, node: Instant) -> Trajectory:
         """Return the trajectory at the stages of the integration."""
-        moment = jax.tree.map(lambda x: x[0], stage)
+        instant = jax.tree.map(lambda x: x[0], node)
         # the instants, known beforehand: half steps
-        times = np.linspace(0.0, self.family.duration, moment.rate.shape[0])
+        times = np.linspace(0.0, self.family.duration, instant.rate.shape[0])
         motion = self.family.motion(parameters)
         state = motion.evaluate(times)
         pose, flow, _ = joint_motion(kinematics(self.model.robot, state), self.tip.joint)
         pose, flow = pose @ self.tip.placement, flow @ self.tip.placement
         turning = jnp.asarray(flow[:, :3, :3] @ jnp.swapaxes(pose[:, :3, :3], 1, 2))
         own_rate = jnp.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
-        body = moment.body
-        drift = -body.com_rate - jnp.cross(moment.rate, body.com)  # of the base origin, the centre of mass resting
-        speed = drift + jnp.cross(moment.rate, pose[:, :3, 3]) + flow[:, :3, 3]
-        turned = jnp.einsum("ji,tjk->tik", moment.attitude[0], moment.attitude)
+        body = instant.body
+        drift = -body.com_rate - jnp.cross(instant.rate, body.com)  # of the base origin, the centre of mass resting
+        speed = drift + jnp.cross(instant.rate, pose[:, :3, 3]) + flow[:, :3, 3]
+        turned = jnp.einsum("ji,tjk->tik", instant.attitude[0], instant.attitude)
         displaced = body.com[0] - jnp.einsum("tij,tj->ti", turned, body.com)
         return Trajectory(
             time=times,
             position=jnp.asarray(state.position),
             velocity=jnp.asarray(state.velocity),
             tip_speed=jnp.maximum(_norm(speed), _norm(flow[:, :3, 3])),
-            tip_rate=jnp.maximum(_norm(own_rate + moment.rate), _norm(own_rate)),
+            tip_rate=jnp.maximum(_norm(own_rate + instant.rate), _norm(own_rate)),
             rotation=_angle(turned),
             excursion=jnp.concatenate([displaced, _cardan(turned)], axis=1),
-            rate=moment.rate,
-            rate_change=moment.rate_change,
-            acceleration=moment.acceleration,
+            rate=instant.rate,
+            rate_change=instant.rate_change,
+            acceleration=instant.acceleration,
         )
 
 

@@ -12,11 +12,11 @@ from bayesid._math.arrays import Floats
 from bayesid.design.pose_region import CONTENT, Pose, Region
 from bayesid.inference.body_quantities import quantity
 
-__all__ = ["Course"]
+__all__ = ["PoseTrajectory"]
 
 
 @dataclass(frozen=True)
-class Course:
+class PoseTrajectory:
     """Draws of the pose of one body along the manoeuvre, orbit axes, from where the base started.
 
     Parameters

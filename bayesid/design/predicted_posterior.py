@@ -82,7 +82,7 @@ def planned_manoeuvre(
     attitude : (4,) array, optional
         Base to orbit axes at time 0.
     **start
-        ``attitude_sigma`` and ``latitude`` of `Manoeuvre`.
+        ``attitude_sigma`` and ``argument_of_latitude`` of `Manoeuvre`.
     """
     recording = Recording(
         name,

@@ -118,7 +118,7 @@ class SimulatedSpacecraft:
     seed: int = 0
     noise: bool = True
     attitude: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
-    latitude: float = 0.0
+    argument_of_latitude: float = 0.0
 
     def execute(self, plan: Recording) -> Recording:
         """Simulate a plan."""
@@ -129,7 +129,7 @@ class SimulatedSpacecraft:
             plan.time,
             name=plan.name,
             attitude=self.attitude,
-            latitude=self.latitude,
+            argument_of_latitude=self.argument_of_latitude,
             rng=np.random.default_rng([self.seed, *plan.name.encode()]) if self.noise else None,
             encoder_sigma=self.encoder_sigma if self.noise else 0.0,
         )

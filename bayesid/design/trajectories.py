@@ -23,10 +23,10 @@ from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Excitation
 from bayesid.robot.joint_state import JointState
 
-__all__ = ["BSplines", "Fourier", "Linear", "PaperExcitation", "Parameterisation", "ParameterisedMotion"]
+__all__ = ["BSplines", "Fourier", "Linear", "PaperExcitation", "TrajectoryFamily", "ParameterisedMotion"]
 
 
-class Parameterisation:
+class TrajectoryFamily:
     """A family of joint motions. Subclass it, set the attributes and override `position`.
 
     Attributes
@@ -80,7 +80,7 @@ class Parameterisation:
 class ParameterisedMotion:
     """One motion of a family; a `bayesid.recording.joint_motion.Motion` whose parameters may be traced by JAX."""
 
-    family: Parameterisation
+    family: TrajectoryFamily
     parameters: Floats | Array
 
     def evaluate(self, time: Floats) -> JointState:
@@ -90,7 +90,7 @@ class ParameterisedMotion:
         return state if traced else JointState(*(np.array(part) for part in state))
 
 
-class Linear(Parameterisation):
+class Linear(TrajectoryFamily):
     """A family of motions linear in its parameters: ``rest(t) + basis(t) parameters``."""
 
     def matrices(self, time: Floats) -> tuple[Floats, Floats]:

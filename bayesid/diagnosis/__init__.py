@@ -2,8 +2,8 @@
 
 from bayesid.diagnosis.candidate_effects import candidates
 from bayesid.diagnosis.candidate_table import Candidate
-from bayesid.diagnosis.cause_search import Hypothesis, Search
-from bayesid.diagnosis.diagnose import Diagnosis, diagnose, identify_extended
+from bayesid.diagnosis.cause_search import CauseSearch, Hypothesis
+from bayesid.diagnosis.diagnosis_run import Diagnosis, diagnose, identify_extended
 from bayesid.diagnosis.disturbing_wrench import Frame, Unexplained
 from bayesid.diagnosis.gain import Gain
 from bayesid.diagnosis.verdict import Status, Verdict
@@ -14,7 +14,7 @@ __all__ = [
     "Frame",
     "Gain",
     "Hypothesis",
-    "Search",
+    "CauseSearch",
     "Status",
     "Unexplained",
     "Verdict",

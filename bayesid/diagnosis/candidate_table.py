@@ -11,7 +11,7 @@ from scipy import stats
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.amplitude_scale import effect_mixture
-from bayesid.diagnosis.cause_search import Hypothesis, Search, significance
+from bayesid.diagnosis.cause_search import CauseSearch, Hypothesis, significance
 from bayesid.diagnosis.perturbation import physical
 from bayesid.diagnosis.score_tests import DRAWS
 from bayesid.diagnosis.test_suite import FALSE_ALARM
@@ -60,14 +60,14 @@ class Candidate:
         return np.abs(self.mean) + ONE_SIDED_95 * self.sd
 
 
-def candidate_table(search: Search) -> list[Candidate]:
+def candidate_table(search: CauseSearch) -> list[Candidate]:
     """Every candidate, the most probable first."""
     alone = {h.labels[0]: h for h in search.tried if len(h.labels) == 1}
     rows = []
     for label, effect in search.candidates.items():
         if label in alone:
             rows.append(_fitted(alone[label], search, effect))
-        elif label in search.battery.effects:
+        elif label in search.suite.effects:
             rows.append(_linear(effect, search))
         elif effect.modes_count:
             rows.append(_vibrating(effect, search))
@@ -105,7 +105,7 @@ def _reported(effect: Effect, coordinates: Floats, covariance: Floats) -> tuple[
     return np.asarray(report(point)), np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
 
 
-def _fitted(hypothesis: Hypothesis, search: Search, effect: Effect) -> Candidate:
+def _fitted(hypothesis: Hypothesis, search: CauseSearch, effect: Effect) -> Candidate:
     snr, log_p = significance(hypothesis, search.base)
     mean, sd = effect_amplitude(hypothesis, 0)
     item = search.base.outcome.scores.get(effect.label)
@@ -113,7 +113,7 @@ def _fitted(hypothesis: Hypothesis, search: Search, effect: Effect) -> Candidate
         effect.label,
         snr,
         float(np.exp(log_p)),
-        search.battery.calibration.adjusted(log_p),
+        search.suite.calibration.adjusted(log_p),
         hypothesis.log_evidence - search.base.log_evidence,
         tuple(effect.quantities),
         mean,
@@ -123,9 +123,9 @@ def _fitted(hypothesis: Hypothesis, search: Search, effect: Effect) -> Candidate
     )
 
 
-def _linear(effect: Effect, search: Search) -> Candidate:
+def _linear(effect: Effect, search: CauseSearch) -> Candidate:
     fit = search.base.fit
-    columns = search.battery.effects[effect.label]
+    columns = search.suite.effects[effect.label]
     item = search.base.outcome.scores[effect.label]
     information = fit.project(columns)
     gradient = columns.T @ fit.residual
@@ -143,7 +143,7 @@ def _linear(effect: Effect, search: Search) -> Candidate:
         effect.label,
         item.signal_to_noise,
         float(np.exp(item.log_p)),
-        search.battery.calibration.adjusted(item.log_p),
+        search.suite.calibration.adjusted(item.log_p),
         gain,
         tuple(effect.quantities),
         mean,
@@ -153,7 +153,7 @@ def _linear(effect: Effect, search: Search) -> Candidate:
     )
 
 
-def _vibrating(effect: Effect, search: Search) -> Candidate:
+def _vibrating(effect: Effect, search: CauseSearch) -> Candidate:
     items = [item for name, item in search.base.outcome.scores.items() if name.startswith("vibration")]
     best = min(items, key=lambda item: item.log_p)
     log_p = min(0.0, best.log_p + float(np.log(len(items))))
@@ -163,7 +163,7 @@ def _vibrating(effect: Effect, search: Search) -> Candidate:
         effect.label,
         best.signal_to_noise,
         float(np.exp(log_p)),
-        search.battery.calibration.adjusted(best.log_p),
+        search.suite.calibration.adjusted(best.log_p),
         None,
         (),
         nothing,
@@ -173,14 +173,14 @@ def _vibrating(effect: Effect, search: Search) -> Candidate:
     )
 
 
-def _noise(label: str, log_p: float, hypothesis: Hypothesis | None, search: Search) -> Candidate:
+def _noise(label: str, log_p: float, hypothesis: Hypothesis | None, search: CauseSearch) -> Candidate:
     fault = hypothesis.faults[0] if hypothesis is not None and hypothesis.faults else None
     snr = float(max(stats.norm.isf(np.exp(max(log_p, -700.0))), 0.0))
     return Candidate(
         label,
         significance(hypothesis, search.base)[0] if hypothesis is not None and label == "initial-rate" else snr,
         float(np.exp(log_p)),
-        search.battery.calibration.adjusted(log_p),
+        search.suite.calibration.adjusted(log_p),
         None if hypothesis is None else hypothesis.log_evidence - search.base.log_evidence,
         () if fault is None else fault.quantities,
         np.zeros(0) if fault is None else fault.mean,
@@ -190,9 +190,9 @@ def _noise(label: str, log_p: float, hypothesis: Hypothesis | None, search: Sear
     )
 
 
-def detection_power(degrees: int, information: float, search: Search) -> float:
+def detection_power(degrees: int, information: float, search: CauseSearch) -> float:
     """Probability of an alarm by an effect with this noncentrality and so many degrees of freedom."""
     if degrees == 0:
         return FALSE_ALARM
-    threshold = np.exp(search.battery.calibration.smallest[DRAWS // 100])
+    threshold = np.exp(search.suite.calibration.smallest[DRAWS // 100])
     return float(stats.ncx2.sf(stats.chi2.isf(threshold, degrees), degrees, max(information, 1e-9)))

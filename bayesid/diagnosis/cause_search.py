@@ -1,7 +1,7 @@
 """The search for causes: which sets of effects and noise faults leave nothing but noise.
 
 From the present model outwards: every candidate alone, then the best of them with one more, then with two more. The
-gate is the calibrated test of what a fit leaves (`Battery`); evidence ranks what passes.
+gate is the calibrated test of what a fit leaves (`TestSuite`); evidence ranks what passes.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.fit_starts import starts_of
 from bayesid.diagnosis.noise_faults import NoiseFault, noise_fault, refined
-from bayesid.diagnosis.perturbation import Situation
+from bayesid.diagnosis.perturbation import OperatingTrajectory
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.score_tests import chi2_log_sf
-from bayesid.diagnosis.test_suite import FALSE_ALARM, Battery, Outcome
+from bayesid.diagnosis.test_suite import FALSE_ALARM, SuiteOutcome, TestSuite
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 
-__all__ = ["Hypothesis", "Search"]
+__all__ = ["Hypothesis", "CauseSearch"]
 
 MOST_CAUSES = 3
 BEAM = (4, 3)
@@ -49,7 +49,7 @@ SPARE = 60.0
 """And whatever it takes, if less than this is left."""
 
 
-class Kind(Enum):
+class HypothesisKind(Enum):
     """Kinds of causes in the order in which they are tried: noise is blamed last."""
 
     FORCE = "effect without inner motion"
@@ -73,7 +73,7 @@ class Hypothesis:
     engine: Engine
     fit: Fit
     faults: tuple[NoiseFault, ...]
-    outcome: Outcome
+    outcome: SuiteOutcome
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -96,7 +96,7 @@ class Hypothesis:
         return self.outcome.adequate
 
 
-class Search:
+class CauseSearch:
     """Fits and tests of hypotheses for one study.
 
     Parameters
@@ -122,7 +122,7 @@ class Search:
         self.candidates = {effect.label: effect for effect in candidates}
         self.seed = seed
         self._tell = progress or (lambda fraction, text: None)
-        self._batteries: dict[tuple[str, ...], Battery] = {}
+        self._batteries: dict[tuple[str, ...], TestSuite] = {}
         self._done: dict[frozenset[str], Hypothesis] = {}
         engine = Engine(posterior, frozen)
         self._tell(0.0, "compiling the simulation")
@@ -132,8 +132,8 @@ class Search:
         engine = engine.with_posterior(posterior.at(first.z))
         fit = engine.fit(z=first.z)
         self._tell(0.1, "testing what it leaves")
-        self.battery = self._battery_of(engine, fit, ())
-        self.base = Hypothesis(engine, fit, (), self.battery.outcome(fit))
+        self.suite = self._battery_of(engine, fit, ())
+        self.base = Hypothesis(engine, fit, (), self.suite.outcome(fit))
 
     def run(self) -> list[Hypothesis]:
         """Return the adequate hypotheses with fewest causes, best first; empty where none is found."""
@@ -142,8 +142,8 @@ class Search:
         beam, simpler = [self.base], list[Hypothesis]()
         for count in range(1, MOST_CAUSES + 1):
             found: list[Hypothesis] = []
-            for parent, kind in [(parent, kind) for kind in Kind for parent in beam]:
-                if kind is not Kind.FORCE and any(hypothesis.adequate for hypothesis in found):
+            for parent, kind in [(parent, kind) for kind in HypothesisKind for parent in beam]:
+                if kind is not HypothesisKind.FORCE and any(hypothesis.adequate for hypothesis in found):
                     break  # the simplest that explains the residual is taken
                 additions = self._additions(parent, kind, TRIED[count - 1])
                 for number, label in enumerate(additions):
@@ -195,18 +195,18 @@ class Search:
                 taken[label] = best
         return taken
 
-    def _additions(self, parent: Hypothesis, kind: Kind, most: int) -> list[str]:
+    def _additions(self, parent: Hypothesis, kind: HypothesisKind, most: int) -> list[str]:
         """Candidates of one kind that are worth adding, most promising first."""
-        if kind is Kind.NOISE and (parent.noisy or len(parent.labels) > 1):
+        if kind is HypothesisKind.NOISE and (parent.noisy or len(parent.labels) > 1):
             return []  # noise explains anything if it may be combined at will
-        if kind is not Kind.NOISE and parent.noisy and len(parent.labels) > 1:
+        if kind is not HypothesisKind.NOISE and parent.noisy and len(parent.labels) > 1:
             return []
-        if kind is Kind.NOISE:
+        if kind is HypothesisKind.NOISE:
             return [
                 label
                 for label, log_p in parent.outcome.log_p.items()
                 if ("noise" in label or label.startswith(("outliers", "quantisation")))
-                and self.battery.calibration.adjusted(log_p) < FALSE_ALARM
+                and self.suite.calibration.adjusted(log_p) < FALSE_ALARM
                 and label not in parent.labels
             ]
         taken = self.predicted(parent)
@@ -216,24 +216,28 @@ class Search:
             for label, gain in sorted(taken.items(), key=lambda item: -item[1])
             if gain > 6.0 and (gain > NEAR * best or best - gain < SPARE or (parent.labels and gain > 0.3 * best))
         ]
-        chosen = [label for label in worth if (self.candidates[label].modes_count > 0) == (kind is Kind.VIBRATION)]
-        if kind is Kind.FORCE and self.base.engine.frozen.size and "initial-rate" not in parent.labels:
+        chosen = [
+            label for label in worth if (self.candidates[label].modes_count > 0) == (kind is HypothesisKind.VIBRATION)
+        ]
+        if kind is HypothesisKind.FORCE and self.base.engine.frozen.size and "initial-rate" not in parent.labels:
             chosen.insert(0, "initial-rate")
-        if kind is Kind.FORCE and _strayed(parent.fit):  # a score at the wrong place says little of an effect's size
+        if kind is HypothesisKind.FORCE and _strayed(
+            parent.fit
+        ):  # a score at the wrong place says little of an effect's size
             sure = [label for label, effect in self.candidates.items() if not effect.parameters]
             chosen = [label for label in sure if label not in (*chosen, *parent.labels)] + chosen
         return chosen[:most]
 
     def _with_effect(self, parent: Hypothesis, effect: Effect) -> Hypothesis | None:
         best: Fit | None = None
-        places: list[tuple[Floats | None, Situation | None]] = [(parent.fit.z, parent.fit.situation)]
+        places: list[tuple[Floats | None, OperatingTrajectory | None]] = [(parent.fit.z, parent.fit.operating)]
         if _strayed(parent.fit):
             places.append((None, None))
         starts = starts_of(effect, parent.engine, parent.fit, self._battery(parent))
-        for (z, situation), start in product(places, starts):
+        for (z, operating), start in product(places, starts):
             try:
                 fit = parent.engine.fit(
-                    (*parent.fit.effects, effect), (*parent.fit.coordinates, start), z=z, situation=situation
+                    (*parent.fit.effects, effect), (*parent.fit.coordinates, start), z=z, operating=operating
                 )
             except InputError:  # no motion from this start
                 continue
@@ -277,12 +281,12 @@ class Search:
         faults = (*parent.faults, fault)
         return Hypothesis(engine, fit, faults, self._battery_of(engine, fit, labels).outcome(fit))
 
-    def _battery(self, hypothesis: Hypothesis) -> Battery:
+    def _battery(self, hypothesis: Hypothesis) -> TestSuite:
         return self._battery_of(hypothesis.engine, hypothesis.fit, tuple(sorted(f.label for f in hypothesis.faults)))
 
-    def _battery_of(self, engine: Engine, fit: Fit, faults: tuple[str, ...]) -> Battery:
+    def _battery_of(self, engine: Engine, fit: Fit, faults: tuple[str, ...]) -> TestSuite:
         if faults not in self._batteries:
-            self._batteries[faults] = Battery(engine, fit, list(self.candidates.values()), self.seed)
+            self._batteries[faults] = TestSuite(engine, fit, list(self.candidates.values()), self.seed)
         return self._batteries[faults]
 
 

@@ -90,8 +90,8 @@ def unexplained_wrench(hypothesis: Hypothesis, name_frame: bool = True) -> Unexp
     """
     fit = hypothesis.fit
     count = len(fit.posterior.manoeuvres)
-    stage = fit.situation.stage
-    times = np.asarray(stage.environment.time)
+    node = fit.operating.node
+    times = np.asarray(node.environment.time)
     rotations = _frames(hypothesis)
     columns = np.concatenate([_responses(hypothesis, rotations[Frame.BASE][0], kind) for kind in (3, 0)], axis=1)
     gram, gradient = fit.project(columns), columns.T @ fit.residual
@@ -150,17 +150,17 @@ def _waves(time: Floats) -> Floats:
 
 def _frames(hypothesis: Hypothesis) -> dict[Frame, tuple[Floats, Floats]]:
     """Rotations from each frame to the base at stages (R, S, 3, 3) and samples (R, T, 3, 3)."""
-    situation = hypothesis.fit.situation
+    operating = hypothesis.fit.operating
     result: dict[Frame, list[Floats]] = {frame: [] for frame in Frame}
-    for moment in (situation.stage, situation.sample):
-        attitude = np.asarray(moment.attitude)  # base to orbit axes
+    for instant in (operating.node, operating.sample):
+        attitude = np.asarray(instant.attitude)  # base to orbit axes
         to_base = np.swapaxes(attitude, -1, -2)
-        zenith = np.asarray(moment.environment.zenith)
-        latitude = np.asarray(moment.environment.latitude)
+        zenith = np.asarray(instant.environment.zenith)
+        argument_of_latitude = np.asarray(instant.environment.argument_of_latitude)
         there = np.linalg.norm(zenith, axis=-1).min() > 0.5
         normal = np.zeros_like(zenith) + np.array([0.0, 0.0, 1.0])
         local = np.stack([zenith, np.cross(normal, zenith), normal], axis=-1) if there else np.eye(3) + 0.0 * attitude
-        start = latitude[:, :1] if there else np.zeros((len(attitude), 1))
+        start = argument_of_latitude[:, :1] if there else np.zeros((len(attitude), 1))
         cos, sin, zero = np.cos(start), np.sin(start), 0.0 * start
         # node axes seen in the recording's orbit axes
         rows = [np.stack(row, axis=-1) for row in ((cos, sin, zero), (-sin, cos, zero), (zero, zero, zero + 1.0))]
@@ -174,15 +174,15 @@ def _frames(hypothesis: Hypothesis) -> dict[Frame, tuple[Floats, Floats]]:
 def _responses(hypothesis: Hypothesis, frames: Floats, first: int, samples: Floats | None = None) -> Floats:
     """Responses to cosines of a torque (first = 3) or force (0) along the axes of frames: (N, R WAVES 3)."""
     engine, fit = hypothesis.engine, hypothesis.fit
-    situation = fit.situation
+    operating = fit.operating
     data = engine.data_of(fit)
     count = len(fit.posterior.manoeuvres)
     scale = TORQUE if first == 3 else FORCE
     sides = []
-    for moment, turn in ((situation.stage, frames), (situation.sample, samples)):
-        time = np.asarray(moment.environment.time)
+    for instant, turn in ((operating.node, frames), (operating.sample, samples)):
+        time = np.asarray(instant.environment.time)
         axes = np.broadcast_to(np.eye(3), (*time.shape, 3, 3)) if turn is None else turn
-        sides.append((time, axes, np.asarray(moment.body.com)))
+        sides.append((time, axes, np.asarray(instant.body.com)))
     found = []
     for r in range(count):
         wrenches = []
@@ -194,8 +194,8 @@ def _responses(hypothesis: Hypothesis, frames: Floats, first: int, samples: Floa
             if first == 0:
                 wrench[:, :, r, :, 3:] = np.cross(com[r], direction)
             wrenches.append(wrench.reshape(WAVES * 3, *time.shape, 6))
-        push = engine.push(WAVES * 3, stage_wrench=wrenches[0], sample_wrench=wrenches[1])
-        found.append(engine.respond(push, fit.z, data))
+        perturbation = engine.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
+        found.append(engine.respond(perturbation, fit.z, data))
     return np.concatenate(found, axis=1)
 
 
@@ -204,7 +204,7 @@ def _fixed_in(hypothesis: Hypothesis, rotations: dict[Frame, tuple[Floats, Float
     fit = hypothesis.fit
     explained = {}
     whole = 0.0
-    orbit = float(np.linalg.norm(np.asarray(fit.situation.stage.environment.zenith)[0, 0])) > 0.5
+    orbit = float(np.linalg.norm(np.asarray(fit.operating.node.environment.zenith)[0, 0])) > 0.5
     for frame in Frame if orbit else (Frame.BASE, Frame.INERTIAL):
         columns = _responses(hypothesis, rotations[frame][0], 3, rotations[frame][1])
         gram, gradient = fit.project(columns), columns.T @ fit.residual
@@ -227,9 +227,9 @@ def _one_direction(gram: Floats, gradient: Floats, scale: float, direction: Floa
     taken = 0.0
     for _ in range(ROUNDS):
         inner = np.einsum("kalb,a,b->kl", gram, direction, direction) + scale**-2 * np.eye(len(gram))
-        course = np.linalg.solve(inner, gradient @ direction)
-        taken = float(gradient @ direction @ course)
-        quadratic = np.einsum("kalb,k,l->ab", gram, course, course)
-        direction = np.linalg.solve(quadratic + 1e-9 * np.trace(quadratic) * np.eye(3), course @ gradient)
+        trajectory = np.linalg.solve(inner, gradient @ direction)
+        taken = float(gradient @ direction @ trajectory)
+        quadratic = np.einsum("kalb,k,l->ab", gram, trajectory, trajectory)
+        direction = np.linalg.solve(quadratic + 1e-9 * np.trace(quadratic) * np.eye(3), trajectory @ gradient)
         direction = direction / np.linalg.norm(direction)
     return taken

@@ -10,7 +10,7 @@ from scipy.special import erfinv
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.omnibus_tests import LIGHT, MODAL, PAIRS
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
-from bayesid.diagnosis.test_suite import Battery
+from bayesid.diagnosis.test_suite import TestSuite
 from bayesid.simulation.effects.effect import Effect, Parameter, Prior
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh
 
@@ -32,12 +32,12 @@ RIDGE = 1.0
 """Prior information on the entries of the coupling matrix, at its scale."""
 
 
-def starts_of(effect: Effect, engine: Engine, fit: Fit, battery: Battery) -> Sequence[Floats]:
+def starts_of(effect: Effect, engine: Engine, fit: Fit, suite: TestSuite) -> Sequence[Floats]:
     """Coordinates to start a fit from."""
     if not isinstance(effect, FlexibleAppendage | FuelSlosh):
         return effect.starts
     ranked = []
-    for frequency, columns in battery.vibrations.items():
+    for frequency, columns in suite.vibrations.items():
         gram = fit.project(columns)
         gradient = columns.T @ fit.residual
         entries = -np.linalg.solve(gram + RIDGE * np.eye(21), gradient)

@@ -98,7 +98,7 @@ def _held_out(hypothesis: Hypothesis) -> Floats:
         outputs = [item.outputs for item in fit.posterior.whitenings]
         masks = [own if i == r else np.zeros_like(own) for i, own in enumerate(outputs)]
         without = engine.with_posterior(fit.posterior.without(masks))
-        rest = without.fit(fit.effects, fit.coordinates, z=fit.z, situation=fit.situation)
+        rest = without.fit(fit.effects, fit.coordinates, z=fit.z, operating=fit.operating)
         scores.append(_bare(hypothesis) - _bare_fit(rest.cost, rest.hessian[0]) + constant[r])
     return np.array(scores)
 

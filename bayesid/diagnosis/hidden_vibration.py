@@ -17,7 +17,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 from bayesid._math.arrays import Floats
 from bayesid._math.small_matrices import solve_small
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
-from bayesid.simulation.effects.effect import Effect, Moment
+from bayesid.simulation.effects.effect import Effect, Instant
 
 __all__ = ["Vibration"]
 
@@ -37,35 +37,33 @@ class Vibration(NamedTuple):
     """
 
     forcing: Floats
-    yielding: Floats
+    compliance: Floats
     times: tuple[Floats, Floats]
     com: tuple[Floats, Floats]
 
     @classmethod
-    def along(cls, stage: Moment, sample: Moment, steps: Floats) -> Vibration:
+    def along(cls, node: Instant, sample: Instant, steps: Floats) -> Vibration:
         """Prepare the forcing from a motion without vibrations."""
-        times = np.asarray(stage.environment.time)
+        times = np.asarray(node.environment.time)
         end = float(times.max())
         fine = FINE * np.arange(int(np.ceil(end / FINE)) + 2)
-        rate = np.asarray(stage.rate)
+        rate = np.asarray(node.rate)
         spread = rate[..., :, None] * rate[..., None, :] - (rate**2).sum(axis=-1)[..., None, None] * np.eye(3)
-        parts = [np.asarray(stage.acceleration), np.asarray(stage.rate_change), spread.reshape(*rate.shape[:2], 9)]
-        drive = np.concatenate(parts, axis=-1)
-        forcing, yielding = [], []
+        parts = [np.asarray(node.acceleration), np.asarray(node.rate_change), spread.reshape(*rate.shape[:2], 9)]
+        excitation = np.concatenate(parts, axis=-1)
+        forcing, compliance = [], []
         for index in range(len(times)):
             own = np.concatenate([[True], np.diff(times[index]) > 0.0])  # padding repeats the last instant
             inside = np.minimum(fine, times[index].max())
-            forcing.append(CubicSpline(times[index][own], drive[index][own])(inside))
-            soft = _yielding(
-                *(np.asarray(x)[index][own] for x in (stage.body.mass, stage.body.com, stage.body.inverse))
-            )
+            forcing.append(CubicSpline(times[index][own], excitation[index][own])(inside))
+            soft = _yielding(*(np.asarray(x)[index][own] for x in (node.body.mass, node.body.com, node.body.inverse)))
             flat = soft.reshape(len(soft), -1)
-            yielding.append(
+            compliance.append(
                 np.stack([np.interp(inside, times[index][own], column) for column in flat.T], axis=-1).reshape(-1, 6, 6)
             )
         both = (times, np.asarray(sample.environment.time))
-        com = (np.asarray(stage.body.com), np.asarray(sample.body.com))
-        return cls(np.stack(forcing), np.stack(yielding), both, com)
+        com = (np.asarray(node.body.com), np.asarray(sample.body.com))
+        return cls(np.stack(forcing), np.stack(compliance), both, com)
 
     def rows(self, effect: Effect, values: Floats) -> tuple[Floats, Floats]:
         """Return changes of the tables by an effect's modes, for n sets of values: (n, R, S, 28), (n, R, T, 28)."""
@@ -84,7 +82,7 @@ class Vibration(NamedTuple):
                 jnp.asarray(omega[chosen]),
                 jnp.asarray(damping[chosen]),
                 jnp.asarray(self.forcing),
-                jnp.asarray(self.yielding),
+                jnp.asarray(self.compliance),
             )
             pieces.append(np.asarray(found)[: len(values) - first])
         speed, change = np.moveaxis(np.concatenate(pieces), -2, 0)  # each (n, R, N, m)
@@ -105,7 +103,7 @@ class Vibration(NamedTuple):
             jnp.full((6, 1), omega),
             jnp.full((6, 1), damping),
             jnp.asarray(self.forcing),
-            jnp.zeros_like(jnp.asarray(self.yielding)),
+            jnp.zeros_like(jnp.asarray(self.compliance)),
         )
         speed, change = np.moveaxis(np.asarray(found), -2, 0)
         return np.moveaxis(speed[..., 0], 0, -1), np.moveaxis(change[..., 0], 0, -1)
@@ -149,10 +147,10 @@ def _yielding(mass: Floats, com: Floats, inverse: Floats) -> Floats:
 
 
 @jax.jit
-def _oscillate(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, yielding: Array) -> Array:
+def _oscillate(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, compliance: Array) -> Array:
     """Speeds and accelerations of modal amplitudes, shape (n, R, N, 2, m)."""
     one = jax.vmap(jax.vmap(_run, (None, None, None, None, 0, 0)), (0, 0, 0, 0, None, None))
-    return one(coupling, load, omega, damping, forcing, yielding)
+    return one(coupling, load, omega, damping, forcing, compliance)
 
 
 def _inverse(mass: Array) -> Array:
@@ -160,10 +158,10 @@ def _inverse(mass: Array) -> Array:
     return jnp.stack([solve_small(mass, unit) for unit in jnp.eye(len(mass))], axis=1)
 
 
-def _run(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, yielding: Array) -> Array:
+def _run(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, compliance: Array) -> Array:
     count = len(omega)
     push = -forcing @ load.T
-    mass = jnp.eye(count) - jnp.einsum("ia,tab,jb->tij", coupling, yielding, coupling)
+    mass = jnp.eye(count) - jnp.einsum("ia,tab,jb->tij", coupling, compliance, coupling)
     soft = jax.vmap(_inverse)(mass)
 
     def change(state: Array, push: Array, soft: Array) -> Array:

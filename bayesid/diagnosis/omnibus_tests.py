@@ -57,24 +57,24 @@ def disturbances(engine: Engine, fit: Fit, torques: int, forces: int) -> tuple[F
     """
     data = engine.data_of(fit)
     recordings = len(engine.posterior.manoeuvres)
-    moments = (fit.situation.stage, fit.situation.sample)
-    times = [np.asarray(moment.environment.time) for moment in moments]
+    moments = (fit.operating.node, fit.operating.sample)
+    times = [np.asarray(instant.environment.time) for instant in moments]
     ends = times[0].max(axis=1)
     found = []
     for functions, first, scale in ((torques, 3, TORQUE), (forces, 0, FORCE)):
         count = recordings * functions * 3
         wrenches = []
-        for moment, time in zip(moments, times, strict=True):
+        for instant, time in zip(moments, times, strict=True):
             wrench = np.zeros((recordings, functions, 3, *time.shape, 6))
             for r in range(recordings):
                 waves = np.cos(np.pi * np.arange(functions)[:, None] * time[r] / ends[r])
                 for axis in range(3):
                     wrench[r, :, axis, r, :, first + axis] = scale * waves
             if first == 0:
-                wrench[..., 3:] = np.cross(np.asarray(moment.body.com), wrench[..., :3])
+                wrench[..., 3:] = np.cross(np.asarray(instant.body.com), wrench[..., :3])
             wrenches.append(wrench.reshape(count, *time.shape, 6))
         found.append(
-            engine.respond(engine.push(count, stage_wrench=wrenches[0], sample_wrench=wrenches[1]), fit.z, data)
+            engine.respond(engine.perturbation(count, node_wrench=wrenches[0], sample_wrench=wrenches[1]), fit.z, data)
         )
     return found[0], found[1]
 
@@ -82,7 +82,7 @@ def disturbances(engine: Engine, fit: Fit, torques: int, forces: int) -> tuple[F
 def vibrations(engine: Engine, fit: Fit) -> dict[float, Floats]:
     """Responses to unit entries of a vibration's coupling matrix at some frequencies: 21 columns each."""
     data = engine.data_of(fit)
-    vibration = fit.situation.vibration
+    vibration = fit.operating.vibration
     found = {}
     for frequency in FREQUENCIES:
         speed, change = vibration.responses(frequency, LIGHT)
@@ -93,8 +93,8 @@ def vibrations(engine: Engine, fit: Fit) -> dict[float, Floats]:
                 flow[row, ..., a] += MODAL**2 * speed[..., b]
                 flow_rate[row, ..., a] += MODAL**2 * change[..., b]
         rows = vibration.flow_rows(flow, flow_rate)
-        push = engine.push(21, stage_rows=rows[0], sample_rows=rows[1])
-        found[frequency] = engine.respond(push, fit.z, data)
+        perturbation = engine.perturbation(21, node_rows=rows[0], sample_rows=rows[1])
+        found[frequency] = engine.respond(perturbation, fit.z, data)
     return found
 
 

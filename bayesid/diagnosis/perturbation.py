@@ -17,23 +17,30 @@ from jax import Array
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.hidden_vibration import Vibration
-from bayesid.inference.posterior import Posterior, Push
+from bayesid.inference.posterior import Perturbation, Posterior
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
-from bayesid.simulation.effects.effect import Effect, Moment, Readings
+from bayesid.simulation.effects.effect import Effect, Instant, Readings
 from bayesid.simulation.sensors import Kind
 
-__all__ = ["Situation", "coordinates_shape", "drive", "linear_drive", "physical", "situation_of"]
+__all__ = [
+    "OperatingTrajectory",
+    "coordinates_shape",
+    "perturb",
+    "linear_perturbation",
+    "physical",
+    "operating_trajectory_of",
+]
 
 DIFFERENCE = 1e-3
 """Step of central differences in the coordinates of vibrations, in prior standard deviations."""
 
 
-class Situation(NamedTuple):
-    """The motion that effects are evaluated on, of all recordings; shapes as in `Push`."""
+class OperatingTrajectory(NamedTuple):
+    """The motion that effects are evaluated on, of all recordings; shapes as in `Perturbation`."""
 
     posterior: Posterior
-    stage: Moment
-    sample: Moment
+    node: Instant
+    sample: Instant
     readings: Readings
     vibration: Vibration
 
@@ -41,14 +48,16 @@ class Situation(NamedTuple):
 class Table(NamedTuple):
     """An effect's `Effect.table` at the stages (R, S, 28, m) and samples (R, T, 28, m)."""
 
-    stage: Floats
+    node: Floats
     sample: Floats
 
 
-def situation_of(posterior: Posterior, stage: Moment, sample: Moment, readings: Readings) -> Situation:
+def operating_trajectory_of(
+    posterior: Posterior, node: Instant, sample: Instant, readings: Readings
+) -> OperatingTrajectory:
     """Collect what effects are evaluated on."""
     steps = np.asarray(posterior.data.grid.step)
-    return Situation(posterior, stage, sample, readings, Vibration.along(stage, sample, steps))
+    return OperatingTrajectory(posterior, node, sample, readings, Vibration.along(node, sample, steps))
 
 
 def coordinates_shape(effect: Effect, recordings: int) -> tuple[int, ...]:
@@ -73,66 +82,71 @@ def tables_of(effect: Effect, posterior: Posterior) -> Table:
         pairs = zip(posterior.manoeuvres, np.asarray(times), strict=True)
         return np.stack([effect.table(posterior.model.robot, manoeuvre.motion, own) for manoeuvre, own in pairs])
 
-    return Table(over(grid.stage.environment.time), over(grid.sample.environment.time))
+    return Table(over(grid.node.environment.time), over(grid.sample.environment.time))
 
 
-def drive(effect: Effect, coordinates: Floats, situation: Situation, table: Table | None) -> Push:
+def perturb(effect: Effect, coordinates: Floats, operating: OperatingTrajectory, table: Table | None) -> Perturbation:
     """Return the push of one effect at some coordinates, flat."""
-    shaped = jnp.asarray(coordinates).reshape(coordinates_shape(effect, _recordings(situation)))
-    push = _nothing(situation)
+    shaped = jnp.asarray(coordinates).reshape(coordinates_shape(effect, _recordings(operating)))
+    perturbation = _nothing(operating)
     if _acts(effect):
-        hooks = _evaluate(_Alike(effect), _setting(situation))(shaped.ravel(), *situation[1:4], _steps(situation))
-        push = push._replace(**{key: np.asarray(value) for key, value in hooks.items()})
+        hooks = _evaluate(_Alike(effect), _setting(operating))(shaped.ravel(), *operating[1:4], _steps(operating))
+        perturbation = perturbation._replace(**{key: np.asarray(value) for key, value in hooks.items()})
     if table is not None:
         loads = np.asarray(effect.loads(physical(effect, shaped)))
-        push = push._replace(
-            stage_rows=push.stage_rows + table.stage @ loads, sample_rows=push.sample_rows + table.sample @ loads
+        perturbation = perturbation._replace(
+            node_rows=perturbation.node_rows + table.node @ loads,
+            sample_rows=perturbation.sample_rows + table.sample @ loads,
         )
     if effect.modes_count:
-        stage, sample = situation.vibration.rows(effect, np.asarray(physical(effect, shaped))[None])
-        push = push._replace(stage_rows=push.stage_rows + stage[0], sample_rows=push.sample_rows + sample[0])
-    return push
+        node, sample = operating.vibration.rows(effect, np.asarray(physical(effect, shaped))[None])
+        perturbation = perturbation._replace(
+            node_rows=perturbation.node_rows + node[0], sample_rows=perturbation.sample_rows + sample[0]
+        )
+    return perturbation
 
 
-def linear_drive(effect: Effect, coordinates: Floats, situation: Situation, table: Table | None) -> Push:
-    """Return the derivatives of `drive` in the coordinates, leading axis n."""
-    shape = coordinates_shape(effect, _recordings(situation))
+def linear_perturbation(
+    effect: Effect, coordinates: Floats, operating: OperatingTrajectory, table: Table | None
+) -> Perturbation:
+    """Return the derivatives of `perturb` in the coordinates, leading axis n."""
+    shape = coordinates_shape(effect, _recordings(operating))
     flat = jnp.asarray(coordinates)
     if not effect.parameters:  # the amplitude of what is either there or not
-        return jax.tree.map(lambda x: x[None], drive(effect, coordinates, situation, table))
+        return jax.tree.map(lambda x: x[None], perturb(effect, coordinates, operating, table))
     if effect.modes_count:
         steps = DIFFERENCE * np.concatenate([np.eye(len(coordinates)), -np.eye(len(coordinates))])
         values = np.asarray(physical(effect, jnp.asarray(coordinates + steps)))
         count = len(coordinates)
-        rows = [(part[:count] - part[count:]) / (2.0 * DIFFERENCE) for part in situation.vibration.rows(effect, values)]
-        return _nothing(situation, (count,))._replace(stage_rows=rows[0], sample_rows=rows[1])
-    slopes = _nothing(situation, (len(flat),))
+        rows = [(part[:count] - part[count:]) / (2.0 * DIFFERENCE) for part in operating.vibration.rows(effect, values)]
+        return _nothing(operating, (count,))._replace(node_rows=rows[0], sample_rows=rows[1])
+    slopes = _nothing(operating, (len(flat),))
     if _acts(effect):
-        hooks = _differentiate(_Alike(effect), _setting(situation))(flat, *situation[1:4], _steps(situation))
+        hooks = _differentiate(_Alike(effect), _setting(operating))(flat, *operating[1:4], _steps(operating))
         slopes = slopes._replace(**{key: np.moveaxis(np.asarray(value), -1, 0) for key, value in hooks.items()})
     if table is not None:
         loads = np.asarray(jax.jacfwd(lambda c: effect.loads(physical(effect, c.reshape(shape))))(flat)).T
         slopes = slopes._replace(
-            stage_rows=slopes.stage_rows + np.einsum("rsdm,nm->nrsd", table.stage, loads),
+            node_rows=slopes.node_rows + np.einsum("rsdm,nm->nrsd", table.node, loads),
             sample_rows=slopes.sample_rows + np.einsum("rsdm,nm->nrsd", table.sample, loads),
         )
     return slopes
 
 
-def _recordings(situation: Situation) -> int:
-    return int(situation.stage.rate.shape[0])
+def _recordings(operating: OperatingTrajectory) -> int:
+    return int(operating.node.rate.shape[0])
 
 
-def _nothing(situation: Situation, lead: Sequence[int] = ()) -> Push:
-    posterior = situation.posterior
-    recordings, stages = situation.stage.rate.shape[:2]
-    samples = situation.sample.rate.shape[1]
+def _nothing(operating: OperatingTrajectory, lead: Sequence[int] = ()) -> Perturbation:
+    posterior = operating.posterior
+    recordings, nodes = operating.node.rate.shape[:2]
+    samples = operating.sample.rate.shape[1]
     channels = posterior.data.measured.shape[-1]
-    return Push(
+    return Perturbation(
         np.zeros((*lead, posterior.size)),
-        np.zeros((*lead, recordings, stages, WIDTH)),
+        np.zeros((*lead, recordings, nodes, WIDTH)),
         np.zeros((*lead, recordings, samples, WIDTH)),
-        np.zeros((*lead, recordings, stages, 6)),
+        np.zeros((*lead, recordings, nodes, 6)),
         np.zeros((*lead, recordings, samples, 6)),
         np.zeros((*lead, recordings, samples, channels)),
     )
@@ -146,8 +160,8 @@ class Setting(NamedTuple):
     point: tuple[float, ...]
 
 
-def _setting(situation: Situation) -> Setting:
-    model = situation.posterior.model
+def _setting(operating: OperatingTrajectory) -> Setting:
+    model = operating.posterior.model
     return Setting(
         tuple(sensor.kind for sensor in model.sensors),
         tuple(tuple(sensor.rotation.ravel().tolist()) for sensor in model.sensors),
@@ -155,13 +169,13 @@ def _setting(situation: Situation) -> Setting:
     )
 
 
-def _steps(situation: Situation) -> Array:
-    return situation.posterior.data.grid.step
+def _steps(operating: OperatingTrajectory) -> Array:
+    return operating.posterior.data.grid.step
 
 
 def _acts(effect: Effect) -> bool:
     """Whether the effect has hooks that act along the motion."""
-    return any(effect.uses(hook) for hook in ("momentum", "wrench", "field", "read"))
+    return any(effect.uses(hook) for hook in ("momentum", "wrench", "specific_force", "read"))
 
 
 class _Alike:
@@ -197,37 +211,37 @@ def _hooks(
     effect: Effect,
     setting: Setting,
     coordinates: Array,
-    stage: Moment,
-    sample: Moment,
+    node: Instant,
+    sample: Instant,
     readings: Readings,
     step: Array,
 ) -> dict[str, Array]:
     """Return the parts of the push that an effect's hooks make, by name."""
     values = physical(effect, coordinates.reshape(coordinates_shape(effect, len(step))))
     axis = 0 if effect.per_recording else None
-    moments = (stage, sample)
+    moments = (node, sample)
     if effect.states:
-        states = jax.vmap(partial(_inner_states, effect), (axis, 0, 0))(values, stage, step)
-        inner = [states, _at_samples(states, stage.environment.time, sample.environment.time)]
+        states = jax.vmap(partial(_inner_states, effect), (axis, 0, 0))(values, node, step)
+        inner = [states, _at_samples(states, node.environment.time, sample.environment.time)]
     else:
-        inner = [jnp.zeros((*moment.rate.shape[:2], 0)) for moment in moments]
+        inner = [jnp.zeros((*instant.rate.shape[:2], 0)) for instant in moments]
     each = (axis, 0, 0)
     parts: dict[str, Array] = {}
     if effect.uses("momentum"):
         hook = jax.vmap(jax.vmap(effect.momentum, (None, 0, 0)), each)
         rows = [_couple(*hook(values, m, i)) for m, i in zip(moments, inner, strict=True)]
-        parts |= {"stage_rows": rows[0], "sample_rows": rows[1]}
+        parts |= {"node_rows": rows[0], "sample_rows": rows[1]}
     if effect.uses("wrench"):
         hook = jax.vmap(jax.vmap(effect.wrench, (None, 0, 0)), each)
         wrenches = [jnp.concatenate(hook(values, m, i), axis=-1) for m, i in zip(moments, inner, strict=True)]
-        parts |= {"stage_wrench": wrenches[0], "sample_wrench": wrenches[1]}
-    if effect.uses("read") or effect.uses("field"):
+        parts |= {"node_wrench": wrenches[0], "sample_wrench": wrenches[1]}
+    if effect.uses("read") or effect.uses("specific_force"):
         parts["reading"] = _reading(effect, setting, values, sample, readings, axis)
     return parts
 
 
 def _reading(
-    effect: Effect, setting: Setting, values: Array, sample: Moment, readings: Readings, axis: int | None
+    effect: Effect, setting: Setting, values: Array, sample: Instant, readings: Readings, axis: int | None
 ) -> Array:
     """Return what the effect adds to the readings, shape (R, T, C), sensor axes."""
     parts = []
@@ -237,9 +251,9 @@ def _reading(
             parts.append(jnp.zeros((*readings.time.shape, 3)))
             continue
         added = getattr(faulty, kind.value) - getattr(readings, kind.value)
-        if kind is Kind.ACCEL and effect.uses("field"):
+        if kind is Kind.ACCEL and effect.uses("specific_force"):
             lever = jnp.asarray(setting.point) - sample.body.com
-            field = jax.vmap(jax.vmap(effect.field, (None, 0, 0)), (axis, 0, 0))
+            field = jax.vmap(jax.vmap(effect.specific_force, (None, 0, 0)), (axis, 0, 0))
             added = added + field(values, sample, lever) @ jnp.asarray(turn).reshape(3, 3)
         parts.append(added)
     return jnp.concatenate(parts, axis=-1)
@@ -250,10 +264,10 @@ def _couple(momentum: Array, rate: Array) -> Array:
     return rows.at[..., ENTRIES["spin"]].set(momentum).at[..., ENTRIES["spin_rate"]].set(rate)
 
 
-def _inner_states(effect: Effect, values: Array, stage: Moment, step: Array) -> Array:
+def _inner_states(effect: Effect, values: Array, node: Instant, step: Array) -> Array:
     """Integrate an effect's own states along the stages of one recording, shape (S, states)."""
     first, middle, last = (
-        jax.tree.map(lambda x, s=s: x[s], stage) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
+        jax.tree.map(lambda x, s=s: x[s], node) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
     )
 
     def advance(state: Array, given: Any) -> tuple[Array, tuple[Array, Array]]:

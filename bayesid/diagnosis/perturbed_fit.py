@@ -1,6 +1,6 @@
 """Fits of any set of effects through one compiled simulation.
 
-The simulation of the present model is compiled once. Effects that it lacks act on it as pushes (`drive`), evaluated
+The simulation of the present model is compiled once. Effects that it lacks act on it as pushes (`perturb`), evaluated
 along the motion of the last fit; a few iterations make motion and pushes agree.
 """
 
@@ -22,16 +22,16 @@ from numpy.typing import NDArray
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.amplitude_scale import effect_mixture, log_mixture
 from bayesid.diagnosis.perturbation import (
-    Situation,
+    OperatingTrajectory,
     Table,
     coordinates_shape,
-    drive,
-    linear_drive,
+    linear_perturbation,
+    operating_trajectory_of,
+    perturb,
     physical,
-    situation_of,
     tables_of,
 )
-from bayesid.inference.posterior import Data, Posterior, Push, pushed
+from bayesid.inference.posterior import Data, Perturbation, Posterior, perturbed
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["Engine", "Fit"]
@@ -76,7 +76,7 @@ class Fit:
     own: Floats
     added: tuple[Floats, ...]
     cost: float
-    situation: Situation
+    operating: OperatingTrajectory
     converged: bool
     released: NDArray[np.intp]
 
@@ -135,7 +135,7 @@ class _Point(NamedTuple):
 
     z: Floats
     coordinates: list[Floats]
-    situation: Situation
+    operating: OperatingTrajectory
     residual: Floats
     jacobian: Floats
     cost: float
@@ -187,7 +187,7 @@ class Engine:
         """Compile simulation and derivatives, side by side."""
         z, data = self.start(), self.posterior.data
         with ThreadPoolExecutor(1) as other:
-            derivatives = other.submit(self.posterior.responses, z, data, self.push(1))
+            derivatives = other.submit(self.posterior.responses, z, data, self.perturbation(1))
             self.posterior.trace(z, data)
             derivatives.result()
 
@@ -196,7 +196,7 @@ class Engine:
         effects: Sequence[Effect] = (),
         coordinates: Sequence[Floats] | None = None,
         z: Floats | None = None,
-        situation: Situation | None = None,
+        operating: OperatingTrajectory | None = None,
         iterations: int = ITERATIONS,
     ) -> Fit:
         """Fit the model with effects added (Levenberg-Marquardt).
@@ -219,13 +219,13 @@ class Engine:
             else np.ravel(c)
             for c, e in zip(chosen, effects, strict=True)
         ]
-        situation = self.situation(z, ()) if situation is None else situation
+        operating = self.operating(z, ()) if operating is None else operating
         sizes = [len(c) for c in chosen]
         ends = np.cumsum([len(self.free), *sizes])
         damping, cost, converged = 1e-3, np.inf, False
         best: _Point | None = None
         for _ in range(iterations):
-            here = self._point(effects, chosen, z, situation)
+            here = self._point(effects, chosen, z, operating)
             if not np.isfinite(here.jacobian).all() or not np.isfinite(here.cost):
                 break
             if best is None or here.cost < best.cost:
@@ -241,7 +241,7 @@ class Engine:
                 new_z[self.free] = trial[: ends[0]]
                 new = [trial[a:b] for a, b in pairwise(ends)]
                 with np.errstate(all="ignore"):
-                    there = self._cost(effects, new, new_z, situation)
+                    there = self._cost(effects, new, new_z, operating)
                 if np.isfinite(there) and there <= here.cost + 1e-9 * abs(here.cost):
                     taken = True
                     break
@@ -250,12 +250,12 @@ class Engine:
                 converged = True
                 break
             z, chosen, damping = new_z, new, damping * 0.1
-            situation = self.situation(z, self._pushes(effects, chosen, situation, vibrations=False))
+            operating = self.operating(z, self._pushes(effects, chosen, operating, vibrations=False))
             if abs(cost - there) < CLOSE and here.cost - there < CLOSE:
                 converged = True
                 break
             cost = there
-        last = self._point(effects, chosen, z, situation)
+        last = self._point(effects, chosen, z, operating)
         if best is None or (np.isfinite(last.jacobian).all() and last.cost < best.cost + CLOSE):
             best = last  # unless motion and pushes came apart on the way
         counts = np.cumsum([len(self.free), *sizes])[:-1]
@@ -269,32 +269,34 @@ class Engine:
             own,
             tuple(added),
             best.cost,
-            best.situation,
+            best.operating,
             converged,
             self._released,
         )
 
     def _point(
-        self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, situation: Situation
+        self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, operating: OperatingTrajectory
     ) -> _Point:
         """Residual and derivatives at one point."""
-        data = self._pushed(self._pushes(effects, coordinates, situation))
+        data = self._pushed(self._pushes(effects, coordinates, operating))
         residual = self.residual(z, data)
         columns = [self.own_columns(z, data)]
         for effect, c in zip(effects, coordinates, strict=True):
             empty = np.zeros((len(residual), 0))
-            columns.append(self.columns(effect, c, situation, z, data) if len(c) else empty)
+            columns.append(self.columns(effect, c, operating, z, data) if len(c) else empty)
         cost = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in coordinates))
-        return _Point(z, list(coordinates), situation, residual, np.concatenate(columns, axis=1), cost)
+        return _Point(z, list(coordinates), operating, residual, np.concatenate(columns, axis=1), cost)
 
-    def _cost(self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, situation: Situation) -> float:
-        r = self.residual(z, self._pushed(self._pushes(effects, coordinates, situation)))
+    def _cost(
+        self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, operating: OperatingTrajectory
+    ) -> float:
+        r = self.residual(z, self._pushed(self._pushes(effects, coordinates, operating)))
         return 0.5 * float(r @ r + z @ z + sum(c @ c for c in coordinates))
 
-    def situation(self, z: Floats, pushes: Sequence[Push]) -> Situation:
+    def operating(self, z: Floats, perturbations: Sequence[Perturbation]) -> OperatingTrajectory:
         """Return the motion with the given pushes."""
-        traced = self.posterior.trace(z, self._pushed(pushes))
-        return situation_of(self.posterior, traced.stage, traced.sample, traced.readings)
+        traced = self.posterior.trace(z, self._pushed(perturbations))
+        return operating_trajectory_of(self.posterior, traced.node, traced.sample, traced.readings)
 
     def residual(self, z: Floats, data: Data) -> Floats:
         """Return the whitened residual, (N,)."""
@@ -305,47 +307,53 @@ class Engine:
         free = self.free
         unit = np.zeros((len(free), self.posterior.size))
         unit[np.arange(len(free)), free] = 1.0
-        return self.posterior.responses(z, data, self.push(len(free), z=unit)).reshape(len(free), -1).T
+        return self.posterior.responses(z, data, self.perturbation(len(free), z=unit)).reshape(len(free), -1).T
 
-    def columns(self, effect: Effect, coordinates: Floats, situation: Situation, z: Floats, data: Data) -> Floats:
+    def columns(
+        self, effect: Effect, coordinates: Floats, operating: OperatingTrajectory, z: Floats, data: Data
+    ) -> Floats:
         """Return derivatives of the residual in an effect's coordinates, (N, n)."""
-        pushes = linear_drive(effect, coordinates, situation, self._table(effect))
-        return self.respond(pushes, z, data)
+        perturbations = linear_perturbation(effect, coordinates, operating, self._table(effect))
+        return self.respond(perturbations, z, data)
 
-    def respond(self, pushes: Push, z: Floats, data: Data) -> Floats:
+    def respond(self, perturbations: Perturbation, z: Floats, data: Data) -> Floats:
         """Return derivatives of the residual along pushes with leading axis n, (N, n)."""
-        return self.posterior.responses(z, data, pushes).reshape(len(pushes.z), -1).T
+        return self.posterior.responses(z, data, perturbations).reshape(len(perturbations.z), -1).T
 
-    def push(self, count: int, **parts: Floats) -> Push:
+    def perturbation(self, count: int, **parts: Floats) -> Perturbation:
         """Return ``count`` pushes with the named parts, the others zero."""
-        empty = Push(
+        empty = Perturbation(
             np.zeros((count, self.posterior.size)), *(np.zeros((count, *shape)) for shape in self._push_shapes())
         )
         return empty._replace(**parts)
 
     def data_of(self, fit: Fit) -> Data:
         """Return the data with a fit's effects pushed."""
-        return self._pushed(self._pushes(fit.effects, fit.coordinates, fit.situation))
+        return self._pushed(self._pushes(fit.effects, fit.coordinates, fit.operating))
 
     def _pushes(
-        self, effects: Sequence[Effect], coordinates: Sequence[Floats], situation: Situation, vibrations: bool = True
-    ) -> list[Push]:
+        self,
+        effects: Sequence[Effect],
+        coordinates: Sequence[Floats],
+        operating: OperatingTrajectory,
+        vibrations: bool = True,
+    ) -> list[Perturbation]:
         return [
-            drive(effect, c, situation, self._table(effect))
+            perturb(effect, c, operating, self._table(effect))
             for effect, c in zip(effects, coordinates, strict=True)
             if vibrations or not effect.modes_count
         ]
 
-    def _pushed(self, pushes: Sequence[Push]) -> Data:
+    def _pushed(self, perturbations: Sequence[Perturbation]) -> Data:
         data = self.posterior.data
-        if not pushes:
+        if not perturbations:
             return data
-        return pushed(data, jax.tree.map(lambda *parts: jnp.asarray(sum(parts)), *pushes))
+        return perturbed(data, jax.tree.map(lambda *parts: jnp.asarray(sum(parts)), *perturbations))
 
     def _push_shapes(self) -> list[tuple[int, ...]]:
         grid, data = self.posterior.data.grid, self.posterior.data
-        stage, sample = grid.stage.known.shape, grid.sample.known.shape
-        return [stage, sample, (*stage[:2], 6), (*sample[:2], 6), data.measured.shape]
+        node, sample = grid.node.known.shape, grid.sample.known.shape
+        return [node, sample, (*node[:2], 6), (*sample[:2], 6), data.measured.shape]
 
     def _table(self, effect: Effect) -> Table | None:
         if not effect.uses("table"):

@@ -12,14 +12,14 @@ from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.score_tests import Calibration, Score, score
 from bayesid.simulation.effects.effect import Effect
 
-__all__ = ["Battery", "Outcome"]
+__all__ = ["TestSuite", "SuiteOutcome"]
 
 FALSE_ALARM = 0.01
 """Family-wise probability of an alarm where there is only noise."""
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SuiteOutcome:
     """What the tests say of one fit.
 
     Attributes
@@ -44,7 +44,7 @@ class Outcome:
         return self.p_value >= FALSE_ALARM
 
 
-class Battery:
+class TestSuite:
     """Tests whose columns are computed once, about one fit, and applied to the residual of any other.
 
     A column need not be exact for its test to be valid: only what the fit has taken must be known, and that is the
@@ -58,19 +58,19 @@ class Battery:
         for effect in effects:
             if effect.modes_count:
                 continue
-            self.effects[effect.label] = engine.columns(effect, effect.starts[0], fit.situation, fit.z, data)
+            self.effects[effect.label] = engine.columns(effect, effect.starts[0], fit.operating, fit.z, data)
         self.vibrations = vibrations(engine, fit)
         self.others = omnibus(engine, fit)
         self.others |= {f"vibration at {f:g} Hz": columns for f, columns in self.vibrations.items()}
         outcome_scores = self._scores(fit)
         self.calibration = Calibration(list(outcome_scores.values()), fit, len(self._noise(fit)), seed)
 
-    def outcome(self, fit: Fit) -> Outcome:
+    def outcome(self, fit: Fit) -> SuiteOutcome:
         """Test a fit."""
         scores = self._scores(fit)
         log_p = {name: item.log_p for name, item in scores.items()} | self._noise(fit)
         worst = min(log_p, key=lambda name: log_p[name])
-        return Outcome(scores, log_p, self.calibration.adjusted(log_p[worst]), worst)
+        return SuiteOutcome(scores, log_p, self.calibration.adjusted(log_p[worst]), worst)
 
     def _scores(self, fit: Fit) -> dict[str, Score]:
         present = {effect.label for effect in fit.effects}

@@ -9,7 +9,7 @@ from enum import Enum
 import numpy as np
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.cause_search import Hypothesis, Search
+from bayesid.diagnosis.cause_search import CauseSearch, Hypothesis
 from bayesid.diagnosis.disturbing_wrench import Unexplained, unexplained_wrench
 
 __all__ = ["Status", "Verdict", "judge"]
@@ -66,7 +66,7 @@ class Verdict:
         return self.best.labels if self.status in (Status.EXPLAINED, Status.AMBIGUOUS) else ()
 
 
-def judge(search: Search) -> Verdict:
+def judge(search: CauseSearch) -> Verdict:
     """Run a search and judge what it found.
 
     A set of causes must also not be much less probable than a free disturbance, or it only imitates something unknown;
@@ -97,12 +97,12 @@ def judge(search: Search) -> Verdict:
     return Verdict(Status.AMBIGUOUS if rivals else Status.EXPLAINED, best, equivalents, tuple(rivals), disturbance)
 
 
-def _contains(best: Hypothesis, other: Hypothesis, rivals: Sequence[Hypothesis], search: Search) -> bool:
+def _contains(best: Hypothesis, other: Hypothesis, rivals: Sequence[Hypothesis], search: CauseSearch) -> bool:
     """Whether a rival is only another name of one already listed."""
     return any(_equivalent(rival, other, search) is not None for rival in rivals)
 
 
-def _unnamed(search: Search) -> Status:
+def _unnamed(search: CauseSearch) -> Status:
     """Say what to call something that no hypothesis explains."""
     outcome = search.base.outcome
     strongest = max((score.signal_to_noise for score in outcome.scores.values()), default=0.0)
@@ -110,13 +110,13 @@ def _unnamed(search: Search) -> Status:
     return Status.UNRESOLVED if strongest < FAINT and noise > -20.0 else Status.UNKNOWN
 
 
-def _equivalent(first: Hypothesis, second: Hypothesis, search: Search) -> tuple[str, str] | None:
+def _equivalent(first: Hypothesis, second: Hypothesis, search: CauseSearch) -> tuple[str, str] | None:
     """Return the names in which two hypotheses differ, if both change the model in the same way."""
     mine = [label for label in first.labels if label not in second.labels]
     theirs = [label for label in second.labels if label not in first.labels]
     if len(mine) != 1 or len(theirs) != 1:
         return None
-    columns = search.battery.effects
+    columns = search.suite.effects
     if mine[0] not in columns or theirs[0] not in columns:
         return None
     a, b = columns[mine[0]], columns[theirs[0]]

@@ -29,7 +29,7 @@ from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor
 
-__all__ = ["Candidate", "NotEvaluated", "Swung", "candidates"]
+__all__ = ["AddedMeasurement", "NotEvaluated", "Swung", "candidates"]
 
 KNOWN_MASS = 0.01
 """Relative standard deviation of a mass that is known."""
@@ -55,7 +55,7 @@ class NotEvaluated(Exception):  # noqa: N818 - a verdict, not an error
 
 
 @dataclass(frozen=True)
-class Candidate:
+class AddedMeasurement:
     """One thing to do besides.
 
     Attributes
@@ -73,18 +73,20 @@ class Candidate:
     change: Callable[[Experiment], Experiment]
 
 
-def candidates(model: Model) -> list[Candidate]:
+def candidates(model: Model) -> list[AddedMeasurement]:
     """Return all candidates for a model."""
     mass, inertia = _whole(model.robot)
     force, torque, spin = _round(PUSH * mass), _round(TURN * inertia), _round(SPIN * inertia)
     declared = {sensor.kind: sensor for sensor in model.sensors}
     each = "x, y and z in turn, each for a tenth of the manoeuvre"
     found = [
-        Candidate(f"better-{kind.value}", f"{kind.value} sensor with a tenth of its noise", partial(_better, kind))
+        AddedMeasurement(
+            f"better-{kind.value}", f"{kind.value} sensor with a tenth of its noise", partial(_better, kind)
+        )
         for kind in declared
     ]
     found += [
-        Candidate(
+        AddedMeasurement(
             f"add-{kind.value}",
             f"added {kind.value} sensor of {float(sensor.noise.sigma(1.0)[0]):g} {kind.unit} per sample"
             + (" at the base origin" if kind is Kind.ACCEL else ""),
@@ -95,22 +97,26 @@ def candidates(model: Model) -> list[Candidate]:
     ]
     if model.torque is not None:
         text = "torque sensors with a tenth of their noise"
-        found.append(Candidate("better-torque", text, partial(_torqued, rescaled(model.torque, FINEST))))
+        found.append(AddedMeasurement("better-torque", text, partial(_torqued, rescaled(model.torque, FINEST))))
     elif (torques := typical_torque(model)) is not None:
         text = f"added torque sensors of {torques.sigma[0]:g} N m per sample in all joints, their friction known"
-        found.append(Candidate("add-torque", text, partial(_torqued, torques)))
+        found.append(AddedMeasurement("add-torque", text, partial(_torqued, torques)))
     found += [
-        Candidate(f"known-mass:{body.name}", f"mass of {body.name} known to 1 %", partial(_weighed, body.name))
+        AddedMeasurement(f"known-mass:{body.name}", f"mass of {body.name} known to 1 %", partial(_weighed, body.name))
         for body in model.bodies
     ]
     return [
         *found,
-        Candidate("thrust", f"known thrust of {force:g} N along {each}", partial(_pushed, np.array([force, 0.0]))),
-        Candidate("torque", f"known torque of {torque:g} N m about {each}", partial(_pushed, np.array([0.0, torque]))),
-        Candidate("wheels", f"known wheel momentum up to {spin:g} N m s about {each}", partial(_spun, spin)),
-        Candidate("twice", "every manoeuvre flown twice", lambda experiment: replace(experiment, times=2)),
+        AddedMeasurement(
+            "thrust", f"known thrust of {force:g} N along {each}", partial(_pushed, np.array([force, 0.0]))
+        ),
+        AddedMeasurement(
+            "torque", f"known torque of {torque:g} N m about {each}", partial(_pushed, np.array([0.0, torque]))
+        ),
+        AddedMeasurement("wheels", f"known wheel momentum up to {spin:g} N m s about {each}", partial(_spun, spin)),
+        AddedMeasurement("twice", "every manoeuvre flown twice", lambda experiment: replace(experiment, times=2)),
         *(
-            Candidate(
+            AddedMeasurement(
                 f"swing:{joint.name}",
                 f"added swing of {joint.name} by {SWING[joint.unit]:g} {joint.unit} and back",
                 partial(_swung, model.robot, index),
@@ -152,10 +158,12 @@ def _with_wrench(manoeuvre: Manoeuvre, size: Floats) -> Manoeuvre:
     recording = manoeuvre.recording
     part = np.searchsorted(np.array(PARTS) * recording.time[-1], recording.time, side="right")
     pulse = np.stack([part == number for number in (1, 2, 3)], axis=1).astype(float)
-    wrench = Actions.from_recording(recording).held(recording.time)
+    wrench = Actions.from_recording(recording).zero_order_hold(recording.time)
     wrench = wrench + np.concatenate([size[0] * pulse, size[1] * pulse], axis=1)
-    held = np.concatenate([[True], np.any(np.diff(wrench, axis=0) != 0.0, axis=1)])
-    rows = np.where(held[:, None], wrench, np.nan)  # a value holds until the next, and every change ends a step
+    zero_order_hold = np.concatenate([[True], np.any(np.diff(wrench, axis=0) != 0.0, axis=1)])
+    rows = np.where(
+        zero_order_hold[:, None], wrench, np.nan
+    )  # a value holds until the next, and every change ends a step
     return _with_channels(manoeuvre, {"base_force": rows[:, :3], "base_torque": rows[:, 3:]})
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from bayesid._io.errors import InputError
-from bayesid.identifiability.added_information import Candidate, NotEvaluated
+from bayesid.identifiability.added_information import AddedMeasurement, NotEvaluated
 from bayesid.identifiability.directions import Direction
-from bayesid.identifiability.hypothetical_experiment import Predictor
+from bayesid.identifiability.hypothetical_experiment import InformationPredictor
 from bayesid.identifiability.local_knowledge import Knowledge
 
 __all__ = ["WORST", "Advice", "advise"]
@@ -66,8 +66,8 @@ class Advice:
 
 
 def advise(
-    predictor: Predictor,
-    candidates: Sequence[Candidate],
+    predictor: InformationPredictor,
+    candidates: Sequence[AddedMeasurement],
     worst: Sequence[Direction],
     now: Knowledge,
     progress: Callable[[float, str], None],
@@ -92,7 +92,7 @@ def advise(
     return sorted(found, key=lambda item: (bool(item.reason), item.directions[:1], -item.information))
 
 
-def _of(candidate: Candidate, known: Knowledge, worst: Sequence[Direction], now: Knowledge) -> Advice:
+def _of(candidate: AddedMeasurement, known: Knowledge, worst: Sequence[Direction], now: Knowledge) -> Advice:
     index = int(np.argmin(now.shrinkage))
     ratios = tuple(float(np.linalg.norm(item.weights @ known.factor)) / item.prior_sd for item in worst[:WORST])
     return Advice(

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.identifiability.directions import Direction, common_factor
-from bayesid.inference.contraction import Verdict
+from bayesid.inference.contraction import ContractionVerdict
 
 __all__ = ["Part", "describe", "parts_of", "subject"]
 
@@ -44,10 +44,10 @@ def describe(direction: Direction, values: Floats, prior_sd: Floats, whole: bool
     """
     what, ratio = subject(direction, values, prior_sd, whole), direction.sd / direction.prior_sd
     verdict = direction.verdict
-    if verdict is Verdict.NOT:
+    if verdict is ContractionVerdict.NOT:
         shared = "cannot be told apart" if " against " in what else "not learnt"
         return f"{what}: {shared}, {_percent(ratio)} of the prior's width is left"
-    if verdict is Verdict.WEAKLY:
+    if verdict is ContractionVerdict.WEAKLY:
         return f"{what}: weakly learnt, {_percent(ratio)} of the prior's width is left"
     return f"{what}: known to {_percent(ratio)} of the prior's width"
 

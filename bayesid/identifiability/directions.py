@@ -16,7 +16,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference.body_quantities import BODY_QUANTITIES
-from bayesid.inference.contraction import Verdict
+from bayesid.inference.contraction import ContractionVerdict
 
 __all__ = ["Direction", "common_factor", "directions"]
 
@@ -58,9 +58,9 @@ class Direction:
         return 1.0 - self.sd / self.prior_sd
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> ContractionVerdict:
         """Whether the data told of it."""
-        return Verdict.of(self.shrinkage)
+        return ContractionVerdict.of(self.shrinkage)
 
     def to_dict(self) -> dict[str, Any]:
         """Form in JSON."""

@@ -17,7 +17,7 @@ from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Noise, Scaled, Sensor, White
 
-__all__ = ["TYPICAL", "Experiment", "Predictor", "blanked", "rescaled", "typical_torque"]
+__all__ = ["TYPICAL", "Experiment", "InformationPredictor", "blanked", "rescaled", "typical_torque"]
 
 TYPICAL: dict[Kind, Sensor] = {
     Kind.RATE: Sensor(Kind.RATE, White(1e-5)),
@@ -57,7 +57,7 @@ class Experiment:
     times: int = 1
 
 
-class Predictor:
+class InformationPredictor:
     """Predict what experiments tell about a model at one point.
 
     All sensors are simulated in all experiments, those that are absent with enormous noise, so that experiments share

@@ -12,7 +12,7 @@ from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference.body_quantities import bodies_of
 from bayesid.inference.ensemble import Progress, sample
-from bayesid.inference.importance import choose_chart, weighted_draws
+from bayesid.inference.importance import choose_parameterisation, weighted_draws
 from bayesid.inference.mode import Optimum
 from bayesid.inference.posterior import Posterior
 
@@ -82,8 +82,8 @@ def draw(
     """Draw from a posterior: by importance sampling, or by emcee where that may not be trusted and can be afforded."""
     weigh, walk = seed.spawn(2)
     rng = np.random.default_rng(weigh)
-    chart = choose_chart(posterior, optimum, rng)
-    weighted = weighted_draws(chart, optimum, rng)
+    parameterisation = choose_parameterisation(posterior, optimum, rng)
+    weighted = weighted_draws(parameterisation, optimum, rng)
     if weighted.trusted or posterior.size > LARGEST:
         values = _quantities(posterior, weighted.z)
         return Draws(Method.IMPORTANCE, values, weighted.weights, weighted.trusted, weighted.pareto_k)
@@ -92,7 +92,9 @@ def draw(
         found = state.effective_samples / state.wanted if state.r_hat < 1.05 else 0.0
         progress(min(max(found, state.steps / state.limit), 1.0), f"sampling, step {state.steps}")
 
-    chains = sample(chart, optimum, walk, effective_samples=effective_samples, max_steps=STEPS, progress=report)
+    chains = sample(
+        parameterisation, optimum, walk, effective_samples=effective_samples, max_steps=STEPS, progress=report
+    )
     values = _quantities(posterior, chains.flat)
     weights = np.full(len(values), 1.0 / len(values))
     return Draws(Method.ENSEMBLE, values, weights, chains.converged, weighted.pareto_k)

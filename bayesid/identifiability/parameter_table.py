@@ -13,11 +13,11 @@ from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.identifiability.normality import NORMAL, Draws, shape_errors
 from bayesid.identifiability.profile_interval import Profile, Target, profile
 from bayesid.inference.body_quantities import BODY_QUANTITIES, quantities_of
-from bayesid.inference.contraction import Verdict
+from bayesid.inference.contraction import ContractionVerdict
 from bayesid.inference.mode import Optimum
 from bayesid.inference.posterior import Posterior
 
-__all__ = ["Parameter", "profiled", "quantity_of", "tabulate"]
+__all__ = ["ParameterRow", "profiled", "quantity_of", "tabulate"]
 
 CORRELATED = 0.9
 """Correlation from which on a quantity is named as one that another is confused with."""
@@ -26,7 +26,7 @@ Show = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
-class Parameter:
+class ParameterRow:
     """What is known of one quantity.
 
     Attributes
@@ -63,9 +63,9 @@ class Parameter:
         return 1.0 - self.sd / self.prior_sd
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> ContractionVerdict:
         """Whether the data told of it."""
-        return Verdict.of(self.shrinkage)
+        return ContractionVerdict.of(self.shrinkage)
 
     def to_dict(self) -> dict[str, Any]:
         """Form in JSON."""
@@ -86,7 +86,7 @@ class Parameter:
         }
 
 
-def tabulate(knowledge: Knowledge, draws: Draws) -> list[Parameter]:
+def tabulate(knowledge: Knowledge, draws: Draws) -> list[ParameterRow]:
     """Return what is known of every quantity, not profiled yet."""
     errors, correlation, conditional = shape_errors(draws, knowledge), knowledge.correlation, knowledge.conditional_sd
     mean, sd = draws.mean, np.sqrt(np.diag(draws.covariance))
@@ -95,7 +95,7 @@ def tabulate(knowledge: Knowledge, draws: Draws) -> list[Parameter]:
     for k, name in enumerate(knowledge.names):
         order = [i for i in np.argsort(-np.abs(correlation[k])) if i != k and abs(correlation[k, i]) > CORRELATED]
         found.append(
-            Parameter(
+            ParameterRow(
                 name=name,
                 unit=units[k % len(units)],
                 mean=float(knowledge.values[k]),
@@ -113,16 +113,16 @@ def tabulate(knowledge: Knowledge, draws: Draws) -> list[Parameter]:
 def profiled(
     posterior: Posterior,
     optimum: Optimum,
-    parameters: list[Parameter],
+    parameters: list[ParameterRow],
     draws: Draws,
     knowledge: Knowledge,
     most: int,
     progress: Show,
-) -> list[Parameter]:
+) -> list[ParameterRow]:
     """Profile the least normal quantities; where draws do not tell, the worst known of which something was learnt."""
     errors = shape_errors(draws, knowledge)
     if not draws.trusted:  # the profile of what was not learnt is the prior
-        told = np.array([item.verdict is not Verdict.NOT for item in parameters])
+        told = np.array([item.verdict is not ContractionVerdict.NOT for item in parameters])
         errors = told - knowledge.shrinkage
     order = [int(k) for k in np.argsort(-errors) if not parameters[int(k)].normal][:most]
     result = list(parameters)
@@ -131,7 +131,7 @@ def profiled(
         curve = profile(
             posterior.least_squares, posterior.jacobian, optimum.z, optimum.covariance, quantity_of(posterior, k)
         )
-        result[k] = Parameter(**{**vars(parameters[k]), "profile": curve})
+        result[k] = ParameterRow(**{**vars(parameters[k]), "profile": curve})
     return result
 
 

@@ -13,10 +13,10 @@ from bayesid.identifiability.added_information import candidates
 from bayesid.identifiability.advice import Advice, advise
 from bayesid.identifiability.direction_words import describe
 from bayesid.identifiability.directions import Direction, directions
-from bayesid.identifiability.hypothetical_experiment import Predictor
+from bayesid.identifiability.hypothetical_experiment import InformationPredictor
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.identifiability.normality import Draws, draw
-from bayesid.identifiability.parameter_table import Parameter, profiled, tabulate
+from bayesid.identifiability.parameter_table import ParameterRow, profiled, tabulate
 from bayesid.inference.mode import Optimum
 from bayesid.inference.posterior import Posterior
 
@@ -58,7 +58,7 @@ class Practical:
     knowledge: Knowledge
     directions: tuple[Direction, ...]
     words: tuple[str, ...]
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ParameterRow, ...]
     draws: Draws
     advice: tuple[Advice, ...]
 
@@ -123,7 +123,7 @@ def practical(
     draws = draw(posterior, optimum, np.random.SeedSequence(seed), effective_samples, _part(progress, 0.1, 0.4))
     parameters = tabulate(knowledge, draws)
     parameters = profiled(posterior, optimum, parameters, draws, knowledge, profiles, _part(progress, 0.4, 0.6))
-    predictor = Predictor(posterior.model, posterior.manoeuvres, optimum.z, posterior.step)
+    predictor = InformationPredictor(posterior.model, posterior.manoeuvres, optimum.z, posterior.step)
     advice = advise(predictor, candidates(posterior.model), found, knowledge, _part(progress, 0.6, 1.0))
     return Practical(basis, posterior, optimum, knowledge, found, words, tuple(parameters), draws, tuple(advice))
 

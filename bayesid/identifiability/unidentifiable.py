@@ -6,29 +6,32 @@ from bayesid.identifiability.direction_words import subject
 from bayesid.identifiability.directions import directions
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.identifiability.practical_identifiability import covers_all
-from bayesid.inference.contraction import Verdict
+from bayesid.inference.contraction import ContractionVerdict
 from bayesid.inference.identification import Identification
 
-__all__ = ["untold_sentences"]
+__all__ = ["unidentifiable_sentences"]
 
 NAMED = 8
 """Quantities or directions a sentence names at most."""
 
 
-def untold_sentences(result: Identification) -> list[str]:
+def unidentifiable_sentences(result: Identification) -> list[str]:
     """Name the quantities and the directions of which the posterior is nearly the prior; empty if there are none."""
     if not result.bodies:
         return []
     found = []
-    for verdict, text in ((Verdict.NOT, "is the prior"), (Verdict.WEAKLY, "owes more to the prior than to the data")):
-        names = [name for name, item in result.learnt.items() if item.verdict is verdict]
+    for verdict, text in (
+        (ContractionVerdict.NOT, "is the prior"),
+        (ContractionVerdict.WEAKLY, "owes more to the prior than to the data"),
+    ):
+        names = [name for name, item in result.contraction.items() if item.verdict is verdict]
         if names:
             found.append(f"What is said of {listed(names)} {text}.")
     knowledge = Knowledge.at(result.posterior, result.optimum.z)
     subjects = [
         subject(item, knowledge.values, knowledge.prior_sd, covers_all(result.posterior))
         for item in directions(knowledge)
-        if item.verdict is Verdict.NOT
+        if item.verdict is ContractionVerdict.NOT
     ]
     if subjects:
         found.append(f"The data do not tell of these directions: {listed(subjects, '; ')}.")

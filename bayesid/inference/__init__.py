@@ -2,20 +2,20 @@
 
 from bayesid.inference.ensemble import Chains, LaplaceMove, sample
 from bayesid.inference.identification import Identification, identify
-from bayesid.inference.importance import Evidence, choose_chart, importance_sample
+from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise
-from bayesid.inference.sampling_coordinates import Chart, LinearChart, LogCholeskyChart
+from bayesid.inference.parameterisation import LinearParameterisation, LogCholeskyParameterisation, Parameterisation
 
 __all__ = [
     "Chains",
-    "Chart",
+    "Parameterisation",
     "Evidence",
     "Identification",
     "LaplaceMove",
-    "LinearChart",
-    "LogCholeskyChart",
+    "LinearParameterisation",
+    "LogCholeskyParameterisation",
     "Optimum",
-    "choose_chart",
+    "choose_parameterisation",
     "identify",
     "importance_sample",
     "maximise",

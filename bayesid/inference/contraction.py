@@ -10,28 +10,28 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 
-__all__ = ["LEARNT", "PRIOR_ONLY", "Learnt", "Verdict", "compare", "half_range"]
+__all__ = ["CONTRACTED", "PRIOR_ONLY", "Contraction", "ContractionVerdict", "compare", "half_range"]
 
-LEARNT, PRIOR_ONLY = 0.5, 0.1
+CONTRACTED, PRIOR_ONLY = 0.5, 0.1
 """Shrinkage from which on a quantity counts as learnt, and below which what is said of it is the prior."""
 
 
-class Verdict(Enum):
+class ContractionVerdict(Enum):
     """Whether the data told of a quantity."""
 
-    LEARNT = "learnt"
+    CONTRACTED = "learnt"
     WEAKLY = "weakly"
     NOT = "not learnt"
 
     @classmethod
-    def of(cls, shrinkage: float) -> Verdict:
-        """Judge one minus the ratio of posterior to prior width: `LEARNT` and `PRIOR_ONLY` are the thresholds."""
-        if shrinkage >= LEARNT:
-            return cls.LEARNT
+    def of(cls, shrinkage: float) -> ContractionVerdict:
+        """Judge one minus the ratio of posterior to prior width: `CONTRACTED` and `PRIOR_ONLY` are the thresholds."""
+        if shrinkage >= CONTRACTED:
+            return cls.CONTRACTED
         return cls.WEAKLY if shrinkage >= PRIOR_ONLY else cls.NOT
 
 
-class Learnt(NamedTuple):
+class Contraction(NamedTuple):
     """What the data told of one quantity.
 
     ``prior_sd`` in the quantity's unit; ``shrinkage`` one minus the ratio of posterior to prior width.
@@ -41,23 +41,23 @@ class Learnt(NamedTuple):
     shrinkage: float
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> ContractionVerdict:
         """Whether the data told of it."""
-        return Verdict.of(self.shrinkage)
+        return ContractionVerdict.of(self.shrinkage)
 
     def to_dict(self) -> dict[str, Any]:
         """Form in JSON."""
         return {"prior_sd": self.prior_sd, "shrinkage": self.shrinkage, "verdict": self.verdict.value}
 
 
-def compare(names: Sequence[str], prior: Floats, posterior: Floats) -> dict[str, Learnt]:
+def compare(names: Sequence[str], prior: Floats, posterior: Floats) -> dict[str, Contraction]:
     """Compare draws of n quantities from prior and posterior, shapes (draws, n).
 
     Widths are half the central 68 %, which is the standard deviation of a normal distribution and finite for all.
     """
     before, after = half_range(prior), half_range(posterior)
     return {
-        name: Learnt(float(wide), float(1.0 - narrow / wide))
+        name: Contraction(float(wide), float(1.0 - narrow / wide))
         for name, wide, narrow in zip(names, before, after, strict=True)
     }
 

@@ -22,9 +22,9 @@ from emcee.moves.red_blue import RedBlueMove
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.inference.mode import Optimum
+from bayesid.inference.parameterisation import Parameterisation
 from bayesid.inference.posterior import BATCH, Posterior
 from bayesid.inference.proposal import StudentT
-from bayesid.inference.sampling_coordinates import Chart
 
 __all__ = ["Chains", "LaplaceMove", "Progress", "sample"]
 
@@ -89,7 +89,7 @@ class Chains:
         Whether length, r_hat and effective samples all reached their goals.
     """
 
-    chart: Chart
+    parameterisation: Parameterisation
     y: Floats
     log_density: Floats
     effective_samples: float
@@ -104,7 +104,7 @@ class Chains:
     @cached_property
     def z(self) -> Floats:
         """Draws in the posterior's coordinates, shape (ensembles, draws, n)."""
-        return self.chart.to_z(self.y.reshape(-1, self.y.shape[-1])).reshape(self.y.shape)
+        return self.parameterisation.to_z(self.y.reshape(-1, self.y.shape[-1])).reshape(self.y.shape)
 
     @property
     def flat(self) -> Floats:
@@ -113,7 +113,7 @@ class Chains:
 
 
 def sample(
-    chart: Chart,
+    parameterisation: Parameterisation,
     optimum: Optimum,
     seed: int | np.random.SeedSequence,
     *,
@@ -139,8 +139,8 @@ def sample(
     progress : callable, optional
         Called after every block of steps.
     """
-    posterior = chart.posterior
-    proposal = chart.proposal(optimum)
+    posterior = parameterisation.posterior
+    proposal = parameterisation.proposal(optimum)
     moves = [(LaplaceMove(proposal), 0.6), (DEMove(), 0.3), (DESnookerMove(), 0.1)]
     walkers = _walkers(posterior.size)
     sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
@@ -151,15 +151,15 @@ def sample(
         state = np.random.RandomState(child.generate_state(8))
         fresh = not backend.initialized or backend.iteration == 0
         sampler = emcee.EnsembleSampler(
-            walkers, posterior.size, chart.log_density, moves=moves, vectorize=True, backend=backend
+            walkers, posterior.size, parameterisation.log_density, moves=moves, vectorize=True, backend=backend
         )
         if fresh:
             sampler.random_state = state.get_state()
-        samplers.append((sampler, None if not fresh else _start(chart, proposal, walkers, state)))
+        samplers.append((sampler, None if not fresh else _start(parameterisation, proposal, walkers, state)))
     while True:
         steps = min(int(sampler.iteration) for sampler, _ in samplers)
         if steps and (steps % BLOCK == 0 or steps >= max_steps):
-            chains = _summary(chart, [sampler for sampler, _ in samplers], effective_samples)
+            chains = _summary(parameterisation, [sampler for sampler, _ in samplers], effective_samples)
             if progress is not None:
                 progress(_progress(chains, max_steps, effective_samples))
             if chains.converged or steps >= max_steps:
@@ -189,10 +189,12 @@ def _walkers(size: int) -> int:
     return pair * max(1, int(np.ceil((2 * size + 2) / pair)))
 
 
-def _start(chart: Chart, proposal: StudentT, walkers: int, state: np.random.RandomState) -> Floats:
+def _start(
+    parameterisation: Parameterisation, proposal: StudentT, walkers: int, state: np.random.RandomState
+) -> Floats:
     """Draw walkers that have a finite density."""
     points = proposal.draw(4 * walkers, state)
-    finite = points[np.isfinite(chart.log_density(points))]
+    finite = points[np.isfinite(parameterisation.log_density(points))]
     if len(finite) < walkers:
         raise InputError("the Laplace approximation lies outside the support", remedy="Check the priors and the data")
     return finite[:walkers]
@@ -233,7 +235,7 @@ def _fingerprint(posterior: Posterior, optimum: Optimum, sequence: np.random.See
     return digest.hexdigest()[:16]
 
 
-def _summary(chart: Chart, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
+def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
     steps = min(int(sampler.iteration) for sampler in samplers)
     chains = [sampler.get_chain()[:steps] for sampler in samplers]
     densities = [sampler.get_log_prob()[:steps] for sampler in samplers]
@@ -245,7 +247,7 @@ def _summary(chart: Chart, samplers: list[emcee.EnsembleSampler], wanted: float)
     effective = y.shape[0] * y.shape[1] / tau
     r_hat = float(np.max([az.rhat(y[:, :, k]) for k in range(y.shape[2])]))
     return Chains(
-        chart=chart,
+        parameterisation=parameterisation,
         y=y,
         log_density=np.stack([density[burn:].ravel() for density in densities]),
         effective_samples=effective,

@@ -21,9 +21,9 @@ from bayesid.inference.body_quantities import (
     quantity,
     reported_effect,
 )
-from bayesid.inference.contraction import Learnt, compare
+from bayesid.inference.contraction import Contraction, compare
 from bayesid.inference.ensemble import Chains, Progress, sample
-from bayesid.inference.importance import Evidence, choose_chart, importance_sample
+from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise
 from bayesid.inference.posterior import Posterior
 
@@ -74,7 +74,7 @@ class Identification:
         }
 
     @cached_property
-    def learnt(self) -> dict[str, Learnt]:
+    def contraction(self) -> dict[str, Contraction]:
         """What the data told of every quantity of the bodies, by its name in `names`."""
         z = np.random.default_rng(0).normal(size=(PRIOR_DRAWS, self.posterior.size))
         prior = bodies_of(self.posterior, z)
@@ -134,7 +134,7 @@ class Identification:
         return {
             "bodies": {name: body_dict(body) for name, body in self.bodies.items()},
             "effects": self._effects_dict(),
-            "learnt": {name: item.to_dict() for name, item in self.learnt.items()},
+            "learnt": {name: item.to_dict() for name, item in self.contraction.items()},
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
             "fit": {"chi2": self.optimum.chi2, "samples": self.posterior.samples, "unknowns": self.posterior.size},
             "sampler": {
@@ -205,10 +205,16 @@ def identify(
     starts, weights, walkers = np.random.SeedSequence(seed).spawn(3)
     refined, optimum = maximise(posterior, np.random.default_rng(starts), start)
     rng = np.random.default_rng(weights)
-    chart = choose_chart(refined, optimum, rng)
-    evidence = importance_sample(chart, optimum, rng)
+    parameterisation = choose_parameterisation(refined, optimum, rng)
+    evidence = importance_sample(parameterisation, optimum, rng)
     began = time.perf_counter()
     chains = sample(
-        chart, optimum, walkers, effective_samples=effective_samples, max_steps=max_steps, file=file, progress=progress
+        parameterisation,
+        optimum,
+        walkers,
+        effective_samples=effective_samples,
+        max_steps=max_steps,
+        file=file,
+        progress=progress,
     )
     return Identification(refined, optimum, evidence, chains, time.perf_counter() - began)

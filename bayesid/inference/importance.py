@@ -10,10 +10,10 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.mode import Optimum
+from bayesid.inference.parameterisation import LinearParameterisation, LogCholeskyParameterisation, Parameterisation
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.sampling_coordinates import Chart, LinearChart, LogCholeskyChart
 
-__all__ = ["Evidence", "WeightedDraws", "choose_chart", "importance_sample", "weighted_draws"]
+__all__ = ["Evidence", "WeightedDraws", "choose_parameterisation", "importance_sample", "weighted_draws"]
 
 
 TRUSTED = 0.7
@@ -47,7 +47,9 @@ class Evidence:
         return bool(self.pareto_k < TRUSTED)
 
 
-def importance_sample(chart: Chart, optimum: Optimum, rng: np.random.Generator, draws: int = 4000) -> Evidence:
+def importance_sample(
+    parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator, draws: int = 4000
+) -> Evidence:
     """Estimate the evidence.
 
     Parameters
@@ -57,7 +59,7 @@ def importance_sample(chart: Chart, optimum: Optimum, rng: np.random.Generator, 
     draws : int
         Evaluations of the posterior density.
     """
-    drawn = weighted_draws(chart, optimum, rng, draws)
+    drawn = weighted_draws(parameterisation, optimum, rng, draws)
     if not np.isfinite(drawn.top):
         return Evidence(-np.inf, np.inf, np.inf, 0.0, draws, optimum.z, np.zeros_like(optimum.z))
     mean = drawn.weights @ drawn.z
@@ -97,12 +99,14 @@ class WeightedDraws(NamedTuple):
         return bool(self.pareto_k < TRUSTED)
 
 
-def weighted_draws(chart: Chart, optimum: Optimum, rng: np.random.Generator, draws: int = 4000) -> WeightedDraws:
+def weighted_draws(
+    parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator, draws: int = 4000
+) -> WeightedDraws:
     """Draw from the Student-t about the mode and weigh by the posterior."""
-    proposal = chart.proposal(optimum)
+    proposal = parameterisation.proposal(optimum)
     y = proposal.draw(draws, rng)
-    log_weights = chart.log_density(y) - proposal.log_density(y)
-    z = np.nan_to_num(chart.to_z(y))
+    log_weights = parameterisation.log_density(y) - proposal.log_density(y)
+    z = np.nan_to_num(parameterisation.to_z(y))
     top = float(log_weights.max())
     if not np.isfinite(top):
         return WeightedDraws(z, np.full(draws, 1.0 / draws), np.inf, np.zeros(draws), top, 0.0)
@@ -114,12 +118,12 @@ def weighted_draws(chart: Chart, optimum: Optimum, rng: np.random.Generator, dra
     return WeightedDraws(z, weights / weights.sum(), float(pareto_k), np.exp(log_weights - top), top, inside)
 
 
-def choose_chart(posterior: Posterior, optimum: Optimum, rng: np.random.Generator) -> Chart:
+def choose_parameterisation(posterior: Posterior, optimum: Optimum, rng: np.random.Generator) -> Parameterisation:
     """Return the coordinates in which the Student-t about the mode is the better proposal."""
 
-    def merit(chart: Chart) -> tuple[bool, float]:
-        drawn = weighted_draws(chart, optimum, rng, TRIAL)
+    def merit(parameterisation: Parameterisation) -> tuple[bool, float]:
+        drawn = weighted_draws(parameterisation, optimum, rng, TRIAL)
         return drawn.inside > INSIDE, drawn.effective_samples
 
-    charts: list[Chart] = [LogCholeskyChart(posterior), LinearChart(posterior)]
+    charts: list[Parameterisation] = [LogCholeskyParameterisation(posterior), LinearParameterisation(posterior)]
     return max(charts, key=merit)

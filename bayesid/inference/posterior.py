@@ -21,7 +21,7 @@ from bayesid.inference.whitening import Whitening
 from bayesid.recording.actions import Actions
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.simulation.dynamics import Grid
-from bayesid.simulation.effects.effect import Moment, Readings
+from bayesid.simulation.effects.effect import Instant, Readings
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor
@@ -59,7 +59,7 @@ class Data(NamedTuple):
     start: Array  # (R, O)
 
 
-class Push(NamedTuple):
+class Perturbation(NamedTuple):
     """A change of the unknowns and of what acts on the robot, from outside the model; leading axis R but for ``z``.
 
     z (size,); rows of the kinematic tables (R, S, 28) and (R, T, 28); wrench on the base (R, S, 6) and (R, T, 6); what
@@ -67,34 +67,34 @@ class Push(NamedTuple):
     """
 
     z: Array | Floats
-    stage_rows: Array | Floats
+    node_rows: Array | Floats
     sample_rows: Array | Floats
-    stage_wrench: Array | Floats
+    node_wrench: Array | Floats
     sample_wrench: Array | Floats
     reading: Array | Floats
 
 
-def pushed(data: Data, push: Push) -> Data:
+def perturbed(data: Data, perturbation: Perturbation) -> Data:
     """Return the data with a push added to what is known."""
-    stage, sample = data.grid.stage, data.grid.sample
+    node, sample = data.grid.node, data.grid.sample
     grid = data.grid._replace(
-        stage=stage._replace(
-            known=stage.known + push.stage_rows,
-            environment=stage.environment._replace(wrench=stage.environment.wrench + push.stage_wrench),
+        node=node._replace(
+            known=node.known + perturbation.node_rows,
+            environment=node.environment._replace(wrench=node.environment.wrench + perturbation.node_wrench),
         ),
         sample=sample._replace(
-            known=sample.known + push.sample_rows,
-            environment=sample.environment._replace(wrench=sample.environment.wrench + push.sample_wrench),
+            known=sample.known + perturbation.sample_rows,
+            environment=sample.environment._replace(wrench=sample.environment.wrench + perturbation.sample_wrench),
         ),
     )
-    return data._replace(grid=grid, measured=data.measured - push.reading)
+    return data._replace(grid=grid, measured=data.measured - perturbation.reading)
 
 
 class Traced(NamedTuple):
     """A simulation: motion at stages (R, S) and samples (R, T), readings (R, T), whitened residual (R, O, C)."""
 
-    stage: Moment
-    sample: Moment
+    node: Instant
+    sample: Instant
     readings: Readings
     residual: Array
 
@@ -322,13 +322,13 @@ class Posterior:
     # ---- responses to what the model does not have ----
 
     def trace(self, z: Floats, data: Data) -> Traced:
-        """Simulate with `pushed` data."""
+        """Simulate with `perturbed` data."""
         return self._compiled.traced(jnp.asarray(z), data)
 
-    def responses(self, z: Floats, data: Data, pushes: Push) -> Floats:
+    def responses(self, z: Floats, data: Data, perturbations: Perturbation) -> Floats:
         """Return derivatives of the whitened residual along many pushes (leading axis n), shape (n, R, O, C)."""
-        count = len(pushes.z)
-        padded = jax.tree.map(lambda x: np.concatenate([x, np.zeros((-count % BATCH, *x.shape[1:]))]), pushes)
+        count = len(perturbations.z)
+        padded = jax.tree.map(lambda x: np.concatenate([x, np.zeros((-count % BATCH, *x.shape[1:]))]), perturbations)
         parts = [
             np.asarray(
                 self._compiled.responses(jnp.asarray(z), data, jax.tree.map(lambda x, i=i: x[i : i + BATCH], padded))
@@ -377,7 +377,7 @@ class Posterior:
                 samples.time,
                 step,
                 orbit=self.model.orbit,
-                latitude=manoeuvre.latitude,
+                argument_of_latitude=manoeuvre.argument_of_latitude,
                 actions=Actions.from_recording(manoeuvre.recording),
                 effects=self.model.effects,
                 torques=self.model.torque is not None,
@@ -487,18 +487,18 @@ class _Compiled:
             return whitened(simulated(z, data.grid, data.attitude), data)
 
         def traced(z: Array, data: Data) -> Traced:
-            stage, sample, readings = simulator.trace(unknowns.values(z), data.grid, data.attitude)
-            return Traced(stage, sample, readings, whitened(readings, data))
+            node, sample, readings = simulator.trace(unknowns.values(z), data.grid, data.attitude)
+            return Traced(node, sample, readings, whitened(readings, data))
 
         def chi2(z: Array, data: Data) -> Array:
             return jnp.sum(residuals(z, data) ** 2, axis=(1, 2))
 
-        def responses(z: Array, data: Data, along: Push) -> Array:
-            def shifted(z: Array, push: Push) -> Array:
-                return residuals(z, pushed(data, push))
+        def responses(z: Array, data: Data, along: Perturbation) -> Array:
+            def shifted(z: Array, perturbation: Perturbation) -> Array:
+                return residuals(z, perturbed(data, perturbation))
 
             at = jax.tree.map(lambda x: jnp.zeros(x.shape[1:]), along)
-            return jax.vmap(lambda push: jax.jvp(shifted, (z, at), (push.z, push))[1])(along)
+            return jax.vmap(lambda perturbation: jax.jvp(shifted, (z, at), (perturbation.z, perturbation))[1])(along)
 
         self.traced = jax.jit(traced)
         self.responses = jax.jit(responses)

@@ -17,7 +17,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor
 
-__all__ = ["Channel", "JointCheck", "RecordingCheck", "SensorCheck", "check_recording", "refuse_wrong_units"]
+__all__ = ["ChannelSampling", "JointCheck", "RecordingCheck", "SensorCheck", "check_recording", "refuse_wrong_units"]
 
 
 STILL = 1e-3
@@ -30,7 +30,7 @@ WRONG_UNIT = 15.0
 
 
 @dataclass(frozen=True)
-class Channel:
+class ChannelSampling:
     """Sampling of one sensor or joint: samples, median interval [s], longest gap [s]."""
 
     name: str
@@ -86,7 +86,7 @@ class RecordingCheck:
 
     name: str
     duration: float
-    channels: tuple[Channel, ...]
+    channels: tuple[ChannelSampling, ...]
     joints: tuple[JointCheck, ...]
     sensors: tuple[SensorCheck, ...]
     rate_is_differenced: bool
@@ -221,12 +221,13 @@ def _detrend(time: Floats, values: Floats) -> Floats:
     return values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
 
 
-def _channels(recording: Recording, model: Model) -> tuple[Channel, ...]:
+def _channels(recording: Recording, model: Model) -> tuple[ChannelSampling, ...]:
     series = [(sensor.kind.value, recording.series(f"{sensor.kind.value}.x")[0]) for sensor in model.sensors]
     joints = [f"{family}.{joint.name}" for joint in model.robot.joints for family in JOINT_FAMILIES]
     series += [(name, recording.series(name)[0]) for name in joints if name in recording.channels]
     return tuple(
-        Channel(name, len(time), float(np.median(np.diff(time))), float(np.diff(time).max())) for name, time in series
+        ChannelSampling(name, len(time), float(np.median(np.diff(time))), float(np.diff(time).max()))
+        for name, time in series
     )
 
 

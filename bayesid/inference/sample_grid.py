@@ -11,7 +11,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.inference import whitening
 from bayesid.inference.encoder_noise import joint_sensitivity
-from bayesid.inference.whitening import Channel, NoiseModel
+from bayesid.inference.whitening import NoiseChannel, NoiseModel
 from bayesid.recording.joint_motion import MeasuredMotion, Motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
@@ -92,12 +92,12 @@ class Samples:
     def noise_model(self, model: Model, robot: Robot, rate: Floats) -> NoiseModel:
         """Return the second moments of the errors, the encoder noise seen through ``robot`` turning at ``rate``."""
         channels = [
-            Channel(float(value), self.rows[sensor.kind], sensor.filter, coloured)
+            NoiseChannel(float(value), self.rows[sensor.kind], sensor.filter, coloured)
             for sensor in self.sensors
             for value, coloured in zip(self.sigma(sensor), _coloured(sensor), strict=True)
         ]
         channels += [
-            Channel(sigma, rows, Filter()) for sigma, rows in zip(self.torque_sigma, self.torque_rows, strict=True)
+            NoiseChannel(sigma, rows, Filter()) for sigma, rows in zip(self.torque_sigma, self.torque_rows, strict=True)
         ]
         if not isinstance(self.motion, MeasuredMotion) or not robot.joints:
             empty = np.zeros((0, 3, len(self.time), len(channels)))

@@ -54,7 +54,7 @@ def simulate_manoeuvre(
     *,
     name: str = "manoeuvre",
     attitude: Floats | None = None,
-    latitude: float = 0.0,
+    argument_of_latitude: float = 0.0,
     rng: np.random.Generator | None = None,
     encoder_sigma: float = 0.0,
 ) -> Recording:
@@ -77,7 +77,7 @@ def simulate_manoeuvre(
     joints = sample_joints(motion, model.robot, time)
     planned = Recording(name, None, time, {**joints, **blank_channels(model.sensors, len(time), model.torque)})
     start = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude, dtype=float)
-    posterior = Posterior(model, [Manoeuvre(planned, motion, start, latitude=latitude)])
+    posterior = Posterior(model, [Manoeuvre(planned, motion, start, argument_of_latitude=argument_of_latitude)])
     recording = simulate_recordings(posterior, rng, np.zeros(posterior.size))[0]
     if rng is None or encoder_sigma == 0.0:
         return recording

@@ -1,8 +1,8 @@
 """The unknowns of an identification: one vector of coordinates whose prior is standard normal.
 
-Inertial parameters are log-Cholesky coordinates relative to the prior's centre (`bayesid.robot.log_cholesky`), so that every
-value is a physical body. They are ``theta = spread z`` body by body, or ``theta = mixing z`` for all bodies together
-where the prior correlates them, as the posterior of an earlier study does.
+Inertial parameters are log-Cholesky coordinates relative to the prior's centre (`bayesid.robot.log_cholesky`), so that
+every value is a physical body. They are ``theta = spread z`` body by body, or ``theta = mixing z`` for all bodies
+together where the prior correlates them, as the posterior of an earlier study does.
 """
 
 from __future__ import annotations

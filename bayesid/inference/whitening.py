@@ -24,7 +24,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
 from bayesid.simulation.sensors import Filter
 
-__all__ = ["Channel", "NoiseModel", "Whitening", "apply", "build"]
+__all__ = ["NoiseChannel", "NoiseModel", "Whitening", "apply", "build"]
 
 
 WINDOWS = (0, 2, 4, 8, 16, 32)
@@ -34,7 +34,7 @@ TOLERANCE = 2e-4
 """Change of log standard deviation per scalar below which a longer window is not worth its cost."""
 
 
-class Channel(NamedTuple):
+class NoiseChannel(NamedTuple):
     """One sensor axis: its white noise, the rows of the sample grid where it was sampled, its filter.
 
     ``coloured`` is the standard deviation and correlation time [s] of exponentially correlated noise beside it.
@@ -62,7 +62,7 @@ class NoiseModel:
     """
 
     time: Floats
-    channels: Sequence[Channel]
+    channels: Sequence[NoiseChannel]
     sensitivity: Floats
     joint_covariance: Floats
 
@@ -144,7 +144,7 @@ def _outputs(noise: NoiseModel) -> list[tuple[int, list[_Output]]]:
     return sorted(blocks.items())
 
 
-def _filtered(time: Floats, channel: Channel, index: int) -> list[_Output]:
+def _filtered(time: Floats, channel: NoiseChannel, index: int) -> list[_Output]:
     own = time[channel.rows]
     if channel.filter == Filter():
         return [_Output(index, channel.rows[i : i + 1], np.ones(1)) for i in range(len(own))]

@@ -41,12 +41,12 @@ class Actions:
         """Read the actions a recording holds; what it does not hold is zero."""
         series = [_vector(recording, family) for family in ("base_force", "base_torque")]
         time = np.unique(np.concatenate([t for t, _ in series]))
-        wrench = np.concatenate([_held(t, values, time) for t, values in series], axis=1)
+        wrench = np.concatenate([_zero_order_hold(t, values, time) for t, values in series], axis=1)
         return cls(time, wrench, *_vector(recording, "wheel_momentum"))
 
-    def held(self, time: Floats) -> Floats:
+    def zero_order_hold(self, time: Floats) -> Floats:
         """Wrench in force at the times, shape (T, 6)."""
-        return _held(self.time, self.wrench, time)
+        return _zero_order_hold(self.time, self.wrench, time)
 
     def wheels(self, time: Floats) -> tuple[Floats, Floats]:
         """Momentum of the wheels and its derivative at the times, each (T, 3)."""
@@ -65,7 +65,7 @@ def _vector(recording: Recording, family: str) -> tuple[Floats, Floats]:
     return recording.vector(family, ("x", "y", "z"))
 
 
-def _held(times: Floats, values: Floats, at: Floats) -> Floats:
+def _zero_order_hold(times: Floats, values: Floats, at: Floats) -> Floats:
     if len(times) == 0:
         return np.zeros((len(at), values.shape[1]))
     index = np.searchsorted(times, at, side="right") - 1

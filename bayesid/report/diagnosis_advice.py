@@ -103,7 +103,7 @@ def imitation(best: Hypothesis, rival: Hypothesis, result: Diagnosis) -> float |
     where a cause has no columns, as faults of noise.
     """
     mine, theirs = differing(best, rival)
-    columns = result.search.battery.effects
+    columns = result.search.suite.effects
     if not mine or not theirs or not {*mine, *theirs} <= columns.keys():
         return None
     base = result.before
@@ -150,7 +150,7 @@ def moves_with(wrench: Unexplained, hypothesis: Hypothesis, most: int = 12) -> l
 
 
 def _known_series(wrench: Unexplained, hypothesis: Hypothesis) -> Iterator[tuple[str, Floats]]:
-    posterior, stage = hypothesis.fit.posterior, hypothesis.fit.situation.stage
+    posterior, node = hypothesis.fit.posterior, hypothesis.fit.operating.node
     states = [
         manoeuvre.motion.evaluate(time) for manoeuvre, time in zip(posterior.manoeuvres, wrench.time, strict=True)
     ]
@@ -159,10 +159,10 @@ def _known_series(wrench: Unexplained, hypothesis: Hypothesis) -> Iterator[tuple
             yield f"{kind} of {joint.name}", np.concatenate([state[order][:, column] for state in states])
     counts = [len(time) for time in wrench.time]
     for axis in range(3):
-        rates = [np.asarray(stage.rate)[r, :n, axis] for r, n in enumerate(counts)]
+        rates = [np.asarray(node.rate)[r, :n, axis] for r, n in enumerate(counts)]
         yield f"rate of the base about {'xyz'[axis]}", np.concatenate(rates)
     if posterior.model.orbit is not None:
-        phase = np.concatenate([np.asarray(stage.environment.latitude)[r, :n] for r, n in enumerate(counts)])
+        phase = np.concatenate([np.asarray(node.environment.argument_of_latitude)[r, :n] for r, n in enumerate(counts)])
         yield "cosine of the argument of latitude", np.cos(phase)
         yield "sine of the argument of latitude", np.sin(phase)
     yield "time", np.concatenate(wrench.time)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from bayesid.identifiability.advice import WORST
 from bayesid.identifiability.base_parameters import BaseParameters
-from bayesid.identifiability.parameter_table import Parameter
+from bayesid.identifiability.parameter_table import ParameterRow
 from bayesid.identifiability.practical_identifiability import Practical
-from bayesid.inference.contraction import Verdict
+from bayesid.inference.contraction import ContractionVerdict
 from bayesid.report import figures
 from bayesid.report import identifiability_text as text
 from bayesid.report.assumptions import model_sentences
@@ -105,7 +105,7 @@ def _add_parameters(document: Document, result: Practical) -> None:
     )
 
 
-def _parameter_row(item: Parameter) -> list[str]:
+def _parameter_row(item: ParameterRow) -> list[str]:
     interval = "" if item.normal else "not evaluated"
     if item.profile is not None:
         ends = item.profile.to_dict()["95 %"]
@@ -118,7 +118,7 @@ def _parameter_row(item: Parameter) -> list[str]:
         format_quantity(item.mean, item.sd),
         format_number(item.prior_sd, 2),
         text.share(item.shrinkage),
-        "prior only" if item.verdict is Verdict.NOT else item.verdict.value,
+        "prior only" if item.verdict is ContractionVerdict.NOT else item.verdict.value,
         ", ".join(confused),
         interval,
     ]

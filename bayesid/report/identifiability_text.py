@@ -7,10 +7,10 @@ import numpy as np
 from bayesid.identifiability.advice import WORST, Advice
 from bayesid.identifiability.base_parameters import BaseParameters
 from bayesid.identifiability.normality import NORMAL, Method
-from bayesid.identifiability.parameter_table import Parameter
+from bayesid.identifiability.parameter_table import ParameterRow
 from bayesid.identifiability.practical_identifiability import Practical
 from bayesid.identifiability.unidentifiable import listed
-from bayesid.inference.contraction import LEARNT, PRIOR_ONLY, Verdict
+from bayesid.inference.contraction import CONTRACTED, PRIOR_ONLY, ContractionVerdict
 from bayesid.report.numbers import format_number, format_unit
 
 __all__ = [
@@ -33,15 +33,15 @@ def structure_sentence(structure: BaseParameters) -> str:
 
 def practical_sentences(result: Practical) -> list[str]:
     """Return what the study tells, and what it does not."""
-    count = {verdict: sum(item.verdict is verdict for item in result.parameters) for verdict in Verdict}
+    count = {verdict: sum(item.verdict is verdict for item in result.parameters) for verdict in ContractionVerdict}
     total = len(result.parameters)
+    fully, weakly, not_at_all = (count[verdict] for verdict in ContractionVerdict)
     sentences = [
-        f"Of {total} parameters of the bodies to identify {count[Verdict.LEARNT]} are learnt, {count[Verdict.WEAKLY]} "
-        f"weakly, {count[Verdict.NOT]} not."
+        f"Of {total} parameters of the bodies to identify {fully} are learnt, {weakly} weakly, {not_at_all} not."
     ]
-    if names := [item.name for item in result.parameters if item.verdict is Verdict.NOT]:
+    if names := [item.name for item in result.parameters if item.verdict is ContractionVerdict.NOT]:
         sentences.append(f"Not learnt, so that the posterior is the prior: {listed(names)}.")
-    directions = sum(item.verdict is Verdict.NOT for item in result.directions)
+    directions = sum(item.verdict is ContractionVerdict.NOT for item in result.directions)
     if directions:
         plural = "direction is" if directions == 1 else "directions are"
         sentences.append(f"{directions} of {len(result.directions)} {plural} not learnt.")
@@ -97,7 +97,7 @@ def method_sentences(result: Practical) -> list[str]:
         "Prior and posterior are compared in the normal approximation about the fit (for a prediction, about the "
         "prior's centre): C = D (J'J)⁻¹ D' and C₀ = D D', with J the derivative of whitened residuals and prior and D "
         "that of the parameters. Initial rates, effects and links that are known to a few percent are marginalised.",
-        f"A parameter or direction is learnt if the data narrow the prior by at least {100 * LEARNT:.0f} %, and not "
+        f"A parameter or direction is learnt if the data narrow the prior by at least {100 * CONTRACTED:.0f} %, and not "
         f"learnt if by less than {100 * PRIOR_ONLY:.0f} %.",
         "Learning counts what the data carry over: a mass tied by the data to others is known as well as the priors of "
         "all of these together say.",
@@ -124,7 +124,7 @@ def advice_row(item: Advice, unit: str) -> list[str]:
     return [item.text, *ratios, f"{format_number(item.sd, 2)} {format_unit(unit)}", f"{item.information:.1f}"]
 
 
-def _confused(item: Parameter) -> str:
+def _confused(item: ParameterRow) -> str:
     if not item.correlated_with:
         return ""
     alone = 1.0 - item.conditional_sd / item.prior_sd

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesid.design.base_prediction import ATTITUDE, Prediction
 from bayesid.design.pose_region import Region
-from bayesid.design.pose_trajectory import Course
+from bayesid.design.pose_trajectory import PoseTrajectory
 from bayesid.inference.posterior import Posterior
 from bayesid.report import figures
 from bayesid.report.assumptions import planning_sentences
@@ -69,9 +69,9 @@ def prediction_report(
         if robot.joints:
             time = np.linspace(0.0, end, CURVE_POINTS)
             document.figure(figures.manoeuvre(manoeuvre.motion, robot, time), "Planned motion of the joints.")
-        for name, course in _courses(prediction):
+        for name, trajectory in _courses(prediction):
             document.figure(
-                figures.course_bands(course),
+                figures.trajectory_bands(trajectory),
                 f"Course of the {name}, orbit axes: mean with a band of ± 2 sd (left), and twice the standard "
                 "deviation (right).",
             )
@@ -103,8 +103,8 @@ def pose_rows(prediction: Prediction) -> list[list[str]]:
             f"{quantity} [{unit}]",
             *(format_quantity(float(m), float(s)) for m, s in zip(region.mean, region.sd, strict=True)),
         ]
-        for name, course in _courses(prediction)
-        for quantity, unit, region in _regions(course)
+        for name, trajectory in _courses(prediction)
+        for quantity, unit, region in _regions(trajectory)
     ]
 
 
@@ -118,17 +118,17 @@ def region_rows(prediction: Prediction) -> list[list[str]]:
             *(format_number(float(value)) for value in region.semi_axes),
             "(" + ", ".join(f"{value:.2f}".replace("-", "−") for value in region.directions[0]) + ")",
         ]
-        for name, course in _courses(prediction)
-        for quantity, unit, region in _regions(course)
+        for name, trajectory in _courses(prediction)
+        for quantity, unit, region in _regions(trajectory)
     ]
 
 
-def _courses(prediction: Prediction) -> list[tuple[str, Course]]:
+def _courses(prediction: Prediction) -> list[tuple[str, PoseTrajectory]]:
     return [("base", prediction.base), (f"end-effector {prediction.tip_frame}", prediction.tip)]
 
 
-def _regions(course: Course) -> list[tuple[str, str, Region]]:
-    final = course.pose()
+def _regions(trajectory: PoseTrajectory) -> list[tuple[str, str, Region]]:
+    final = trajectory.pose()
     return [("position", "mm", final.millimetres), ("rotation", "deg", final.degrees)]
 
 

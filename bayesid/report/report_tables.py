@@ -7,7 +7,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES, reported_effect
-from bayesid.inference.contraction import Learnt, Verdict
+from bayesid.inference.contraction import Contraction, ContractionVerdict
 from bayesid.inference.identification import Identification
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -38,7 +38,7 @@ def parameter_rows(result: Identification) -> Rows:
                     format_number(centre[index], 4),
                     format_quantity(mean, sd),
                     _relative(mean, sd),
-                    _shrinkage(result.learnt[f"{prior.name}.{key}"]),
+                    _shrinkage(result.contraction[f"{prior.name}.{key}"]),
                 ]
             )
     return rows
@@ -160,11 +160,11 @@ def _span(values: list[float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _shrinkage(learnt: Learnt) -> str:
-    if learnt.verdict is Verdict.NOT:
+def _shrinkage(contraction: Contraction) -> str:
+    if contraction.verdict is ContractionVerdict.NOT:
         return "prior only"
-    text = f"{format_number(100.0 * learnt.shrinkage, 3)} %"
-    return text if learnt.verdict is Verdict.LEARNT else f"{text} (weakly)"
+    text = f"{format_number(100.0 * contraction.shrinkage, 3)} %"
+    return text if contraction.verdict is ContractionVerdict.CONTRACTED else f"{text} (weakly)"
 
 
 def _relative(mean: float, sd: float) -> str:

@@ -1,8 +1,8 @@
 """Equations of motion as numbers times inertial parameters.
 
 Every regressor multiplies the ten parameters of each body (`InertialParameters.vector`) and is built on the tables of
-`bayesid.robot.composite_tables`. NumPy arrays give NumPy arrays; where any is JAX's, so is the result. Vectors are in base axes,
-moments of force and of momentum about the base origin.
+`bayesid.robot.composite_tables`. NumPy arrays give NumPy arrays; where any is JAX's, so is the result. Vectors are in
+base axes, moments of force and of momentum about the base origin.
 """
 
 from __future__ import annotations

@@ -20,15 +20,15 @@ from bayesid._math.hermite import hermite
 from bayesid._math.rotation import quaternion_rate, rotation
 from bayesid._math.small_matrices import cross, inverse, solve_small, symmetric, trace_less
 from bayesid.robot.composite_tables import ENTRIES
-from bayesid.simulation.effects.effect import Composite, Effect, Environment, Modes, Moment, Readings, Wrench
+from bayesid.simulation.effects.effect import Composite, Effect, Environment, Instant, Modes, Readings, Wrench
 from bayesid.simulation.joint_torques import BaseMotion, Beyond, joint_torques
 
-__all__ = ["Grid", "Instants", "Start", "composite", "simulate", "trace"]
+__all__ = ["Grid", "TimeTables", "Start", "composite", "simulate", "trace"]
 
 ATTITUDE, MOMENTUM, INNER = slice(0, 4), slice(4, 7), slice(7, None)
 
 
-class Instants(NamedTuple):
+class TimeTables(NamedTuple):
     """Tables at some instants: rows of the known bodies (T, 28), coefficients of the unknown ones (T, 28, p).
 
     ``beyond`` is what the joints carry, for their torques.
@@ -43,14 +43,14 @@ class Instants(NamedTuple):
 class Grid(NamedTuple):
     """Everything about one recording that a simulation needs, reduced to arrays.
 
-    ``stage`` holds nodes and midpoints of the K integration steps, 2 K + 1 instants; ``held`` the known force and
-    torque on the base during each step, (K, 6); a sample lies in step ``step_of`` at the given ``fraction`` of it.
+    ``node`` holds nodes and midpoints of the K integration steps, 2 K + 1 instants; ``zero_order_hold`` the known
+    force and torque on the base during each step, (K, 6); a sample lies in step ``step_of`` at the given ``fraction``.
     """
 
     step: Array
-    stage: Instants
-    held: Array
-    sample: Instants
+    node: TimeTables
+    zero_order_hold: Array
+    sample: TimeTables
     step_of: Array
     fraction: Array
 
@@ -121,21 +121,23 @@ def trace(
     effects: Sequence[Effect],
     values: Sequence[Array],
     point: Array,
-) -> tuple[Moment, Moment, Readings]:
+) -> tuple[Instant, Instant, Readings]:
     """Return the motion as effects see it at every instant of the stages, then of the samples, and the readings.
 
     Arguments and readings as for `simulate`; leading axes 2 K + 1 and T.
     """
-    system, loads, course = _integrate(grid, inertial, start, effects, values)
+    system, loads, trajectory = _integrate(grid, inertial, start, effects, values)
     steps = len(grid.step)
     index = jnp.minimum(jnp.arange(2 * steps + 1) // 2, steps - 1)
     fraction = jnp.concatenate([jnp.tile(jnp.array([0.0, 0.5]), steps), jnp.ones(1)])
     motions = []
-    for instants, of, where in ((grid.stage, index, fraction), (grid.sample, grid.step_of, grid.fraction)):
+    for instants, of, where in ((grid.node, index, fraction), (grid.sample, grid.step_of, grid.fraction)):
         bodies = jax.vmap(composite)(instants.known + instants.unknown @ loads)
-        motion = jax.vmap(system.motion)(course.at(of, where), (bodies, instants.environment), grid.held[of])
+        motion = jax.vmap(system.motion)(
+            trajectory.at(of, where), (bodies, instants.environment), grid.zero_order_hold[of]
+        )
         motions.append(motion[0])
-    return motions[0], motions[1], _sense(grid, point, system, loads, course)
+    return motions[0], motions[1], _sense(grid, point, system, loads, trajectory)
 
 
 class _Course(NamedTuple):
@@ -158,33 +160,35 @@ def _integrate(
     """Run the classical Runge-Kutta method over the grid; also return what multiplies its tables."""
     system = _System(tuple(effects), tuple(values))
     loads = jnp.concatenate([inertial, *(effect.loads(v) for effect, v in zip(effects, values, strict=True))])
-    bodies = jax.vmap(composite)(grid.stage.known + grid.stage.unknown @ loads)
-    stages = (bodies, grid.stage.environment)
+    bodies = jax.vmap(composite)(grid.node.known + grid.node.unknown @ loads)
+    stages = (bodies, grid.node.environment)
     first, middle, last = (
         jax.tree.map(lambda x, s=s: x[s], stages) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
     )
     initial = system.initial(jax.tree.map(lambda x: x[0], stages), start)
 
     def step(state: Array, given: tuple) -> tuple[Array, tuple[Array, Array, Array]]:
-        size, held, here, half, there = given
-        k1 = system.derivative(state, here, held)
-        k2 = system.derivative(state + 0.5 * size * k1, half, held)
-        k3 = system.derivative(state + 0.5 * size * k2, half, held)
-        k4 = system.derivative(state + size * k3, there, held)
+        size, zero_order_hold, here, half, there = given
+        k1 = system.derivative(state, here, zero_order_hold)
+        k2 = system.derivative(state + 0.5 * size * k1, half, zero_order_hold)
+        k3 = system.derivative(state + 0.5 * size * k2, half, zero_order_hold)
+        k4 = system.derivative(state + size * k3, there, zero_order_hold)
         new = state + size / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
         # the slope at the end is k1 of the next step, but for a jump of the held wrench
-        return new, (state, size * k1, size * system.derivative(new, there, held))
+        return new, (state, size * k1, size * system.derivative(new, there, zero_order_hold))
 
-    final, (states, slopes, end_slopes) = jax.lax.scan(step, initial, (grid.step, grid.held, first, middle, last))
+    final, (states, slopes, end_slopes) = jax.lax.scan(
+        step, initial, (grid.step, grid.zero_order_hold, first, middle, last)
+    )
     return system, loads, _Course(states, jnp.concatenate([states[1:], final[None]]), slopes, end_slopes)
 
 
-def _sense(grid: Grid, point: Array, system: _System, loads: Array, course: _Course) -> Readings:
+def _sense(grid: Grid, point: Array, system: _System, loads: Array, trajectory: _Course) -> Readings:
     """Return what the sensors read along a course."""
     seen = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ loads)
     sense = jax.vmap(system.sense, (0, 0, 0, None, 0, None))
-    states, held = course.at(grid.step_of, grid.fraction), grid.held[grid.step_of]
-    return Readings(*sense(states, (seen, grid.sample.environment), held, point, grid.sample, loads))
+    states, zero_order_hold = trajectory.at(grid.step_of, grid.fraction), grid.zero_order_hold[grid.step_of]
+    return Readings(*sense(states, (seen, grid.sample.environment), zero_order_hold, point, grid.sample, loads))
 
 
 class _Inner(NamedTuple):
@@ -203,25 +207,25 @@ class _System(NamedTuple):
     effects: tuple[Effect, ...]
     values: tuple[Array, ...]
 
-    def initial(self, instant: tuple[Composite, Environment], start: Start) -> Array:
-        body, environment = instant
+    def initial(self, given: tuple[Composite, Environment], start: Start) -> Array:
+        body, environment = given
         inner = jnp.zeros(sum(effect.states + 2 * effect.modes_count for effect in self.effects))
-        moment = Moment(environment, body, rotation(start.attitude), *jnp.zeros((3, 3)))
-        momentum = body.inertia @ start.rate + body.spin + self.momentum(moment, inner)[0]
+        instant = Instant(environment, body, rotation(start.attitude), *jnp.zeros((3, 3)))
+        momentum = body.inertia @ start.rate + body.spin + self.momentum(instant, inner)[0]
         return jnp.concatenate([start.attitude, momentum, inner])
 
-    def derivative(self, state: Array, instant: tuple[Composite, Environment], held: Array) -> Array:
+    def derivative(self, state: Array, given: tuple[Composite, Environment], zero_order_hold: Array) -> Array:
         if any(effect.modes_count for effect in self.effects):
-            moment, mode_changes = self.motion(state, instant, held)
+            instant, mode_changes = self.motion(state, given, zero_order_hold)
         else:  # the acceleration is not needed
-            moment, mode_changes = self.moment(state, instant)[0], jnp.zeros(0)
-        wrench = self.wrench(moment, state[INNER], held)
-        torque = wrench.torque - cross(moment.body.com, wrench.force)
-        parts = [quaternion_rate(state[ATTITUDE], moment.rate), torque - cross(moment.rate, state[MOMENTUM])]
+            instant, mode_changes = self.instant(state, given)[0], jnp.zeros(0)
+        wrench = self.wrench(instant, state[INNER], zero_order_hold)
+        torque = wrench.torque - cross(instant.body.com, wrench.force)
+        parts = [quaternion_rate(state[ATTITUDE], instant.rate), torque - cross(instant.rate, state[MOMENTUM])]
         used = 0
         for effect, values, own, _, speed in self.inner(state[INNER]):
             if effect.states:
-                parts.append(effect.derivative(values, moment, own))
+                parts.append(effect.derivative(values, instant, own))
             if effect.modes_count:
                 parts += [speed, mode_changes[used : used + effect.modes_count]]
                 used += effect.modes_count
@@ -230,27 +234,31 @@ class _System(NamedTuple):
     def sense(
         self,
         state: Array,
-        instant: tuple[Composite, Environment],
-        held: Array,
+        given: tuple[Composite, Environment],
+        zero_order_hold: Array,
         point: Array,
-        tables: Instants,
+        tables: TimeTables,
         loads: Array,
     ) -> tuple[Array, Array, Array, Array, Array]:
-        moment, _ = self.motion(state, instant, held)
-        rate = moment.rate
-        accel = moment.acceleration + cross(moment.rate_change, point) + cross(rate, cross(rate, point))
+        instant, _ = self.motion(state, given, zero_order_hold)
+        rate = instant.rate
+        accel = instant.acceleration + cross(instant.rate_change, point) + cross(rate, cross(rate, point))
         for effect, values, *_ in self.inner(state[INNER]):
-            if effect.uses("field"):
-                accel = accel + effect.field(values, moment, point - moment.body.com)
-        motion = BaseMotion(rate, moment.rate_change, moment.acceleration)
-        torque = joint_torques(tables.beyond, tables.unknown, loads, motion, moment.body.com, self.tide(moment))
-        return instant[1].time, rate, accel, state[ATTITUDE] / jnp.linalg.norm(state[ATTITUDE]), torque
+            if effect.uses("specific_force"):
+                accel = accel + effect.specific_force(values, instant, point - instant.body.com)
+        motion = BaseMotion(rate, instant.rate_change, instant.acceleration)
+        torque = joint_torques(
+            tables.beyond, tables.unknown, loads, motion, instant.body.com, self.gravity_gradient_tensor(instant)
+        )
+        return given[1].time, rate, accel, state[ATTITUDE] / jnp.linalg.norm(state[ATTITUDE]), torque
 
-    def motion(self, state: Array, instant: tuple[Composite, Environment], held: Array) -> tuple[Moment, Array]:
+    def motion(
+        self, state: Array, given: tuple[Composite, Environment], zero_order_hold: Array
+    ) -> tuple[Instant, Array]:
         """Return the instant with its accelerations, and those of the modes' amplitudes."""
-        moment, momentum_rate = self.moment(state, instant)
-        body, rate = moment.body, moment.rate
-        wrench = self.wrench(moment, state[INNER], held)
+        instant, momentum_rate = self.instant(state, given)
+        body, rate = instant.body, instant.rate
+        wrench = self.wrench(instant, state[INNER], zero_order_hold)
         torque = wrench.torque - cross(body.com, wrench.force)
         change = torque - cross(rate, state[MOMENTUM]) - body.inertia_rate @ rate - body.spin_rate - momentum_rate
         force = wrench.force
@@ -268,7 +276,7 @@ class _System(NamedTuple):
             - cross(rate, cross(rate, body.com))
         )
         if not moving:
-            return moment._replace(rate_change=rate_change, acceleration=acceleration), jnp.zeros(0)
+            return instant._replace(rate_change=rate_change, acceleration=acceleration), jnp.zeros(0)
         modes = [item.effect.modes(item.values) for item in moving]
         linear = jnp.concatenate([mode.linear for mode in modes])
         central = jnp.concatenate([_about_com(mode, body.com) for mode in modes])
@@ -280,49 +288,52 @@ class _System(NamedTuple):
         )
         spread = jnp.outer(rate, rate) - (rate @ rate) * jnp.eye(3)  # w x (w x r) as a matrix
         moments = jnp.concatenate([mode.moment for mode in modes])
-        drive = (
+        excitation = (
             -linear @ (acceleration + cross(rate_change, body.com))
             - central @ rate_change
             - jnp.einsum("nij,ij->n", moments, spread)
         )
-        yielding = jnp.eye(len(linear)) - linear @ linear.T / body.mass - central @ body.inverse @ central.T
-        changes = solve_small(yielding, free + drive)
+        compliance = jnp.eye(len(linear)) - linear @ linear.T / body.mass - central @ body.inverse @ central.T
+        changes = solve_small(compliance, free + excitation)
         recoil = body.inverse @ (central.T @ changes)
-        return moment._replace(
+        return instant._replace(
             rate_change=rate_change - recoil,
             acceleration=acceleration - linear.T @ changes / body.mass + cross(recoil, body.com),
         ), changes
 
-    def moment(self, state: Array, instant: tuple[Composite, Environment]) -> tuple[Moment, Array]:
-        body, environment = instant
-        still = Moment(environment, body, rotation(state[ATTITUDE]), *jnp.zeros((3, 3)))
+    def instant(self, state: Array, given: tuple[Composite, Environment]) -> tuple[Instant, Array]:
+        body, environment = given
+        still = Instant(environment, body, rotation(state[ATTITUDE]), *jnp.zeros((3, 3)))
         momentum, momentum_rate = self.momentum(still, state[INNER])
         return still._replace(rate=body.inverse @ (state[MOMENTUM] - body.spin - momentum)), momentum_rate
 
-    def momentum(self, moment: Moment, inner: Array) -> tuple[Array, Array]:
+    def momentum(self, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return momentum relative to the base, about the centre of mass, and its derivative but for the modes'."""
-        momentum, rate = moment.environment.wheel_momentum, moment.environment.wheel_torque
+        momentum, rate = instant.environment.wheel_momentum, instant.environment.wheel_torque
         for effect, values, own, _, speed in self.inner(inner):
             if effect.uses("momentum"):
-                more, more_rate = effect.momentum(values, moment, own)
+                more, more_rate = effect.momentum(values, instant, own)
                 momentum, rate = momentum + more, rate + more_rate
             if effect.modes_count:
-                momentum = momentum + _about_com(effect.modes(values), moment.body.com).T @ speed
+                momentum = momentum + _about_com(effect.modes(values), instant.body.com).T @ speed
         return momentum, rate
 
-    def wrench(self, moment: Moment, inner: Array, held: Array) -> Wrench:
-        given = held + moment.environment.wrench
+    def wrench(self, instant: Instant, inner: Array, zero_order_hold: Array) -> Wrench:
+        given = zero_order_hold + instant.environment.wrench
         total = Wrench(given[:3], given[3:])
         for effect, values, own, *_ in self.inner(inner):
             if effect.uses("wrench"):
-                more = effect.wrench(values, moment, own)
+                more = effect.wrench(values, instant, own)
                 total = Wrench(total.force + more.force, total.torque + more.torque)
         return total
 
-    def tide(self, moment: Moment) -> Array:
+    def gravity_gradient_tensor(self, instant: Instant) -> Array:
         """Return gravitational acceleration per distance from the centre of mass, (3, 3)."""
         parts = zip(self.effects, self.values, strict=True)
-        return sum((e.tide(v, moment) for e, v in parts if e.uses("tide")), jnp.zeros((3, 3)))
+        return sum(
+            (e.gravity_gradient_tensor(v, instant) for e, v in parts if e.uses("gravity_gradient_tensor")),
+            jnp.zeros((3, 3)),
+        )
 
     def inner(self, inner: Array) -> list[_Inner]:
         parts, start = [], 0

@@ -29,7 +29,7 @@ __all__ = ["BaseMotion", "Beyond", "TorqueSensor", "beyond_joints", "joint_torqu
 class TorqueSensor:
     """Torque (force of a prismatic joint) that the parent exerts on the child along the axis, at the motor's side.
 
-    Friction of the joint is part of the reading as far as the model has it (`bayesid.simulation.effects.joint_friction`).
+    Friction of the joint is part of the reading as far as the model has it (`JointFriction`).
 
     Parameters
     ----------
@@ -112,7 +112,9 @@ class BaseMotion(NamedTuple):
     acceleration: Array
 
 
-def joint_torques(beyond: Beyond, unknown: Array, loads: Array, motion: BaseMotion, com: Array, tide: Array) -> Array:
+def joint_torques(
+    beyond: Beyond, unknown: Array, loads: Array, motion: BaseMotion, com: Array, gravity_gradient_tensor: Array
+) -> Array:
     """Return the torques of one instant, shape (n,).
 
     Parameters
@@ -133,15 +135,17 @@ def joint_torques(beyond: Beyond, unknown: Array, loads: Array, motion: BaseMoti
         return jnp.zeros(0)
     rows = beyond.known + (beyond.carried * loads) @ unknown.T
     wrench = balance_regressor(rows.T[None], *(part[None] for part in motion))[0].T
-    pulled = jax.vmap(_pulled, (0, None, None))(rows, com, tide)
+    pulled = jax.vmap(_pulled, (0, None, None))(rows, com, gravity_gradient_tensor)
     return jnp.einsum("jk,jk->j", beyond.axis, wrench - pulled)
 
 
-def _pulled(row: Array, com: Array, tide: Array) -> Array:
+def _pulled(row: Array, com: Array, gravity_gradient_tensor: Array) -> Array:
     """Force and torque about the base origin that a field growing linearly from ``com`` exerts on bodies."""
     mass, first = row[ENTRIES["mass"]], row[ENTRIES["first"]]
     xx, yy, zz, xy, xz, yz = row[ENTRIES["second"]]
     second = jnp.stack([jnp.stack([xx, xy, xz]), jnp.stack([xy, yy, yz]), jnp.stack([xz, yz, zz])])
-    spread = second @ tide  # integral of r (tide r)'; its antisymmetric part is the torque
+    spread = second @ gravity_gradient_tensor  # integral of r (tide r)'; its antisymmetric part is the torque
     torque = jnp.stack([spread[1, 2] - spread[2, 1], spread[2, 0] - spread[0, 2], spread[0, 1] - spread[1, 0]])
-    return jnp.concatenate([tide @ (first - mass * com), torque - jnp.cross(first, tide @ com)])
+    return jnp.concatenate(
+        [gravity_gradient_tensor @ (first - mass * com), torque - jnp.cross(first, gravity_gradient_tensor @ com)]
+    )

@@ -47,7 +47,7 @@ class Manoeuvre:
     motion: Motion
     attitude: Floats = field(default_factory=lambda: np.array([0.0, 0.0, 0.0, 1.0]))
     attitude_sigma: float = 0.0
-    latitude: float = 0.0
+    argument_of_latitude: float = 0.0
 
 
 @dataclass(frozen=True)

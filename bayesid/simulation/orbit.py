@@ -28,7 +28,7 @@ class OrbitState(NamedTuple):
     gradient: Floats  # mu / r^3 [1/s2]
     velocity: Floats  # direction of motion
     sun: Floats
-    latitude: Floats  # argument of latitude [rad]
+    argument_of_latitude: Floats  # argument of latitude [rad]
     north: Floats  # the Earth's north pole
 
 
@@ -93,7 +93,7 @@ class Orbit:
             gradient=EARTH / distance**3,
             velocity=velocity,
             sun=np.broadcast_to(self._sun(argument_of_latitude), zenith.shape),
-            latitude=argument_of_latitude + angle,
+            argument_of_latitude=argument_of_latitude + angle,
             north=np.broadcast_to(self._north(argument_of_latitude), zenith.shape),
         )
 
@@ -114,16 +114,16 @@ class Orbit:
         turns = np.round(eccentric / (2.0 * np.pi)) * 2.0 * np.pi
         return 2.0 * np.arctan(np.tan((eccentric - turns) / 2.0) / half) + turns
 
-    def _sun(self, latitude: float) -> Floats:
-        return np.zeros(3) if self.sun is None else _from_node(np.asarray(self.sun), latitude)
+    def _sun(self, argument_of_latitude: float) -> Floats:
+        return np.zeros(3) if self.sun is None else _from_node(np.asarray(self.sun), argument_of_latitude)
 
-    def _north(self, latitude: float) -> Floats:
+    def _north(self, argument_of_latitude: float) -> Floats:
         i = self.inclination
-        return np.zeros(3) if i is None else _from_node(np.array([0.0, np.sin(i), np.cos(i)]), latitude)
+        return np.zeros(3) if i is None else _from_node(np.array([0.0, np.sin(i), np.cos(i)]), argument_of_latitude)
 
 
-def _from_node(vector: Floats, latitude: float) -> Floats:
+def _from_node(vector: Floats, argument_of_latitude: float) -> Floats:
     """Turn a direction from axes (ascending node, along-orbit, normal) to orbit axes, as a unit vector."""
-    cos, sin = np.cos(latitude), np.sin(latitude)
+    cos, sin = np.cos(argument_of_latitude), np.sin(argument_of_latitude)
     node, along, normal = vector / np.linalg.norm(vector)
     return np.array([cos * node + sin * along, -sin * node + cos * along, normal])

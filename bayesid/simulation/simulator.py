@@ -12,7 +12,7 @@ from jax import Array
 
 from bayesid._math.rotation import quaternion_product
 from bayesid.simulation.dynamics import Grid, Start, simulate, trace
-from bayesid.simulation.effects.effect import Moment, Readings
+from bayesid.simulation.effects.effect import Instant, Readings
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Kind
 
@@ -49,7 +49,7 @@ class Simulator:
         """Return what the sensors read, in sensor axes, (R, T, ...)."""
         return self._each(self._sensed, values, grid, attitude)
 
-    def trace(self, values: Values, grid: Grid, attitude: Array) -> tuple[Moment, Moment, Readings]:
+    def trace(self, values: Values, grid: Grid, attitude: Array) -> tuple[Instant, Instant, Readings]:
         """Return the motion at the stages and at the samples, and the readings."""
         return self._each(self._moved, values, grid, attitude)
 
@@ -82,8 +82,8 @@ class Simulator:
 
     def _moved(self, grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Any:
         start = _start(attitude, rate, tilt)
-        stage, sample, readings = trace(grid, inertial, start, self.model.effects, effects, jnp.asarray(self.point))
-        return stage, sample, self._distorted(readings, effects, grid)
+        node, sample, readings = trace(grid, inertial, start, self.model.effects, effects, jnp.asarray(self.point))
+        return node, sample, self._distorted(readings, effects, grid)
 
     def _distorted(self, readings: Readings, effects: Any, grid: Grid) -> Readings:
         readings = readings._replace(

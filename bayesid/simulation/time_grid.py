@@ -15,7 +15,7 @@ from bayesid.recording.joint_motion import Motion
 from bayesid.robot.composite_tables import WIDTH, composite_rows, link_table
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
-from bayesid.simulation.dynamics import Grid, Instants
+from bayesid.simulation.dynamics import Grid, TimeTables
 from bayesid.simulation.effects.effect import Effect, Environment
 from bayesid.simulation.joint_torques import beyond_joints, no_joints
 from bayesid.simulation.orbit import Orbit, OrbitState
@@ -31,7 +31,7 @@ def build_grid(
     step: float,
     *,
     orbit: Orbit | None = None,
-    latitude: float = 0.0,
+    argument_of_latitude: float = 0.0,
     actions: Actions | None = None,
     effects: Sequence[Effect] = (),
     torques: bool = False,
@@ -57,17 +57,17 @@ def build_grid(
     """
     actions = Actions.none() if actions is None else actions
     nodes = _nodes(float(samples[-1]), step, actions.time)
-    stage = np.sort(np.concatenate([nodes, 0.5 * (nodes[1:] + nodes[:-1])]))
+    node = np.sort(np.concatenate([nodes, 0.5 * (nodes[1:] + nodes[:-1])]))
     instants = [
-        _instants(robot, unknown, effects, motion, time, orbit, latitude, actions, sampled)
-        for time, sampled in ((stage, False), (samples, torques))
+        _instants(robot, unknown, effects, motion, time, orbit, argument_of_latitude, actions, sampled)
+        for time, sampled in ((node, False), (samples, torques))
     ]
     index = np.clip(np.searchsorted(nodes, samples, side="right") - 1, 0, len(nodes) - 2)
     size = np.diff(nodes)
     return Grid(
         step=jnp.asarray(size),
-        stage=instants[0],
-        held=jnp.asarray(actions.held(nodes[:-1])),
+        node=instants[0],
+        zero_order_hold=jnp.asarray(actions.zero_order_hold(nodes[:-1])),
         sample=instants[1],
         step_of=jnp.asarray(index, dtype=jnp.int32),
         fraction=jnp.asarray((samples - nodes[index]) / size[index]),
@@ -91,10 +91,10 @@ def _instants(
     motion: Motion,
     time: Floats,
     orbit: Orbit | None,
-    latitude: float,
+    argument_of_latitude: float,
     actions: Actions,
     torques: bool,
-) -> Instants:
+) -> TimeTables:
     joints = motion.evaluate(time)
     moved = kinematics(robot, joints)
     known = composite_rows(robot, moved, leave_out=unknown)
@@ -102,7 +102,7 @@ def _instants(
     tables += [(effect.link, effect.table(robot, motion, time)) for effect in effects if effect.uses("table")]
     owners = [name for name, table in tables for _ in range(table.shape[2])]
     none = OrbitState(*(np.zeros((len(time), *shape)) for shape in ((3,), (), (3,), (3,), (), (3,))))
-    state = none if orbit is None else orbit.state(time, latitude)
+    state = none if orbit is None else orbit.state(time, argument_of_latitude)
     momentum, torque = actions.wheels(time)
     environment = Environment(
         time=jnp.asarray(time),
@@ -110,7 +110,7 @@ def _instants(
         gradient=jnp.asarray(state.gradient),
         velocity=jnp.asarray(state.velocity),
         sun=jnp.asarray(state.sun),
-        latitude=jnp.asarray(state.latitude),
+        argument_of_latitude=jnp.asarray(state.argument_of_latitude),
         north=jnp.asarray(state.north),
         wheel_momentum=jnp.asarray(momentum),
         wheel_torque=jnp.asarray(torque),
@@ -120,7 +120,7 @@ def _instants(
     beyond = no_joints(len(time), len(owners))
     if torques and robot.joints:
         beyond = beyond_joints(robot, joints, moved, unknown, owners)
-    return Instants(jnp.asarray(known), jnp.concatenate(coefficients, axis=2), environment, beyond)
+    return TimeTables(jnp.asarray(known), jnp.concatenate(coefficients, axis=2), environment, beyond)
 
 
 ROUND = 16
@@ -147,8 +147,8 @@ def pad_grids(grids: list[Grid], steps: int | None = None, samples: int | None =
         padded.append(
             Grid(
                 step=jnp.concatenate([grid.step, jnp.zeros(extra)]),
-                stage=jax.tree.map(lambda x: lengthen(x, 2 * steps + 1), grid.stage),
-                held=lengthen(grid.held, steps),
+                node=jax.tree.map(lambda x: lengthen(x, 2 * steps + 1), grid.node),
+                zero_order_hold=lengthen(grid.zero_order_hold, steps),
                 sample=jax.tree.map(lambda x: lengthen(x, samples), grid.sample),
                 step_of=lengthen(grid.step_of, samples),
                 fraction=lengthen(grid.fraction, samples),

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.inference import Identification, choose_chart, importance_sample, maximise, sample
+from bayesid.inference import Identification, choose_parameterisation, importance_sample, maximise, sample
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.simulated_recordings import simulate_recordings
@@ -102,10 +102,10 @@ def sample_posterior(arm_spread: float, seed: int, effective_samples: float = 10
     draws, weights, walkers = np.random.SeedSequence(seed).spawn(3)
     refined, optimum = maximise(posterior, np.random.default_rng(draws), start)
     rng = np.random.default_rng(weights)
-    chart = choose_chart(refined, optimum, rng)
-    evidence = importance_sample(chart, optimum, rng)
+    parameterisation = choose_parameterisation(refined, optimum, rng)
+    evidence = importance_sample(parameterisation, optimum, rng)
     began = time.perf_counter()
-    chains = sample(chart, optimum, walkers, effective_samples=effective_samples, max_steps=LONGEST)
+    chains = sample(parameterisation, optimum, walkers, effective_samples=effective_samples, max_steps=LONGEST)
     return Identification(refined, optimum, evidence, chains, time.perf_counter() - began)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from emcee.autocorr import integrated_time
 
 from bayesid import Posterior
-from bayesid.inference import Chains, LogCholeskyChart, maximise, sample
+from bayesid.inference import Chains, LogCholeskyParameterisation, maximise, sample
 
 
 class Sampling(NamedTuple):
@@ -27,14 +27,14 @@ class Sampling(NamedTuple):
 def compare_moves(posterior: Posterior, *, wanted: float, default_steps: int, seed: int) -> Sampling:
     """Sample one posterior with our moves and with emcee's default stretch move."""
     refined, optimum = maximise(posterior, np.random.default_rng(seed))
-    chart = LogCholeskyChart(refined)
+    parameterisation = LogCholeskyParameterisation(refined)
     refined.log_density(optimum.z)  # compile
     began = time.perf_counter()
-    ours = sample(chart, optimum, seed, effective_samples=wanted)
+    ours = sample(parameterisation, optimum, seed, effective_samples=wanted)
     seconds = time.perf_counter() - began
     sampler = emcee.EnsembleSampler(ours.walkers, refined.size, refined.log_density, vectorize=True)
     sampler.random_state = np.random.RandomState(seed).get_state()
-    start = chart.proposal(optimum).draw(ours.walkers, np.random.default_rng(seed))
+    start = parameterisation.proposal(optimum).draw(ours.walkers, np.random.default_rng(seed))
     began = time.perf_counter()
     sampler.run_mcmc(start, default_steps, skip_initial_state_check=True)
     default_seconds = time.perf_counter() - began

@@ -236,7 +236,7 @@ def _limits(result: Diagnosis, case: hidden.Case, weaker: Study) -> tuple[float,
     degrees = sum(max(len(search.candidates[c].parameters), 1) if c in search.candidates else 3 for c in case.causes)
     closest = noncentrality
     names = set(case.causes) | set(case.accept)
-    for label, columns in search.battery.effects.items():
+    for label, columns in search.suite.effects.items():
         if label not in names and len(case.causes) == 1:
             closest = min(closest, _left(fit, columns, change))
     return (

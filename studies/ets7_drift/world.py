@@ -136,11 +136,11 @@ def draw_world(recordings: int, seed: int, momentum: float = 1.0, duration: floa
         robot.write_urdf(urdf)
         truth.write_urdf(urdf, true_urdf, base)
         for index in range(recordings):
-            latitude = float(rng.uniform(0.0, 2.0 * np.pi))
+            argument_of_latitude = float(rng.uniform(0.0, 2.0 * np.pi))
             attitude = Rotation.random(rng=rng).as_quat()
             model = truth.TruthModel(
                 true_urdf,
-                orbit=truth.Orbit(radius=RADIUS, argument_of_latitude=latitude),
+                orbit=truth.Orbit(radius=RADIUS, argument_of_latitude=argument_of_latitude),
                 rotor=truth.Rotor(tuple(wheels), **WHEEL),
             )
             run = model.run(motion, time, rate0=rates[index], attitude0=attitude, step=0.25)
@@ -156,7 +156,7 @@ def draw_world(recordings: int, seed: int, momentum: float = 1.0, duration: floa
             recording = Recording(f"flight {index + 1}", None, time, channels)
             sigma: dict[int, float] = {0: ENCODER_SIGMA}
             smoothed = MeasuredMotion.from_recording(recording, robot, sigma=sigma)
-            manoeuvres.append(Manoeuvre(recording, smoothed, attitude, latitude=latitude))
+            manoeuvres.append(Manoeuvre(recording, smoothed, attitude, argument_of_latitude=argument_of_latitude))
     tensor = base.inertia
     quantities = [base.mass, *base.com, *np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
     return World(wheels, rates, np.array(quantities), tuple(manoeuvres))

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import White
-from bayesid.design import Found, Problem, Search, Store
-from bayesid.design import trajectory_search as optimise
+from bayesid.design import Found, Problem, Search, Store, optimise
 from bayesid.design.design_problem import Reached
 from bayesid.design.plan import Trajectory
 from bayesid.design.trajectories import ParameterisedMotion

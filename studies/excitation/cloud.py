@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 from bayesid.design import DOptimal, Paper26, Paper26Intended, Problem
-from bayesid.design.plan import Outcome
+from bayesid.design.plan import PlannedOutcome
 
 __all__ = ["Cloud", "Sensitivity", "random_cloud", "sensitivity"]
 
@@ -46,7 +46,7 @@ def random_cloud(own: Problem, count: int, rng: np.random.Generator) -> Cloud:
 
     @jax.jit
     def judged(parameters: jax.Array) -> tuple[jax.Array, ...]:
-        outcome: Outcome = own.plan.outcome(parameters, jax.numpy.asarray(own.centre))
+        outcome: PlannedOutcome = own.plan.outcome(parameters, jax.numpy.asarray(own.centre))
         largest = jax.numpy.abs(outcome.trajectory.excursion).max(axis=0)
         return (
             -Paper26().cost(own.plan, outcome),

@@ -22,13 +22,9 @@ from bayesid.design import (
     Paper26Intended,
     Problem,
     Search,
+    design,
     evaluate,
-)
-from bayesid.design import (
-    designed as design,
-)
-from bayesid.design import (
-    trajectory_search as optimise,
+    optimise,
 )
 from bayesid.design.design_problem import Known
 from studies.base_body import paper

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import BodyPrior, Kind, Manoeuvre, MeasuredMotion, Model, Orbit, Recording, Robot, Sensor, White
-from bayesid.design import BSplines, Criterion, Limits, PaperExcitation, Parameterisation, Plan, Problem, Tip
+from bayesid.design import BSplines, Criterion, Limits, PaperExcitation, Plan, Problem, Tip, TrajectoryFamily
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.effects import AccelBias, GravityGradient
 from studies.base_body import paper
@@ -89,7 +89,7 @@ def splines(points: int = 8) -> BSplines:
     return BSplines(posture(), range(6), DURATION, points)
 
 
-def problem(family: Parameterisation, limits: Limits, criteria: tuple[Criterion, ...]) -> Problem:
+def problem(family: TrajectoryFamily, limits: Limits, criteria: tuple[Criterion, ...]) -> Problem:
     """Return a design problem of a family within limits."""
     model = model_of()
     plan = Plan(model, family, INTERVAL, Tip.of(model.robot, "tip"), step=2.0, thinning=2)

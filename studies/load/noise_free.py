@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.design import Criterion, Paper26Intended, PlannedMotion, Search
-from bayesid.design import trajectory_search as optimise
+from bayesid.design import Criterion, Paper26Intended, PlannedMotion, Search, optimise
 from bayesid.design.design_problem import Known
 from bayesid.design.simulated_spacecraft import plan_recording
 from bayesid.inference.mode import fit

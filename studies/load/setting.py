@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import BodyPrior, Kind, Load, Model, Orbit, Recording, Robot, Sensor, White
-from bayesid.design import Criterion, Limits, PaperExcitation, Parameterisation, Plan, PlannedMotion, Problem, Tip
+from bayesid.design import Criterion, Limits, PaperExcitation, Plan, PlannedMotion, Problem, Tip, TrajectoryFamily
 from bayesid.simulation.effects import GravityGradient
 from studies.base_body.setting import extended_wrist
 from studies.ets7_drift.world import simulator
@@ -69,7 +69,7 @@ def excitation() -> PaperExcitation:
     return PaperExcitation([0.0, 0.0, 0.0, *extended_wrist()], DURATION)
 
 
-def problem(known: Model, family: Parameterisation, *criteria: Criterion, limits: Limits = LIMITS) -> Problem:
+def problem(known: Model, family: TrajectoryFamily, *criteria: Criterion, limits: Limits = LIMITS) -> Problem:
     """Return the design problem of a family of manoeuvres."""
     plan = Plan(known, family, interval=INTERVAL, tip=Tip.of(known.robot, "tip"), step=PLAN_STEP, thinning=4)
     return Problem(plan, limits, criteria)

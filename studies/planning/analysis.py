@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from bayesid import Identification, InertialParameters, Manoeuvre, Model, Posterior, Recording, Robot, identify
-from bayesid.design.base_prediction import Prediction, Predictor
+from bayesid.design.base_prediction import BasePredictor, Prediction
 from bayesid.design.pose_region import Pose
 from bayesid.inference.posterior_as_prior import InertialDraws, joint_prior
 from studies.planning.world import ATTITUDE, BASE, START, TIP, Flown, Guess, Swing, fly, measure, model_of
@@ -110,7 +110,7 @@ def identified(model: Model, result: Identification) -> Model:
     return replace(model, robot=robot, priors=prior.bodies(), mixing=prior.mixing())
 
 
-def plan(predictor: Predictor, model: Model, target: tuple[Floats, Floats], duration: float) -> Floats:
+def plan(predictor: BasePredictor, model: Model, target: tuple[Floats, Floats], duration: float) -> Floats:
     """Return the joint positions that bring the end-effector to a pose, with the model's base at its prior's centre."""
 
     def miss(goal: Floats) -> Floats:
@@ -122,10 +122,10 @@ def plan(predictor: Predictor, model: Model, target: tuple[Floats, Floats], dura
     return np.asarray(found.x)
 
 
-def predictor_of(model: Model, swing: Swing, like: Predictor | None = None) -> Predictor:
+def predictor_of(model: Model, swing: Swing, like: BasePredictor | None = None) -> BasePredictor:
     """Return the predictor of a path; ``like`` is one of the same model."""
     time = np.linspace(0.0, swing.duration, 9)
-    return Predictor(model, Manoeuvre(Recording("path", None, time, {}), swing, ATTITUDE), TIP, like)
+    return BasePredictor(model, Manoeuvre(Recording("path", None, time, {}), swing, ATTITUDE), TIP, like)
 
 
 def flight_of(goal: Floats, target: tuple[Floats, Floats], duration: float) -> Flight:

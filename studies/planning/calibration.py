@@ -65,8 +65,8 @@ def calibrate(
         # one compiled simulation serves all guesses: their draws, in coordinates about the truth
         z[:, :10] = [coordinates_of(model.priors[0], draw_inertial(guess, spread, rng)) for _ in range(draws)]
         courses = predictor.courses(z)
-        for row, (course, pose) in enumerate(zip(courses, (flown.base, flown.tip), strict=True)):
-            held[row] += _holds(course.pose(), pose)
+        for row, (trajectory, pose) in enumerate(zip(courses, (flown.base, flown.tip), strict=True)):
+            held[row] += _holds(trajectory.pose(), pose)
     (base_place, base_turn), (tip_place, tip_turn) = held.tolist()
     return Calibration(spread, guesses, draws, (base_place, base_turn), (tip_place, tip_turn))
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from bayesid import Kind, Manoeuvre, MeasuredMotion, Posterior, Recording
 from bayesid.inference.encoder_noise import joint_sensitivity
-from bayesid.inference.whitening import Channel, NoiseModel, build
+from bayesid.inference.whitening import NoiseChannel, NoiseModel, build
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.sensors import Filter
 from studies.base_body.physical import physical_slope
@@ -95,7 +95,7 @@ class Linear:
         count = len(self.time)
         rows = np.arange(count) if left_out is None else np.flatnonzero(~left_out)
         own = np.arange(len(rows))
-        channels = [Channel(sigma, own, Filter()) for sigma in (noise.rate, noise.accel) for _ in range(3)]
+        channels = [NoiseChannel(sigma, own, Filter()) for sigma in (noise.rate, noise.accel) for _ in range(3)]
         covariance = measured.lag_covariance(self.time[rows], LAGS)
         found = build(NoiseModel(self.time[rows], channels, self.joints[:, :, rows], covariance))
         dense = np.zeros((len(found.start), 6, len(rows), 6))

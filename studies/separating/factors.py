@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, Posterior
 from bayesid.inference import maximise
-from bayesid.inference.importance import choose_chart, importance_sample
+from bayesid.inference.importance import choose_parameterisation, importance_sample
 from bayesid.recording.joint_motion import Motion
 from studies.ets7_drift.world import WHEEL, simulator
 from studies.ets7_limits.truth import fly, record
@@ -89,7 +89,7 @@ class Rivalry:
         for label in _ordered(truth):
             refined, optimum = maximise(self.posterior(label, manoeuvres), rng)
             laplace.append(optimum.log_evidence(refined))
-            values.append(importance_sample(choose_chart(refined, optimum, rng), optimum, rng))
+            values.append(importance_sample(choose_parameterisation(refined, optimum, rng), optimum, rng))
         return Sampled(
             laplace=laplace[0] - laplace[1],
             sampled=values[0].value - values[1].value,

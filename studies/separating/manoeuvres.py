@@ -19,9 +19,7 @@ from bayesid.design import (
     Separation,
     Store,
     Tip,
-)
-from bayesid.design import (
-    trajectory_search as optimise,
+    optimise,
 )
 from bayesid.design.design_problem import Reached
 from bayesid.design.plan import Trajectory

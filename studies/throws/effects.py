@@ -9,7 +9,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
-from bayesid.simulation.effects import AccelBias, Effect, Moment, Parameter, Readings, Wrench
+from bayesid.simulation.effects import AccelBias, Effect, Instant, Parameter, Readings, Wrench
 
 __all__ = ["AirDrag", "GyroCross", "SmoothTorque", "ThrowBias", "WheelTilt"]
 
@@ -40,10 +40,10 @@ class WheelTilt(Effect):
     def __init__(self, sigma: float = 0.05) -> None:
         self.parameters = tuple(Parameter(axis, "rad", sigma) for axis in "xy")
 
-    def momentum(self, values: Array, moment: Moment, inner: Array) -> tuple[Array, Array]:
+    def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return what the recorded momentum lacks, and its derivative."""
         tilt = jnp.concatenate([values, jnp.zeros(1)])
-        return tilt * moment.environment.wheel_momentum[2], tilt * moment.environment.wheel_torque[2]
+        return tilt * instant.environment.wheel_momentum[2], tilt * instant.environment.wheel_torque[2]
 
 
 class AirDrag(Effect):
@@ -55,9 +55,9 @@ class AirDrag(Effect):
     def __init__(self, sigma: float) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
 
-    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the drag torque."""
-        return Wrench(jnp.zeros(3), -values * moment.rate)
+        return Wrench(jnp.zeros(3), -values * instant.rate)
 
 
 class SmoothTorque(Effect):
@@ -76,9 +76,9 @@ class SmoothTorque(Effect):
         distance = jnp.abs(jnp.asarray(time)[..., None] / self.spacing - jnp.arange(self.knots))
         return jnp.maximum(0.0, 1.0 - distance) @ jnp.asarray(values).reshape(self.knots, 3)
 
-    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the torque of the instant."""
-        return Wrench(jnp.zeros(3), self.torque(values, moment.environment.time))
+        return Wrench(jnp.zeros(3), self.torque(values, instant.environment.time))
 
 
 class ThrowBias(AccelBias):

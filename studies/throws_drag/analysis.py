@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import BodyPrior, Manoeuvre, MeasuredMotion, Model, Posterior, Recording
-from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, diagnose
-from bayesid.diagnosis import candidate_effects as candidates
-from bayesid.diagnosis.diagnose import extended_posterior, extended_start
+from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, candidates, diagnose
+from bayesid.diagnosis.diagnosis_run import extended_posterior, extended_start
 from bayesid.inference.mode import fit
 from bayesid.simulation.effects import Effect
 from studies.throws.bodies import Tensor, object_moments, tensors, wheel_inertia

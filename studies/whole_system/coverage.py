@@ -11,7 +11,7 @@ from scipy import stats
 
 from bayesid import Posterior, Robot
 from bayesid.inference.mode import fit
-from bayesid.inference.sampling_coordinates import LinearChart
+from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.robot.body_prior import draw_inertial
 from studies.whole_system.sampled import distance, true_point
 from studies.whole_system.setting import BASE, LOAD, bodies, model_of, spreads
@@ -69,7 +69,7 @@ def covered(
         z = true_point(posterior, truth, START_RATE)
         refined = posterior.at(z)
         optimum = fit(refined, z)
-        proposal = LinearChart(refined).proposal(optimum)
+        proposal = LinearParameterisation(refined).proposal(optimum)
         covariance = proposal.factor @ proposal.factor.T
         own = slice(0, 10 * len(posterior.model.priors))  # not the initial rate: errors of joint speed enter it
         distances.append(distance(posterior.to_linear(z[None])[0, own], proposal.mean[own], covariance[own, own]))

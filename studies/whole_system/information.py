@@ -72,7 +72,7 @@ class Knowledge:
         return np.sqrt(np.clip(np.linalg.eigvalsh(own), 0.0, None))
 
     @property
-    def learnt(self) -> int:
+    def contraction(self) -> int:
         """How many of them the data narrowed to half of the prior or less."""
         return int((self.directions < 0.5).sum())
 

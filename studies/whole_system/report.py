@@ -95,8 +95,8 @@ def _summary(document: Document, result: Result) -> None:
             f"Measured joint torques bring the scale, although friction in every joint is unknown: "
             f"{_percent(torques[3][1])}. A known thrust does the same without them: {_percent(thrust[3][1])}.",
             f"Of the 80 directions in which the bodies could differ, the data narrow "
-            f"{six.knowledge(Sensors.MOTION).learnt} (motion) or {six.knowledge(Sensors.TORQUES).learnt} (torques too) "
-            "to less than half of the prior. The rest is the prior and is reported as such: the base parameters tell "
+            f"{six.knowledge(Sensors.MOTION).contraction} (motion) or "
+            f"{six.knowledge(Sensors.TORQUES).contraction} (torques too) to less than half of the prior. The rest is the prior and is reported as such: the base parameters tell "
             "which combinations could ever be learnt, the manoeuvre and the noise which of them are.",
             _regressor_sentence(result),
         ]
@@ -120,7 +120,12 @@ def _manoeuvres(document: Document, result: Result) -> None:
         for sensors in Sensors:
             knowledge = information.knowledge(sensors)
             rows.append(
-                [name, sensors.value[0], str(knowledge.learnt), *(_percent(width) for _, width in masses(knowledge))]
+                [
+                    name,
+                    sensors.value[0],
+                    str(knowledge.contraction),
+                    *(_percent(width) for _, width in masses(knowledge)),
+                ]
             )
     prior = masses(result.known["six joints"].knowledge(Sensors.MOTION))
     rows.append(["before", "drawings", "0", *(_percent(width) for width, _ in prior)])

@@ -10,7 +10,7 @@ from bayesid.report.figures.diagnosis_figures import (
     wrench_spectrum,
 )
 from bayesid.report.figures.identifiability_figures import direction_widths, displacements
-from bayesid.report.figures.prediction_figures import course_bands, final_positions
+from bayesid.report.figures.prediction_figures import final_positions, trajectory_bands
 from bayesid.report.figures.robot_figures import manoeuvre, robot_pose
 from bayesid.report.figures.sampler_figures import convergence
 from bayesid.report.figures.torque_figures import torques_over_time
@@ -22,7 +22,7 @@ __all__ = [
     "convergence",
     "corner",
     "correlations",
-    "course_bands",
+    "trajectory_bands",
     "covariance_ellipses",
     "direction_widths",
     "displacements",

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from bayesid._math.arrays import Floats
 from bayesid.identifiability.directions import Direction
-from bayesid.inference.contraction import LEARNT, PRIOR_ONLY, Verdict
+from bayesid.inference.contraction import CONTRACTED, PRIOR_ONLY, ContractionVerdict
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 
 __all__ = ["direction_widths", "displacements"]
@@ -21,7 +21,11 @@ WORST, MOST_ROWS = 12, 44
 VISIBLE = 0.1
 """Displacement, in prior sd, from which on a parameter counts as moved."""
 
-LOOK = {Verdict.LEARNT: COLOURS[2], Verdict.WEAKLY: COLOURS[4], Verdict.NOT: COLOURS[1]}
+LOOK = {
+    ContractionVerdict.CONTRACTED: COLOURS[2],
+    ContractionVerdict.WEAKLY: COLOURS[4],
+    ContractionVerdict.NOT: COLOURS[1],
+}
 
 
 @styled
@@ -35,7 +39,7 @@ def direction_widths(directions: Sequence[Direction]) -> Figure:
         chosen = np.array([item.verdict is verdict for item in directions])
         if chosen.any():
             axes.semilogy(numbers[chosen], ratio[chosen], "o", markersize=3.5, color=colour, label=verdict.value)
-    axes.axhline(1.0 - LEARNT, color="black", linewidth=0.5, linestyle=":")
+    axes.axhline(1.0 - CONTRACTED, color="black", linewidth=0.5, linestyle=":")
     axes.axhline(1.0 - PRIOR_ONLY, color="black", linewidth=0.5, linestyle=":")
     axes.set_ylim(0.5 * float(ratio.min()), 2.0)
     axes.set_xlim(0.3, len(ratio) + 0.7)

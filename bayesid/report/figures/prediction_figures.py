@@ -10,18 +10,18 @@ from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
 from bayesid.design.pose_region import REACH, Pose, Region
-from bayesid.design.pose_trajectory import Course
+from bayesid.design.pose_trajectory import PoseTrajectory
 from bayesid.report.figures.figure_style import curve_style, styled, wide_figure
 
-__all__ = ["course_bands", "final_positions"]
+__all__ = ["trajectory_bands", "final_positions"]
 
 PLANES = ((0, 1), (0, 2), (1, 2))
 
 
 @styled
-def course_bands(course: Course) -> Figure:
+def trajectory_bands(trajectory: PoseTrajectory) -> Figure:
     """Draw the mean course of one body, and beside it the width of its uncertainty, ± 2 sd about the mean."""
-    poses = [course.pose(index) for index in range(len(course.time))]
+    poses = [trajectory.pose(index) for index in range(len(trajectory.time))]
     figure = wide_figure(3.2)
     panels = figure.subplots(2, 2, sharex=True)
     rows = (("position", "mm", [pose.millimetres for pose in poses]), ("rotation", "deg", [p.degrees for p in poses]))
@@ -29,16 +29,16 @@ def course_bands(course: Course) -> Figure:
         mean, sd = np.stack([region.mean for region in regions]), np.stack([region.sd for region in regions])
         for axis in range(3):
             style = curve_style(axis)
-            panels[row, 0].plot(course.time, mean[:, axis], label="xyz"[axis] if row == 0 else None, **style)
+            panels[row, 0].plot(trajectory.time, mean[:, axis], label="xyz"[axis] if row == 0 else None, **style)
             panels[row, 0].fill_between(
-                course.time,
+                trajectory.time,
                 mean[:, axis] - 2.0 * sd[:, axis],
                 mean[:, axis] + 2.0 * sd[:, axis],
                 color=style["color"],
                 alpha=0.25,
                 linewidth=0.0,
             )
-            panels[row, 1].plot(course.time, 2.0 * sd[:, axis], **style)
+            panels[row, 1].plot(trajectory.time, 2.0 * sd[:, axis], **style)
         panels[row, 0].set_ylabel(f"{name} [{unit}]")
         panels[row, 1].set_ylabel(f"2 sd of {name} [{unit}]")
         panels[row, 1].set_ylim(bottom=0.0)

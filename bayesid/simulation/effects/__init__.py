@@ -3,8 +3,8 @@
 from bayesid.simulation.effects.arm_effects import EncoderOffset, JointFlexibility, JointLatency, LinkInertia, Payload
 from bayesid.simulation.effects.effect import (
     Effect,
+    Instant,
     Modes,
-    Moment,
     Parameter,
     Prior,
     Quantity,
@@ -58,7 +58,7 @@ __all__ = [
     "LinkInertia",
     "MagneticDipole",
     "Modes",
-    "Moment",
+    "Instant",
     "Parameter",
     "Payload",
     "Prior",

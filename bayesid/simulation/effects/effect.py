@@ -28,7 +28,7 @@ __all__ = [
     "Effect",
     "Environment",
     "Modes",
-    "Moment",
+    "Instant",
     "Parameter",
     "Prior",
     "Quantity",
@@ -108,18 +108,19 @@ class Environment(NamedTuple):
     gradient: Array  # mu / r^3 [1/s2]
     velocity: Array
     sun: Array
-    latitude: Array  # argument of latitude [rad]
+    argument_of_latitude: Array  # argument of latitude [rad]
     north: Array  # direction of the Earth's north pole
     wheel_momentum: Array  # recorded [N m s]
     wheel_torque: Array  # its derivative
     wrench: Array  # known force and torque about the base origin, base axes (6,)
 
 
-class Moment(NamedTuple):
+class Instant(NamedTuple):
     """One instant of a simulation, as an effect sees it.
 
     ``attitude`` rotates base axes to orbit axes. ``rate`` is zero while momenta are being summed: it follows from
-    them. ``rate_change`` and ``acceleration`` (of the base origin, non-gravitational) are known to `Effect.field` only.
+    them. ``rate_change`` and ``acceleration`` (of the base origin, non-gravitational) are known to
+    `Effect.specific_force` only.
     """
 
     environment: Environment
@@ -233,23 +234,23 @@ class Effect:
         """Link that `table` is a table of; None where it changes others too, which joint torques do not follow."""
         return None
 
-    def momentum(self, values: Array, moment: Moment, inner: Array) -> tuple[Array, Array]:
+    def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return angular momentum relative to the base and its derivative, as a free couple [N m s, N m]."""
         return jnp.zeros(3), jnp.zeros(3)
 
-    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the external force and its torque about the base origin [N, N m]."""
         return Wrench(jnp.zeros(3), jnp.zeros(3))
 
-    def derivative(self, values: Array, moment: Moment, inner: Array) -> Array:
+    def derivative(self, values: Array, instant: Instant, inner: Array) -> Array:
         """Return the derivative of the inner states, shape (states,)."""
         return jnp.zeros(self.states)
 
-    def field(self, values: Array, moment: Moment, lever: Array) -> Array:
+    def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
         """Return what an accelerometer at ``lever`` from the centre of mass reads beyond wrench and motion [m/s2]."""
         return jnp.zeros(3)
 
-    def tide(self, values: Array, moment: Moment) -> Array:
+    def gravity_gradient_tensor(self, values: Array, instant: Instant) -> Array:
         """Return gravitational acceleration per distance from the centre of mass, shape (3, 3) [1/s2]."""
         return jnp.zeros((3, 3))
 
@@ -258,7 +259,7 @@ class Effect:
         raise NotImplementedError
 
     def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
-        """Return coefficients of changes of the kinematic tables, shape (T, 28, m), see `bayesid.robot.composite_tables`."""
+        """Return coefficients of changes of the tables (`bayesid.robot.composite_tables`), shape (T, 28, m)."""
         return np.zeros((len(time), 28, 0))
 
     def loads(self, values: Array) -> Array:

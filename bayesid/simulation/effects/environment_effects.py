@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 from jax import Array
 
-from bayesid.simulation.effects.effect import Effect, Moment, Parameter, Prior, Wrench, register
+from bayesid.simulation.effects.effect import Effect, Instant, Parameter, Prior, Wrench, register
 
 __all__ = ["AerodynamicDrag", "GravityGradient", "MagneticDipole", "RotationalDrag", "SolarPressure", "ThrusterLeak"]
 
@@ -31,19 +31,19 @@ class GravityGradient(Effect):
     )
     needs_orbit = True
 
-    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the torque 3 mu/r^3 (Xi u) x u."""
-        up = moment.to_base(moment.environment.zenith)
-        return Wrench(jnp.zeros(3), 3.0 * moment.environment.gradient * jnp.cross(moment.body.second_moment @ up, up))
+        up = instant.to_base(instant.environment.zenith)
+        return Wrench(jnp.zeros(3), 3.0 * instant.environment.gradient * jnp.cross(instant.body.second_moment @ up, up))
 
-    def field(self, values: Array, moment: Moment, lever: Array) -> Array:
+    def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
         """Return less the tidal acceleration at the accelerometer."""
-        return -self.tide(values, moment) @ lever
+        return -self.gravity_gradient_tensor(values, instant) @ lever
 
-    def tide(self, values: Array, moment: Moment) -> Array:
+    def gravity_gradient_tensor(self, values: Array, instant: Instant) -> Array:
         """Return mu/r^3 (3 u u' - 1)."""
-        up = moment.to_base(moment.environment.zenith)
-        return moment.environment.gradient * (3.0 * jnp.outer(up, up) - jnp.eye(3))
+        up = instant.to_base(instant.environment.zenith)
+        return instant.environment.gradient * (3.0 * jnp.outer(up, up) - jnp.eye(3))
 
 
 class _Pressure(Effect):
@@ -57,13 +57,13 @@ class _Pressure(Effect):
             *(Parameter(f"cp.{axis}", "m", REACH, 0.0, Prior.UNIFORM) for axis in "xyz"),
         )
 
-    def direction(self, moment: Moment) -> Array:
+    def direction(self, instant: Instant) -> Array:
         """Return the force's direction in orbit axes."""
         raise NotImplementedError
 
-    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the force and its torque about the base origin."""
-        force = values[0] * moment.to_base(self.direction(moment))
+        force = values[0] * instant.to_base(self.direction(instant))
         return Wrench(force, jnp.cross(values[1:], force))
 
 
@@ -84,9 +84,9 @@ class AerodynamicDrag(_Pressure):
     def __init__(self, force: float = 5.0e-3, spread: float = 1.5) -> None:
         super().__init__(force, spread)
 
-    def direction(self, moment: Moment) -> Array:
+    def direction(self, instant: Instant) -> Array:
         """Return backwards along the orbit."""
-        return -moment.environment.velocity
+        return -instant.environment.velocity
 
 
 @register
@@ -105,9 +105,9 @@ class SolarPressure(_Pressure):
     def __init__(self, force: float = 3.0e-4, spread: float = 2.0) -> None:
         super().__init__(force, spread)
 
-    def direction(self, moment: Moment) -> Array:
+    def direction(self, instant: Instant) -> Array:
         """Return away from the Sun."""
-        return -moment.environment.sun
+        return -instant.environment.sun
 
 
 @register
@@ -124,11 +124,11 @@ class MagneticDipole(Effect):
     def __init__(self, sigma: float = 10.0) -> None:
         self.parameters = tuple(Parameter(axis, "A m2", sigma) for axis in "xyz")
 
-    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the torque mu x B, with B = -B0 (Re/r)^3 (3 (n.u) u - n)."""
-        north, up = moment.environment.north, moment.environment.zenith
-        field = -EARTH_FIELD * moment.environment.gradient * (3.0 * up * (up @ north) - north)
-        return Wrench(jnp.zeros(3), jnp.cross(values, moment.to_base(field)))
+        north, up = instant.environment.north, instant.environment.zenith
+        field = -EARTH_FIELD * instant.environment.gradient * (3.0 * up * (up @ north) - north)
+        return Wrench(jnp.zeros(3), jnp.cross(values, instant.to_base(field)))
 
 
 @register
@@ -148,7 +148,7 @@ class ThrusterLeak(Effect):
             for axis in "xyz"
         )
 
-    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the parameters."""
         return Wrench(values[:3], values[3:])
 
@@ -166,6 +166,6 @@ class RotationalDrag(Effect):
     def __init__(self, sigma: float = 0.1) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
 
-    def wrench(self, values: Array, moment: Moment, inner: Array) -> Wrench:
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the torque, less the rates times the coefficients."""
-        return Wrench(jnp.zeros(3), -values * moment.rate)
+        return Wrench(jnp.zeros(3), -values * instant.rate)

@@ -10,7 +10,7 @@ from jax import Array
 
 from bayesid._math.arrays import Floats
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects.effect import Effect, Modes, Moment, Parameter, Prior, Quantity, register
+from bayesid.simulation.effects.effect import Effect, Instant, Modes, Parameter, Prior, Quantity, register
 
 __all__ = ["FlexibleAppendage", "FuelSlosh", "WheelMomentum"]
 
@@ -39,7 +39,7 @@ class WheelMomentum(Effect):
     def __init__(self, sigma: float = 1.0) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
 
-    def momentum(self, values: Array, moment: Moment, inner: Array) -> tuple[Array, Array]:
+    def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return the wheels' momentum; they keep their speed."""
         return values, jnp.zeros(3)
 

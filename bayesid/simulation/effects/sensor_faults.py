@@ -11,7 +11,7 @@ from typing import ClassVar
 import jax.numpy as jnp
 from jax import Array
 
-from bayesid.simulation.effects.effect import Effect, Moment, Parameter, Readings, register
+from bayesid.simulation.effects.effect import Effect, Instant, Parameter, Readings, register
 from bayesid.simulation.sensors import Kind
 
 __all__ = [
@@ -180,9 +180,9 @@ class AccelPosition(_Axes):
     summary = "The accelerometer sits elsewhere than stated and feels another part of the base's rotation."
     sensor, unit, sigma = Kind.ACCEL, "m", 0.05
 
-    def field(self, values: Array, moment: Moment, lever: Array) -> Array:
+    def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
         """Return what rotation adds over the error of position."""
-        return jnp.cross(moment.rate_change, values) + jnp.cross(moment.rate, jnp.cross(moment.rate, values))
+        return jnp.cross(instant.rate_change, values) + jnp.cross(instant.rate, jnp.cross(instant.rate, values))
 
     read = Effect.read
 

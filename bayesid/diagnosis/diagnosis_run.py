@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidate_effects import candidates
 from bayesid.diagnosis.candidate_table import Candidate, candidate_table
-from bayesid.diagnosis.cause_search import Hypothesis, Search
+from bayesid.diagnosis.cause_search import CauseSearch, Hypothesis
 from bayesid.diagnosis.disturbing_wrench import Unexplained, unexplained_wrench
 from bayesid.diagnosis.gain import Gain, measure_gain
 from bayesid.diagnosis.verdict import Status, Verdict, judge
@@ -48,7 +48,7 @@ class Diagnosis:
         Left by the named causes, or by the present model where none is named.
     """
 
-    search: Search
+    search: CauseSearch
     verdict: Verdict
     candidates: list[Candidate]
     gain: Gain
@@ -152,7 +152,7 @@ def _diagnose(
     posterior = Posterior(replace(model, rate_sigma=RATE_SIGMA) if at_rest else model, manoeuvres)
     frozen = [i for i, name in enumerate(posterior.unknowns.names) if at_rest and name.startswith("initial-rate")]
     catalogue = candidates(model, knows_latitude=knows_latitude) if effects is None else list(effects)
-    search = Search(posterior, frozen, catalogue, seed, progress)
+    search = CauseSearch(posterior, frozen, catalogue, seed, progress)
     verdict = judge(search)
     tell(0.8, "measuring the gain")
     best = verdict.best if verdict.causes else search.base

@@ -16,10 +16,10 @@ from bayesid.inference.mode import Optimum
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.proposal import StudentT
 
-__all__ = ["Chart", "LinearChart", "LogCholeskyChart"]
+__all__ = ["Parameterisation", "LinearParameterisation", "LogCholeskyParameterisation"]
 
 
-class Chart(Protocol):
+class Parameterisation(Protocol):
     """A change of coordinates of a posterior, for many points at once, shape (n, size)."""
 
     posterior: Posterior
@@ -37,7 +37,7 @@ class Chart(Protocol):
         ...
 
 
-class LogCholeskyChart:
+class LogCholeskyParameterisation:
     """The posterior's own coordinates."""
 
     def __init__(self, posterior: Posterior) -> None:
@@ -56,7 +56,7 @@ class LogCholeskyChart:
         return StudentT.about(optimum.z, optimum.covariance)
 
 
-class LinearChart:
+class LinearParameterisation:
     """Coordinates linear in the inertial parameters (`Unknowns.to_linear`)."""
 
     def __init__(self, posterior: Posterior) -> None:
