@@ -131,7 +131,7 @@ def planar_posterior(noisy: Callable[..., Recording]) -> Callable[..., Posterior
             Orbit(ORBIT.radius),
             (GravityGradient(),),
         )
-        return Posterior(model, [Manoeuvre(recording, motion)], **options)
+        return Posterior.of(model, [Manoeuvre(recording, motion)], **options)
 
     return make
 

@@ -20,6 +20,7 @@ from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.time_grid import build_grid
 from tests import mujoco_truth as mj
+from tests.sensed import read
 from tests.trees import random_body, random_tree
 
 REVOLUTE, PRISMATIC = ("revolute", "continuous"), ("prismatic",)
@@ -200,7 +201,8 @@ def test_motion_does_not_see_the_change(other, formula_motion, tmp_path):
 
     @jax.jit
     def readings(p: jax.Array) -> jax.Array:
-        result = simulate(grid, p, start, (GravityGradient(),), (jnp.zeros(0),), jnp.array([0.2, 0.1, 0.4]))
+        point = jnp.array([0.2, 0.1, 0.4])
+        result = read(simulate(grid, p, start, (GravityGradient(),), (jnp.zeros(0),), point[None]), point)
         return jnp.concatenate([result.rate, result.accel], axis=1)
 
     p, same = (np.concatenate([robot.link(name).inertial.vector for name in names]) for robot in (first, second))

@@ -15,6 +15,7 @@ from test_unknowns import CENTRE, OTHER
 from bayesid._io.errors import InputError
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_model, load_robot
+from bayesid.inference.noise_changes import leaving_out, with_manoeuvres
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, joint_prior
 from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
@@ -119,7 +120,7 @@ def laplace(posterior: Posterior) -> np.ndarray:
     found = least_squares(posterior.least_squares, np.zeros(posterior.size), "3-point", method="lm")
     normal = np.random.default_rng(4).normal(size=(8000, posterior.size))
     z = found.x + normal @ np.linalg.cholesky(np.linalg.inv(found.jac.T @ found.jac)).T
-    return np.asarray(posterior.values_of(z).inertial)
+    return np.asarray(posterior.unknowns.values_of(z).inertial)
 
 
 @pytest.mark.usefixtures("slow")  # the loop's tests show the same on two steps
@@ -134,18 +135,18 @@ def test_two_studies_in_turn_tell_what_one_tells_of_both():
         Manoeuvre(Recording(f"sine {phase}", None, time, blank_channels(sensors, len(time))), Sine(frequency, phase))
         for frequency, phase in ((0.5, 0.0), (0.8, 1.0))
     ]
-    both = Posterior(model, planned, step=0.5)
+    both = Posterior.of(model, planned, step=0.5)
     truth = 0.5 * np.random.default_rng(6).normal(size=10)
     recordings = simulate_recordings(both, np.random.default_rng(5), truth)
     manoeuvres = [Manoeuvre(recording, plan.motion) for recording, plan in zip(recordings, planned, strict=True)]
-    posterior = both.with_manoeuvres(manoeuvres)
+    posterior = with_manoeuvres(both, manoeuvres)
     # a recording left out in place of a posterior of one: nothing is compiled anew
     everything = [np.ones_like(item.outputs) for item in posterior.whitenings]
     joint = laplace(posterior)
-    first = laplace(posterior.without([np.zeros_like(everything[0]), everything[1]]))
+    first = laplace(leaving_out(posterior, [np.zeros_like(everything[0]), everything[1]]))
     carried = joint_prior(InertialDraws(("base_link",), first[:, None]))
     later = replace(model, priors=carried.bodies(), mixing=carried.mixing())
-    sequential = laplace(Posterior(later, manoeuvres[1:], step=0.5))
+    sequential = laplace(Posterior.of(later, manoeuvres[1:], step=0.5))
     sd = joint.std(axis=0)
     assert (first.std(axis=0) > 1.5 * sd).sum() >= 3  # the second recording did matter
     np.testing.assert_array_less(np.abs(sequential.mean(axis=0) - joint.mean(axis=0)) / sd, 0.08)

@@ -48,7 +48,7 @@ def recording(model: Model) -> Recording:
 
 def check(model: Model, recording: Recording):
     motion = MeasuredMotion.from_recording(recording, model.robot, sigma={0: 1e-6})
-    return check_recording(Posterior(model, [Manoeuvre(recording, motion)], step=0.5), 0)
+    return check_recording(Posterior.of(model, [Manoeuvre(recording, motion)], step=0.5), 0)
 
 
 def changed(recording: Recording, **channels: np.ndarray) -> Recording:

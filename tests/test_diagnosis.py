@@ -17,6 +17,7 @@ from bayesid.diagnosis.diagnosis_run import extended_start
 from bayesid.diagnosis.noise_faults import noise_fault
 from bayesid.diagnosis.perturbed_fit import Engine
 from bayesid.diagnosis.score_tests import chi2_log_sf
+from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create
 from tests import hidden
@@ -49,7 +50,7 @@ def test_the_extended_posterior_agrees_with_the_pushes(wheel):
     """The full simulation with the effect in it leaves the same residual as the pushes on the present model."""
     posterior = wheel.posterior
     z = extended_start(wheel.after, posterior)
-    refined = posterior.at(z)
+    refined = relinearised(posterior, z)
     chi2 = float((refined.residuals(z) ** 2).sum())
     assert abs(chi2 - wheel.after.fit.chi2) < 0.01 * np.sqrt(posterior.samples)
 
@@ -95,7 +96,7 @@ def test_slosh_in_basilisk_is_found(tmp_path):
 def engine_and_fit(tmp_path_factory):
     study = Study.load(CASES["null, three joints"].make(tmp_path_factory.mktemp("null"), 5))
     model = load_model(study)
-    engine = Engine(Posterior(model, load_manoeuvres(study, model.robot)))
+    engine = Engine(Posterior.of(model, load_manoeuvres(study, model.robot)))
     return engine, engine.fit()
 
 
@@ -106,7 +107,7 @@ def test_a_push_is_the_effect_in_the_simulation(label, engine_and_fit):
     effect = create(label).attach(engine.posterior.model.robot)
     coordinates = 0.03 * np.ones(len(effect.parameters))
     pushed = engine.fit((effect,), (coordinates,), z=fit.z, operating=fit.operating, iterations=0)
-    posterior = Posterior(engine.posterior.model.extend(effect), engine.posterior.manoeuvres)
+    posterior = Posterior.of(engine.posterior.model.extend(effect), engine.posterior.manoeuvres)
     full = posterior.residuals(np.concatenate([fit.z, coordinates])).ravel()
     change = full - engine.posterior.residuals(fit.z).ravel()
     assert np.linalg.norm(change) > 1.0
@@ -141,5 +142,5 @@ def test_an_event_is_no_outlier(tmp_path):
     """A mass that moves inside the base for two seconds leaves a few large residuals side by side."""
     study = Study.load(CASES["shifting-mass"].make(tmp_path, 246))
     model = load_model(study)
-    fit = Engine(Posterior(model, load_manoeuvres(study, model.robot))).fit()
+    fit = Engine(Posterior.of(model, load_manoeuvres(study, model.robot))).fit()
     assert noise_fault("outliers:accel", fit) is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +21,7 @@ from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.time_grid import build_grid, pad_grids
 from tests import mujoco_truth as mj
 from tests import reference as ref
+from tests.sensed import read
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS = {
@@ -54,8 +56,8 @@ def run(robot, motion, times, step, *, effects=(), values=(), unknown=(), rate=R
     inertial = [robot.link(name).inertial.vector for name in unknown]
     vector = jnp.asarray(np.concatenate(inertial) if inertial else np.zeros(0))
     start = Start(jnp.asarray(attitude), jnp.asarray(rate))
-    readings = SIMULATE(grid, vector, start, tuple(effects), tuple(map(jnp.asarray, values)), jnp.asarray(POINT))
-    return jax.tree.map(np.asarray, readings)
+    samples = SIMULATE(grid, vector, start, tuple(effects), tuple(map(jnp.asarray, values)), jnp.asarray([POINT]))
+    return SimpleNamespace(**{key: np.asarray(value) for key, value in vars(read(samples, POINT)).items()})
 
 
 def matrices(quaternions: np.ndarray) -> np.ndarray:
@@ -132,7 +134,7 @@ def test_agrees_with_the_reference(name, tmp_path, formula_motion):
         base_torque=zero_order_hold(TORQUE_TIMES, TORQUES),
     )
     orbit = Orbit(truth.radius, truth.eccentricity, argument_of_perigee=truth.argument_of_perigee)
-    options = {"orbit": orbit, "latitude": truth.argument_of_latitude}
+    options = {"orbit": orbit, "argument_of_latitude": truth.argument_of_latitude}
     options["actions"] = Actions.from_recording(action_recording())
     given = formula_motion(motion, file, robot)
     found = run(robot, given, TIMES, STEP, effects=(GRADIENT,), values=(np.zeros(0),), **options)
@@ -294,13 +296,14 @@ def test_padding_changes_nothing(formula_motion):
     motion = formula_motion(motion_of(urdf), urdf, robot)
     grids = [build_grid(robot, (), motion, times, 0.5) for times in (TIMES, TIMES[:9])]
     start = Start(jnp.asarray(ATTITUDE), jnp.asarray(RATE))
-    call = lambda grid: SIMULATE(grid, jnp.zeros(0), start, (), (), jnp.asarray(POINT))  # noqa: E731
+    call = lambda grid: SIMULATE(grid, jnp.zeros(0), start, (), (), jnp.asarray([POINT]))  # noqa: E731
     both = jax.vmap(call)(pad_grids(grids))
     for index, grid in enumerate(grids):
         alone = call(grid)
         count = len(grid.step_of)
-        np.testing.assert_allclose(both.rate[index, :count], alone.rate, atol=1e-15)
-        np.testing.assert_allclose(both.accel[index, :count], alone.accel, atol=1e-15)
+        for key in ("rate", "rate_change", "acceleration"):
+            one, other = getattr(alone.instant, key), getattr(both.instant, key)
+            np.testing.assert_allclose(other[index, :count], one, atol=1e-15)
 
 
 # a closed form --------------------------------------------------------------------------------------------------------
@@ -342,7 +345,7 @@ def test_a_torque_free_symmetric_top(formula_motion, tmp_path):
 def test_the_jacobian_is_that_of_the_residual(planar_case):
     """Central differences with h = 1e-5: truncation h^2 and rounding 1e-11 / h, both below 1e-5 of the column."""
     posterior = planar_case.posterior
-    z = posterior.initial_point() + 0.1 * np.random.default_rng(0).normal(size=posterior.size)
+    z = posterior.starting_point() + 0.1 * np.random.default_rng(0).normal(size=posterior.size)
     exact = posterior.jacobian(z)
     h = 1e-5
     for column in range(posterior.size):

@@ -253,16 +253,16 @@ def posterior_of(rate: np.ndarray, accel: np.ndarray, motion: mj.Motion) -> Post
     smoothed = MeasuredMotion.from_recording(recording, robot, sigma={0: 1e-6})
     sensors = (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT))
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.1)
-    return Posterior(Model(robot, sensors, (prior,)), [Manoeuvre(recording, smoothed)], step=0.5)
+    return Posterior.of(Model(robot, sensors, (prior,)), [Manoeuvre(recording, smoothed)], step=0.5)
 
 
 def identified(posterior: Posterior, effect: Effect) -> tuple[np.ndarray, np.ndarray, float]:
     """Values, covariance and chi2 per sample of the model extended by the effect."""
-    extended = Posterior(posterior.model.extend(effect), posterior.manoeuvres, step=0.5)
+    extended = Posterior.of(posterior.model.extend(effect), posterior.manoeuvres, step=0.5)
     assert extended.unknowns.names[-3:] == tuple(f"{effect.label}.{axis}" for axis in "xyz")
     assert posterior.model.effects == ()
     refined, optimum = maximise(extended, np.random.default_rng(0))
-    values = np.asarray(refined.values(optimum.z).effects[0])
+    values = np.asarray(refined.unknowns.values_at(optimum.z).effects[0])
     return values, optimum.covariance[-3:, -3:] * 0.01**2, optimum.chi2 / refined.samples
 
 

@@ -19,6 +19,7 @@ from bayesid.identifiability.profile_interval import Target, profile
 from bayesid.inference import maximise
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.contraction import Contraction, ContractionVerdict, compare
+from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
@@ -197,7 +198,7 @@ def test_a_profile_of_a_linear_problem_is_the_normal_interval() -> None:
 def test_a_prediction_without_change_is_the_posterior_itself(planar_case) -> None:
     posterior = planar_case.posterior
     z = np.random.default_rng(4).normal(size=posterior.size) * 0.1
-    there = posterior.at(z)
+    there = relinearised(posterior, z)
     predictor = InformationPredictor(posterior.model, posterior.manoeuvres, z, posterior.step)
     predicted, own = predictor.knowledge(predictor.flown), Knowledge.at(there, z)
     np.testing.assert_allclose(predicted.sd, own.sd, rtol=0.02)  # whitening windows may differ
@@ -283,7 +284,7 @@ def test_motion_alone_leaves_the_scale_and_a_known_thrust_gives_it(planar_truth:
     known, total, rng, like = {}, {}, np.random.default_rng(5), None
     model = whole_robot(rng)
     for name, truth in (("motion", planar_truth), ("thrust", thrust_truth())):
-        like = Posterior(model, [recorded(truth, model.robot, rng)], step=STEP, like=like)
+        like = Posterior.of(model, [recorded(truth, model.robot, rng)], step=STEP)
         posterior, optimum = maximise(like, np.random.default_rng(6))
         assert covers_all(posterior)
         noise = 4.0 * np.sqrt(2.0 * posterior.samples)

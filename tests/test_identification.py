@@ -13,6 +13,7 @@ from scipy.stats import chi2
 import bayesid
 from bayesid.inference import maximise
 from bayesid.inference.body_quantities import bodies_of
+from bayesid.inference.predicted_readings import integration_error_at
 
 ROBOTS = Path(__file__).parent / "robots"
 SHIPPED = Path(bayesid.__file__).parent / "robot" / "models"
@@ -81,7 +82,7 @@ def test_truth_lies_inside_the_posterior_and_noise_is_all_that_is_left(name: str
     truth = np.concatenate([[made.base.mass], made.base.com, inertia])
     miss = truth - body.mean(axis=0)
     assert miss @ np.linalg.solve(np.cov(body.T), miss) < chi2.ppf(0.9999, 10)
-    assert posterior.integration_error(optimum.z) < 0.01
+    assert integration_error_at(posterior, optimum.z) < 0.01
 
 
 @pytest.mark.skipif(not EXAMPLES.is_dir(), reason="the examples that come with the file contract are absent")

@@ -15,6 +15,7 @@ from bayesid.inference.ensemble import BLOCK, LaplaceMove, sample
 from bayesid.inference.identification import identify
 from bayesid.inference.importance import importance_sample
 from bayesid.inference.mode import Optimum, fit, maximise
+from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.parameterisation import LogCholeskyParameterisation
 from bayesid.inference.proposal import StudentT
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -245,7 +246,7 @@ def test_laplace_importance_and_ensemble_agree_on_a_nearly_normal_posterior(plan
 def test_the_optimum_is_reached_from_random_starts(planar_posterior, request):
     """From draws of a prior of relative width one, at least 95 % reach the lowest cost found to 1e-3."""
     posterior = planar_posterior(np.random.default_rng(2), spread=1.0, step=0.5)
-    rng, first = np.random.default_rng(3), posterior.initial_point()
+    rng, first = np.random.default_rng(3), posterior.starting_point()
     costs, count = [], 100 if request.config.getoption("--catalogue") else 40
     for _ in range(count):
         start = first.copy()
@@ -268,7 +269,7 @@ def test_the_truth_is_covered_as_often_as_stated(planar_case, noisy):
     for seed in range(40):
         recording = noisy(np.random.default_rng(100 + seed))
         motion = MeasuredMotion.from_recording(recording, compiled.model.robot, sigma={0: 1e-6})
-        posterior = compiled.with_manoeuvres([Manoeuvre(recording, motion)])
+        posterior = with_manoeuvres(compiled, [Manoeuvre(recording, motion)])
         _, optimum = maximise(posterior, np.random.default_rng(0))
         error = coordinates_of(prior, truth) - optimum.z[:10]
         values.append(error @ np.linalg.solve(optimum.covariance[:10, :10], error))

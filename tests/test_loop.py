@@ -167,7 +167,7 @@ def test_two_steps_tell_what_one_identification_of_both_tells(done):
     manoeuvres = [flown(plan, Recording.read(done.path(number, "recording")), ENCODER) for number in (1, 2)]
     seed = int(np.random.SeedSequence(1).generate_state(1)[0])
     file = done.folder / "both.nc"
-    Laplace(20000).identify(Posterior(plan.model, manoeuvres), seed, file)
+    Laplace(20000).identify(Posterior.of(plan.model, manoeuvres), seed, file)
     joint = bodies_of_draws(plan.model, InertialDraws.read(file))["base_link"]
     bodies = done.steps[1]["identification"]["bodies"]["base_link"]
     mean, sd = (np.array([item[key] for item in bodies.values()]) for key in ("mean", "sd"))

@@ -34,7 +34,7 @@ def test_zenith_of_a_circular_orbit():
     np.testing.assert_allclose(state.argument_of_latitude, 1.1 + n * TIME, rtol=1e-14)
 
 
-@pytest.mark.parametrize("latitude", [-2.0, 0.3, 3.1, 5.9, 40.0])
+@pytest.mark.parametrize("argument_of_latitude", [-2.0, 0.3, 3.1, 5.9, 40.0])
 @pytest.mark.parametrize("eccentricity", [0.01, 0.3, 0.7])
 def test_an_elliptic_orbit_obeys_newtons_law(eccentricity, argument_of_latitude):
     """Start on the ellipse (vis-viva, from the perigee's angle), integrate r'' = -mu r / r^3 to 1e-12, compare."""

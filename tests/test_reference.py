@@ -167,7 +167,7 @@ def test_stiff_appendage_is_part_of_the_base(tmp_path):
     assert 1e-9 < differences(response, truth)[0] < 2e-3 * np.abs(response.rate).max()
 
 
-@pytest.mark.parametrize(("eccentricity", "latitude"), [(0.0, 0.0), (0.2, 2.5)])
+@pytest.mark.parametrize(("eccentricity", "argument_of_latitude"), [(0.0, 0.0), (0.2, 2.5)])
 def test_orbit_obeys_newton(eccentricity, latitude):
     orbit = mj.Orbit(7.5e6, eccentricity, argument_of_perigee=0.7, argument_of_latitude=latitude)
 

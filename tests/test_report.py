@@ -77,7 +77,7 @@ def attitude_posterior():
     blank = {f"{kind.value}.{axis}": np.zeros(len(time)) for kind in (Kind.RATE, Kind.ACCEL) for axis in "xyz"}
     blank |= {f"attitude.{axis}": np.full(len(time), float(axis == "w")) for axis in "xyzw"}
     recording = Recording("still", None, time, {**blank, **sample_joints(motion, robot, time)})
-    return Posterior(model, [Manoeuvre(recording, motion, attitude_sigma=1e-3)], step=0.5)
+    return Posterior.of(model, [Manoeuvre(recording, motion, attitude_sigma=1e-3)], step=0.5)
 
 
 @pytest.mark.parametrize("text", HOSTILE)

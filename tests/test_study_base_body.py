@@ -58,7 +58,7 @@ def test_data_of_an_independent_simulator_give_the_same(tmp_path: Path):
         for index, axis in enumerate("xyz")
     }
     recording = Recording("reference", None, planned.time, channels)
-    posterior = Posterior(noise_free.guess_model(), [Manoeuvre(recording, motion)], step=0.5, flat_prior=True)
+    posterior = Posterior.of(noise_free.guess_model(), [Manoeuvre(recording, motion)], step=0.5, flat_prior=True)
     assert noise_free.identify_exact(posterior).worst < GOAL
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesid.inference.predicted_readings import integration_error_at
 from studies.benchmark.cases import chain, posterior_of
 from studies.benchmark.timing import seconds_per_evaluation
 
@@ -17,4 +18,4 @@ def test_chains_of_any_length_are_the_same_arm() -> None:
 def test_an_evaluation_is_timed() -> None:
     posterior = posterior_of(chain(3), interval=2.0)
     assert 0.0 < seconds_per_evaluation(posterior, repeats=1) < 1.0
-    assert posterior.integration_error(posterior.initial_point()) < 0.01
+    assert integration_error_at(posterior, posterior.starting_point()) < 0.01

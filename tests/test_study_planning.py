@@ -27,4 +27,4 @@ def test_a_plan_hits_with_the_true_base_and_misses_with_a_wrong_one():
     wrong[0] = 20.0
     _, tip = predictor_of(model, Swing(START, goal, DURATION), predictor).courses(wrong[None])
     assert np.linalg.norm(tip.position[0, -1] - target[0]) > 0.005
-    assert predictor.posterior.values(wrong).inertial[0] == pytest.approx(truth.mass * np.exp(0.4))
+    assert predictor.posterior.unknowns.values_at(wrong).inertial[0] == pytest.approx(truth.mass * np.exp(0.4))

@@ -8,12 +8,14 @@ import jax.numpy as jnp
 import numpy as np
 import pinocchio as pin
 import pytest
+from bayesid.inference.sample_grid import Samples
 
 from bayesid._io.errors import InputError
 from bayesid.inference.encoder_noise import joint_sensitivity
+from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.inference.recording_check import refuse_wrong_units
-from bayesid.inference.sample_grid import Samples
 from bayesid.inference.simulated_recordings import simulate_recordings
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior
@@ -61,7 +63,7 @@ def posterior_of(urdf, truth, motion, *, robot=None, priors=(), effects=GRADIENT
         torque=TorqueSensor(names, (1e-4,) * len(names)),
     )
     recording = Recording("truth", None, truth.times, channels)
-    return Posterior(model, [Manoeuvre(recording, motion)], step=0.25)
+    return Posterior.of(model, [Manoeuvre(recording, motion)], step=0.25)
 
 
 def start(posterior: Posterior, rate0=RATE0) -> np.ndarray:
@@ -75,8 +77,8 @@ def test_torques_are_mujocos(name, formula_motion):
     motion, truth = flown(urdf)
     robot = Robot.from_urdf(urdf)
     posterior = posterior_of(urdf, truth, formula_motion(motion, urdf, robot))
-    time, measured = posterior.torques(0)
-    predicted = posterior.predict(start(posterior))[0].torque
+    time, measured = posterior.data.torques(0)
+    predicted = predicted_readings(posterior, start(posterior))[0].torque
     assert np.array_equal(time, TIMES)
     assert np.abs(measured).max() > 0.1
     np.testing.assert_allclose(predicted, measured, rtol=0, atol=1e-8 * np.abs(measured).max())
@@ -87,7 +89,7 @@ def test_gravity_gradient_shows_in_the_torques(formula_motion):
     motion, truth = flown(urdf)
     robot = Robot.from_urdf(urdf)
     without = posterior_of(urdf, truth, formula_motion(motion, urdf, robot), effects=())
-    miss = without.predict(start(without))[0].torque - without.torques(0)[1]
+    miss = predicted_readings(without, start(without))[0].torque - without.data.torques(0)[1]
     assert np.abs(miss).max() > 1e-4  # of which the first test leaves less than 1e-6
 
 
@@ -116,7 +118,9 @@ def test_unknown_bodies_and_a_changed_link_carry_their_torques(formula_motion):
     bodies = [robot.link("base_link").inertial, heavier["link2"], heavier["link5"]]
     z = posterior.unknowns.coordinates(bodies, np.array([RATE0]))
     z[-10] = 0.5 * np.log(1.2) / 0.1  # alpha of the effect on link4: all its parameters by a factor
-    np.testing.assert_allclose(posterior.predict(z)[0].torque, posterior.torques(0)[1], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(
+        predicted_readings(posterior, z)[0].torque, posterior.data.torques(0)[1], rtol=0, atol=1e-6
+    )
 
 
 def test_encoder_errors_reach_the_torques_as_differences_of_the_simulation(formula_motion):
@@ -147,7 +151,7 @@ def test_friction_and_bias_add_to_the_reading(formula_motion):
     effects = (GravityGradient(), JointFriction("joint3"), TorqueBias("joint1"))
     rubbing = posterior_of(urdf, truth, formula_motion(motion, urdf, robot), effects=effects)
     z = np.concatenate([start(plain), [2.0 / 5.0, 10.0 / 50.0, -0.3 / 2.0]])
-    added = rubbing.predict(z)[0].torque - plain.predict(start(plain))[0].torque
+    added = predicted_readings(rubbing, z)[0].torque - predicted_readings(plain, start(plain))[0].torque
     speed = truth.speed[:, 2]
     moving = np.abs(speed) > 1e-3
     assert moving.sum() > 10
@@ -164,8 +168,8 @@ def test_simulated_torques_have_the_declared_noise(formula_motion):
     (quiet,), (noisy,) = (simulate_recordings(posterior, rng, z) for rng in (None, np.random.default_rng(2)))
     error = noisy.channels["torque.joint2"] - quiet.channels["torque.joint2"]
     assert 0.5e-4 < error.std() < 1.7e-4
-    assert np.array_equal(quiet.channels["torque.joint2"], posterior.predict(z)[0].torque[:, 0])
-    chi2 = (posterior.with_manoeuvres([Manoeuvre(quiet, posterior.manoeuvres[0].motion)]).residuals(z) ** 2).sum()
+    assert np.array_equal(quiet.channels["torque.joint2"], predicted_readings(posterior, z)[0].torque[:, 0])
+    chi2 = (with_manoeuvres(posterior, [Manoeuvre(quiet, posterior.manoeuvres[0].motion)]).residuals(z) ** 2).sum()
     assert chi2 < 1e-10
 
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import ClassVar
 
-import jax
 import numpy as np
 import pytest
 
@@ -180,8 +179,8 @@ def test_a_diagonal_mixing_is_the_spreads():
     diagonal = replace(plain, mixing=factor)
     z = np.random.default_rng(6).normal(size=plain.size)
     np.testing.assert_allclose(diagonal.values(z).inertial, plain.values(z).inertial, rtol=1e-13)
-    np.testing.assert_allclose(diagonal.to_linear(z), plain.to_linear(z), atol=1e-12)
-    assert diagonal.log_volume(z) == pytest.approx(float(plain.log_volume(z)))
+    np.testing.assert_allclose(diagonal.to_linear(z[None]), plain.to_linear(z[None]), atol=1e-12)
+    assert diagonal.log_volume(z[None])[0] == pytest.approx(float(plain.log_volume(z[None])[0]))
     assert diagonal != plain
     assert diagonal == replace(plain, mixing=tuple(map(tuple, factor)))
     assert diagonal != replace(plain, mixing=mixed().mixing)
@@ -203,10 +202,10 @@ def test_the_mixing_carries_coordinates_over():
 @pytest.mark.parametrize("layout", [unknowns(), mixed()], ids=["spreads", "mixing"])
 def test_linear_coordinates_invert_and_have_the_stated_volume(layout):
     z = 0.5 * np.random.default_rng(8).normal(size=layout.size)
-    np.testing.assert_allclose(layout.from_linear(layout.to_linear(z)), z, atol=1e-9)
-    sign, log = np.linalg.slogdet(np.asarray(jax.jacfwd(layout.to_linear)(z)))
+    np.testing.assert_allclose(layout.from_linear(layout.to_linear(z[None]))[0], z, atol=1e-9)
+    sign, log = np.linalg.slogdet(layout.linear_slope(z))
     assert sign == 1.0
-    assert log == pytest.approx(float(layout.log_volume(z)), abs=1e-8)
+    assert log == pytest.approx(float(layout.log_volume(z[None])[0]), abs=1e-8)
 
 
 def test_a_mixing_must_fit_the_bodies():

@@ -25,6 +25,7 @@ from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Filter, Kind, Sensor, White
 from bayesid.simulation.time_grid import build_grid
 from tests import mujoco_truth as mj
+from tests.sensed import read
 
 PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf"
 TIME = np.arange(0.0, 20.0, 0.5)
@@ -183,7 +184,7 @@ def loud_posterior(truth: mj.Truth, encoder: float, step: float | None = None) -
     motion = MeasuredMotion.from_recording(recording, robot, sigma={0: encoder})
     sensors = (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT))
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.3)
-    return Posterior(Model(robot, sensors, (prior,)), [Manoeuvre(recording, motion)], step=step)
+    return Posterior.of(Model(robot, sensors, (prior,)), [Manoeuvre(recording, motion)], step=step)
 
 
 def trajectory_basis(joint) -> np.ndarray:
@@ -226,7 +227,8 @@ def test_marginalised_encoder_noise_equals_errors_in_variables():
     def readings(z, grid):
         values = posterior.unknowns.values(z)
         start = Start(jnp.asarray(manoeuvre.attitude), values.rate[0])
-        found = simulate(grid, values.inertial, start, model.effects, values.effects, jnp.asarray(model.point))
+        point = jnp.asarray(model.sensor(Kind.ACCEL).position)
+        found = read(simulate(grid, values.inertial, start, model.effects, values.effects, point[None]), point)
         return jnp.concatenate([found.rate, found.accel], axis=1).ravel()
 
     compiled, slope = jax.jit(readings), jax.jit(jax.jacfwd(readings))

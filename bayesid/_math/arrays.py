@@ -5,10 +5,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Floats", "Integers", "namespace"]
+__all__ = ["Floats", "Integers", "Traceable", "namespace"]
 
 Floats: TypeAlias = NDArray[np.floating[Any]]
 Integers: TypeAlias = NDArray[np.integer[Any]]
+Traceable: TypeAlias = Any
+"""An array of NumPy, or one of JAX, which may be traced: a leaf of what compiled code takes."""
 
 
 def namespace(*arrays: Any) -> Any:

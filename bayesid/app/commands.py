@@ -28,6 +28,7 @@ from bayesid.inference.ensemble import Progress
 from bayesid.inference.identified_robot import write_identified
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_file import write_netcdf
+from bayesid.inference.predicted_readings import integration_error_at
 from bayesid.inference.recording_check import RecordingCheck, check_recording, refuse_wrong_units
 from bayesid.inference.simulated_recordings import simulate_recordings
 from bayesid.recording.plausibility import refuse_impossible_joints
@@ -43,7 +44,6 @@ from bayesid.report import (
 )
 from bayesid.report.design_text import design_sentences
 from bayesid.report.diagnosis_report import diagnosis_sentences
-from bayesid.simulation.sensors import Kind
 
 __all__ = ["run_check", "run_demo", "run_design", "run_diagnose", "run_identify", "run_predict", "run_simulate"]
 
@@ -95,7 +95,7 @@ def run_diagnose(
     study = Study.load(file)
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
-    refuse_wrong_units(Posterior(model, manoeuvres))
+    refuse_wrong_units(Posterior.of(model, manoeuvres))
     knows = all(section.argument_of_latitude is not None for section in study.recordings)
     result = diagnose(model, manoeuvres, seed, knows_latitude=knows, progress=progress)
     if keep is not None:
@@ -118,7 +118,7 @@ def run_simulate(file: Path, output: Path, *, seed: int, noise: bool) -> Iterato
     """Write simulated recordings, simulation.json and report.pdf of a study."""
     study, posterior = _read(file)
     recordings = simulate_recordings(posterior, np.random.default_rng(seed) if noise else None)
-    error = posterior.integration_error(posterior.initial_point())
+    error = integration_error_at(posterior, posterior.starting_point())
     with complete_folder(output) as folder:
         for recording in recordings:
             recording.write(folder / f"{recording.name}.csv")
@@ -131,7 +131,7 @@ def run_simulate(file: Path, output: Path, *, seed: int, noise: bool) -> Iterato
                             float(np.nanmax(np.abs(recording.channels[f"{kind.value}.{axis}"]))) for axis in "xyz"
                         ]
                         for kind in (sensor.kind for sensor in posterior.model.sensors)
-                        if kind is not Kind.ATTITUDE
+                        if kind.mounted
                     },
                 }
                 for recording in recordings

@@ -14,6 +14,7 @@ from bayesid.design.predicted_posterior import planned_posterior
 from bayesid.identifiability.hypothetical_experiment import blanked, has
 from bayesid.identifiability.practical_identifiability import Basis
 from bayesid.inference.mode import Optimum, fit, maximise
+from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.recording_check import refuse_wrong_units
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -56,7 +57,7 @@ def prepare(study: Study, seed: int) -> LinearisationPoint:
     manoeuvres = load_manoeuvres(study, model.robot)
     if lacking := _lacking(model, manoeuvres):
         return _predicted(study, model, manoeuvres, lacking)
-    posterior = Posterior(model, manoeuvres)
+    posterior = Posterior.of(model, manoeuvres)
     refuse_wrong_units(posterior)
     refined, optimum = maximise(posterior, np.random.default_rng(seed))
     statement = (
@@ -80,7 +81,7 @@ def _predicted(
         planned.append(blanked(replace(manoeuvre, motion=motion), model.sensors, model.torque))
     posterior = planned_posterior(model, planned)
     centre = np.zeros(posterior.size)
-    posterior = posterior.at(centre)
+    posterior = relinearised(posterior, centre)
     statement = (
         f"This is a prediction: {_count(manoeuvres)} without {', '.join(lacking)} cannot be fitted; its motion "
         "is taken as planned. The sensors are supposed to read what the prior's centre predicts, with the declared "

@@ -40,7 +40,7 @@ def load_posterior(study: Study) -> Posterior:
         Naming file, place, value and remedy.
     """
     model = load_model(study)
-    return Posterior(model, load_manoeuvres(study, model.robot))
+    return Posterior.of(model, load_manoeuvres(study, model.robot))
 
 
 def load_robot(study: Study) -> Robot:

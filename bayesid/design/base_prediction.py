@@ -17,6 +17,8 @@ from scipy.spatial.transform import Rotation
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.design.pose_trajectory import PoseTrajectory
+from bayesid.inference.noise_changes import with_manoeuvres
+from bayesid.inference.perturbed_posterior import trace
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.simulated_recordings import blank_channels
 from bayesid.recording.recording import Recording
@@ -94,9 +96,9 @@ class BasePredictor:
         self.name, self.tip_frame = manoeuvre.recording.name, tip_frame or last_link(model.robot)
         planned = replace(manoeuvre, recording=_planned(manoeuvre.recording), motion=_Exact(manoeuvre.motion))
         if like is None:
-            self.posterior = Posterior(replace(model.without_torque, sensors=(ATTITUDE,)), [planned])
+            self.posterior = Posterior.of(replace(model.without_torque, sensors=(ATTITUDE,)), [planned])
         else:
-            self.posterior = like.posterior.with_manoeuvres([planned])
+            self.posterior = with_manoeuvres(like.posterior, [planned])
         self.rate = _first_rate(model, manoeuvre.recording)
         self.time = planned.recording.time
         self._tip = _poses(model.robot, self.tip_frame, manoeuvre.motion.evaluate(self.time).position)
@@ -104,7 +106,9 @@ class BasePredictor:
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
         """Draw from the prior; the initial rate is the known one, shape (count, size)."""
         z = rng.normal(size=(count, self.posterior.size))
-        return np.where([name.startswith("initial-rate[") for name in self.posterior.unknowns.names], self.centre, z)
+        rates = self.posterior.unknowns.layout.all_rates
+        z[:, rates] = self.centre[rates]
+        return z
 
     def predict(self, draws: int, rng: np.random.Generator) -> Prediction:
         """Predict with so many draws of the prior."""
@@ -115,14 +119,14 @@ class BasePredictor:
     @property
     def centre(self) -> Floats:
         """The prior's centre, with the known initial rate, shape (size,)."""
-        bodies = [prior.centre for prior in self.posterior.model.priors]
-        z = self.posterior.unknowns.coordinates(bodies, self.rate[None])
-        z[: 10 * len(bodies)] = 0.0
+        unknowns = self.posterior.unknowns
+        z = unknowns.coordinates([body.centre for body in unknowns.bodies], self.rate[None])
+        z[unknowns.layout.all_bodies] = 0.0
         return z
 
     def courses(self, z: Floats) -> tuple[PoseTrajectory, PoseTrajectory]:
         """Return the courses of base and end-effector at many points, shape (n, size)."""
-        moments = [self.posterior.trace(point, self.posterior.data).sample for point in z]
+        moments = [trace(self.posterior, point, self.posterior.data.arrays).sample for point in z]
         count = len(self.time)
         com = np.stack([np.asarray(instant.body.com)[0, :count] for instant in moments])
         turn = np.stack([np.asarray(instant.attitude)[0, :count] for instant in moments])

@@ -172,7 +172,7 @@ class Loop:
         flown(self.problem.plan, recording, self.encoder)
         refuse_impossible_joints(recording, model.robot)
         for sensor in model.sensors:
-            recording.vector(sensor.kind.value)
+            recording.vector(sensor.kind.value, sensor.kind.axes)
 
     def _identify(self, history: History, number: int, model: Model) -> None:
         """Identify a step unless that is done."""
@@ -181,7 +181,7 @@ class Loop:
         file = history.path(number, "identification")
         recording = Recording.read(history.path(number, "recording"))
         self._check(recording)
-        posterior = Posterior(model, [flown(self.problem.plan, recording, self.encoder)])
+        posterior = Posterior.of(model, [flown(self.problem.plan, recording, self.encoder)])
         if all(prior.spread <= NARROW for prior in model.priors):
             refuse_wrong_units(posterior)
         if history.entry(number, "recording") is None:
@@ -229,8 +229,8 @@ def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
                 remedy="Give the attitude at time 0, or leave the attitude out",
             )
         attitude = values[0]
-        for sensor in plan.model.sensors:
-            if sensor.kind is Kind.ATTITUDE:
-                sigma = max(sigma, LOOSE * float(np.max(sensor.noise.sigma(plan.interval))))
+        star = plan.model.sensor(Kind.ATTITUDE)
+        if star is not None:
+            sigma = max(sigma, LOOSE * float(np.max(star.noise.sigma(plan.interval))))
     motion = MeasuredMotion.from_recording(recording, plan.model.robot, sigma=encoder)
     return Manoeuvre(recording, motion, attitude, attitude_sigma=sigma, argument_of_latitude=plan.argument_of_latitude)

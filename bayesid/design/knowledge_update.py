@@ -92,7 +92,7 @@ class Laplace:
         noise = np.random.default_rng(normal).normal(size=(self.draws, posterior.size))
         z = optimum.z + noise @ np.linalg.cholesky(optimum.covariance).T
         names = [prior.name for prior in posterior.model.priors]
-        values = np.asarray(refined.values_of(z).inertial).reshape(1, self.draws, len(names), 10)
+        values = np.asarray(refined.unknowns.values_of(z).inertial).reshape(1, self.draws, len(names), 10)
         data = az.from_dict(
             posterior={"inertial": values}, dims={"inertial": ["body", "parameter"]}, coords={"body": names}
         )

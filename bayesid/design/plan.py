@@ -13,7 +13,6 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
-from bayesid._math.rotation import quaternion_product
 from bayesid.design.trajectories import TrajectoryFamily
 from bayesid.inference.unknowns import Unknowns
 from bayesid.robot.end_effector import Tip
@@ -22,8 +21,7 @@ from bayesid.robot.regressors import balance_regressor
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.effects.effect import Instant, Readings
 from bayesid.simulation.model import Model
-from bayesid.simulation.sensors import Kind
-from bayesid.simulation.simulator import Simulator
+from bayesid.simulation.simulator import ModelConstants, Simulator
 from bayesid.simulation.time_grid import build_grid
 
 __all__ = ["PlannedOutcome", "Plan", "Trajectory"]
@@ -118,7 +116,12 @@ class Plan:
     @cached_property
     def simulator(self) -> Simulator:
         """Return the forward model."""
-        return Simulator(self.model)
+        return Simulator.of(self.model)
+
+    @cached_property
+    def constants(self) -> ModelConstants:
+        """Numbers of the model."""
+        return ModelConstants.of(self.model)
 
     @cached_property
     def samples(self) -> Floats:
@@ -134,25 +137,17 @@ class Plan:
 
     def bodies(self) -> Sequence[int]:
         """Return the indices of the coordinates of the bodies to identify."""
-        return [
-            10 * index + k for index, prior in enumerate(self.model.priors) if not prior.nuisance for k in range(10)
-        ]
+        return self.unknowns.body_indices()
 
     def effect(self, label: str) -> Sequence[int]:
         """Return the indices of an effect's coordinates."""
-        return [
-            index
-            for index, name in enumerate(self.unknowns.names)
-            if name.startswith((f"{label}.", f"{label}[")) and index >= 10 * len(self.model.priors)
-        ]
+        return self.unknowns.effect_indices(label)
 
     # ---- functions of the parameters of the motion and of the unknowns, both traced ----
 
     def trajectory(self, parameters: Array, z: Array) -> Trajectory:
         """Return what the robot does."""
-        node, _, _ = self.simulator.trace(
-            self.unknowns.values(z), self._grid(parameters), jnp.asarray(self.attitude)[None]
-        )
+        node, _, _ = self._traced(z, self._grid(parameters))
         return self._trajectory(parameters, node)
 
     def slopes(self, parameters: Array, z: Array) -> Array:
@@ -166,7 +161,7 @@ class Plan:
         trajectory = self._trajectory(parameters, node)
         bodies = jnp.asarray(self.bodies(), dtype=int)
         per_coordinate = jax.jacfwd(lambda z: self.unknowns.values(z).inertial)(z)[:, bodies]
-        tables = grid.node.unknown[0, :, :, : 10 * len(self.model.priors)]
+        tables = grid.node.unknown[0, :, :, self.unknowns.layout.all_bodies]
         wrench = balance_regressor(tables, trajectory.rate, trajectory.rate_change, trajectory.acceleration)
         wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / self._gyration)])[:, None]
         regressor = (wrench @ per_coordinate).reshape(6 * len(wrench), len(bodies))
@@ -176,12 +171,16 @@ class Plan:
         """Return the grid, the whitened derivatives of what the sensors read and the motion, from one simulation."""
         grid = self._grid(parameters)
 
-        def read(z: Array) -> tuple[Readings, tuple[Instant, Readings]]:
-            node, _, readings = self.simulator.trace(self.unknowns.values(z), grid, jnp.asarray(self.attitude)[None])
-            return readings, (node, readings)
+        def read(z: Array) -> tuple[Array, Instant]:
+            node, _, readings = self._traced(z, grid)
+            return self.simulator.residual(readings, jax.lax.stop_gradient(readings))[0], node
 
-        slopes, (node, readings) = jax.jacfwd(read, has_aux=True)(z)
-        return grid, self._slope(slopes, readings) / jnp.asarray(self.sigma)[:, None], node
+        slopes, node = jax.jacfwd(read, has_aux=True)(z)
+        return grid, -slopes / jnp.asarray(self.sigma)[:, None], node
+
+    def _traced(self, z: Array, grid: Grid) -> tuple[Instant, Instant, Readings]:
+        values, attitude = self.unknowns.values(z), jnp.asarray(self.attitude)[None]
+        return self.simulator.trace(self.constants, values, grid, attitude)
 
     @property
     def _gyration(self) -> float:
@@ -201,14 +200,6 @@ class Plan:
             effects=self.model.effects,
         )
         return jax.tree.map(lambda x: x[None], grid)
-
-    def _slope(self, slopes: Readings, readings: Readings) -> Array:
-        """Return derivatives of what the sensors read, (T, 3 sensors, n); of an attitude as a small rotation."""
-        parts = []
-        for kind in self.simulator.kinds:
-            slope = getattr(slopes, kind.value)[0]
-            parts.append(_turning(readings.attitude[0], slope) if kind is Kind.ATTITUDE else slope)
-        return jnp.concatenate(parts, axis=1)
 
     def _trajectory(self, parameters: Array, node: Instant) -> Trajectory:
         """Return the trajectory at the stages of the integration."""
@@ -238,13 +229,6 @@ class Plan:
             rate_change=instant.rate_change,
             acceleration=instant.acceleration,
         )
-
-
-def _turning(quaternion: Array, slope: Array) -> Array:
-    """Small rotations in base axes, (T, 3, n), of changes of a quaternion, (T, 4, n)."""
-    inverse = quaternion * jnp.array([-1.0, -1.0, -1.0, 1.0])
-    product = jax.vmap(jax.vmap(quaternion_product, (None, 1), 1))
-    return 2.0 * product(inverse, slope)[:, :3]
 
 
 def _norm(vectors: Array | Floats) -> Array:

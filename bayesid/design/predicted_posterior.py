@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import linearise
+from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
 from bayesid.recording.joint_motion import MeasuredMotion, Motion, sample_joints
@@ -106,31 +107,30 @@ def planned_posterior(
 
     Compiled functions are shared with those of ``like``, where they fit.
     """
-    blank = Posterior(model, manoeuvres, like=like, step=step)
+    blank = Posterior.of(model, manoeuvres, step=step)
     return simulated(blank, np.zeros(blank.size) if z is None else z)
 
 
 def simulated(posterior: Posterior, z: Floats) -> Posterior:
     """Return a posterior whose sensors read what ``z`` predicts."""
     recordings = simulate_recordings(posterior, z=z)
-    return posterior.with_manoeuvres(
-        [replace(manoeuvre, recording=own) for manoeuvre, own in zip(posterior.manoeuvres, recordings, strict=True)]
+    return with_manoeuvres(
+        posterior,
+        [replace(manoeuvre, recording=own) for manoeuvre, own in zip(posterior.manoeuvres, recordings, strict=True)],
     )
 
 
 def predict(posterior: Posterior) -> Predicted:
     """Return what manoeuvres lead to if the prior's centre is the truth."""
     z = np.zeros(posterior.size)
-    jacobian = posterior.at(z).jacobian(z)
+    jacobian = relinearised(posterior, z).jacobian(z)
     return describe(posterior, z, np.linalg.inv(jacobian.T @ jacobian))
 
 
 def describe(posterior: Posterior, z: Floats, coordinates: Floats) -> Predicted:
     """Carry a covariance of the coordinates over to the quantities that are reported."""
-    own = [index for index, prior in enumerate(posterior.model.priors) if not prior.nuisance]
     names, values, slope = linearise(posterior, z)
-    rows = [10 * index + k for index in own for k in range(10)]
-    widths = np.asarray(posterior.unknowns.widths)[rows]
+    widths = np.asarray(posterior.unknowns.widths)[posterior.unknowns.body_indices()]
     count = widths.shape[1]
     return Predicted(
         names=names,

@@ -21,6 +21,7 @@ from bayesid.diagnosis.perturbation import OperatingTrajectory
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.score_tests import chi2_log_sf
 from bayesid.diagnosis.test_suite import FALSE_ALARM, SuiteOutcome, TestSuite
+from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 
@@ -129,7 +130,7 @@ class CauseSearch:
         engine.compile()
         self._tell(0.02, "fitting the present model")
         first = engine.fit()
-        engine = engine.with_posterior(posterior.at(first.z))
+        engine = engine.with_posterior(relinearised(posterior, first.z))
         fit = engine.fit(z=first.z)
         self._tell(0.1, "testing what it leaves")
         self.suite = self._battery_of(engine, fit, ())
@@ -251,7 +252,7 @@ class CauseSearch:
         """Free the initial rates."""
         engine = parent.engine.released()
         z = parent.fit.z.copy()
-        measured = engine.posterior.initial_point()
+        measured = engine.posterior.starting_point()
         z[parent.engine.frozen] = measured[parent.engine.frozen]
         fit = engine.fit(parent.fit.effects, parent.fit.coordinates, z=z)
         marker = NoiseFault("initial-rate", (), np.zeros(0), np.zeros(0), engine.posterior)
@@ -292,7 +293,7 @@ class CauseSearch:
 
 def _strayed(fit: Fit) -> bool:
     """Whether the model's own unknowns went so far from their prior that they may imitate what is missing."""
-    return bool(np.abs(fit.z[: 10 * len(fit.posterior.model.priors)]).max(initial=0.0) > FAR)
+    return bool(np.abs(fit.z[fit.posterior.unknowns.layout.all_bodies]).max(initial=0.0) > FAR)
 
 
 def log_bayes_factor(hypothesis: Hypothesis, base: Hypothesis) -> float:

@@ -149,8 +149,9 @@ def _diagnose(
 ) -> Diagnosis:
     tell = progress or (lambda fraction, text: None)
     at_rest = model.rate_sigma == 0.0
-    posterior = Posterior(replace(model, rate_sigma=RATE_SIGMA) if at_rest else model, manoeuvres)
-    frozen = [i for i, name in enumerate(posterior.unknowns.names) if at_rest and name.startswith("initial-rate")]
+    posterior = Posterior.of(replace(model, rate_sigma=RATE_SIGMA, speed_errors=True) if at_rest else model, manoeuvres)
+    rates = posterior.unknowns.layout.all_rates
+    frozen = range(rates.start, rates.stop) if at_rest else ()
     catalogue = candidates(model, knows_latitude=knows_latitude) if effects is None else list(effects)
     search = CauseSearch(posterior, frozen, catalogue, seed, progress)
     verdict = judge(search)
@@ -172,7 +173,7 @@ def extended_posterior(hypothesis: Hypothesis) -> Posterior:
     if hypothesis.engine.frozen.size:
         model = replace(model, rate_sigma=0.0)
     manoeuvres = [_without(manoeuvre, fit.posterior, index) for index, manoeuvre in enumerate(fit.posterior.manoeuvres)]
-    return Posterior(model, manoeuvres)
+    return Posterior.of(model, manoeuvres)
 
 
 def extended_start(hypothesis: Hypothesis, posterior: Posterior) -> Floats:
@@ -205,7 +206,7 @@ def _tuned(effect: Effect, values: Floats) -> Effect:
 
 def _without(manoeuvre: Manoeuvre, posterior: Posterior, index: int) -> Manoeuvre:
     """Return a manoeuvre without the samples that a hypothesis counts as outliers."""
-    gone = posterior.left_out(index)
+    gone = posterior.data.left_out_times(index)
     if not gone:
         return manoeuvre
     channels = dict(manoeuvre.recording.channels)

@@ -11,6 +11,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.cause_search import Hypothesis
 from bayesid.inference.body_quantities import BODY_QUANTITIES
+from bayesid.inference.noise_changes import leaving_out
 from bayesid.robot.inertial_parameters import mass_com_inertia
 
 __all__ = ["BodyFigures", "Gain", "body_figures", "measure_gain"]
@@ -71,7 +72,7 @@ def _side(hypothesis: Hypothesis) -> Side:
     fit = hypothesis.fit
     posterior = fit.posterior
     whole = fit.residual.reshape(posterior.residual_shape)
-    names = [f"{sensor.kind.value}.{axis}" for sensor in posterior.model.sensors for axis in "xyz"]
+    names = posterior.model.channels.names
     there = np.zeros(posterior.residual_shape, dtype=bool)
     for r, item in enumerate(posterior.whitenings):
         there[r, : len(item.outputs)] = item.outputs
@@ -97,7 +98,7 @@ def _held_out(hypothesis: Hypothesis) -> Floats:
     for r in range(len(fit.posterior.manoeuvres)):
         outputs = [item.outputs for item in fit.posterior.whitenings]
         masks = [own if i == r else np.zeros_like(own) for i, own in enumerate(outputs)]
-        without = engine.with_posterior(fit.posterior.without(masks))
+        without = engine.with_posterior(leaving_out(fit.posterior, masks))
         rest = without.fit(fit.effects, fit.coordinates, z=fit.z, operating=fit.operating)
         scores.append(_bare(hypothesis) - _bare_fit(rest.cost, rest.hessian[0]) + constant[r])
     return np.array(scores)

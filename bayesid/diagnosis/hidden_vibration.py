@@ -15,6 +15,7 @@ from jax import Array
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from bayesid._math.arrays import Floats
+from bayesid._math.runge_kutta import runge_kutta_step
 from bayesid._math.small_matrices import solve_small
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect, Instant
@@ -170,12 +171,11 @@ def _run(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Ar
 
     def step(state: Array, given: tuple[Array, Array, Array, Array]) -> tuple[Array, Array]:
         here, there, soft_here, soft_there = given
-        half, soft_half = 0.5 * (here + there), 0.5 * (soft_here + soft_there)
-        k1 = change(state, here, soft_here)
-        k2 = change(state + 0.5 * FINE * k1, half, soft_half)
-        k3 = change(state + 0.5 * FINE * k2, half, soft_half)
-        k4 = change(state + FINE * k3, there, soft_there)
-        return state + FINE / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), jnp.stack([state[1], k1[1]])
+        half = (0.5 * (here + there), 0.5 * (soft_here + soft_there))
+        new, k1, _ = runge_kutta_step(
+            lambda s, at: change(s, *at), state, jnp.asarray(FINE), (here, soft_here), half, (there, soft_there)
+        )
+        return new, jnp.stack([state[1], k1[1]])
 
     final, found = jax.lax.scan(step, jnp.zeros((2, count)), (push[:-1], push[1:], soft[:-1], soft[1:]))
     end = jnp.stack([final[1], change(final, push[-1], soft[-1])[1]])

@@ -13,6 +13,7 @@ from scipy.optimize import minimize
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.noise_tests import lattice, leverage
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
+from bayesid.inference.noise_changes import leaving_out, with_sensors
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Quantity
 from bayesid.simulation.sensors import Coloured, Kind, Quantised, Scaled, Sensor
@@ -75,12 +76,12 @@ def noise_fault(label: str, fit: Fit) -> NoiseFault | None:
     """Estimate a noise fault from the residual of a fit and put it into the fit's posterior; None if it is no such."""
     name, _, place = label.partition(":")
     if name == "coloured-noise":
-        return _coloured(label, Kind(place), fit)
+        return _coloured(label, Kind.of(place), fit)
     if name == "outliers":
-        return _outliers(label, Kind(place), fit)
+        return _outliers(label, Kind.of(place), fit)
     if name == "quantisation":
-        return _quantisation(label, Kind(place), fit)
-    return _understated(label, Kind(name.removesuffix("-noise")), fit)
+        return _quantisation(label, Kind.of(place), fit)
+    return _understated(label, Kind.of(name.removesuffix("-noise")), fit)
 
 
 def _understated(label: str, kind: Kind, fit: Fit) -> NoiseFault:
@@ -101,7 +102,7 @@ def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
     whole, _ = _shaped(fit)
     powers, angles, interval = [], [], 1.0
     for r, item in enumerate(fit.posterior.whitenings):
-        interval = float(np.median(np.diff(fit.posterior.measured(r, kind)[0])))
+        interval = float(np.median(np.diff(fit.posterior.data.measured(r, kind)[0])))
         for c in range(slot.start, slot.stop):
             own = whole[r, np.flatnonzero(item.outputs[:, c]), c]
             spectrum = np.abs(np.fft.rfft(own)) ** 2 / len(own)
@@ -128,7 +129,7 @@ def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
 def _longest(fit: Fit, kind: Kind) -> float:
     """Longest correlation time looked for [s]."""
     return LONGEST * max(
-        float(np.ptp(fit.posterior.measured(r, kind)[0])) for r in range(len(fit.posterior.manoeuvres))
+        float(np.ptp(fit.posterior.data.measured(r, kind)[0])) for r in range(len(fit.posterior.manoeuvres))
     )
 
 
@@ -136,7 +137,7 @@ def _coloured_at(
     label: str, kind: Kind, fit: Fit, logs: Floats, relative: Floats, like: Posterior | None = None
 ) -> NoiseFault:
     """Coloured noise with the logarithms of its level, in sigma, and of its correlation time."""
-    level, time = np.exp(logs[0]) * fit.posterior.sigma(0, kind), float(np.exp(logs[1]))
+    level, time = np.exp(logs[0]) * fit.posterior.data.sigma(0, kind), float(np.exp(logs[1]))
     noise = Coloured((float(level[0]), float(level[1]), float(level[2])), time)
     posterior = _with_sensor(fit, kind, lambda s: replace(s, coloured=noise), like)
     mean = np.array([float(level.mean()), time])
@@ -151,8 +152,8 @@ def refined(fault: NoiseFault, engine: Engine, fit: Fit) -> NoiseFault:
     name, _, place = fault.label.partition(":")
     if name != "coloured-noise":
         return fault
-    kind = Kind(place)
-    sigma = fit.posterior.sigma(0, kind)
+    kind = Kind.of(place)
+    sigma = fit.posterior.data.sigma(0, kind)
     first = np.log([fault.mean[0] / sigma.mean(), fault.mean[1]])
     longest = np.log(_longest(fit, kind))
     points, values = [], []
@@ -193,7 +194,7 @@ def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault | None:
         own = whole[r, : len(mask), slot]
         scale = max(1.0, float(np.median(np.abs(own[item.outputs[:, slot]])) / 0.6745))
         mask[:, slot] = item.outputs[:, slot] & (np.abs(own) > OUTLYING * scale)
-        mask |= fit.posterior.gone(r)
+        mask |= fit.posterior.data.left_out[r]
         masks.append(mask)
         count += int(mask[:, slot].any(axis=1).sum())
         instants = np.flatnonzero(mask[:, slot].any(axis=1))
@@ -206,7 +207,7 @@ def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault | None:
     fraction = count / max(total, 1)
     sd = np.sqrt(max(fraction * (1.0 - fraction), 1.0 / max(total, 1)) / max(total, 1))
     return NoiseFault(
-        label, (Quantity("fraction", "1"),), np.array([fraction]), np.array([sd]), fit.posterior.without(masks)
+        label, (Quantity("fraction", "1"),), np.array([fraction]), np.array([sd]), leaving_out(fit.posterior, masks)
     )
 
 
@@ -220,13 +221,12 @@ def _quantisation(label: str, kind: Kind, fit: Fit) -> NoiseFault:
 
 
 def _with_sensor(fit: Fit, kind: Kind, change: Callable[[Sensor], Sensor], like: Posterior | None = None) -> Posterior:
-    sensors = [change(sensor) if sensor.kind is kind else sensor for sensor in fit.posterior.model.sensors]
-    return fit.posterior.with_sensors(sensors, fit.z, like)
+    sensors = [change(sensor) if sensor.kind == kind else sensor for sensor in fit.posterior.model.sensors]
+    return with_sensors(fit.posterior, sensors, fit.z, like)
 
 
 def _slot(posterior: Posterior, kind: Kind) -> slice:
-    index = [sensor.kind for sensor in posterior.model.sensors].index(kind)
-    return slice(3 * index, 3 * index + 3)
+    return posterior.model.channels.of(kind)
 
 
 def _shaped(fit: Fit) -> tuple[Floats, Floats]:

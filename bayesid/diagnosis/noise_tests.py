@@ -32,11 +32,11 @@ def noise_tests(posterior: Posterior, fit: Fit) -> dict[str, float]:
     whole = fit.residual.reshape(posterior.residual_shape)
     taken = leverage(fit).reshape(posterior.residual_shape)
     found = {}
-    for slot, sensor in enumerate(posterior.model.sensors):
-        name = sensor.kind.value
+    for sensor in posterior.model.sensors:
+        name, columns = sensor.kind.value, posterior.model.channels.of(sensor.kind)
         energy, degrees, pieces = 0.0, 0.0, []
         for r, item in enumerate(posterior.whitenings):
-            for c in range(3 * slot, 3 * slot + 3):
+            for c in range(columns.start, columns.stop):
                 there = np.flatnonzero(item.outputs[:, c])
                 own = whole[r, there, c]
                 energy += float((own**2).sum())
@@ -73,12 +73,14 @@ def _coloured(pieces: list[Floats]) -> float:
 
 def lattice(posterior: Posterior, kind: Kind) -> Floats | None:
     """Step per axis of the lattice that a sensor's values lie on, (3,), or None where they lie on no coarse one."""
-    if kind is Kind.ATTITUDE:
+    if not kind.mounted:
         return None
     steps = []
     for axis in range(3):
-        values = np.concatenate([posterior.measured(i, kind)[1][:, axis] for i in range(len(posterior.manoeuvres))])
-        sigma = float(posterior.sigma(0, kind)[axis])
+        values = np.concatenate(
+            [posterior.data.measured(i, kind)[1][:, axis] for i in range(len(posterior.manoeuvres))]
+        )
+        sigma = float(posterior.data.sigma(0, kind)[axis])
         distances = np.diff(np.unique(values))
         distances = distances[distances > 1e-9 * np.abs(values).max()]
         if len(distances) == 0:

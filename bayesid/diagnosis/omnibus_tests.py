@@ -43,7 +43,7 @@ def omnibus(engine: Engine, fit: Fit) -> dict[str, Floats]:
             found[f"{band} torque about {name}"] = torque[:, :, low:high, axis].reshape(len(torque), -1)
     for axis, name in enumerate("xyz"):
         found[f"slow force along {name}"] = force[..., axis].reshape(len(force), -1)
-    names = [f"{sensor.kind.value}.{axis}" for sensor in engine.posterior.model.sensors for axis in "xyz"]
+    names = engine.posterior.model.channels.names
     for band in ("slow", "middle"):
         for channel, name in enumerate(names):
             found[f"{band} residual of {name}"] = _cosines(engine, channel, *BANDS[band])

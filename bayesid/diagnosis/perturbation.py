@@ -6,8 +6,8 @@ takes tables, wrenches and readings as arguments, serves every candidate.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache, partial
+from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -16,10 +16,13 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.runge_kutta import runge_kutta_step
 from bayesid.diagnosis.hidden_vibration import Vibration
-from bayesid.inference.posterior import Perturbation, Posterior
+from bayesid.inference.perturbed_posterior import Perturbation
+from bayesid.inference.posterior import Posterior
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect, Instant, Readings
+from bayesid.simulation.effects.effect_key import EffectKey
 from bayesid.simulation.sensors import Kind
 
 __all__ = [
@@ -56,7 +59,7 @@ def operating_trajectory_of(
     posterior: Posterior, node: Instant, sample: Instant, readings: Readings
 ) -> OperatingTrajectory:
     """Collect what effects are evaluated on."""
-    steps = np.asarray(posterior.data.grid.step)
+    steps = np.asarray(posterior.data.arrays.grid.step)
     return OperatingTrajectory(posterior, node, sample, readings, Vibration.along(node, sample, steps))
 
 
@@ -76,7 +79,7 @@ def physical(effect: Effect, coordinates: Array) -> Array:
 
 def tables_of(effect: Effect, posterior: Posterior) -> Table:
     """Evaluate an effect's table over the recordings of a posterior."""
-    grid = posterior.data.grid
+    grid = posterior.data.arrays.grid
 
     def over(times: Array) -> Floats:
         pairs = zip(posterior.manoeuvres, np.asarray(times), strict=True)
@@ -90,7 +93,7 @@ def perturb(effect: Effect, coordinates: Floats, operating: OperatingTrajectory,
     shaped = jnp.asarray(coordinates).reshape(coordinates_shape(effect, _recordings(operating)))
     perturbation = _nothing(operating)
     if _acts(effect):
-        hooks = _evaluate(_Alike(effect), _setting(operating))(shaped.ravel(), *operating[1:4], _steps(operating))
+        hooks = _evaluate(*_given(effect, operating), shaped.ravel(), *operating[1:4], _steps(operating))
         perturbation = perturbation._replace(**{key: np.asarray(value) for key, value in hooks.items()})
     if table is not None:
         loads = np.asarray(effect.loads(physical(effect, shaped)))
@@ -122,7 +125,7 @@ def linear_perturbation(
         return _nothing(operating, (count,))._replace(node_rows=rows[0], sample_rows=rows[1])
     slopes = _nothing(operating, (len(flat),))
     if _acts(effect):
-        hooks = _differentiate(_Alike(effect), _setting(operating))(flat, *operating[1:4], _steps(operating))
+        hooks = _differentiate(*_given(effect, operating), flat, *operating[1:4], _steps(operating))
         slopes = slopes._replace(**{key: np.moveaxis(np.asarray(value), -1, 0) for key, value in hooks.items()})
     if table is not None:
         loads = np.asarray(jax.jacfwd(lambda c: effect.loads(physical(effect, c.reshape(shape))))(flat)).T
@@ -141,7 +144,7 @@ def _nothing(operating: OperatingTrajectory, lead: Sequence[int] = ()) -> Pertur
     posterior = operating.posterior
     recordings, nodes = operating.node.rate.shape[:2]
     samples = operating.sample.rate.shape[1]
-    channels = posterior.data.measured.shape[-1]
+    channels = posterior.data.arrays.offset.shape[-1]
     return Perturbation(
         np.zeros((*lead, posterior.size)),
         np.zeros((*lead, recordings, nodes, WIDTH)),
@@ -152,25 +155,34 @@ def _nothing(operating: OperatingTrajectory, lead: Sequence[int] = ()) -> Pertur
     )
 
 
-class Setting(NamedTuple):
-    """What of the sensors the hooks need: kinds in order, how they are turned, where the accelerometer sits."""
+class _Given(NamedTuple):
+    """Numbers that the compiled hooks of an effect take.
 
-    kinds: tuple[Kind, ...]
-    turns: tuple[tuple[float, ...], ...]
-    point: tuple[float, ...]
+    constants of the effect; mean and sigma (n,) of its parameters' priors; rotation (K, 3, 3), sensor to base axes, and
+    point (K, 3) of every sensor.
+    """
+
+    constants: tuple[Any, ...]
+    mean: Floats
+    sigma: Floats
+    rotation: Floats
+    point: Floats
 
 
-def _setting(operating: OperatingTrajectory) -> Setting:
-    model = operating.posterior.model
-    return Setting(
-        tuple(sensor.kind for sensor in model.sensors),
-        tuple(tuple(sensor.rotation.ravel().tolist()) for sensor in model.sensors),
-        tuple(model.point.tolist()),
+def _given(effect: Effect, operating: OperatingTrajectory) -> tuple[EffectKey, tuple[Kind, ...], _Given]:
+    sensors = operating.posterior.model.sensors
+    given = _Given(
+        effect.constants,
+        np.array([parameter.mean for parameter in effect.parameters]),
+        np.array([parameter.sigma for parameter in effect.parameters]),
+        np.stack([sensor.rotation for sensor in sensors]),
+        np.stack([np.asarray(sensor.position, dtype=float) for sensor in sensors]),
     )
+    return EffectKey(effect), operating.posterior.model.channels.kinds, given
 
 
 def _steps(operating: OperatingTrajectory) -> Array:
-    return operating.posterior.data.grid.step
+    return operating.posterior.data.arrays.grid.step
 
 
 def _acts(effect: Effect) -> bool:
@@ -178,46 +190,21 @@ def _acts(effect: Effect) -> bool:
     return any(effect.uses(hook) for hook in ("momentum", "wrench", "specific_force", "read"))
 
 
-class _Alike:
-    """An effect as a key: equal to others of its class with equal attributes, which share compiled functions."""
-
-    def __init__(self, effect: Effect) -> None:
-        self.effect = effect
-        own = tuple(sorted(vars(effect).items()))
-        try:
-            hash(own)
-        except TypeError:  # arrays: every such effect is its own
-            own = (("id", id(effect)),)
-        self._key = (type(effect), own)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Alike) and self._key == other._key
-
-    def __hash__(self) -> int:
-        return hash(self._key)
-
-
-@lru_cache(maxsize=128)
-def _evaluate(alike: _Alike, setting: Setting) -> Callable[..., dict[str, Array]]:
-    return jax.jit(partial(_hooks, alike.effect, setting))
-
-
-@lru_cache(maxsize=128)
-def _differentiate(alike: _Alike, setting: Setting) -> Callable[..., dict[str, Array]]:
-    return jax.jit(jax.jacfwd(partial(_hooks, alike.effect, setting)))
-
-
 def _hooks(
-    effect: Effect,
-    setting: Setting,
+    key: EffectKey,
+    kinds: tuple[Kind, ...],
+    given: _Given,
     coordinates: Array,
     node: Instant,
     sample: Instant,
     readings: Readings,
     step: Array,
 ) -> dict[str, Array]:
-    """Return the parts of the push that an effect's hooks make, by name."""
-    values = physical(effect, coordinates.reshape(coordinates_shape(effect, len(step))))
+    """Return the parts of the perturbation that an effect's hooks make, by name."""
+    effect = key.effect.bound(given.constants)
+    shaped = coordinates.reshape(coordinates_shape(effect, len(step)))
+    columns = [p.prior.physical(given.mean[k], given.sigma[k], shaped[..., k]) for k, p in enumerate(effect.parameters)]
+    values = jnp.stack(columns, axis=-1) if columns else shaped
     axis = 0 if effect.per_recording else None
     moments = (node, sample)
     if effect.states:
@@ -236,27 +223,35 @@ def _hooks(
         wrenches = [jnp.concatenate(hook(values, m, i), axis=-1) for m, i in zip(moments, inner, strict=True)]
         parts |= {"node_wrench": wrenches[0], "sample_wrench": wrenches[1]}
     if effect.uses("read") or effect.uses("specific_force"):
-        parts["reading"] = _reading(effect, setting, values, sample, readings, axis)
+        parts["reading"] = _reading(effect, kinds, given, values, sample, readings, axis)
     return parts
 
 
 def _reading(
-    effect: Effect, setting: Setting, values: Array, sample: Instant, readings: Readings, axis: int | None
+    effect: Effect,
+    kinds: tuple[Kind, ...],
+    given: _Given,
+    values: Array,
+    sample: Instant,
+    readings: Readings,
+    axis: int | None,
 ) -> Array:
     """Return what the effect adds to the readings, shape (R, T, C), sensor axes."""
     parts = []
     faulty = jax.vmap(effect.read, (axis, 0))(values, readings) if effect.uses("read") else readings
-    for kind, turn in zip(setting.kinds, setting.turns, strict=True):
-        if kind is Kind.ATTITUDE:
-            parts.append(jnp.zeros((*readings.time.shape, 3)))
-            continue
-        added = getattr(faulty, kind.value) - getattr(readings, kind.value)
-        if kind is Kind.ACCEL and effect.uses("specific_force"):
-            lever = jnp.asarray(setting.point) - sample.body.com
-            field = jax.vmap(jax.vmap(effect.specific_force, (None, 0, 0)), (axis, 0, 0))
-            added = added + field(values, sample, lever) @ jnp.asarray(turn).reshape(3, 3)
+    for index, kind in enumerate(kinds):
+        added = jax.vmap(jax.vmap(kind.residual))(faulty.channels[kind.value], readings.channels[kind.value])
+        if kind.feels_force and effect.uses("specific_force"):
+            lever = given.point[index] - sample.body.com
+            force = jax.vmap(jax.vmap(effect.specific_force, (None, 0, 0)), (axis, 0, 0))
+            added = added + force(values, sample, lever) @ given.rotation[index]
         parts.append(added)
-    return jnp.concatenate(parts, axis=-1)
+    torques = jnp.zeros((*readings.time.shape, 0))
+    return jnp.concatenate([*parts, torques], axis=-1)
+
+
+_evaluate = jax.jit(_hooks, static_argnums=(0, 1))
+_differentiate = jax.jit(jax.jacfwd(_hooks, argnums=3), static_argnums=(0, 1))
 
 
 def _couple(momentum: Array, rate: Array) -> Array:
@@ -271,14 +266,9 @@ def _inner_states(effect: Effect, values: Array, node: Instant, step: Array) -> 
     )
 
     def advance(state: Array, given: Any) -> tuple[Array, tuple[Array, Array]]:
-        size, here, half, there = given
-        k1 = effect.derivative(values, here, state)
-        k2 = effect.derivative(values, half, state + 0.5 * size * k1)
-        k3 = effect.derivative(values, half, state + 0.5 * size * k2)
-        k4 = effect.derivative(values, there, state + size * k3)
-        new = state + size / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        middle_state = 0.5 * (state + new) + 0.125 * size * (k1 - k4)
-        return new, (state, middle_state)
+        size, *instants = given
+        new, k1, k4 = runge_kutta_step(lambda s, at: effect.derivative(values, at, s), state, size, *instants)
+        return new, (state, 0.5 * (state + new) + 0.125 * size * (k1 - k4))
 
     final, (nodes, middles) = jax.lax.scan(advance, jnp.zeros(effect.states), (step, first, middle, last))
     both = jnp.stack([nodes, middles], axis=1).reshape(-1, effect.states)

@@ -31,7 +31,8 @@ from bayesid.diagnosis.perturbation import (
     physical,
     tables_of,
 )
-from bayesid.inference.posterior import Data, Perturbation, Posterior, perturbed
+from bayesid.inference.perturbed_posterior import Arrays, Perturbation, perturbed, responses, trace
+from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["Engine", "Fit"]
@@ -179,16 +180,16 @@ class Engine:
 
     def start(self) -> Floats:
         """Return the model's starting point."""
-        z = self.posterior.initial_point()
+        z = self.posterior.starting_point()
         z[self.frozen] = 0.0
         return z
 
     def compile(self) -> None:
         """Compile simulation and derivatives, side by side."""
-        z, data = self.start(), self.posterior.data
+        z, data = self.start(), self.posterior.data.arrays
         with ThreadPoolExecutor(1) as other:
-            derivatives = other.submit(self.posterior.responses, z, data, self.perturbation(1))
-            self.posterior.trace(z, data)
+            derivatives = other.submit(responses, self.posterior, z, data, self.perturbation(1))
+            trace(self.posterior, z, data)
             derivatives.result()
 
     def fit(
@@ -295,30 +296,30 @@ class Engine:
 
     def operating(self, z: Floats, perturbations: Sequence[Perturbation]) -> OperatingTrajectory:
         """Return the motion with the given pushes."""
-        traced = self.posterior.trace(z, self._pushed(perturbations))
+        traced = trace(self.posterior, z, self._pushed(perturbations))
         return operating_trajectory_of(self.posterior, traced.node, traced.sample, traced.readings)
 
-    def residual(self, z: Floats, data: Data) -> Floats:
+    def residual(self, z: Floats, data: Arrays) -> Floats:
         """Return the whitened residual, (N,)."""
-        return np.asarray(self.posterior.trace(z, data).residual).ravel()
+        return np.asarray(trace(self.posterior, z, data).residual).ravel()
 
-    def own_columns(self, z: Floats, data: Data) -> Floats:
+    def own_columns(self, z: Floats, data: Arrays) -> Floats:
         """Return derivatives of the residual in the model's free coordinates, (N, n)."""
         free = self.free
         unit = np.zeros((len(free), self.posterior.size))
         unit[np.arange(len(free)), free] = 1.0
-        return self.posterior.responses(z, data, self.perturbation(len(free), z=unit)).reshape(len(free), -1).T
+        return responses(self.posterior, z, data, self.perturbation(len(free), z=unit)).reshape(len(free), -1).T
 
     def columns(
-        self, effect: Effect, coordinates: Floats, operating: OperatingTrajectory, z: Floats, data: Data
+        self, effect: Effect, coordinates: Floats, operating: OperatingTrajectory, z: Floats, data: Arrays
     ) -> Floats:
         """Return derivatives of the residual in an effect's coordinates, (N, n)."""
         perturbations = linear_perturbation(effect, coordinates, operating, self._table(effect))
         return self.respond(perturbations, z, data)
 
-    def respond(self, perturbations: Perturbation, z: Floats, data: Data) -> Floats:
+    def respond(self, perturbations: Perturbation, z: Floats, data: Arrays) -> Floats:
         """Return derivatives of the residual along pushes with leading axis n, (N, n)."""
-        return self.posterior.responses(z, data, perturbations).reshape(len(perturbations.z), -1).T
+        return responses(self.posterior, z, data, perturbations).reshape(len(perturbations.z), -1).T
 
     def perturbation(self, count: int, **parts: Floats) -> Perturbation:
         """Return ``count`` pushes with the named parts, the others zero."""
@@ -327,7 +328,7 @@ class Engine:
         )
         return empty._replace(**parts)
 
-    def data_of(self, fit: Fit) -> Data:
+    def data_of(self, fit: Fit) -> Arrays:
         """Return the data with a fit's effects pushed."""
         return self._pushed(self._pushes(fit.effects, fit.coordinates, fit.operating))
 
@@ -344,16 +345,16 @@ class Engine:
             if vibrations or not effect.modes_count
         ]
 
-    def _pushed(self, perturbations: Sequence[Perturbation]) -> Data:
-        data = self.posterior.data
+    def _pushed(self, perturbations: Sequence[Perturbation]) -> Arrays:
+        data = self.posterior.data.arrays
         if not perturbations:
             return data
         return perturbed(data, jax.tree.map(lambda *parts: jnp.asarray(sum(parts)), *perturbations))
 
     def _push_shapes(self) -> list[tuple[int, ...]]:
-        grid, data = self.posterior.data.grid, self.posterior.data
-        node, sample = grid.node.known.shape, grid.sample.known.shape
-        return [node, sample, (*node[:2], 6), (*sample[:2], 6), data.measured.shape]
+        arrays = self.posterior.data.arrays
+        node, sample = arrays.grid.node.known.shape, arrays.grid.sample.known.shape
+        return [node, sample, (*node[:2], 6), (*sample[:2], 6), arrays.offset.shape]
 
     def _table(self, effect: Effect) -> Table | None:
         if not effect.uses("table"):

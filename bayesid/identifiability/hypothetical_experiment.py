@@ -11,6 +11,7 @@ from bayesid._math.arrays import Floats
 from bayesid.design.predicted_posterior import planned_posterior, simulated
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference.body_quantities import BODY_QUANTITIES
+from bayesid.inference.noise_changes import with_manoeuvres, with_sensors
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.recording import Recording
 from bayesid.simulation.joint_torques import TorqueSensor
@@ -93,14 +94,14 @@ class InformationPredictor:
         """Return what an experiment would tell."""
         posterior, there = self.posterior, {sensor.kind: sensor for sensor in experiment.sensors}
         if experiment.manoeuvres is not self.flown.manoeuvres:
-            blank = self.posterior.with_manoeuvres(self._read(experiment.manoeuvres))
+            blank = with_manoeuvres(self.posterior, self._read(experiment.manoeuvres))
             # what is read changes the Jacobian of attitudes only
             posterior = blank if Kind.ATTITUDE not in there else simulated(blank, self.z)
         sensors = [there.get(kind) or scaled(sensor, ABSENT) for kind, sensor in self._plain.items()]
         torque = experiment.torque
         if torque is None and self._torque is not None:
             torque = rescaled(self._torque, ABSENT)
-        posterior = posterior.with_sensors(sensors, self.z, like=self.posterior, torque=torque)
+        posterior = with_sensors(posterior, sensors, self.z, like=self.posterior, torque=torque)
         known = Knowledge.at(posterior, self.z)
         known = _repeated(known, posterior.unknowns.names, experiment.times)
         for body, relative in experiment.weighed:
@@ -118,12 +119,12 @@ def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...], torque: TorqueSen
     present = [sensor.kind for sensor in sensors if has(recording, sensor.kind)]
     when = np.ones(len(recording.time), dtype=bool)
     if present:
-        when = np.isfinite(recording.channels[f"{present[0].value}.x"])
+        when = np.isfinite(recording.channels[present[0].columns[0]])
     channels = dict(recording.channels)
     for sensor in sensors:
         if sensor.kind not in present:
-            for axis in "xyzw" if sensor.kind is Kind.ATTITUDE else "xyz":
-                channels[f"{sensor.kind.value}.{axis}"] = np.where(when, 1.0 if axis == "w" else 0.0, np.nan)
+            for name, value in zip(sensor.kind.columns, sensor.kind.rest, strict=True):
+                channels[name] = np.where(when, value, np.nan)
     for joint in () if torque is None else torque.joints:
         channels.setdefault(f"torque.{joint}", np.where(when, 0.0, np.nan))
     return replace(manoeuvre, recording=Recording(recording.name, recording.file, recording.time, channels))
@@ -131,7 +132,7 @@ def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...], torque: TorqueSen
 
 def has(recording: Recording, kind: Kind) -> bool:
     """Whether a recording holds a sensor's channels."""
-    return f"{kind.value}.x" in recording.channels
+    return kind.columns[0] in recording.channels
 
 
 def scaled(sensor: Sensor, factor: float) -> Sensor:

@@ -90,7 +90,7 @@ def quantities_of(unknowns: Unknowns) -> Callable[[Array], Array]:
 
 def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
     """Return the reported quantities of the identified bodies at many points, shape (draws, size)."""
-    inertial = np.asarray(posterior.values_of(z).inertial).reshape(len(z), -1, 10)
+    inertial = np.asarray(posterior.unknowns.values_of(z).inertial).reshape(len(z), -1, 10)
     return {
         prior.name: BodyDraws(prior.name, mass_com_inertia(inertial[:, index]))
         for index, prior in enumerate(posterior.model.priors)

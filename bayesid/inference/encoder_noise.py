@@ -1,8 +1,8 @@
 """How errors of the joints' motion reach the sensors, at the same instant.
 
 The angular momentum in inertial axes does not depend on what the joints are believed to do, so an error of joint
-position, velocity or acceleration changes rate and accelerometer through the momentum's balance alone. An error of a
-joint's position also turns the base, and with it the momentum in base axes; what external torques make of that is far
+position, velocity or acceleration changes the base's rate and acceleration through the momentum's balance alone. An error
+of a joint's position also turns the base, and with it the momentum in base axes; what external torques make of that is far
 below any sensor's noise. Joint torques follow with the bodies that each joint carries; what friction makes of an error
 of speed is left out.
 """
@@ -10,6 +10,7 @@ of speed is left out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -18,75 +19,108 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.rotation import rotation, tilted
+from bayesid._math.small_matrices import cross
 from bayesid.robot.composite_tables import WIDTH, composite_rows
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
+from bayesid.simulation.channels import Channels
 from bayesid.simulation.dynamics import composite
+from bayesid.simulation.effects.effect import Environment, Instant
 from bayesid.simulation.joint_torques import BaseMotion, Beyond, beyond_joints, joint_torques, no_joints
+from bayesid.simulation.sensors import Kind, Sensed, Sensor
+from bayesid.simulation.time_grid import lengthened, rounded
 
-__all__ = ["JointSensitivity", "joint_sensitivity"]
+__all__ = ["SampledMotion", "joint_sensitivity"]
 
 STEP = 1e-6
 """Finite difference in joint position, velocity and acceleration [rad or m, per s, per s2]."""
 
 
-class JointSensitivity(NamedTuple):
-    """Change of the sensors per unit of joint position, velocity and acceleration, base axes.
+class SampledMotion(NamedTuple):
+    """The base's motion at T instants: attitude quaternion (T, 4), angular velocity (T, 3) in base axes, surroundings."""
 
-    rate, accel and attitude (a small rotation), each of shape (joints, 3, T, 3); torque (joints, 3, T, n).
-    """
-
+    quaternion: Floats
     rate: Floats
-    accel: Floats
-    attitude: Floats
-    torque: Floats
+    environment: Environment
+
+
+class _Mounted(NamedTuple):
+    """Where the sensors sit: rotation (K, 3, 3), sensor to base axes, and point (K, 3)."""
+
+    rotation: Floats
+    point: Floats
 
 
 def joint_sensitivity(
-    robot: Robot, state: JointState, rate: Floats, point: Floats, torques: Sequence[int] = ()
-) -> JointSensitivity:
+    robot: Robot, state: JointState, seen: SampledMotion, sensors: Sequence[Sensor], torques: Sequence[int] = ()
+) -> Floats:
     """Linearise the sensors in the joints' motion, by finite differences through Pinocchio's kinematics.
 
     Parameters
     ----------
     robot : Robot
     state : JointState
-        At T times.
-    rate : (T, 3) array
-        Angular velocity of the base, base axes [rad/s].
-    point : (3,) array
-        Mounting point of the accelerometer in the base [m].
+        At T instants.
+    seen : SampledMotion
+        At the same instants.
+    sensors : sequence of Sensor
     torques : sequence of int
         The n joints whose torque is measured, indices into `Robot.joints`.
+
+    Returns
+    -------
+    (joints, 3, T, C) array
+        Change of the columns of `Channels` per unit of joint position, velocity and acceleration.
     """
-    columns = list(torques)
+    columns, kinds = list(torques), tuple(sensor.kind for sensor in sensors)
+    count, joints = state.position.shape
+    length = rounded(count)
+    mounted = _Mounted(
+        np.stack([sensor.rotation for sensor in sensors]),
+        np.stack([np.asarray(sensor.position, dtype=float) for sensor in sensors]),
+    )
+    quaternion, rate = lengthened(seen.quaternion, length), lengthened(seen.rate, length)
+    environment = jax.tree.map(lambda x: lengthened(x, length), seen.environment)
 
     def tables(state: JointState) -> tuple[Floats, Beyond]:
         moved = kinematics(robot, state)
         beyond = beyond_joints(robot, state, moved) if columns else no_joints(len(state.position), 0)
-        return composite_rows(robot, moved), beyond
+        return jax.tree.map(lambda x: lengthened(x, length), (composite_rows(robot, moved), beyond))
 
-    nominal, beyond = tables(state)
-    momentum = np.asarray(_momentum(nominal, rate))
-    before = [np.asarray(value) for value in _read(nominal, beyond, momentum, point)]
-    count, joints = state.position.shape
-    rates, accels = np.zeros((2, joints, 3, count, 3))
-    attitude, torque = np.zeros_like(rates), np.zeros((joints, 3, count, len(columns)))
+    rows, beyond = tables(state)
+    momentum = np.asarray(_momentum(rows, rate))
+    before = _read(kinds, mounted, environment, rows, beyond, momentum, quaternion)
+    result = np.zeros((joints, 3, count, Channels(kinds, tuple(map(str, columns))).count))
     for joint in range(joints):
+        turn = np.zeros((length, 3))  # of the base per unit of the joint's position, as its rate follows their velocity
         for derivative in (1, 0, 2):
             changed = [np.array(values) for values in state]
             changed[derivative][:, joint] += STEP
-            rows, beyond = tables(JointState(*changed))
-            turned = momentum - STEP * np.cross(attitude[joint, derivative], momentum)
-            after = [np.asarray(value) for value in _read(rows, beyond, turned, point)]
-            rates[joint, derivative], accels[joint, derivative], change = (
-                (new - old) / STEP for new, old in zip(after, before, strict=True)
+            turned = STEP * turn if derivative == 0 else np.zeros_like(turn)
+            after = _read(
+                kinds,
+                mounted,
+                environment,
+                *tables(JointState(*changed)),
+                momentum - np.cross(turned, momentum),
+                np.asarray(_turned(quaternion, turned)),
             )
-            torque[joint, derivative] = change[:, columns]
-            if derivative == 1:  # the base turns with the joints' position as its rate follows their velocity
-                attitude[joint, 0] = rates[joint, 1]
-    return JointSensitivity(rates, accels, attitude, torque)
+            if derivative == 1:
+                turn = (np.asarray(after.rate) - np.asarray(before.rate)) / STEP
+            difference = np.asarray(_difference(kinds, before, after))[:count] / STEP
+            sensed = difference.shape[1] - len(robot.joints if columns else ())
+            result[joint, derivative] = difference[:, [*range(sensed), *(sensed + column for column in columns)]]
+    return result
+
+
+class _Reading(NamedTuple):
+    """Angular velocity of the base (T, 3), readings of every sensor, torques of all joints (T, n)."""
+
+    rate: Array
+    readings: tuple[Array, ...]
+    torque: Array
 
 
 @jax.jit
@@ -96,25 +130,55 @@ def _momentum(row: Array, rate: Array) -> Array:
     return body.inertia @ rate + body.spin
 
 
-@jax.jit
-def _read(rows: Array, beyond: Beyond, momentum: Array, point: Array) -> tuple[Array, Array, Array]:
-    return jax.vmap(_read_one, (0, 0, 0, None))(rows, beyond, momentum, point)
+_turned = jax.jit(jax.vmap(tilted))
 
 
-def _read_one(row: Array, beyond: Beyond, momentum: Array, point: Array) -> tuple[Array, Array, Array]:
+@partial(jax.jit, static_argnums=0)
+def _difference(kinds: tuple[Kind, ...], before: _Reading, after: _Reading) -> Array:
+    """Return how all readings changed, in the columns of `Channels` with the torques of all joints, (T, C)."""
+    parts = [
+        jax.vmap(kind.residual)(new, old) for kind, new, old in zip(kinds, after.readings, before.readings, strict=True)
+    ]
+    return jnp.concatenate([*parts, after.torque - before.torque], axis=1)
+
+
+@partial(jax.jit, static_argnums=0)
+def _read(
+    kinds: tuple[Kind, ...],
+    mounted: _Mounted,
+    environment: Environment,
+    rows: Array,
+    beyond: Beyond,
+    momentum: Array,
+    quaternion: Array,
+) -> _Reading:
+    read = partial(_read_one, kinds, mounted)
+    return jax.vmap(read)(environment, rows, beyond, momentum, quaternion)
+
+
+def _read_one(
+    kinds: tuple[Kind, ...],
+    mounted: _Mounted,
+    environment: Environment,
+    row: Array,
+    beyond: Beyond,
+    momentum: Array,
+    quaternion: Array,
+) -> _Reading:
     body = composite(row)
     rate = body.inverse @ (momentum - body.spin)
-    change = body.inverse @ (-jnp.cross(rate, momentum) - body.inertia_rate @ rate - body.spin_rate)
-
-    def acceleration(lever: Array) -> Array:
-        return (
-            -body.com_acceleration
-            - 2.0 * jnp.cross(rate, body.com_rate)
-            + jnp.cross(change, lever)
-            + jnp.cross(rate, jnp.cross(rate, lever))
-        )
-
-    motion = BaseMotion(rate, change, acceleration(-body.com))
-    none = jnp.zeros((WIDTH, 0))
+    change = body.inverse @ (-cross(rate, momentum) - body.inertia_rate @ rate - body.spin_rate)
+    acceleration = (
+        -body.com_acceleration
+        - 2.0 * cross(rate, body.com_rate)
+        - cross(change, body.com)
+        - cross(rate, cross(rate, body.com))
+    )
+    instant = Instant(environment, body, rotation(quaternion), rate, change, acceleration)
+    readings = []
+    for index, kind in enumerate(kinds):
+        reading = kind.read(Sensed(instant, quaternion, jnp.asarray(mounted.point[index]), jnp.zeros(3)))
+        readings.append(reading @ mounted.rotation[index] if kind.mounted else reading)
+    motion, none = BaseMotion(rate, change, acceleration), jnp.zeros((WIDTH, 0))
     torque = joint_torques(beyond, none, jnp.zeros(0), motion, body.com, jnp.zeros((3, 3)))
-    return rate, acceleration(point - body.com), torque
+    return _Reading(rate, tuple(readings), torque)

@@ -26,6 +26,7 @@ from bayesid.inference.ensemble import Chains, Progress, sample
 from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import integration_error_at
 
 __all__ = ["Identification", "identify"]
 
@@ -66,7 +67,7 @@ class Identification:
     @cached_property
     def effects(self) -> dict[str, Floats]:
         """Draws of every effect with parameters, (draws, n) or, per recording, (draws, R, n)."""
-        values = self.posterior.values_of(self.chains.flat)
+        values = self.posterior.unknowns.values_of(self.chains.flat)
         return {
             effect.label: reported_effect(effect, np.asarray(draws))
             for effect, draws in zip(self.posterior.model.effects, values.effects, strict=True)
@@ -86,7 +87,7 @@ class Identification:
     @cached_property
     def integration_error(self) -> float:
         """Largest error of any sample from the integration step, in its standard deviations."""
-        return self.posterior.integration_error(self.optimum.z)
+        return integration_error_at(self.posterior, self.optimum.z)
 
     @property
     def names(self) -> tuple[str, ...]:

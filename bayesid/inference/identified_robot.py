@@ -56,5 +56,5 @@ def write_identified(result: Identification, folder: Path) -> None:
 def _draws(result: Identification) -> dict[str, Floats]:
     """Linear parameters of every unknown body, shape (draws, 10)."""
     flat = result.chains.flat
-    inertial = np.asarray(result.posterior.values_of(flat).inertial).reshape(len(flat), -1, 10)
+    inertial = np.asarray(result.posterior.unknowns.values_of(flat).inertial).reshape(len(flat), -1, 10)
     return {prior.name: inertial[:, index] for index, prior in enumerate(result.posterior.model.priors)}

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from bayesid._math.arrays import Floats
+from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 
 __all__ = ["Optimum", "fit", "maximise"]
@@ -92,19 +93,18 @@ def maximise(posterior: Posterior, rng: np.random.Generator, start: Floats | Non
     Posterior, Optimum
         The posterior with its noise linearised at the mode, and the mode.
     """
-    first = posterior.initial_point() if start is None else start
+    first = posterior.starting_point() if start is None else start
     best = fit(posterior, first)
     evaluations = best.evaluations
     if best.chi2 > SUSPICIOUS * posterior.samples:
         for _ in range(STARTS):
-            other = fit(
-                posterior,
-                first + 0.5 * rng.normal(size=first.size) * (np.arange(first.size) < 10 * len(posterior.model.priors)),
-            )
+            away = 0.5 * rng.normal(size=first.size)
+            away[posterior.unknowns.layout.all_bodies.stop :] = 0.0
+            other = fit(posterior, first + away)
             evaluations += other.evaluations
             if other.cost < best.cost:
                 best = other
-    refined = posterior.at(best.z)
+    refined = relinearised(posterior, best.z)
     polished = fit(refined, best.z)
     return refined, Optimum(
         z=polished.z,

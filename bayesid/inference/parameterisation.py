@@ -64,17 +64,19 @@ class LinearParameterisation:
 
     def to_z(self, y: Floats) -> Floats:
         """Return the posterior's coordinates; not a number where no physical body exists."""
-        return self.posterior.from_linear(y)
+        return self.posterior.unknowns.from_linear(y)
 
     def log_density(self, y: Floats) -> Floats:
         """Log posterior density over y, shape (n,); minus infinity where no physical body exists."""
         z = self.to_z(y)
         physical = np.all(np.isfinite(z), axis=1)
         inside = np.where(np.isfinite(z), z, 0.0)
-        value = self.posterior.log_density(inside) - self.posterior.log_volume(inside)
+        value = self.posterior.log_density(inside) - self.posterior.unknowns.log_volume(inside)
         return np.where(physical, value, -np.inf)
 
     def proposal(self, optimum: Optimum) -> StudentT:
         """Return a Student-t about the mode with the Laplace covariance carried over."""
-        slope = self.posterior.linear_slope(optimum.z)
-        return StudentT.about(self.posterior.to_linear(optimum.z[None])[0], slope @ optimum.covariance @ slope.T)
+        slope = self.posterior.unknowns.linear_slope(optimum.z)
+        return StudentT.about(
+            self.posterior.unknowns.to_linear(optimum.z[None])[0], slope @ optimum.covariance @ slope.T
+        )

@@ -51,7 +51,7 @@ class InertialDraws:
     def of(cls, result: Identification) -> InertialDraws:
         """Take all draws of a result, bodies that were only marginalised included."""
         names = tuple(prior.name for prior in result.posterior.model.priors)
-        inertial = np.asarray(result.posterior.values_of(result.chains.flat).inertial)
+        inertial = np.asarray(result.posterior.unknowns.values_of(result.chains.flat).inertial)
         return cls(names, inertial.reshape(len(inertial), len(names), 10))
 
     @classmethod

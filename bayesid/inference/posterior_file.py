@@ -11,6 +11,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of, reported_effect
 from bayesid.inference.identification import Identification
+from bayesid.inference.predicted_readings import noisy, predicted_readings
 from bayesid.simulation.sensors import Kind
 
 __all__ = ["to_arviz", "write_netcdf"]
@@ -24,12 +25,6 @@ PREDICTED = 50
 
 LINEAR = ("m", "mc.x", "mc.y", "mc.z", "xx", "xy", "yy", "xz", "yz", "zz")
 """Names of the linear parameters of every body (`InertialParameters.vector`), from which a later study starts."""
-
-FRAMES = {
-    Kind.RATE: "angular velocity of the base relative to inertial space, sensor axes",
-    Kind.ACCEL: "non-gravitational acceleration of the mounting point, sensor axes",
-    Kind.ATTITUDE: "quaternion x, y, z, w, base axes to orbit axes",
-}
 
 
 def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceData:
@@ -56,7 +51,7 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
         for sensor in result.posterior.model.sensors:
             for manoeuvre in result.posterior.manoeuvres:
                 variable = group[_name(sensor.kind, manoeuvre.recording.name)]
-                variable.attrs.update(unit=sensor.kind.unit, frame=FRAMES[sensor.kind])
+                variable.attrs.update(unit=sensor.kind.unit, frame=sensor.kind.frame)
         for manoeuvre in result.posterior.manoeuvres if result.posterior.model.torque is not None else ():
             group[f"torque.{manoeuvre.recording.name}"].attrs.update(unit="N m or N", frame="along the joint's axis")
     data.posterior.attrs.update(
@@ -91,7 +86,7 @@ def _posterior_group(
         for column, (key, unit) in enumerate(BODY_QUANTITIES.items()):
             group[f"{name}.{key}"] = body.values[:, column].reshape(chains, draws)
             units[f"{name}.{key}"] = unit
-    values = result.posterior.values_of(flat)
+    values = result.posterior.unknowns.values_of(flat)
     if result.posterior.model.priors:
         group["inertial"] = np.asarray(values.inertial).reshape(chains, draws, -1, 10)
         dims["inertial"], units["inertial"] = ["body", "parameter"], "kg, kg m, kg m2 about the origin of the link"
@@ -117,23 +112,29 @@ def _coords(result: Identification) -> dict[str, Any]:
         "axis": ["x", "y", "z"],
         "quaternion": ["x", "y", "z", "w"],
     }
+    coords |= {_axis(kind): list(kind.axes) for kind in result.posterior.model.channels.kinds}
     if (torque := result.posterior.model.torque) is not None:
         coords["joint"] = list(torque.joints)
     for index, manoeuvre in enumerate(result.posterior.manoeuvres):
-        coords[f"time.{manoeuvre.recording.name}"] = result.posterior.sample_times(index)
+        coords[f"time.{manoeuvre.recording.name}"] = result.posterior.data.times(index)
     return coords
 
 
 def _sensor_dims(result: Identification) -> dict[str, list[str]]:
     recordings = [manoeuvre.recording.name for manoeuvre in result.posterior.manoeuvres]
     dims = {
-        _name(sensor.kind, name): [f"time.{name}", "quaternion" if sensor.kind is Kind.ATTITUDE else "axis"]
-        for sensor in result.posterior.model.sensors
+        _name(kind, name): [f"time.{name}", _axis(kind)]
+        for kind in result.posterior.model.channels.kinds
         for name in recordings
     }
     if result.posterior.model.torque is not None:
         dims |= {f"torque.{name}": [f"time.{name}", "joint"] for name in recordings}
     return dims
+
+
+def _axis(kind: Kind) -> str:
+    """Name of the dimension of a sensor's components."""
+    return {("x", "y", "z"): "axis", ("x", "y", "z", "w"): "quaternion"}.get(kind.axes, f"axis.{kind.value}")
 
 
 def _name(kind: Kind, recording: str) -> str:
@@ -149,14 +150,14 @@ def _log_likelihood(result: Identification, z: Floats) -> dict[str, Floats]:
 def _observed(result: Identification) -> dict[str, Floats]:
     observed = {}
     for index, manoeuvre in enumerate(result.posterior.manoeuvres):
-        times = result.posterior.sample_times(index)
+        times = result.posterior.data.times(index)
         for sensor in result.posterior.model.sensors:
-            time, values = result.posterior.measured(index, sensor.kind)
+            time, values = result.posterior.data.measured(index, sensor.kind)
             grid = np.full((len(times), values.shape[1]), np.nan)
             grid[np.searchsorted(times, time)] = values
             observed[_name(sensor.kind, manoeuvre.recording.name)] = grid
         if result.posterior.model.torque is not None:
-            time, values = result.posterior.torques(index)
+            time, values = result.posterior.data.torques(index)
             grid = np.full((len(times), values.shape[1]), np.nan)
             grid[np.searchsorted(times, time)] = values
             observed[f"torque.{manoeuvre.recording.name}"] = grid
@@ -164,18 +165,16 @@ def _observed(result: Identification) -> dict[str, Floats]:
 
 
 def _predictive(result: Identification, z: Floats, rng: np.random.Generator) -> dict[str, Floats]:
-    """Predictions with fresh white noise of the sensors, for draws of shape (chains, draws, size)."""
+    """PredictedReadings with fresh noise of the sensors, for draws of shape (chains, draws, size)."""
     chains, draws, size = z.shape
-    points = [result.posterior.predict(point) for point in z.reshape(-1, size)]
+    points = [predicted_readings(result.posterior, point) for point in z.reshape(-1, size)]
     predictive = {}
     for index, manoeuvre in enumerate(result.posterior.manoeuvres):
-        for sensor in result.posterior.model.sensors:
-            mean = np.stack([np.asarray(getattr(point[index], sensor.kind.value)) for point in points])
-            if sensor.kind is not Kind.ATTITUDE:
-                mean = mean + result.posterior.sigma(index, sensor.kind) * rng.normal(size=mean.shape)
-            predictive[_name(sensor.kind, manoeuvre.recording.name)] = mean.reshape(chains, draws, *mean.shape[1:])
-        if (torque := result.posterior.model.torque) is not None:
-            mean = np.stack([np.asarray(point[index].torque) for point in points])
-            mean = mean + np.array(torque.sigma) * rng.normal(size=mean.shape)
-            predictive[f"torque.{manoeuvre.recording.name}"] = mean.reshape(chains, draws, *mean.shape[1:])
+        name = manoeuvre.recording.name
+        read = [noisy(result.posterior, index, point[index], rng) for point in points]
+        series = {_name(kind, name): [one.channels[kind] for one in read] for kind in read[0].channels}
+        if result.posterior.model.torque is not None:
+            series[f"torque.{name}"] = [one.torque for one in read]
+        for key, values in series.items():
+            predictive[key] = np.stack(values).reshape(chains, draws, *values[0].shape)
     return predictive

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.inference.posterior import Posterior, Predictions
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import PredictedReadings, predicted_readings
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.recording.recording import JOINT_FAMILIES, Recording
@@ -130,7 +131,7 @@ def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
     """Look at one recording of a posterior, with the robot at the prior's centre."""
     manoeuvre, model = posterior.manoeuvres[index], posterior.model
     recording = manoeuvre.recording
-    predicted = posterior.predict(posterior.initial_point())[index]
+    predicted = predicted_readings(posterior, posterior.starting_point())[index]
     return RecordingCheck(
         name=recording.name,
         duration=float(recording.time[-1] - recording.time[0]),
@@ -151,7 +152,7 @@ def refuse_wrong_units(posterior: Posterior) -> None:
     """
     for manoeuvre in posterior.manoeuvres:
         refuse_impossible_joints(manoeuvre.recording, posterior.model.robot)
-    predictions = posterior.predict(posterior.initial_point())
+    predictions = predicted_readings(posterior, posterior.starting_point())
     for index, (manoeuvre, predicted) in enumerate(zip(posterior.manoeuvres, predictions, strict=True)):
         for seen in _comparisons(posterior, index, predicted):
             _refuse_factor(manoeuvre.recording, seen)
@@ -170,18 +171,17 @@ class _Comparison:
     sigma: float
 
 
-def _comparisons(posterior: Posterior, index: int, predicted: Predictions) -> list[_Comparison]:
+def _comparisons(posterior: Posterior, index: int, predicted: PredictedReadings) -> list[_Comparison]:
     found = []
     for sensor in posterior.model.sensors:
-        if sensor.kind is not Kind.ATTITUDE:
-            time, measured = posterior.measured(index, sensor.kind)
-            expected = getattr(predicted, sensor.kind.value)[np.searchsorted(predicted.time, time)]
-            mistaken = "degrees per second" if sensor.kind is Kind.RATE else "mm/s2 or micro-g"
+        if sensor.kind.mounted:
+            time, measured = posterior.data.measured(index, sensor.kind)
+            expected = predicted.channels[sensor.kind][np.searchsorted(predicted.time, time)]
             sigma = float(sensor.noise.sigma(float(np.median(np.diff(time)))).max())
             column = f"{sensor.kind.value}.x|y|z"
-            found.append(_Comparison(column, sensor.kind.unit, mistaken, time, measured, expected, sigma))
+            found.append(_Comparison(column, sensor.kind.unit, sensor.kind.slip, time, measured, expected, sigma))
     if (torque := posterior.model.torque) is not None:
-        time, measured = posterior.torques(index)
+        time, measured = posterior.data.torques(index)
         expected = predicted.torque[np.searchsorted(predicted.time, time)]
         for k, (joint, sigma) in enumerate(zip(torque.joints, torque.sigma, strict=True)):
             own = slice(k, k + 1)
@@ -256,12 +256,12 @@ def _joints(manoeuvre: Manoeuvre, robot: Robot) -> tuple[JointCheck, ...]:
     return tuple(checks)
 
 
-def _sensor(sensor: Sensor, manoeuvre: Manoeuvre, model: Model, predicted: Predictions) -> SensorCheck:
-    if sensor.kind is Kind.ATTITUDE:
-        time, _ = manoeuvre.recording.vector("attitude", ("x", "y", "z", "w"))
+def _sensor(sensor: Sensor, manoeuvre: Manoeuvre, model: Model, predicted: PredictedReadings) -> SensorCheck:
+    if not sensor.kind.mounted:
+        time, _ = manoeuvre.recording.vector(sensor.kind.value, sensor.kind.axes)
         return SensorCheck(sensor.kind, sensor.noise.sigma(float(np.median(np.diff(time)))), None, 0.0, None)
     time, measured = manoeuvre.recording.vector(sensor.kind.value)
-    expected = getattr(predicted, sensor.kind.value)[np.searchsorted(predicted.time, time)]
+    expected = predicted.channels[sensor.kind][np.searchsorted(predicted.time, time)]
     measured_sigma, sigma_error = _quiet_sigma(expected, measured)
     return SensorCheck(
         kind=sensor.kind,

@@ -9,24 +9,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid.inference.layout import EffectLayout, Layout, PriorNumbers
 from bayesid.robot.body_prior import BodyPrior, Mixing, coordinates_of
-from bayesid.robot.inertial_parameters import LOG_CHOLESKY, InertialParameters, log_cholesky_vector
-from bayesid.robot.log_cholesky import SLOPE, absolute, log_volume, relative
+from bayesid.robot.inertial_parameters import LOG_CHOLESKY, PARAMETERS, InertialParameters, upper_cholesky
+from bayesid.robot.log_cholesky import SLOPE
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.simulator import Values
 
 __all__ = ["Unknowns"]
 
+MAPPED = 256
+"""Points whose coordinates are converted together."""
+
 
 @dataclass(frozen=True)
 class Unknowns:
-    """Layout of the vector of unknowns and its map to physical values.
+    """What is unknown, its prior, and the map from coordinates to physical values.
 
     Parameters
     ----------
@@ -41,6 +48,11 @@ class Unknowns:
     mixing : (10 B, 10 B) tuple of tuples, optional
         Lower-triangular factor of the joint prior covariance of the log-Cholesky coordinates of all B bodies; left out,
         they are independent, each with its body's spread.
+    speed_sigma : (R,) tuple of (J,) tuples
+        Standard deviation of the error of each joint's smoothed speed at time 0 [rad/s or m/s]; empty where such errors
+        are of no account (`Model.has_speed_errors`).
+    joints : (J,) tuple of str
+        Names of those joints.
     """
 
     bodies: tuple[BodyPrior, ...]
@@ -49,125 +61,159 @@ class Unknowns:
     rate_sigma: float
     tilt_sigma: tuple[float, ...]
     mixing: Mixing | None = None
+    speed_sigma: tuple[tuple[float, ...], ...] = ()
+    joints: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """One name per coordinate."""
+        recordings = range(self.recordings)
         names = [f"{body.name}.{key}" for body in self.bodies for key in LOG_CHOLESKY]
-        names += [f"initial-rate[{i}].{axis}" for i in self._rates for axis in "xyz"]
-        names += [f"initial-attitude[{i}].{axis}" for i in self._tilts for axis in "xyz"]
+        names += [f"initial-rate[{i}].{axis}" for i in recordings if self.layout.rates for axis in "xyz"]
+        names += [f"initial-attitude[{i}].{axis}" for i in self.layout.tilts for axis in "xyz"]
+        names += [f"initial-speed[{i}].{joint}" for i in recordings for joint in self.joints]
         for effect in self.effects:
-            copies = (
-                [f"{effect.label}[{i}]" for i in range(self.recordings)] if effect.per_recording else [effect.label]
-            )
+            copies = [f"{effect.label}[{i}]" for i in recordings] if effect.per_recording else [effect.label]
             names += [f"{copy}.{parameter.name}" for copy in copies for parameter in effect.parameters]
         return tuple(names)
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return len(self.names)
+        return self.layout.size
 
-    @property
-    def _rates(self) -> range:
-        return range(self.recordings if self.rate_sigma > 0.0 else 0)
+    @cached_property
+    def layout(self) -> Layout:
+        """Which coordinates belong to what."""
+        return Layout(
+            bodies=len(self.bodies),
+            recordings=self.recordings,
+            rates=self.rate_sigma > 0.0,
+            tilts=tuple(index for index, sigma in enumerate(self.tilt_sigma) if sigma > 0.0),
+            joints=len(self.joints),
+            effects=tuple(
+                EffectLayout(tuple(parameter.prior for parameter in effect.parameters), effect.per_recording)
+                for effect in self.effects
+            ),
+        )
 
-    @property
-    def _tilts(self) -> list[int]:
-        return [index for index, sigma in enumerate(self.tilt_sigma) if sigma > 0.0]
-
-    def values(self, z: Array) -> Values:
-        """Map standard-normal coordinates, shape (size,), to physical values."""
-        cursor = 0
-
-        def take(*shape: int) -> Array:
-            nonlocal cursor
-            count = int(np.prod(shape))
-            cursor += count
-            return z[cursor - count : cursor].reshape(shape)
-
-        thetas = self._theta(take(10 * len(self.bodies)))
-        inertial = [log_cholesky_vector(body.centre, theta) for body, theta in zip(self.bodies, thetas, strict=True)]
-        rate = jnp.zeros((self.recordings, 3))
-        if self._rates:
-            rate = self.rate_sigma * take(self.recordings, 3)
-        tilt = jnp.zeros((self.recordings, 3))
-        if self._tilts:
-            rows = np.array(self._tilts)
-            tilt = tilt.at[rows].set(np.array(self.tilt_sigma)[rows][:, None] * take(len(rows), 3))
-        effects = []
-        for effect in self.effects:
-            count = len(effect.parameters)
-            own = take(self.recordings, count) if effect.per_recording else take(count)
-            columns = [parameter.value(own[..., k]) for k, parameter in enumerate(effect.parameters)]
-            effects.append(jnp.stack(columns, axis=-1) if count else own)
-        return Values(jnp.concatenate(inertial) if inertial else jnp.zeros(0), rate, tilt, tuple(effects))
-
-    def to_linear(self, z: Array) -> Array:
-        """Coordinates linear in the inertial parameters: entries of each relative pseudo-inertia, less the identity.
-
-        Whatever else is unknown keeps its coordinates. What the dynamics determines sharply are linear combinations of
-        inertial parameters up to a common factor, so ridges of the posterior are straight here.
-        """
-        count = 10 * len(self.bodies)
-        entries = self._each(relative, self._theta(z[:count]))
-        if self.mixing is None:
-            scaled = entries / self._widths
-        else:  # near the centre these are then z itself, up to SLOPE
-            scaled = jnp.asarray(np.linalg.inv(self._mixed_slope)) @ entries
-        return jnp.concatenate([scaled, z[count:]])
-
-    def from_linear(self, y: Array) -> Array:
-        """Inverse of `to_linear`; not a number where no physical body has these coordinates."""
-        count = 10 * len(self.bodies)
-        if self.mixing is None:
-            entries = y[:count] * self._widths
-            return jnp.concatenate([self._each(absolute, _split(entries)) / self._widths, y[count:]])
-        entries = jnp.asarray(self._mixed_slope) @ y[:count]
-        theta = self._each(absolute, _split(entries))
-        return jnp.concatenate([jnp.asarray(np.linalg.inv(np.array(self.mixing))) @ theta, y[count:]])
-
-    def log_volume(self, z: Array) -> Array:
-        """Logarithm of the determinant of d to_linear / d z."""
-        return sum((log_volume(theta) for theta in self._theta(z[: 10 * len(self.bodies)])), jnp.zeros(()))
-
-    def _theta(self, z: Array) -> list[Array]:
-        """Log-Cholesky coordinates of each body relative to its centre."""
-        if self.mixing is None:
-            return [body.spread * part for body, part in zip(self.bodies, _split(z), strict=True)]
-        return _split(jnp.asarray(np.array(self.mixing)) @ z)
+    @cached_property
+    def numbers(self) -> PriorNumbers:
+        """Centres and widths of the prior."""
+        mixing = self.widths
+        per_theta = np.kron(np.eye(len(self.bodies)), SLOPE)
+        # independent bodies: entries over widths, as they are; correlated ones so that the determinant is the mixing's
+        slope = mixing if self.mixing is None else per_theta @ mixing @ np.linalg.inv(per_theta)
+        factors = [upper_cholesky(body.centre.pseudo_inertia) for body in self.bodies]
+        tilts = list(self.layout.tilts)
+        return PriorNumbers(
+            factor=np.array(factors).reshape(-1, 4, 4),
+            mixing=mixing,
+            inverse_mixing=np.linalg.inv(mixing),
+            slope=slope,
+            inverse_slope=np.linalg.inv(slope),
+            rate=np.array(self.rate_sigma),
+            tilt=np.array(self.tilt_sigma)[tilts],
+            speed=np.array(self.speed_sigma).reshape(self.recordings, len(self.joints)),
+            effects=tuple(
+                (np.array([p.mean for p in effect.parameters]), np.array([p.sigma for p in effect.parameters]))
+                for effect in self.effects
+            ),
+        )
 
     @property
     def widths(self) -> Floats:
         """Log-Cholesky coordinates of all bodies per unit of z, shape (10 B, 10 B)."""
-        return np.diag(self._widths) if self.mixing is None else np.array(self.mixing)
+        if self.mixing is None:
+            return np.diag(np.repeat([body.spread for body in self.bodies], PARAMETERS))
+        return np.array(self.mixing)
 
-    def _each(self, function: Callable[[Array], Array], parts: Sequence[Array]) -> Array:
-        return jnp.concatenate([function(part) for part in parts]) if parts else jnp.zeros(0)
+    # ---- maps ----
 
-    @property
-    def _widths(self) -> Floats:
-        return np.repeat([body.spread for body in self.bodies], 10)
+    def values(self, z: Array) -> Values:
+        """Return the physical values of standard-normal coordinates, shape (size,), in a traced function."""
+        return self.layout.values(self.numbers, z)
 
-    @property
-    def _mixed_slope(self) -> Floats:
-        """Map from linear coordinates to entries of the relative pseudo-inertias; of the determinant of the mixing."""
-        slope = np.kron(np.eye(len(self.bodies)), SLOPE)
-        return slope @ np.array(self.mixing) @ np.linalg.inv(slope)
+    def values_at(self, z: Floats) -> Values:
+        """Return the physical values at one point."""
+        return jax.tree.map(lambda x: x[0], self.values_of(np.asarray(z)[None]))
+
+    def values_of(self, z: Floats) -> Values:
+        """Return the physical values at many points, shape (n, size); every array gets a leading axis."""
+        return self._mapped(_values, z)
+
+    def inertials(self, z: Floats) -> list[InertialParameters]:
+        """Return the inertial parameters of the bodies at one point."""
+        vectors = self.values_at(z).inertial.reshape(-1, PARAMETERS)
+        return [InertialParameters.from_vector(row) for row in vectors]
+
+    def to_linear(self, z: Floats) -> Floats:
+        """Return `Layout.to_linear` of many points, shape (n, size)."""
+        return self._mapped(_to_linear, z)
+
+    def from_linear(self, y: Floats) -> Floats:
+        """Return `Layout.from_linear` of many points, shape (n, size)."""
+        return self._mapped(_from_linear, y)
+
+    def log_volume(self, z: Floats) -> Floats:
+        """Return `Layout.log_volume` of many points, shape (n, size) -> (n,)."""
+        return self._mapped(_log_volume, z)
+
+    def linear_slope(self, z: Floats) -> Floats:
+        """Return the Jacobian of `to_linear` at one point, shape (size, size)."""
+        return np.asarray(_linear_slope(self.layout, self.numbers, jnp.asarray(z)))
 
     def coordinates(self, inertials: Sequence[InertialParameters], rate: Floats | None = None) -> Floats:
-        """Coordinates of given bodies and initial rates, everything else at its prior mean."""
+        """Return the coordinates of given bodies and initial rates (R, 3), everything else at its prior mean."""
         z = np.zeros(self.size)
-        for index, (body, inertial) in enumerate(zip(self.bodies, inertials, strict=True)):
-            z[10 * index : 10 * index + 10] = coordinates_of(body, inertial)
-        if self.mixing is not None:
-            count = 10 * len(self.bodies)
-            z[:count] = np.linalg.solve(np.array(self.mixing), z[:count] * self._widths)
-        if rate is not None and self._rates:
-            first = 10 * len(self.bodies)
-            z[first : first + 3 * self.recordings] = (rate / self.rate_sigma).ravel()
+        theta = [
+            body.spread * coordinates_of(body, inertial) for body, inertial in zip(self.bodies, inertials, strict=True)
+        ]
+        if theta:
+            z[self.layout.all_bodies] = np.linalg.solve(self.widths, np.concatenate(theta))
+        if rate is not None and self.layout.rates:
+            z[self.layout.all_rates] = (rate / self.rate_sigma).ravel()
         return z
 
+    def body_indices(self, *, nuisance: bool = False) -> list[int]:
+        """Return the coordinates of the bodies to identify, or of all with those only marginalised."""
+        slices = [self.layout.body(index) for index, body in enumerate(self.bodies) if nuisance or not body.nuisance]
+        return [index for part in slices for index in range(part.start, part.stop)]
 
-def _split(z: Array) -> list[Array]:
-    return [z[start : start + 10] for start in range(0, len(z), 10)]
+    def effect_indices(self, label: str) -> list[int]:
+        """Return the coordinates of an effect of the model; none where the model lacks it."""
+        parts = [self.layout.effect(i) for i, effect in enumerate(self.effects) if effect.label == label]
+        return [index for part in parts for index in range(part.start, part.stop)]
+
+    def _mapped(self, function: Callable[..., Any], z: Floats) -> Any:
+        """Apply a compiled function to batches of one length, so that it compiles once."""
+        z = np.asarray(z)
+        padded = np.concatenate([z, np.repeat(z[-1:], -len(z) % MAPPED, axis=0)])
+        batches = [padded[i : i + MAPPED] for i in range(0, len(padded), MAPPED)]
+        parts = [function(self.layout, self.numbers, batch) for batch in batches]
+        return jax.tree.map(lambda *x: np.concatenate([np.asarray(part) for part in x])[: len(z)], *parts)
+
+
+@partial(jax.jit, static_argnums=0)
+def _values(layout: Layout, numbers: PriorNumbers, z: Array) -> Values:
+    return jax.vmap(partial(layout.values, numbers))(z)
+
+
+@partial(jax.jit, static_argnums=0)
+def _to_linear(layout: Layout, numbers: PriorNumbers, z: Array) -> Array:
+    return jax.vmap(partial(layout.to_linear, numbers))(z)
+
+
+@partial(jax.jit, static_argnums=0)
+def _from_linear(layout: Layout, numbers: PriorNumbers, y: Array) -> Array:
+    return jax.vmap(partial(layout.from_linear, numbers))(y)
+
+
+@partial(jax.jit, static_argnums=0)
+def _log_volume(layout: Layout, numbers: PriorNumbers, z: Array) -> Array:
+    return jax.vmap(partial(layout.log_volume, numbers))(z)
+
+
+@partial(jax.jit, static_argnums=0)
+def _linear_slope(layout: Layout, numbers: PriorNumbers, z: Array) -> Array:
+    return jax.jacfwd(partial(layout.to_linear, numbers))(z)

@@ -110,7 +110,7 @@ def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:
     width = span(sensor_sigma(posterior, sensor).ravel().tolist())
     parts = [f"Sensor {sensor.kind.value}: white noise of {width} {format_unit(sensor.kind.unit)} per sample and axis"]
     if sensor.kind is Kind.ACCEL:
-        position = ", ".join(format_number(float(value)) for value in posterior.model.point)
+        position = ", ".join(format_number(float(value)) for value in np.asarray(sensor.position, dtype=float))
         parts.append(f"mounted at ({position}) m in the base frame")
     if not np.allclose(sensor.rotation, np.eye(3)):
         parts.append("turned against the base axes as declared")

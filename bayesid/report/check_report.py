@@ -103,7 +103,7 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
         time = np.linspace(manoeuvre.recording.time[0], manoeuvre.recording.time[-1], CURVE_POINTS)
         document.figure(figures.manoeuvre(manoeuvre.motion, posterior.model.robot, time), "Motion of the joints.")
     document.figure(
-        figures.measured_against_simulated(posterior, posterior.initial_point(), index),
+        figures.measured_against_simulated(posterior, posterior.starting_point(), index),
         "Measured, and simulated with the robot as given; beneath, the residual in σ. It is large until the unknown "
         "bodies are identified.",
     )

@@ -79,7 +79,7 @@ def assumption_sentences(best: Design) -> list[str]:
     return [
         "The search compares manoeuvres by the white noise of the sensors alone; the predicted standard deviations and "
         "covariances below include the noise of the encoders and filters, and every other unknown is marginalised.",
-        "Predictions hold to first order about the prior's centre (Laplace), and include the prior.",
+        "PredictedReadings hold to first order about the prior's centre (Laplace), and include the prior.",
         f"Sampling every {plan.interval:g} s; the search integrates with steps of {format_number(plan.step)} s and "
         f"simulates every {_ordinal(plan.thinning)} sample. Limits are looked at every half step in the search, and "
         "eight times more finely at its end.",

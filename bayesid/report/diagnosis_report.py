@@ -7,6 +7,7 @@ from pathlib import Path
 
 from bayesid.diagnosis import Diagnosis, Status
 from bayesid.inference import Identification
+from bayesid.inference.predicted_readings import integration_error_at
 from bayesid.report import diagnosis_evidence as evidence
 from bayesid.report import diagnosis_tables as rows
 from bayesid.report import diagnosis_text as text
@@ -184,7 +185,7 @@ def _add_assumptions(document: Document, result: Diagnosis, identification: Iden
     sentences = list(text.made_sentences(result))
     if identification is None:
         posterior = result.posterior
-        sentences += model_sentences(posterior, posterior.integration_error(result.start))
+        sentences += model_sentences(posterior, integration_error_at(posterior, result.start))
     document.items(sentences)
     if identification is None and (joints := joint_rows(result.posterior)):
         document.table(

@@ -9,6 +9,7 @@ from bayesid.identifiability.base_parameters import BaseParameters
 from bayesid.identifiability.parameter_table import ParameterRow
 from bayesid.identifiability.practical_identifiability import Practical
 from bayesid.inference.contraction import ContractionVerdict
+from bayesid.inference.predicted_readings import integration_error_at
 from bayesid.report import figures
 from bayesid.report import identifiability_text as text
 from bayesid.report.assumptions import model_sentences
@@ -54,7 +55,7 @@ def identifiability_report(
     _add_structure(document, structure)
     if result is not None:
         document.section("How to read this, and what was assumed")
-        error = result.posterior.integration_error(result.optimum.z)
+        error = integration_error_at(result.posterior, result.optimum.z)
         document.items([*text.method_sentences(result), *model_sentences(result.posterior, error)])
         add_joints(document, result.posterior)
     document.write(file)

@@ -82,7 +82,7 @@ def prior_range(effect: Effect) -> tuple[Floats, Floats]:
 def start_rows(result: Identification) -> Rows:
     """Return initial rate and attitude of each recording, where unknown."""
     posterior = result.posterior
-    values = posterior.values_of(result.chains.flat)
+    values = posterior.unknowns.values_of(result.chains.flat)
     rows = []
     for index, manoeuvre in enumerate(posterior.manoeuvres):
         unknown = [("initial rate", "rad/s", values.rate, posterior.unknowns.rate_sigma)]

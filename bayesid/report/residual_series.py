@@ -48,5 +48,5 @@ class Residuals:
         """Return times [s] and residuals of one sensor axis in one recording, where it has samples."""
         item = self.posterior.whitenings[recording]
         there = np.flatnonzero(item.outputs[:, channel])
-        time = self.posterior.sample_times(recording)[item.rows[there]]
+        time = self.posterior.data.times(recording)[item.rows[there]]
         return time, self.values[recording, there, channel]

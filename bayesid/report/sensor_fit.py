@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.simulation.sensors import Kind, Sensor
 
 __all__ = ["SensorFit", "TorqueFit", "sensor_fits", "sensor_sigma", "torque_fits"]
@@ -46,19 +46,17 @@ class SensorFit:
 
 def sensor_fits(posterior: Posterior, z: Floats) -> list[list[SensorFit]]:
     """Compare measured and simulated at ``z``: one list per recording, one entry per sensor."""
-    predictions, residuals = posterior.predict(z), posterior.residuals(z)
+    predictions, residuals = predicted_readings(posterior, z), posterior.residuals(z)
     result = []
     for index, (predicted, whitening) in enumerate(zip(predictions, posterior.whitenings, strict=True)):
-        grid = posterior.sample_times(index)
+        grid = posterior.data.times(index)
         whitened = np.where(whitening.outputs, residuals[index, : len(whitening.rows)], np.nan)
         fits = []
-        for slot, sensor in enumerate(posterior.model.sensors):
-            time, measured = posterior.measured(index, sensor.kind)
-            simulated = np.asarray(getattr(predicted, sensor.kind.value))[np.searchsorted(grid, time)]
-            if sensor.kind is Kind.ATTITUDE:
-                first = Rotation.from_quat(measured[0]).inv()
-                measured, simulated = ((first * Rotation.from_quat(q)).as_rotvec() for q in (measured, simulated))
-            own = whitened[:, 3 * slot : 3 * slot + 3]
+        for sensor in posterior.model.sensors:
+            time, measured = posterior.data.measured(index, sensor.kind)
+            simulated = predicted.channels[sensor.kind][np.searchsorted(grid, time)]
+            measured, simulated = (sensor.kind.shown(values, measured[0]) for values in (measured, simulated))
+            own = whitened[:, posterior.model.channels.of(sensor.kind)]
             kept = np.isfinite(own).any(axis=1)
             fits.append(SensorFit(sensor.kind, time, measured, simulated, grid[whitening.rows][kept], own[kept]))
         result.append(fits)
@@ -83,11 +81,11 @@ def torque_fits(posterior: Posterior, z: Floats) -> list[list[TorqueFit]]:
     sensor, robot = posterior.model.torque, posterior.model.robot
     if sensor is None:
         return [[] for _ in posterior.manoeuvres]
-    predictions, residuals = posterior.predict(z), posterior.residuals(z)
-    first, result = 3 * len(posterior.model.sensors), []
+    predictions, residuals = predicted_readings(posterior, z), posterior.residuals(z)
+    first, result = posterior.model.channels.torques.start, []
     for index, (predicted, whitening) in enumerate(zip(predictions, posterior.whitenings, strict=True)):
-        time, measured = posterior.torques(index)
-        grid = posterior.sample_times(index)
+        time, measured = posterior.data.torques(index)
+        grid = posterior.data.times(index)
         simulated = predicted.torque[np.searchsorted(grid, time)]
         fits = []
         for column, joint in enumerate(sensor.joints):
@@ -102,4 +100,4 @@ def torque_fits(posterior: Posterior, z: Floats) -> list[list[TorqueFit]]:
 
 def sensor_sigma(posterior: Posterior, sensor: Sensor) -> Floats:
     """Noise of a sensor per recording and axis, shape (R, 3)."""
-    return np.stack([posterior.sigma(index, sensor.kind) for index in range(len(posterior.manoeuvres))])
+    return np.stack([posterior.data.sigma(index, sensor.kind) for index in range(len(posterior.manoeuvres))])

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import integration_error_at
 from bayesid.recording.recording import Recording
 from bayesid.report import figures
 from bayesid.report.assumptions import model_sentences
 from bayesid.report.document import Document
-from bayesid.simulation.sensors import Kind
 
 __all__ = ["simulation_report"]
 
@@ -36,7 +36,7 @@ def simulation_report(posterior: Posterior, recordings: Sequence[Recording], tit
     rows = []
     for recording in recordings:
         for sensor in posterior.model.sensors:
-            if sensor.kind is not Kind.ATTITUDE:
+            if sensor.kind.mounted:
                 _, values = recording.vector(sensor.kind.value)
                 largest = np.abs(values).max(axis=0)
                 rows.append(
@@ -48,7 +48,7 @@ def simulation_report(posterior: Posterior, recordings: Sequence[Recording], tit
         "Largest simulated readings per sensor axis, with the robot as given.",
         ["left", "left", "left", "right", "right", "right"],
     )
-    z = posterior.initial_point()
+    z = posterior.starting_point()
     for index, recording in enumerate(recordings):
         manoeuvre = posterior.manoeuvres[index]
         document.section(f"Recording {recording.name}")
@@ -60,5 +60,5 @@ def simulation_report(posterior: Posterior, recordings: Sequence[Recording], tit
             "Simulated with the robot as given, beside what the study's recording holds; beneath, the residual in σ.",
         )
     document.section("What was assumed")
-    document.items(model_sentences(posterior, posterior.integration_error(z)))
+    document.items(model_sentences(posterior, integration_error_at(posterior, z)))
     document.write(file)

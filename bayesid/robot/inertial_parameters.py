@@ -25,6 +25,7 @@ __all__ = [
     "InertialParameters",
     "log_cholesky_factor",
     "log_cholesky_vector",
+    "vector_from_factor",
     "mass_com_inertia",
     "parameters_from_pseudo_inertia",
     "upper_cholesky",
@@ -169,11 +170,12 @@ def log_cholesky_factor(coordinates: Array) -> Array:
 
 def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array:
     """Ten linear parameters of the body with given log-Cholesky coordinates relative to a centre, shape (10,)."""
-    return _vector(jnp.asarray(upper_cholesky(centre.pseudo_inertia)), coordinates)
+    return vector_from_factor(jnp.asarray(upper_cholesky(centre.pseudo_inertia)), coordinates)
 
 
 @jax.jit  # traced once for all bodies
-def _vector(centre: Array, coordinates: Array) -> Array:
+def vector_from_factor(centre: Array, coordinates: Array) -> Array:
+    """Return `log_cholesky_vector` for a centre given by the factor of its pseudo-inertia (`upper_cholesky`), (4, 4)."""
     factor = centre @ log_cholesky_factor(coordinates)
     return parameters_from_pseudo_inertia(factor @ factor.T)
 

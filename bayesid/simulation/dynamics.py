@@ -8,6 +8,7 @@ axes, ``L = I w + spin + h`` and ``dL/dt = N - w x L``; the attitude quaternion 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -16,14 +17,16 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from bayesid._math.arrays import Traceable
 from bayesid._math.hermite import hermite
 from bayesid._math.rotation import quaternion_rate, rotation
+from bayesid._math.runge_kutta import runge_kutta_step
 from bayesid._math.small_matrices import cross, inverse, solve_small, symmetric, trace_less
 from bayesid.robot.composite_tables import ENTRIES
-from bayesid.simulation.effects.effect import Composite, Effect, Environment, Instant, Modes, Readings, Wrench
+from bayesid.simulation.effects.effect import Composite, Effect, Environment, Instant, Modes, Wrench
 from bayesid.simulation.joint_torques import BaseMotion, Beyond, joint_torques
 
-__all__ = ["Grid", "TimeTables", "Start", "composite", "simulate", "trace"]
+__all__ = ["Grid", "Samples", "Start", "TimeTables", "UnitSpeed", "composite", "simulate", "trace"]
 
 ATTITUDE, MOMENTUM, INNER = slice(0, 4), slice(4, 7), slice(7, None)
 
@@ -34,10 +37,17 @@ class TimeTables(NamedTuple):
     ``beyond`` is what the joints carry, for their torques.
     """
 
-    known: Array
-    unknown: Array
+    known: Traceable
+    unknown: Traceable
     environment: Environment
     beyond: Beyond
+
+
+class UnitSpeed(NamedTuple):
+    """Tables at time 0 of each of n joints moving alone at unit speed, known (n, 28) and unknown (n, 28, p) bodies."""
+
+    known: Traceable
+    unknown: Traceable
 
 
 class Grid(NamedTuple):
@@ -47,19 +57,25 @@ class Grid(NamedTuple):
     force and torque on the base during each step, (K, 6); a sample lies in step ``step_of`` at the given ``fraction``.
     """
 
-    step: Array
+    step: Traceable
     node: TimeTables
-    zero_order_hold: Array
+    zero_order_hold: Traceable
     sample: TimeTables
-    step_of: Array
-    fraction: Array
+    step_of: Traceable
+    fraction: Traceable
+    unit_speed: UnitSpeed
 
 
 class Start(NamedTuple):
-    """Initial attitude quaternion, base to orbit axes, and angular velocity in base axes [rad/s]."""
+    """State of a recording at time 0.
 
-    attitude: Array
-    rate: Array
+    attitude (4,): quaternion, base to orbit axes; rate (3,): angular velocity, base axes [rad/s]; speed_error (n,): what
+    the smoothed joint speeds have too much [rad/s or m/s], or nothing (0,) where that is of no account.
+    """
+
+    attitude: Traceable
+    rate: Traceable
+    speed_error: Traceable = np.zeros(0)
 
 
 def composite(row: Array) -> Composite:
@@ -84,14 +100,22 @@ def composite(row: Array) -> Composite:
     )
 
 
+class Samples(NamedTuple):
+    """The motion at the sample times, as sensors meet it.
+
+    instant (T,); quaternion (T, 4), base to orbit axes; specific_force (T, K, 3): what effects add to an accelerometer
+    at each of K mounting points [m/s2], base axes; torque (T, n) of the joints [N m or N].
+    """
+
+    instant: Instant
+    quaternion: Array
+    specific_force: Array
+    torque: Array
+
+
 def simulate(
-    grid: Grid,
-    inertial: Array,
-    start: Start,
-    effects: Sequence[Effect],
-    values: Sequence[Array],
-    point: Array,
-) -> Readings:
+    grid: Grid, inertial: Array, start: Start, effects: Sequence[Effect], values: Sequence[Array], points: Array
+) -> Samples:
     """Simulate one recording.
 
     Parameters
@@ -103,44 +127,32 @@ def simulate(
     start : Start
     effects, values : sequences
         Active effects and their parameters.
-    point : (3,) array
-        Mounting point of the accelerometer in the base [m].
+    points : (K, 3) array
+        Mounting points of the sensors in the base [m].
 
     Returns
     -------
-    Readings
-        In base axes; faults of the sensors are not applied.
+    Samples
     """
-    return _sense(grid, point, *_integrate(grid, inertial, start, effects, values))
+    return _sample(grid, points, *_integrate(grid, inertial, start, effects, values))
 
 
 def trace(
-    grid: Grid,
-    inertial: Array,
-    start: Start,
-    effects: Sequence[Effect],
-    values: Sequence[Array],
-    point: Array,
-) -> tuple[Instant, Instant, Readings]:
-    """Return the motion as effects see it at every instant of the stages, then of the samples, and the readings.
-
-    Arguments and readings as for `simulate`; leading axes 2 K + 1 and T.
-    """
+    grid: Grid, inertial: Array, start: Start, effects: Sequence[Effect], values: Sequence[Array], points: Array
+) -> tuple[Instant, Samples]:
+    """Return the motion at every integration node, leading axis 2 K + 1, and at the samples (`simulate`)."""
     system, loads, trajectory = _integrate(grid, inertial, start, effects, values)
     steps = len(grid.step)
     index = jnp.minimum(jnp.arange(2 * steps + 1) // 2, steps - 1)
     fraction = jnp.concatenate([jnp.tile(jnp.array([0.0, 0.5]), steps), jnp.ones(1)])
-    motions = []
-    for instants, of, where in ((grid.node, index, fraction), (grid.sample, grid.step_of, grid.fraction)):
-        bodies = jax.vmap(composite)(instants.known + instants.unknown @ loads)
-        motion = jax.vmap(system.motion)(
-            trajectory.at(of, where), (bodies, instants.environment), grid.zero_order_hold[of]
-        )
-        motions.append(motion[0])
-    return motions[0], motions[1], _sense(grid, point, system, loads, trajectory)
+    bodies = jax.vmap(composite)(grid.node.known + grid.node.unknown @ loads)
+    motion = jax.vmap(system.motion)(
+        trajectory.at(index, fraction), (bodies, grid.node.environment), grid.zero_order_hold[index]
+    )
+    return motion[0], _sample(grid, points, system, loads, trajectory)
 
 
-class _Course(NamedTuple):
+class _StateTrajectory(NamedTuple):
     """States at the start and end of every step, and their slopes times the step's length."""
 
     left: Array
@@ -156,7 +168,7 @@ class _Course(NamedTuple):
 
 def _integrate(
     grid: Grid, inertial: Array, start: Start, effects: Sequence[Effect], values: Sequence[Array]
-) -> tuple[_System, Array, _Course]:
+) -> tuple[_System, Array, _StateTrajectory]:
     """Run the classical Runge-Kutta method over the grid; also return what multiplies its tables."""
     system = _System(tuple(effects), tuple(values))
     loads = jnp.concatenate([inertial, *(effect.loads(v) for effect, v in zip(effects, values, strict=True))])
@@ -165,30 +177,34 @@ def _integrate(
     first, middle, last = (
         jax.tree.map(lambda x, s=s: x[s], stages) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
     )
-    initial = system.initial(jax.tree.map(lambda x: x[0], stages), start)
+    initial = system.initial(jax.tree.map(lambda x: x[0], stages), start, _spin_error(grid.unit_speed, loads, start))
 
     def step(state: Array, given: tuple) -> tuple[Array, tuple[Array, Array, Array]]:
-        size, zero_order_hold, here, half, there = given
-        k1 = system.derivative(state, here, zero_order_hold)
-        k2 = system.derivative(state + 0.5 * size * k1, half, zero_order_hold)
-        k3 = system.derivative(state + 0.5 * size * k2, half, zero_order_hold)
-        k4 = system.derivative(state + size * k3, there, zero_order_hold)
-        new = state + size / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        # the slope at the end is k1 of the next step, but for a jump of the held wrench
-        return new, (state, size * k1, size * system.derivative(new, there, zero_order_hold))
+        size, hold, here, half, there = given
+        new, slope, _ = runge_kutta_step(partial(system.derivative, hold=hold), state, size, here, half, there)
+        # the slope at the end is that of the next step's start, but for a jump of the wrench that is held
+        return new, (state, size * slope, size * system.derivative(new, there, hold))
 
     final, (states, slopes, end_slopes) = jax.lax.scan(
         step, initial, (grid.step, grid.zero_order_hold, first, middle, last)
     )
-    return system, loads, _Course(states, jnp.concatenate([states[1:], final[None]]), slopes, end_slopes)
+    return system, loads, _StateTrajectory(states, jnp.concatenate([states[1:], final[None]]), slopes, end_slopes)
 
 
-def _sense(grid: Grid, point: Array, system: _System, loads: Array, trajectory: _Course) -> Readings:
-    """Return what the sensors read along a course."""
+def _spin_error(tables: UnitSpeed, loads: Array, start: Start) -> Array:
+    """Return the angular momentum relative to the base that errors of the joints' speeds at time 0 feign [N m s]."""
+    if not len(start.speed_error):
+        return jnp.zeros(3)
+    spins = jax.vmap(lambda row: composite(row).spin)(tables.known + tables.unknown @ loads)
+    return start.speed_error @ spins
+
+
+def _sample(grid: Grid, points: Array, system: _System, loads: Array, trajectory: _StateTrajectory) -> Samples:
+    """Return the motion at the samples along a trajectory of states."""
     seen = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ loads)
-    sense = jax.vmap(system.sense, (0, 0, 0, None, 0, None))
-    states, zero_order_hold = trajectory.at(grid.step_of, grid.fraction), grid.zero_order_hold[grid.step_of]
-    return Readings(*sense(states, (seen, grid.sample.environment), zero_order_hold, point, grid.sample, loads))
+    sample = jax.vmap(system.sample, (0, 0, 0, None, 0, None))
+    states, hold = trajectory.at(grid.step_of, grid.fraction), grid.zero_order_hold[grid.step_of]
+    return sample(states, (seen, grid.sample.environment), hold, points, grid.sample, loads)
 
 
 class _Inner(NamedTuple):
@@ -207,19 +223,19 @@ class _System(NamedTuple):
     effects: tuple[Effect, ...]
     values: tuple[Array, ...]
 
-    def initial(self, given: tuple[Composite, Environment], start: Start) -> Array:
+    def initial(self, given: tuple[Composite, Environment], start: Start, spin_error: Array) -> Array:
         body, environment = given
         inner = jnp.zeros(sum(effect.states + 2 * effect.modes_count for effect in self.effects))
         instant = Instant(environment, body, rotation(start.attitude), *jnp.zeros((3, 3)))
-        momentum = body.inertia @ start.rate + body.spin + self.momentum(instant, inner)[0]
+        momentum = body.inertia @ start.rate + body.spin - spin_error + self.momentum(instant, inner)[0]
         return jnp.concatenate([start.attitude, momentum, inner])
 
-    def derivative(self, state: Array, given: tuple[Composite, Environment], zero_order_hold: Array) -> Array:
+    def derivative(self, state: Array, given: tuple[Composite, Environment], hold: Array) -> Array:
         if any(effect.modes_count for effect in self.effects):
-            instant, mode_changes = self.motion(state, given, zero_order_hold)
+            instant, mode_changes = self.motion(state, given, hold)
         else:  # the acceleration is not needed
             instant, mode_changes = self.instant(state, given)[0], jnp.zeros(0)
-        wrench = self.wrench(instant, state[INNER], zero_order_hold)
+        wrench = self.wrench(instant, state[INNER], hold)
         torque = wrench.torque - cross(instant.body.com, wrench.force)
         parts = [quaternion_rate(state[ATTITUDE], instant.rate), torque - cross(instant.rate, state[MOMENTUM])]
         used = 0
@@ -231,34 +247,32 @@ class _System(NamedTuple):
                 used += effect.modes_count
         return jnp.concatenate(parts)
 
-    def sense(
+    def sample(
         self,
         state: Array,
         given: tuple[Composite, Environment],
-        zero_order_hold: Array,
-        point: Array,
+        hold: Array,
+        points: Array,
         tables: TimeTables,
         loads: Array,
-    ) -> tuple[Array, Array, Array, Array, Array]:
-        instant, _ = self.motion(state, given, zero_order_hold)
-        rate = instant.rate
-        accel = instant.acceleration + cross(instant.rate_change, point) + cross(rate, cross(rate, point))
+    ) -> Samples:
+        instant, _ = self.motion(state, given, hold)
+        added = jnp.zeros_like(points)
         for effect, values, *_ in self.inner(state[INNER]):
             if effect.uses("specific_force"):
-                accel = accel + effect.specific_force(values, instant, point - instant.body.com)
-        motion = BaseMotion(rate, instant.rate_change, instant.acceleration)
-        torque = joint_torques(
-            tables.beyond, tables.unknown, loads, motion, instant.body.com, self.gravity_gradient_tensor(instant)
-        )
-        return given[1].time, rate, accel, state[ATTITUDE] / jnp.linalg.norm(state[ATTITUDE]), torque
+                force = jax.vmap(effect.specific_force, (None, None, 0))
+                added = added + force(values, instant, points - instant.body.com)
+        motion = BaseMotion(instant.rate, instant.rate_change, instant.acceleration)
+        tensor = self.gravity_gradient_tensor(instant)
+        torque = joint_torques(tables.beyond, tables.unknown, loads, motion, instant.body.com, tensor)
+        quaternion = state[ATTITUDE] / jnp.linalg.norm(state[ATTITUDE])
+        return Samples(instant, quaternion, added, torque)
 
-    def motion(
-        self, state: Array, given: tuple[Composite, Environment], zero_order_hold: Array
-    ) -> tuple[Instant, Array]:
+    def motion(self, state: Array, given: tuple[Composite, Environment], hold: Array) -> tuple[Instant, Array]:
         """Return the instant with its accelerations, and those of the modes' amplitudes."""
         instant, momentum_rate = self.instant(state, given)
         body, rate = instant.body, instant.rate
-        wrench = self.wrench(instant, state[INNER], zero_order_hold)
+        wrench = self.wrench(instant, state[INNER], hold)
         torque = wrench.torque - cross(body.com, wrench.force)
         change = torque - cross(rate, state[MOMENTUM]) - body.inertia_rate @ rate - body.spin_rate - momentum_rate
         force = wrench.force
@@ -318,8 +332,8 @@ class _System(NamedTuple):
                 momentum = momentum + _about_com(effect.modes(values), instant.body.com).T @ speed
         return momentum, rate
 
-    def wrench(self, instant: Instant, inner: Array, zero_order_hold: Array) -> Wrench:
-        given = zero_order_hold + instant.environment.wrench
+    def wrench(self, instant: Instant, inner: Array, hold: Array) -> Wrench:
+        given = hold + instant.environment.wrench
         total = Wrench(given[:3], given[3:])
         for effect, values, own, *_ in self.inner(inner):
             if effect.uses("wrench"):

@@ -16,6 +16,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._io.errors import InputError
+from bayesid._math.arrays import Traceable
 from bayesid.robot.composite_tables import ENTRIES, WIDTH, composite_rows
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import Kinematics
@@ -63,15 +64,15 @@ class Beyond(NamedTuple):
     speed, linear at the base origin and angular, base axes; velocity (T, n): of the joints.
     """
 
-    known: Array
-    carried: Array
-    axis: Array
-    velocity: Array
+    known: Traceable
+    carried: Traceable
+    axis: Traceable
+    velocity: Traceable
 
 
 def no_joints(count: int, columns: int) -> Beyond:
     """Return what is needed at ``count`` instants where no torque is measured."""
-    return Beyond(*(jnp.zeros((count, *shape)) for shape in ((0, WIDTH), (0, columns), (0, 6), (0,))))
+    return Beyond(*(np.zeros((count, *shape)) for shape in ((0, WIDTH), (0, columns), (0, 6), (0,))))
 
 
 def beyond_joints(
@@ -97,10 +98,10 @@ def beyond_joints(
     ]
     carried = np.array([[0.0 if name is None else own[links.index(name)] for name in owners] for own in beyond])
     return Beyond(
-        known=jnp.asarray(np.stack(rows, axis=1)),
-        carried=jnp.asarray(np.tile(carried, (len(state.position), 1, 1))),
-        axis=jnp.asarray(joint_axes(robot, moved)),
-        velocity=jnp.asarray(state.velocity),
+        known=np.stack(rows, axis=1),
+        carried=np.tile(carried, (len(state.position), 1, 1)),
+        axis=joint_axes(robot, moved),
+        velocity=state.velocity,
     )
 
 

@@ -13,6 +13,7 @@ from bayesid.recording.joint_motion import Motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing, check_mixing
 from bayesid.robot.robot import Robot
+from bayesid.simulation.channels import Channels
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.joint_torques import TorqueSensor
@@ -70,6 +71,8 @@ class Model:
         left out, bodies and coordinates are independent.
     torque : TorqueSensor, optional
         Where joint torques are measured.
+    speed_errors : bool, optional
+        Whether the smoothed joint speeds at time 0 are uncertain; by default where the initial rate is zero.
     """
 
     robot: Robot
@@ -80,6 +83,7 @@ class Model:
     rate_sigma: float = RATE_SIGMA
     mixing: Mixing | None = None
     torque: TorqueSensor | None = None
+    speed_errors: bool | None = None
 
     def __post_init__(self) -> None:
         if not self.sensors:
@@ -133,12 +137,23 @@ class Model:
         return replace(self, effects=(*self.effects, effect))
 
     @property
-    def point(self) -> Floats:
-        """Mounting point of the accelerometer in the base [m]; the origin where there is none."""
-        for sensor in self.sensors:
-            if sensor.kind is Kind.ACCEL:
-                return np.asarray(sensor.position, dtype=float)
-        return np.zeros(3)
+    def channels(self) -> Channels:
+        """Layout of the residual's columns."""
+        joints = () if self.torque is None else self.torque.joints
+        return Channels(tuple(sensor.kind for sensor in self.sensors), joints)
+
+    def sensor(self, kind: Kind) -> Sensor | None:
+        """Return the sensor of a kind, None where none is declared."""
+        return next((sensor for sensor in self.sensors if sensor.kind == kind), None)
+
+    @property
+    def has_speed_errors(self) -> bool:
+        """Whether errors of the smoothed joint speeds at time 0 are unknowns.
+
+        They are where the initial rate is declared zero: the base rests if the joints truly do, and a smoothed speed that
+        is not the true one would be read as momentum. An unknown initial rate takes them up.
+        """
+        return self.rate_sigma == 0.0 if self.speed_errors is None else self.speed_errors
 
     @property
     def bodies(self) -> tuple[BodyPrior, ...]:

@@ -1,19 +1,39 @@
-"""Sensors: where they sit, how they are turned, how noisy they are, and what data sheets say about that."""
+"""Sensors on the base: what a kind of sensor measures, where one sits, how it is turned and how noisy it is.
+
+A kind of sensor is one class: the channels it is recorded in, what it reads at an instant of the simulation, and how a
+measured and a predicted reading differ. `Kind.register` makes it known by the name of its channels.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from enum import Enum
-from typing import Protocol
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.simulation.sensor_noise import (
+    ARCSEC,
+    AngleRandomWalk,
+    Coloured,
+    Filter,
+    Noise,
+    NoiseDensity,
+    Quantised,
+    Scaled,
+    StarTracker,
+    White,
+)
+
+if TYPE_CHECKING:
+    from jax import Array
+
+    from bayesid.simulation.effects.effect import Instant
 
 __all__ = [
+    "ARCSEC",
     "AngleRandomWalk",
     "Coloured",
     "Filter",
@@ -22,155 +42,191 @@ __all__ = [
     "NoiseDensity",
     "Quantised",
     "Scaled",
+    "Sensed",
     "Sensor",
     "StarTracker",
     "White",
 ]
 
 
-ARCSEC = np.pi / 180.0 / 3600.0
-"""One second of arc [rad]."""
+class Sensed(NamedTuple):
+    """One instant of the simulation as a sensor meets it.
+
+    ``quaternion`` (4,) turns base to orbit axes; ``point`` (3,) is the sensor's mounting point in the base [m]; ``specific_force`` (3,) is what effects add to an
+    accelerometer there [m/s2], base axes.
+    """
+
+    instant: Instant
+    quaternion: Array
+    point: Array
+    specific_force: Array
 
 
-class Kind(Enum):
-    """What a sensor measures; the value is the channel's family in recordings."""
+class Kind:
+    """What a sensor measures. Subclass it, set the attributes, define `read`, and register an instance.
 
-    RATE = "rate"
-    ACCEL = "accel"
-    ATTITUDE = "attitude"
+    Attributes
+    ----------
+    value : str
+        Family of its channels in recordings, whose columns are ``value.axis``.
+    unit : str
+        Unit of the residual.
+    axes : tuple of str
+        Components as recorded.
+    rest : tuple of float
+        Reading, component by component, of a base at rest in orbit axes.
+    mounted : bool
+        Whether readings are vectors that the sensor's mounting turns.
+    feels_force : bool
+        Whether the specific forces that effects add reach it.
+    frame : str
+        What the reading is, and in which axes.
+    slip : str
+        The unit by which users most often mistake it.
+    """
+
+    value: ClassVar[str]
+    unit: ClassVar[str]
+    axes: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    rest: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0)
+    mounted: ClassVar[bool] = True
+    feels_force: ClassVar[bool] = False
+    frame: ClassVar[str] = ""
+    slip: ClassVar[str] = "another unit"
+
+    size: ClassVar[int] = 3
+    """Components of the residual."""
+
+    RATE: ClassVar[Kind]
+    ACCEL: ClassVar[Kind]
+    ATTITUDE: ClassVar[Kind]
+
+    _known: ClassVar[dict[str, Kind]] = {}
+
+    @staticmethod
+    def register(kind: K) -> K:
+        """Make a kind known by the family of its channels."""
+        if kind.value in Kind._known and type(Kind._known[kind.value]) is not type(kind):
+            raise InputError(f"two kinds of sensor are named {kind.value!r}", remedy="Give each channels of its own")
+        Kind._known[kind.value] = kind
+        return kind
+
+    @staticmethod
+    def of(value: str) -> Kind:
+        """Return the registered kind whose channels have this name."""
+        if value not in Kind._known:
+            raise InputError(f"unknown sensor {value!r}", remedy=f"Choose from {', '.join(sorted(Kind._known))}")
+        return Kind._known[value]
 
     @property
-    def unit(self) -> str:
-        """Unit of the residual."""
-        return {"rate": "rad/s", "accel": "m/s2", "attitude": "rad"}[self.value]
+    def columns(self) -> tuple[str, ...]:
+        """Names of its channels."""
+        return tuple(f"{self.value}.{axis}" for axis in self.axes)
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the components of its residual."""
+        return tuple(f"{self.value}.{axis}" for axis in self.axes[: self.size])
+
+    def read(self, sensed: Sensed) -> Array:
+        """Return the true reading, base axes, shape (axes,)."""
+        raise NotImplementedError
+
+    def residual(self, measured: Array, predicted: Array) -> Array:
+        """Return how a measured reading differs from a predicted one, shape (size,)."""
+        return measured - predicted
+
+    def noisy(self, readings: Floats, noise: Floats) -> Floats:
+        """Return readings (..., axes) with noise (..., size) of the residual added."""
+        return readings + noise
+
+    def shown(self, readings: Floats, reference: Floats) -> Floats:
+        """Return readings (n, axes) as they are drawn, (n, size), where need be relative to a reference (axes,)."""
+        return readings
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other)
+
+    def __hash__(self) -> int:
+        return hash(type(self))
+
+    def __repr__(self) -> str:
+        return f"Kind.of({self.value!r})"
 
 
-class Noise(Protocol):
-    """White noise of a sensor."""
-
-    def sigma(self, interval: float) -> Floats:
-        """Return the standard deviation per axis, (3,), of samples taken every ``interval`` seconds."""
-        ...
+K = TypeVar("K", bound=Kind)
 
 
-@dataclass(frozen=True)
-class White:
-    """Noise given per sample."""
+class AngularRate(Kind):
+    """Angular velocity of the base relative to inertial space."""
 
-    value: float | tuple[float, float, float]
+    value, unit = "rate", "rad/s"
+    frame = "angular velocity of the base relative to inertial space, sensor axes"
+    slip = "degrees per second"
 
-    def sigma(self, interval: float) -> Floats:
-        """Return the given value, whatever the interval."""
-        return np.broadcast_to(np.asarray(self.value, dtype=float), (3,)).copy()
-
-
-@dataclass(frozen=True)
-class AngleRandomWalk:
-    """Gyro noise from a data sheet [rad/sqrt(s)]: the angle's error grows as the square root of time."""
-
-    value: float | tuple[float, float, float]
-
-    def sigma(self, interval: float) -> Floats:
-        """Return the rate's noise: walk / sqrt(interval)."""
-        return White(self.value).sigma(interval) / np.sqrt(interval)
+    def read(self, sensed: Sensed) -> Array:
+        """Return the base's angular velocity."""
+        return sensed.instant.rate
 
 
-@dataclass(frozen=True)
-class NoiseDensity:
-    """One-sided white spectral density from a data sheet, in units per sqrt(Hz)."""
+class SpecificForce(Kind):
+    """Non-gravitational acceleration of the mounting point."""
 
-    value: float | tuple[float, float, float]
+    value, unit = "accel", "m/s2"
+    feels_force = True
+    frame = "non-gravitational acceleration of the mounting point, sensor axes"
+    slip = "mm/s2 or micro-g"
 
-    def sigma(self, interval: float) -> Floats:
-        """Return density * sqrt(Nyquist frequency)."""
-        return White(self.value).sigma(interval) * np.sqrt(0.5 / interval)
+    def read(self, sensed: Sensed) -> Array:
+        """Return the acceleration of the base origin, what rotation adds at the point, and what effects add."""
+        from bayesid._math.small_matrices import cross
 
-
-@dataclass(frozen=True)
-class StarTracker:
-    """Rate from differencing a star sensor's attitude, whose samples have the given error in seconds of arc."""
-
-    arcsec: float | tuple[float, float, float]
-
-    def sigma(self, interval: float) -> Floats:
-        """Return sqrt(2) * error / interval."""
-        return np.sqrt(2.0) * White(self.arcsec).sigma(interval) * ARCSEC / interval
+        instant, point = sensed.instant, sensed.point
+        rotating = cross(instant.rate_change, point) + cross(instant.rate, cross(instant.rate, point))
+        return instant.acceleration + rotating + sensed.specific_force
 
 
-@dataclass(frozen=True)
-class Scaled:
-    """Another noise, times a factor per axis: an understated data sheet."""
+class StarAttitude(Kind):
+    """Attitude of the base, a quaternion x, y, z, w from base to orbit axes; its residual is a small rotation."""
 
-    noise: Noise
-    factor: tuple[float, float, float]
+    value, unit = "attitude", "rad"
+    axes, rest = ("x", "y", "z", "w"), (0.0, 0.0, 0.0, 1.0)
+    mounted = False
+    frame = "quaternion x, y, z, w, base axes to orbit axes"
 
-    def sigma(self, interval: float) -> Floats:
-        """Return the scaled noise."""
-        return self.noise.sigma(interval) * np.asarray(self.factor)
+    def read(self, sensed: Sensed) -> Array:
+        """Return the unit quaternion."""
+        return sensed.quaternion
 
+    def residual(self, measured: Array, predicted: Array) -> Array:
+        """Return the small rotation, base axes, from the predicted to the measured attitude."""
+        from bayesid._math.rotation import rotation_between
 
-@dataclass(frozen=True)
-class Quantised:
-    """Another noise, rounded to multiples of a step per axis: rounding adds a twelfth of the step's square."""
+        return rotation_between(predicted, measured)
 
-    noise: Noise
-    step: tuple[float, float, float]
+    def noisy(self, readings: Floats, noise: Floats) -> Floats:
+        """Return attitudes turned by small rotations in base axes."""
+        half = 0.5 * noise
+        vector = readings[..., 3:] * half + np.cross(readings[..., :3], half)
+        scalar = readings[..., 3] - (readings[..., :3] * half).sum(axis=-1)
+        turned = np.concatenate([readings[..., :3] + vector, scalar[..., None]], axis=-1)
+        return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
 
-    def sigma(self, interval: float) -> Floats:
-        """Return the noise with that of rounding."""
-        return np.hypot(self.noise.sigma(interval), np.asarray(self.step) / np.sqrt(12.0))
+    def shown(self, readings: Floats, reference: Floats) -> Floats:
+        """Return rotation vectors from the reference [rad]."""
+        from scipy.spatial.transform import Rotation
 
-
-@dataclass(frozen=True)
-class Coloured:
-    """Exponentially correlated noise (Ornstein-Uhlenbeck) beside the white one.
-
-    Parameters
-    ----------
-    sigma : (3,)
-        Standard deviation per axis, in the sensor's unit.
-    time : float
-        Correlation time [s].
-    """
-
-    sigma: tuple[float, float, float]
-    time: float
+        return (Rotation.from_quat(reference).inv() * Rotation.from_quat(readings)).as_rotvec()
 
 
-@dataclass(frozen=True)
-class Filter:
-    """Zero-phase low-pass and decimation, applied alike to measurement and prediction.
-
-    Parameters
-    ----------
-    low_pass : float, optional
-        Cut-off (half amplitude) [Hz].
-    decimate : int
-        Keep every n-th sample.
-    """
-
-    low_pass: float | None = None
-    decimate: int = 1
-
-    def taps(self, interval: float) -> Floats:
-        """Return the symmetric kernel, of odd length, for samples every ``interval`` seconds."""
-        if self.low_pass is None:
-            return np.ones(1)
-        cut = self.low_pass * interval
-        if not 0.0 < cut < 0.5:
-            raise InputError(
-                f"low_pass {self.low_pass:g} Hz is not below half the sampling rate, {0.5 / interval:g} Hz",
-                remedy="Choose a lower cut-off or leave it out",
-            )
-        half = int(np.ceil(1.65 / cut))  # a Hamming window's transition band is then as wide as the pass band
-        n = np.arange(-half, half + 1)
-        kernel = np.sinc(2.0 * cut * n) * np.hamming(2 * half + 1)
-        return kernel / kernel.sum()
+Kind.RATE = Kind.register(AngularRate())
+Kind.ACCEL = Kind.register(SpecificForce())
+Kind.ATTITUDE = Kind.register(StarAttitude())
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor of three axes on the base.
+    """A sensor on the base.
 
     Parameters
     ----------
@@ -179,7 +235,7 @@ class Sensor:
     mounting : (4,) array_like
         Quaternion x, y, z, w that turns sensor axes into base axes.
     position : (3,) array_like
-        Mounting point of an accelerometer in the base [m].
+        Mounting point in the base [m].
     filter : Filter
     coloured : Coloured, optional
         Correlated noise beside the white one.
@@ -195,4 +251,6 @@ class Sensor:
     @property
     def rotation(self) -> Floats:
         """Rotation matrix, sensor to base axes."""
+        from scipy.spatial.transform import Rotation
+
         return Rotation.from_quat(np.asarray(self.mounting, dtype=float)).as_matrix()

@@ -1,8 +1,8 @@
-"""The forward model: from the physical values of the unknowns to what the sensors read."""
+"""The forward model: from the physical values of the unknowns to what the sensors read, and to the residual."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import jax
@@ -10,100 +10,142 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bayesid._math.rotation import quaternion_product
-from bayesid.simulation.dynamics import Grid, Start, simulate, trace
-from bayesid.simulation.effects.effect import Instant, Readings
+from bayesid._math.rotation import tilted
+from bayesid.simulation.channels import Channels
+from bayesid.simulation.dynamics import Grid, Samples, Start, simulate, trace
+from bayesid.simulation.effects.effect import Effect, Instant, Readings
+from bayesid.simulation.effects.effect_key import EffectKey
 from bayesid.simulation.model import Model
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import Sensed
 
-__all__ = ["Simulator", "Values"]
+__all__ = ["ModelConstants", "Simulator", "Values"]
 
 
 class Values(NamedTuple):
     """Physical values of the unknowns.
 
     inertial (10 bodies,) linear parameters body after body; rate (R, 3) initial rates; tilt (R, 3) small rotation
-    of the initial attitude, base axes; effects: per effect (n,) or, per recording, (R, n).
+    of the initial attitude, base axes; speed (R, n) errors of the smoothed joint speeds at time 0, n = 0 where they are
+    of no account; effects: per effect (n,) or, per recording, (R, n).
     """
 
     inertial: Array
     rate: Array
     tilt: Array
+    speed: Array
     effects: tuple[Array, ...]
 
 
-class Simulator:
-    """Simulate a model; every method can be traced, batched and differentiated by JAX.
+class ModelConstants(NamedTuple):
+    """Numbers of a model that compiled code takes as arguments.
 
-    Grids and initial attitudes have a leading axis R of recordings.
+    rotation (K, 3, 3), sensor to base axes, and point (K, 3), mounting point in the base [m], of every sensor; and the
+    constants of every effect.
     """
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
-        self.point = np.asarray(model.point)
-        self.kinds = [sensor.kind for sensor in model.sensors]
-        self.turn = {sensor.kind: sensor.rotation for sensor in model.sensors}
-        self.torques = () if model.torque is None else tuple(model.torque.columns(model.robot))
+    rotation: Array
+    point: Array
+    effects: tuple[Any, ...]
 
-    def readings(self, values: Values, grid: Grid, attitude: Array) -> Readings:
-        """Return what the sensors read, in sensor axes, (R, T, ...)."""
-        return self._each(self._sensed, values, grid, attitude)
+    @classmethod
+    def of(cls, model: Model) -> ModelConstants:
+        """Collect the constants of a model."""
+        return cls(
+            rotation=jnp.asarray(np.stack([sensor.rotation for sensor in model.sensors])),
+            point=jnp.asarray(np.stack([np.asarray(sensor.position, dtype=float) for sensor in model.sensors])),
+            effects=tuple(effect.constants for effect in model.effects),
+        )
 
-    def trace(self, values: Values, grid: Grid, attitude: Array) -> tuple[Instant, Instant, Readings]:
-        """Return the motion at the stages and at the samples, and the readings."""
-        return self._each(self._moved, values, grid, attitude)
 
-    def misfit(self, readings: Readings, measured: Array, quaternion: Array) -> Array:
-        """Measured less predicted, sensor after sensor, (R, T, C); of an attitude the small rotation between.
+@dataclass(frozen=True)
+class Simulator:
+    """The forward model; every method can be traced, batched and differentiated by JAX.
 
-        C is three per sensor, then one per joint with a torque sensor. ``measured`` (R, T, C) holds no attitudes: they
-        are in ``quaternion``, (R, T, 4).
-        """
+    Simulators that do the same operations are equal. Grids, attitudes and readings have a leading axis R of recordings.
+
+    Parameters
+    ----------
+    channels : Channels
+    torques : tuple of int
+        Joints whose torque is measured, indices into `Robot.joints`.
+    keys : tuple of EffectKey
+        Effects at work.
+    """
+
+    channels: Channels
+    torques: tuple[int, ...]
+    keys: tuple[EffectKey, ...]
+
+    @classmethod
+    def of(cls, model: Model) -> Simulator:
+        """Return the simulator of a model."""
+        torques = () if model.torque is None else tuple(model.torque.columns(model.robot))
+        return cls(model.channels, torques, tuple(EffectKey(effect) for effect in model.effects))
+
+    def readings(
+        self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array
+    ) -> tuple[Readings, Array, Array]:
+        """Return what the sensors read, sensor axes, (R, T, ...), and the base's attitude and rate, base axes."""
+
+        def one(values: Values, grid: Grid, attitude: Array) -> tuple[Readings, Array, Array]:
+            samples = simulate(*self._arguments(constants, values, grid, attitude))
+            return self._read(constants, values, grid, samples), samples.quaternion, samples.instant.rate
+
+        return jax.vmap(one, (self._axes, 0, 0))(values, grid, attitude)
+
+    def trace(
+        self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array
+    ) -> tuple[Instant, Instant, Readings]:
+        """Return the motion at the integration nodes and at the samples, and the readings."""
+
+        def one(values: Values, grid: Grid, attitude: Array) -> tuple[Instant, Instant, Readings]:
+            node, samples = trace(*self._arguments(constants, values, grid, attitude))
+            return node, samples.instant, self._read(constants, values, grid, samples)
+
+        return jax.vmap(one, (self._axes, 0, 0))(values, grid, attitude)
+
+    def residual(self, readings: Readings, measured: Readings) -> Array:
+        """Return measured less predicted readings in the columns of `Channels`, (R, T, C)."""
         parts = []
-        for slot, kind in enumerate(self.kinds):
-            if kind is Kind.ATTITUDE:
-                parts.append(jax.vmap(jax.vmap(_rotation_between))(readings.attitude, quaternion))
-            else:
-                parts.append(measured[..., 3 * slot : 3 * slot + 3] - getattr(readings, kind.value))
-        torques = readings.torque[..., list(self.torques)] if self.torques else jnp.zeros((*measured.shape[:-1], 0))
-        return jnp.concatenate([*parts, measured[..., 3 * len(self.kinds) :] - torques], axis=-1)
+        for kind in self.channels.kinds:
+            differ = jax.vmap(jax.vmap(kind.residual))
+            parts.append(differ(measured.channels[kind.value], readings.channels[kind.value]))
+        return jnp.concatenate([*parts, measured.torque - self.measured_torques(readings)], axis=-1)
 
-    def _each(self, run: Callable[..., Any], values: Values, grid: Grid, attitude: Array) -> Any:
-        axes = tuple(0 if effect.per_recording else None for effect in self.model.effects)
-        return jax.vmap(run, (0, 0, None, 0, 0, axes))(
-            grid, attitude, values.inertial, values.rate, values.tilt, values.effects
-        )
+    def measured_torques(self, readings: Readings) -> Array:
+        """Return the predicted torques of the joints that are measured, (R, T, n)."""
+        if not self.torques:
+            return jnp.zeros((*readings.time.shape, 0))
+        return readings.torque[..., list(self.torques)]
 
-    def _sensed(self, grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Readings:
-        readings = simulate(
-            grid, inertial, _start(attitude, rate, tilt), self.model.effects, effects, jnp.asarray(self.point)
-        )
-        return self._distorted(readings, effects, grid)
+    @property
+    def _axes(self) -> Values:
+        effects = tuple(0 if key.effect.per_recording else None for key in self.keys)
+        return Values(None, 0, 0, 0, effects)  # type: ignore[arg-type]
 
-    def _moved(self, grid: Grid, attitude: Array, inertial: Array, rate: Array, tilt: Array, effects: Any) -> Any:
-        start = _start(attitude, rate, tilt)
-        node, sample, readings = trace(grid, inertial, start, self.model.effects, effects, jnp.asarray(self.point))
-        return node, sample, self._distorted(readings, effects, grid)
+    def _effects(self, constants: ModelConstants) -> tuple[Effect, ...]:
+        return tuple(key.effect.bound(own) for key, own in zip(self.keys, constants.effects, strict=True))
 
-    def _distorted(self, readings: Readings, effects: Any, grid: Grid) -> Readings:
-        readings = readings._replace(
-            rate=readings.rate @ self.turn.get(Kind.RATE, np.eye(3)),
-            accel=readings.accel @ self.turn.get(Kind.ACCEL, np.eye(3)),
-        )
-        for effect, values in zip(self.model.effects, effects, strict=True):
-            readings = effect.read(values, readings)
+    def _arguments(self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array) -> tuple[Any, ...]:
+        start = Start(tilted(attitude, values.tilt), values.rate, values.speed)
+        return grid, values.inertial, start, self._effects(constants), values.effects, constants.point
+
+    def _read(self, constants: ModelConstants, values: Values, grid: Grid, samples: Samples) -> Readings:
+        """Return what the sensors make of the motion of one recording."""
+        channels = {}
+        for index, kind in enumerate(self.channels.kinds):
+            sensed = Sensed(
+                samples.instant,
+                samples.quaternion,
+                jnp.broadcast_to(constants.point[index], samples.specific_force[:, index].shape),
+                samples.specific_force[:, index],
+            )
+            reading = jax.vmap(kind.read)(sensed)
+            channels[kind.value] = reading @ constants.rotation[index] if kind.mounted else reading
+        readings = Readings(samples.instant.environment.time, channels, samples.torque)
+        for effect, own in zip(self._effects(constants), values.effects, strict=True):
+            readings = effect.read(own, readings)
             if self.torques and effect.uses("friction"):
-                added = effect.friction(values, grid.sample.beyond.velocity)
-                readings = readings._replace(torque=readings.torque + added)
+                friction = effect.friction(own, grid.sample.beyond.velocity)
+                readings = readings._replace(torque=readings.torque + friction)
         return readings
-
-
-def _start(attitude: Array, rate: Array, tilt: Array) -> Start:
-    small = jnp.concatenate([0.5 * tilt, jnp.ones(1)])
-    return Start(quaternion_product(attitude, small / jnp.linalg.norm(small)), rate)
-
-
-def _rotation_between(predicted: Array, measured: Array) -> Array:
-    """Small rotation, base axes, from the predicted to the measured attitude."""
-    difference = quaternion_product(predicted * jnp.array([-1.0, -1.0, -1.0, 1.0]), measured)
-    return 2.0 * difference[:3] * jnp.sign(difference[3])

@@ -9,18 +9,19 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Traceable, namespace
 from bayesid.recording.actions import Actions
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.composite_tables import WIDTH, composite_rows, link_table
+from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
-from bayesid.simulation.dynamics import Grid, TimeTables
+from bayesid.simulation.dynamics import Grid, TimeTables, UnitSpeed
 from bayesid.simulation.effects.effect import Effect, Environment
 from bayesid.simulation.joint_torques import beyond_joints, no_joints
 from bayesid.simulation.orbit import Orbit, OrbitState
 
-__all__ = ["build_grid", "pad_grids", "rounded"]
+__all__ = ["build_grid", "lengthened", "pad_grids", "rounded"]
 
 
 def build_grid(
@@ -35,6 +36,7 @@ def build_grid(
     actions: Actions | None = None,
     effects: Sequence[Effect] = (),
     torques: bool = False,
+    speed_errors: bool = False,
 ) -> Grid:
     """Reduce one recording to a `Grid`.
 
@@ -48,12 +50,19 @@ def build_grid(
         Times at which sensors are read [s].
     step : float
         Longest integration step [s]; steps end where a held action changes.
-    latitude : float
+    argument_of_latitude : float
         Argument of latitude at time 0 [rad].
     effects : sequence of Effect
         Whose tables follow those of the unknown links.
     torques : bool
         Whether the joints' torques are sampled too.
+    speed_errors : bool
+        Whether errors of the joints' speeds at time 0 are told apart (`UnitSpeed`).
+
+    Returns
+    -------
+    Grid
+        Of NumPy arrays, or of JAX's where the motion is traced.
     """
     actions = Actions.none() if actions is None else actions
     nodes = _nodes(float(samples[-1]), step, actions.time)
@@ -65,13 +74,25 @@ def build_grid(
     index = np.clip(np.searchsorted(nodes, samples, side="right") - 1, 0, len(nodes) - 2)
     size = np.diff(nodes)
     return Grid(
-        step=jnp.asarray(size),
+        step=size,
         node=instants[0],
-        zero_order_hold=jnp.asarray(actions.zero_order_hold(nodes[:-1])),
+        zero_order_hold=actions.zero_order_hold(nodes[:-1]),
         sample=instants[1],
-        step_of=jnp.asarray(index, dtype=jnp.int32),
-        fraction=jnp.asarray((samples - nodes[index]) / size[index]),
+        step_of=index.astype(np.int32),
+        fraction=(samples - nodes[index]) / size[index],
+        unit_speed=_unit_speed(robot, unknown, motion, instants[0].unknown.shape[2], speed_errors),
     )
+
+
+def _unit_speed(robot: Robot, unknown: tuple[str, ...], motion: Motion, columns: int, speed_errors: bool) -> UnitSpeed:
+    count = len(robot.joints) if speed_errors else 0
+    if not count:
+        return UnitSpeed(np.zeros((0, WIDTH)), np.zeros((0, WIDTH, columns)))
+    position = np.tile(motion.evaluate(np.zeros(1)).position, (count, 1))
+    moved = kinematics(robot, JointState(position, np.eye(count), np.zeros((count, count))))
+    tables = [link_table(robot, name, moved) for name in unknown]
+    rest = np.zeros((count, WIDTH, columns - 10 * len(tables)))  # effects: of second order
+    return UnitSpeed(composite_rows(robot, moved, leave_out=unknown), np.concatenate([*tables, rest], axis=2))
 
 
 def _nodes(end: float, step: float, changes: Floats) -> Floats:
@@ -105,53 +126,49 @@ def _instants(
     state = none if orbit is None else orbit.state(time, argument_of_latitude)
     momentum, torque = actions.wheels(time)
     environment = Environment(
-        time=jnp.asarray(time),
-        zenith=jnp.asarray(state.zenith),
-        gradient=jnp.asarray(state.gradient),
-        velocity=jnp.asarray(state.velocity),
-        sun=jnp.asarray(state.sun),
-        argument_of_latitude=jnp.asarray(state.argument_of_latitude),
-        north=jnp.asarray(state.north),
-        wheel_momentum=jnp.asarray(momentum),
-        wheel_torque=jnp.asarray(torque),
-        wrench=jnp.zeros((len(time), 6)),
+        time, *state, wheel_momentum=momentum, wheel_torque=torque, wrench=np.zeros((len(time), 6))
     )
-    coefficients = [jnp.zeros((len(time), WIDTH, 0)), *(jnp.asarray(table) for _, table in tables)]
+    xp = namespace(known)
+    coefficients = xp.concatenate([np.zeros((len(time), WIDTH, 0)), *(table for _, table in tables)], axis=2)
     beyond = no_joints(len(time), len(owners))
     if torques and robot.joints:
         beyond = beyond_joints(robot, joints, moved, unknown, owners)
-    return TimeTables(jnp.asarray(known), jnp.concatenate(coefficients, axis=2), environment, beyond)
+    return TimeTables(known, coefficients, environment, beyond)
 
 
-ROUND = 16
-"""Lengths are padded to multiples of this, so that recordings of about one length share compiled functions."""
+FINEST = 32
+"""Lengths are padded to multiples of this at least, so that recordings of about one length share compiled functions."""
+
+PARTS = 4
+"""Lengths beyond are padded to one of so many steps between a power of two and the next."""
 
 
 def rounded(length: int) -> int:
-    """Round a length up."""
-    return -(-length // ROUND) * ROUND
+    """Return a length rounded up coarsely, by at most a quarter where it is not short."""
+    unit = max(FINEST, (1 << max(length - 1, 1).bit_length() - 1) // PARTS)
+    return -(-length // unit) * unit
 
 
-def pad_grids(grids: list[Grid], steps: int | None = None, samples: int | None = None) -> Grid:
+def pad_grids(grids: Sequence[Grid], steps: int | None = None, samples: int | None = None) -> Grid:
     """Stack grids of different lengths, shape (R, ...); the padding is steps of no length and copies of a sample."""
     steps = max(len(grid.step) for grid in grids) if steps is None else steps
     samples = max(len(grid.step_of) for grid in grids) if samples is None else samples
-
-    def lengthen(array: jax.Array, length: int) -> jax.Array:
-        values = np.asarray(array)
-        return jnp.asarray(np.concatenate([values, np.repeat(values[-1:], length - len(values), axis=0)]))
-
-    padded = []
-    for grid in grids:
-        extra = steps - len(grid.step)
-        padded.append(
-            Grid(
-                step=jnp.concatenate([grid.step, jnp.zeros(extra)]),
-                node=jax.tree.map(lambda x: lengthen(x, 2 * steps + 1), grid.node),
-                zero_order_hold=lengthen(grid.zero_order_hold, steps),
-                sample=jax.tree.map(lambda x: lengthen(x, samples), grid.sample),
-                step_of=lengthen(grid.step_of, samples),
-                fraction=lengthen(grid.fraction, samples),
-            )
+    padded = [
+        Grid(
+            step=np.concatenate([grid.step, np.zeros(steps - len(grid.step))]),
+            node=jax.tree.map(lambda x: lengthened(x, 2 * steps + 1), grid.node),
+            zero_order_hold=lengthened(grid.zero_order_hold, steps),
+            sample=jax.tree.map(lambda x: lengthened(x, samples), grid.sample),
+            step_of=lengthened(grid.step_of, samples),
+            fraction=lengthened(grid.fraction, samples),
+            unit_speed=grid.unit_speed,
         )
+        for grid in grids
+    ]
     return jax.tree.map(lambda *arrays: jnp.asarray(np.stack(arrays)), *padded)
+
+
+def lengthened(array: Traceable, length: int) -> Floats:
+    """Return an array with its last row repeated up to a length."""
+    values = np.asarray(array)
+    return np.concatenate([values, np.repeat(values[-1:], length - len(values), axis=0)])

@@ -13,7 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.inference.posterior import Posterior, Predictions
+from bayesid.inference.noise_changes import with_manoeuvres
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import PredictedReadings
 from bayesid.inference.simulated_recordings import simulate_recordings
 from bayesid.recording.joint_motion import Excitation
 from bayesid.robot.body_prior import BodyPrior
@@ -75,25 +77,25 @@ class Information:
         Of the base's quantities.
     names : tuple of str
         Of the n unknowns.
-    truth : Predictions
+    truth : PredictedReadings
         What the sensors read.
     """
 
     by_sensor: Mapping[Kind, Floats]
     slope: Floats
     names: tuple[str, ...]
-    truth: Predictions
+    truth: PredictedReadings
 
     @classmethod
     def of(cls, motion: Excitation, step: float = STEP) -> Information:
         """Compute the information of a manoeuvre."""
         model = wide_model()
         planned = Manoeuvre(blank(motion, KINDS), motion, attitude_sigma=STAR)
-        simulator = Posterior(model, [planned], step=step, flat_prior=True)
+        simulator = Posterior.of(model, [planned], step=step, flat_prior=True)
         z = np.zeros(simulator.size)
-        truth = simulator.predict(z)[0]
+        truth = predicted_readings(simulator, z)[0]
         recording = simulate_recordings(simulator, z=z)[0]
-        posterior = simulator.with_manoeuvres([replace(planned, recording=recording)])
+        posterior = with_manoeuvres(simulator, [replace(planned, recording=recording)])
         jacobian = posterior.jacobian(z).reshape(-1, len(KINDS), 3, posterior.size)
         blocks = {
             kind: np.einsum("tai,taj->ij", jacobian[:, index], jacobian[:, index]) for index, kind in enumerate(KINDS)

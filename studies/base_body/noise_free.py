@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid.inference.mode import fit
+from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.simulated_recordings import simulate_recordings
 from bayesid.recording.joint_motion import Excitation
@@ -86,14 +87,14 @@ def guess_model(robot: Robot | None = None, *, gradient: bool = True, rate_sigma
 def record(model: Model, motions: Sequence[Excitation], step: float = TRUTH_STEP) -> list[Recording]:
     """Simulate noise-free recordings of the true base with the integration step of the truth."""
     planned = [Manoeuvre(blank(motion, KINDS), motion) for motion in motions]
-    simulator = Posterior(replace(model, rate_sigma=0.0), planned, step=step)
+    simulator = Posterior.of(replace(model, rate_sigma=0.0), planned, step=step)
     return simulate_recordings(simulator, z=simulator.unknowns.coordinates([paper.body(paper.TRUTH)]))
 
 
 def identify_exact(posterior: Posterior) -> NoiseFree:
     """Identify the base by least squares alone, from the paper's initial guess."""
-    optimum = fit(posterior, posterior.initial_point())
-    estimate = mass_com_inertia(np.asarray(posterior.values(optimum.z).inertial))
+    optimum = fit(posterior, posterior.starting_point())
+    estimate = mass_com_inertia(np.asarray(posterior.unknowns.values_at(optimum.z).inertial))
     slope = physical_slope(posterior, optimum.z)
     recording = posterior.manoeuvres[0].recording
     return NoiseFree(
@@ -112,18 +113,18 @@ def run_noise_free(*, full: bool) -> dict[str, NoiseFree]:
     motions = [excitation(q) for q in (paper.EXCITATION, POOR)]
     model = guess_model()
     well, poor = (Manoeuvre(own, motion) for own, motion in zip(record(model, motions), motions, strict=True))
-    posterior = Posterior(model, [well], step=STEP, flat_prior=True)
-    blind = Posterior(guess_model(gradient=False), [well], step=STEP, flat_prior=True)
+    posterior = Posterior.of(model, [well], step=STEP, flat_prior=True)
+    blind = Posterior.of(guess_model(gradient=False), [well], step=STEP, flat_prior=True)
     cases = {
         "well": identify_exact(posterior),
-        "poor": identify_exact(posterior.with_manoeuvres([poor])),
+        "poor": identify_exact(with_manoeuvres(posterior, [poor])),
         "well, no gradient": identify_exact(blind),
     }
     if full:
-        cases["poor, no gradient"] = identify_exact(blind.with_manoeuvres([poor]))
+        cases["poor, no gradient"] = identify_exact(with_manoeuvres(blind, [poor]))
         free = guess_model(rate_sigma=0.1)
-        cases["well, rate unknown"] = identify_exact(Posterior(free, [well], step=STEP, flat_prior=True))
+        cases["well, rate unknown"] = identify_exact(Posterior.of(free, [well], step=STEP, flat_prior=True))
         heavy = guess_model(heavy_arm(ship()))
         own = Manoeuvre(record(heavy, motions[:1])[0], motions[0])
-        cases["well, arm 1/7"] = identify_exact(Posterior(heavy, [own], step=STEP, flat_prior=True))
+        cases["well, arm 1/7"] = identify_exact(Posterior.of(heavy, [own], step=STEP, flat_prior=True))
     return cases

@@ -19,7 +19,7 @@ DIFFERENCE = 1e-5
 def physical_slope(posterior: Posterior, z: Floats) -> Floats:
     """Return the derivative of the first body's quantities, in the order of `BODY_QUANTITIES`, shape (10, size)."""
     shifts = DIFFERENCE * np.eye(posterior.size)
-    inertial = posterior.values_of(np.concatenate([z + shifts, z - shifts])).inertial[:, :10]
+    inertial = posterior.unknowns.values_of(np.concatenate([z + shifts, z - shifts])).inertial[:, :10]
     ahead, behind = np.split(mass_com_inertia(np.asarray(inertial)), 2)
     return (ahead - behind).T / (2.0 * DIFFERENCE)
 

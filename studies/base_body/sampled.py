@@ -75,7 +75,7 @@ def _simulated(seed: int) -> Manoeuvre:
     """Return the same manoeuvre with what the true robot's sensors read while its joints moved exactly."""
     planned = _planned(seed)
     exact = replace(planned, motion=excitation(paper.EXCITATION))
-    simulator = Posterior(_model(ACCEL, paper.body(paper.TRUTH), 0.0), [exact], step=0.5)
+    simulator = Posterior.of(_model(ACCEL, paper.body(paper.TRUTH), 0.0), [exact], step=0.5)
     recording = simulate_recordings(simulator, np.random.default_rng(seed + 1), np.zeros(simulator.size))[0]
     return replace(planned, recording=recording)
 
@@ -92,11 +92,11 @@ def sample_posterior(arm_spread: float, seed: int, effective_samples: float = 10
         Uncertainty of the links in log-Cholesky coordinates; 0 for an exactly known arm.
     """
     manoeuvre, guess = _simulated(seed), paper.body(paper.GUESS)
-    exact = Posterior(_model(ACCEL, guess, 0.0), [manoeuvre])
+    exact = Posterior.of(_model(ACCEL, guess, 0.0), [manoeuvre])
     start = fit(exact, np.zeros(exact.size)).z
     posterior = exact
     if arm_spread > 0.0:
-        posterior = Posterior(_model(ACCEL, guess, arm_spread), [manoeuvre])
+        posterior = Posterior.of(_model(ACCEL, guess, arm_spread), [manoeuvre])
         links = np.zeros(posterior.size - exact.size)
         start = np.concatenate([start[:10], links, start[10:]])
     draws, weights, walkers = np.random.SeedSequence(seed).spawn(3)
@@ -113,7 +113,7 @@ def encoder_grades(grades: Sequence[float], seed: int) -> list[Floats]:
     """Relative sd of the ten quantities for accelerometers of these grades when the joints' motion is measured too."""
     planned, rows = _planned(seed), []
     for grade in grades:
-        posterior = Posterior(_model(grade, paper.body(paper.TRUTH), 0.0), [planned], step=1.0)
+        posterior = Posterior.of(_model(grade, paper.body(paper.TRUTH), 0.0), [planned], step=1.0)
         z = np.zeros(posterior.size)
         jacobian = posterior.jacobian(z)
         covariance = np.linalg.inv(jacobian.T @ jacobian)

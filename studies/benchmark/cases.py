@@ -92,4 +92,4 @@ def posterior_of(robot: Robot, *, recordings: int = 1, interval: float = 0.5, en
             manoeuvres.append(Manoeuvre(recording, measured))
         else:
             manoeuvres.append(Manoeuvre(recording, motion))
-    return Posterior(model, manoeuvres)
+    return Posterior.of(model, manoeuvres)

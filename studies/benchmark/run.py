@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bayesid import Robot
+from bayesid.inference.predicted_readings import integration_error_at
 from studies.benchmark.cases import chain, posterior_of
 from studies.benchmark.sampling import Sampling, compare_moves
 from studies.benchmark.timing import Rival, rivals, seconds_per_evaluation
@@ -50,7 +51,7 @@ def run(*, full: bool = False, seed: int = 0) -> Benchmark:
     repeats = 20 if full else 5
     return Benchmark(
         evaluation=seconds_per_evaluation(single, repeats),
-        error=single.integration_error(single.initial_point()),
+        error=integration_error_at(single, single.starting_point()),
         rivals=rivals(robot, single),
         links={count: seconds_per_evaluation(posterior_of(chain(count)), repeats) for count in (6, 20, 60)},
         samples={

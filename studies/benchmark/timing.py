@@ -44,7 +44,7 @@ def best_of(function: Callable[[], Any], repeats: int) -> float:
 
 def seconds_per_evaluation(posterior: Posterior, repeats: int = 10) -> float:
     """Return the time of one evaluation of the log density, simulation and sensors included [s]."""
-    z = posterior.initial_point() + 0.01 * np.random.default_rng(0).normal(size=(BATCH, posterior.size))
+    z = posterior.starting_point() + 0.01 * np.random.default_rng(0).normal(size=(BATCH, posterior.size))
     return best_of(lambda: posterior.log_density(z), repeats) / BATCH
 
 
@@ -58,7 +58,7 @@ def rivals(robot: Robot, posterior: Posterior, repeats: int = 2) -> list[Rival]:
     """
     reference, truth = _independent()
     motion = excitation(len(robot.joints), 0)
-    samples = posterior.sample_times(0)
+    samples = posterior.data.times(0)
     with tempfile.TemporaryDirectory() as folder:
         urdf = Path(folder) / "robot.urdf"
         robot.write_urdf(urdf)

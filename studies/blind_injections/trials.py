@@ -18,6 +18,7 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Frame, diagnose
 from bayesid.diagnosis.candidate_table import detection_power, effect_amplitude
 from bayesid.diagnosis.perturbed_fit import Fit
+from bayesid.inference.noise_changes import with_manoeuvres
 from tests import hidden, mujoco_truth
 
 __all__ = ["Plan", "Trial", "make", "plan", "read", "run"]
@@ -224,7 +225,7 @@ def _visible(case: hidden.Case) -> bool:
 def _limits(result: Diagnosis, case: hidden.Case, weaker: Study) -> tuple[float, float | None, float | None]:
     """Signal-to-noise ratio of what is hidden and theory's limits, from the same noise with less hidden."""
     fit, engine = result.before.fit, result.before.engine
-    like = fit.posterior.with_manoeuvres(load_manoeuvres(weaker, fit.posterior.model.robot))
+    like = with_manoeuvres(fit.posterior, load_manoeuvres(weaker, fit.posterior.model.robot))
     other = like.data._replace(weights=fit.posterior.data.weights, start=fit.posterior.data.start)
     change = (engine.residual(fit.z, fit.posterior.data) - engine.residual(fit.z, other)) / (1.0 - WEAKER)
     if case.status == "unknown":

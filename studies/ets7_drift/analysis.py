@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from bayesid import Kind, Model, Posterior, Sensor, White
 from bayesid.diagnosis import Diagnosis, Hypothesis, diagnose
+from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.report.diagnosis_tables import amplitudes_of
 from bayesid.simulation.effects import create
 from studies.ets7_drift.world import ATTITUDE_SIGMA, World, model_of
@@ -179,5 +180,5 @@ def _angles(turned: Rotation) -> Floats:
 def _simulated(model: Model, found: Diagnosis, z: Floats) -> list[Floats]:
     """Simulate the attitude of all recordings."""
     sensors = (*model.sensors, Sensor(Kind.ATTITUDE, White(ATTITUDE_SIGMA)))
-    posterior = Posterior(replace(model, sensors=sensors), found.posterior.manoeuvres)
-    return [np.asarray(predicted.attitude) for predicted in posterior.predict(z)]
+    posterior = Posterior.of(replace(model, sensors=sensors), found.posterior.manoeuvres)
+    return [np.asarray(predicted.attitude) for predicted in predicted_readings(posterior, z)]

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bayesid import Posterior
 from bayesid.inference import maximise
+from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.base_body.physical import physical_sd, physical_slope
@@ -71,16 +72,16 @@ def check(motion: Motion, duration: float, noises: int, seed: int, progress: Cal
     """
     run = fly(motion, duration, RATE_AT_START)
     rng = np.random.default_rng(seed)
-    posterior = Posterior(model_of(), [record(run, "flight", rng)])
-    z = posterior.initial_point()
-    jacobian = posterior.at(z).jacobian(z)
+    posterior = Posterior.of(model_of(), [record(run, "flight", rng)])
+    z = posterior.starting_point()
+    jacobian = relinearised(posterior, z).jacobian(z)
     predicted = physical_sd(physical_slope(posterior, z), np.linalg.inv(jacobian.T @ jacobian))
-    truth = np.asarray(mass_com_inertia(np.asarray(posterior.values(z).inertial)))
+    truth = np.asarray(mass_com_inertia(np.asarray(posterior.unknowns.values_at(z).inertial)))
     estimates, chi2 = [], []
     for number in range(noises):
-        own = posterior.with_manoeuvres([record(run, "flight", rng)])
+        own = with_manoeuvres(posterior, [record(run, "flight", rng)])
         refined, optimum = maximise(own, rng)
-        estimates.append(np.asarray(mass_com_inertia(np.asarray(refined.values(optimum.z).inertial))))
+        estimates.append(np.asarray(mass_com_inertia(np.asarray(refined.unknowns.values_at(optimum.z).inertial))))
         chi2.append(optimum.chi2 / refined.samples)
         progress(f"noise {number + 1}")
     return Check(truth, predicted, np.array(estimates), np.array(chi2))

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from bayesid import Kind, Sensor, White
 from bayesid.design import planned_manoeuvre, planned_posterior
 from bayesid.design.designed import sample_times
+from bayesid.inference.noise_changes import with_sensors
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.inertial_parameters import mass_com_inertia
@@ -116,7 +117,7 @@ class Knowledge:
         if (grade.rate, accel) not in self._fisher:
             sensors = (Sensor(Kind.RATE, grade.rate), Sensor(Kind.ACCEL, White(accel), position=POINT))
             z = np.zeros(self.posterior.size)
-            jacobian = self.posterior.with_sensors(sensors, z).jacobian(z)[: -self.posterior.size]
+            jacobian = with_sensors(self.posterior, sensors, z).jacobian(z)[: -self.posterior.size]
             self._fisher[grade.rate, accel] = jacobian.T @ jacobian
         return self._fisher[grade.rate, accel]
 
@@ -128,7 +129,7 @@ class Knowledge:
     @cached_property
     def truth(self) -> Floats:
         """The base's quantities, shape (10,)."""
-        inertial = self.posterior.values(np.zeros(self.posterior.size)).inertial[:10]
+        inertial = self.posterior.unknowns.values_at(np.zeros(self.posterior.size)).inertial[:10]
         return np.asarray(mass_com_inertia(np.asarray(inertial)))
 
 

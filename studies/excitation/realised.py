@@ -71,12 +71,12 @@ def realise(
     offset: Floats = np.zeros(10)
     for index, own in enumerate(seeds):
         rng = np.random.default_rng(own)
-        posterior = Posterior(item.posterior.model, [recorded(run, rng)], step=item.posterior.step, like=item.posterior)
+        posterior = Posterior.of(item.posterior.model, [recorded(run, rng)], step=item.posterior.step)
         if index == 0:
             result = identify(posterior, seed, effective_samples=effective_samples)
             sampled, offset = result.bodies[BASE].sd, result.bodies[BASE].mean - truth
         _, optimum = maximise(posterior, rng, np.zeros(posterior.size))
-        errors.append(mass_com_inertia(posterior.inertials(optimum.z)[0].vector) - truth)
+        errors.append(mass_com_inertia(posterior.unknowns.inertials(optimum.z)[0].vector) - truth)
         if index % 50 == 49:
             progress(f"{item.name}: {index + 1} of {repeats} recordings identified")
     every = np.array(errors)

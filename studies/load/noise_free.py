@@ -94,14 +94,14 @@ def iterate(
         plan = plan_recording(present.plan.family.motion(best), known.robot, time, f"iteration {number}")
         recording = spacecraft.execute(plan)
         motion = PlannedMotion(plan, [joint.name for joint in known.robot.joints])
-        posterior = Posterior(known, [Manoeuvre(recording, motion)], step=STEP, flat_prior=True, like=posterior)
+        posterior = Posterior.of(known, [Manoeuvre(recording, motion)], step=STEP, flat_prior=True)
         optimum = fit(posterior, z)
         z = optimum.z
         found.append(
             Iteration(
                 parameters=best,
                 recording=recording,
-                estimate=mass_com_inertia(np.asarray(posterior.values(z).inertial)),
+                estimate=mass_com_inertia(np.asarray(posterior.unknowns.values_at(z).inertial)),
                 misfit=float(np.sqrt(optimum.chi2 / posterior.samples)),
                 excursion=np.abs(present.trajectory(best).excursion).max(axis=0),
             )

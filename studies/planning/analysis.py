@@ -84,7 +84,7 @@ def analyse(
     predictor = predictor_of(before, Swing(START, START, duration))
     first = flight_of(plan(predictor, before, target, duration), target, duration)
     progress("identifying")
-    result = identify(Posterior(before, [measure(seed)]), seed, effective_samples=effective_samples)
+    result = identify(Posterior.of(before, [measure(seed)]), seed, effective_samples=effective_samples)
     after = identified(before, result)
     progress("planning again")
     again_predictor = predictor_of(after, Swing(START, START, duration))

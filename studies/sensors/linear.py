@@ -44,7 +44,7 @@ def raw_posterior(flight: Flight, moved: Motion, *, gradient: bool = True) -> Po
     """Return a posterior without prior whose residuals are in SI units, by giving all sensors a sigma of one."""
     recording = recording_of(flight.time, flight.rate, flight.accel)
     model = model_of(Noise(1.0, 1.0, 0.0), gradient=gradient)
-    return Posterior(model, [Manoeuvre(recording, moved)], step=STEP, flat_prior=True)
+    return Posterior.of(model, [Manoeuvre(recording, moved)], step=STEP, flat_prior=True)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 
 from bayesid import Manoeuvre, Posterior
 from bayesid.inference import maximise
+from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.robot.joint_state import JointState
 from studies.base_body import paper
@@ -95,7 +96,7 @@ def _ours(draws: Draws, noise: Noise, count: int) -> Spread:
     model, first, errors, stated, chi2 = model_of(noise, biased=False), None, [], [], []
     for index in range(count):
         manoeuvre = Manoeuvre(draws.recording(noise, index), draws.measured_motion(noise, index))
-        posterior = Posterior(model, [manoeuvre], step=STEP, flat_prior=True, like=first)
+        posterior = Posterior.of(model, [manoeuvre], step=STEP, flat_prior=True)
         first = first or posterior
         refined, optimum = maximise(posterior, np.random.default_rng(index), np.zeros(posterior.size))
         errors.append(_quantities(refined, optimum.z) - paper.TRUTH)
@@ -114,7 +115,7 @@ def _paper(raw: Posterior, draws: Draws, noise: Noise, count: int) -> Spread:
             for family in ("rate", "accel")
         )
         joints = SampledMotion(flown + draws.joints(PIECES, noise)[index])
-        posterior = raw.with_manoeuvres([Manoeuvre(recording_of(time, rate, accel), joints)])
+        posterior = with_manoeuvres(raw, [Manoeuvre(recording_of(time, rate, accel), joints)])
         residual, jacobian = _weighted(posterior, weight)
         solution = least_squares(residual, np.zeros(BODY), jacobian, method="lm", x_scale="jac")
         slopes = jacobian(solution.x)
@@ -142,4 +143,4 @@ def _weighted(posterior: Posterior, weight: Floats) -> tuple[Callable[[Floats], 
 
 
 def _quantities(posterior: Posterior, z: Floats) -> Floats:
-    return np.asarray(mass_com_inertia(np.asarray(posterior.values(z).inertial)))
+    return np.asarray(mass_com_inertia(np.asarray(posterior.unknowns.values_at(z).inertial)))

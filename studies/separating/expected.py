@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from bayesid import Manoeuvre, Model, Recording
 from bayesid.design import planned_posterior
 from bayesid.design.designed import sample_times
+from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.simulated_recordings import blank_channels
 from bayesid.recording.joint_motion import Motion
@@ -73,7 +74,7 @@ class Linearised:
         blank = Recording("manoeuvre", None, time, blank_channels(model.sensors, len(time)))
         posterior = planned_posterior(model, [Manoeuvre(blank, motion)], like)
         z = drifting(model, posterior.unknowns.names)
-        jacobian = posterior.at(z).jacobian(z)[: -posterior.size]
+        jacobian = relinearised(posterior, z).jacobian(z)[: -posterior.size]
         return cls(jacobian.T @ jacobian, posterior.unknowns.names), posterior
 
     def with_another(self, other: Linearised) -> Linearised:

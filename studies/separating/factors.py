@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bayesid import Manoeuvre, Posterior
 from bayesid.inference import maximise
 from bayesid.inference.importance import choose_parameterisation, importance_sample
+from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.recording.joint_motion import Motion
 from studies.ets7_drift.world import WHEEL, simulator
 from studies.ets7_limits.truth import fly, record
@@ -69,8 +70,8 @@ class Rivalry:
         """Return the posterior of the model with one rival, or with neither where the label is empty."""
         like = self.known.get((label, len(manoeuvres)))
         if like is not None:
-            return like.with_manoeuvres(manoeuvres)
-        self.known[label, len(manoeuvres)] = Posterior(rival_model([label]), manoeuvres)
+            return with_manoeuvres(like, manoeuvres)
+        self.known[label, len(manoeuvres)] = Posterior.of(rival_model([label]), manoeuvres)
         return self.known[label, len(manoeuvres)]
 
     def log_evidence(self, label: str, manoeuvres: Sequence[Manoeuvre], rng: np.random.Generator) -> float:

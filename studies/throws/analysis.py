@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from bayesid import Manoeuvre, MeasuredMotion, Posterior
+from bayesid.inference.noise_changes import leaving_out, with_manoeuvres
 from studies.throws.bodies import object_moments, tensors, truth_sd, wheel_inertia
 from studies.throws.data import BODIES, Timing, Truth, read_throws
 from studies.throws.effects import SmoothTorque
@@ -161,7 +162,7 @@ def prepare(folder: Path, timing: Timing, count: int | None, like: Posterior | N
         start = guess(recordings, rough(body))
         for recording in recordings:
             manoeuvre = [Manoeuvre(recording, MeasuredMotion.from_recording(recording, model.robot))]
-            posterior = Posterior(model, manoeuvre, step=STEP) if like is None else like.with_manoeuvres(manoeuvre)
+            posterior = Posterior.of(model, manoeuvre, step=STEP) if like is None else with_manoeuvres(like, manoeuvre)
             like = posterior
             z = posterior.unknowns.coordinates([start], recording.vector("rate")[1][:1])
             throws.append(Throw(body, posterior, z, np.ones(len(z)), np.ones(6)))
@@ -184,7 +185,7 @@ def analyse(
     posteriors = {throw.body: throw.posterior for throw in throws}
     wheel, moments = _bodies(posteriors, joint, joint.value[None], truth)
     wheel_draws, draws = _bodies(posteriors, joint, joint.draw(DRAWS, rng), truth)
-    wheel_left, left = _bodies(posteriors, joint, np.stack([joint.without(i) for i in range(len(throws))]), truth)
+    wheel_left, left = _bodies(posteriors, joint, np.stack([leaving_out(joint, i) for i in range(len(throws))]), truth)
     groups = [throw.body for throw in throws]
     results = {}
     for body in OBJECTS:
@@ -214,7 +215,7 @@ def analyse(
         drag={body: _shared_effect(joint, body, "air-drag") for body in BODIES},
         chi2={body: _chi2(joint, body) for body in BODIES},
         torque={body: _torque(joint, body) for body in BODIES},
-        torque_time=_TIMES * (throws[0].posterior.sample_times(0)[-1]),
+        torque_time=_TIMES * (throws[0].posterior.data.times(0)[-1]),
         com={b: tensors(posteriors[b], joint.body_coordinates(b, joint.value[None])).com[0] for b in BODIES},
         converged=joint.converged,
     )
@@ -285,7 +286,9 @@ def _calibration(joint: Joint, posterior: Posterior) -> dict[str, tuple[float, f
 
 def _shared_effect(joint: Joint, body: str, label: str) -> Floats:
     throw = next(throw for throw in joint.throws if throw.body == body)
-    for effect, values in zip(throw.posterior.model.effects, throw.posterior.values(throw.z).effects, strict=True):
+    for effect, values in zip(
+        throw.posterior.model.effects, throw.posterior.unknowns.values_at(throw.z).effects, strict=True
+    ):
         if effect.label == label:
             return np.asarray(values)
     return np.zeros(3)
@@ -307,7 +310,9 @@ def _torque(joint: Joint, body: str) -> Floats:
     for throw in joint.throws:
         if throw.body != body:
             continue
-        for effect, values in zip(throw.posterior.model.effects, throw.posterior.values(throw.z).effects, strict=True):
+        for effect, values in zip(
+            throw.posterior.model.effects, throw.posterior.unknowns.values_at(throw.z).effects, strict=True
+        ):
             if isinstance(effect, SmoothTorque):
                 time = _TIMES * effect.spacing * (effect.knots - 1)
                 square += (np.asarray(effect.torque(np.asarray(values)[0], time)) ** 2).mean(axis=1)

@@ -65,7 +65,7 @@ def sample_jointly(folder: Path, body: str, settings: Settings, timing: Timing, 
     manoeuvres = [
         Manoeuvre(recording, MeasuredMotion.from_recording(recording, model.robot)) for recording in recordings
     ]
-    posterior = Posterior(model, manoeuvres, step=STEP)
+    posterior = Posterior.of(model, manoeuvres, step=STEP)
     found = identify(posterior, seed, effective_samples=1000.0, max_steps=MAX_STEPS)
     draws = found.chains.flat
     rng = np.random.default_rng(seed)

@@ -13,6 +13,7 @@ from bayesid import BodyPrior, Manoeuvre, MeasuredMotion, Model, Posterior, Reco
 from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, candidates, diagnose
 from bayesid.diagnosis.diagnosis_run import extended_posterior, extended_start
 from bayesid.inference.mode import fit
+from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.simulation.effects import Effect
 from studies.throws.bodies import Tensor, object_moments, tensors, wheel_inertia
 from studies.throws.data import BODIES, Timing, Truth, read_throws
@@ -156,17 +157,17 @@ def predict(model: Model, taken: Hypothesis, training: Sequence[Manoeuvre], test
     """Predict throws by the plain model and by a hypothesis."""
     extended = extended_posterior(taken)
     starts = {
-        "rigid": (Posterior(model, training), None),
-        "extended": (Posterior(extended.model, training), extended_start(taken, extended)),
+        "rigid": (Posterior.of(model, training), None),
+        "extended": (Posterior.of(extended.model, training), extended_start(taken, extended)),
     }
     score: dict[str, list[float]] = {}
     chi2: dict[str, list[float]] = {}
     for name, (posterior, start) in starts.items():
-        mode = fit(posterior, posterior.initial_point() if start is None else start)
+        mode = fit(posterior, posterior.starting_point() if start is None else start)
         whole: Posterior | None = None
         for throw in testing:
             manoeuvres = [*training, throw]
-            whole = Posterior(posterior.model, manoeuvres) if whole is None else whole.with_manoeuvres(manoeuvres)
+            whole = Posterior.of(posterior.model, manoeuvres) if whole is None else with_manoeuvres(whole, manoeuvres)
             z = _carried(posterior, mode.z, whole)
             z, residual = _alone(whole, z)
             chi2.setdefault(name, []).append(float((residual**2).sum()) / whole.whitenings[-1].samples)
@@ -182,7 +183,7 @@ def predict(model: Model, taken: Hypothesis, training: Sequence[Manoeuvre], test
 def _carried(posterior: Posterior, z: Floats, whole: Posterior) -> Floats:
     """Carry a mode over to a posterior with more throws."""
     known = dict(zip(posterior.unknowns.names, z, strict=True))
-    start = whole.initial_point()
+    start = whole.starting_point()
     return np.array([known.get(name, value) for name, value in zip(whole.unknowns.names, start, strict=True)])
 
 
@@ -255,13 +256,13 @@ def compare(folder: Path, studies: Sequence[Study], count: int, truth: Truth) ->
         recordings = read_throws(folder, body, Timing(), count)
         model = plain_model(body, recordings)
         throws = _manoeuvres(model, recordings)
-        rigid = Posterior(model, throws)
-        mode = fit(rigid, rigid.initial_point())
+        rigid = Posterior.of(model, throws)
+        mode = fit(rigid, rigid.starting_point())
         found["rigid"][body] = tensors(rigid, mode.z[None, :10])
         longer = model
         for effect in taken[body].fit.effects:
             longer = longer.extend(effect)
-        extended = Posterior(longer, throws)
+        extended = Posterior.of(longer, throws)
         mode = fit(extended, _carried(rigid, mode.z, extended))
         found["extended"][body] = tensors(extended, mode.z[None, :10])
     wheel, errors = {}, {}

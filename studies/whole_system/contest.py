@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from bayesid import Posterior, Robot
 from bayesid.inference.mode import fit
+from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from studies.whole_system.linear import regress
 from studies.whole_system.sampled import true_point
 from studies.whole_system.setting import BASE, LOAD, bodies, model_of
@@ -60,13 +61,13 @@ def contest(
         for number, manoeuvre in enumerate(manoeuvres):
             progress(f"integral method, {suffix}: recording {number + 1} of {count}")
             posterior = (
-                Posterior(model_of(drawings, torques=torques), [manoeuvre])
+                Posterior.of(model_of(drawings, torques=torques), [manoeuvre])
                 if posterior is None
-                else posterior.with_manoeuvres([manoeuvre])
+                else with_manoeuvres(posterior, [manoeuvre])
             )
             z = true_point(posterior, truth, START_RATE)
-            optimum = fit(posterior.at(z), z)
-            masses = np.array([body.mass for body in posterior.inertials(optimum.z)])
+            optimum = fit(relinearised(posterior, z), z)
+            masses = np.array([body.mass for body in posterior.unknowns.inertials(optimum.z)])
             spread = [prior.spread for prior in posterior.model.priors]
             slope = np.zeros((4, posterior.size))
             slope[:, : 10 * len(names) : 10] = gather * (2.0 * np.array(spread) * masses)

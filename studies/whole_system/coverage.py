@@ -11,6 +11,7 @@ from scipy import stats
 
 from bayesid import Posterior, Robot
 from bayesid.inference.mode import fit
+from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.robot.body_prior import draw_inertial
 from studies.whole_system.sampled import distance, true_point
@@ -64,15 +65,17 @@ def covered(
         run = fly(truth, int(rng.integers(1000)), duration=duration, joints=tuple(range(len(drawings.joints))))
         manoeuvre = record(run, truth, "drawn", rng)
         if posterior is None:
-            posterior = Posterior(model_of(drawings, torques=torques), [manoeuvre])
-        posterior = posterior.with_manoeuvres([manoeuvre])
+            posterior = Posterior.of(model_of(drawings, torques=torques), [manoeuvre])
+        posterior = with_manoeuvres(posterior, [manoeuvre])
         z = true_point(posterior, truth, START_RATE)
-        refined = posterior.at(z)
+        refined = relinearised(posterior, z)
         optimum = fit(refined, z)
         proposal = LinearParameterisation(refined).proposal(optimum)
         covariance = proposal.factor @ proposal.factor.T
         own = slice(0, 10 * len(posterior.model.priors))  # not the initial rate: errors of joint speed enter it
-        distances.append(distance(posterior.to_linear(z[None])[0, own], proposal.mean[own], covariance[own, own]))
+        distances.append(
+            distance(posterior.unknowns.to_linear(z[None])[0, own], proposal.mean[own], covariance[own, own])
+        )
         scores.append(_mass_scores(posterior, proposal.mean, covariance, truth))
     assert posterior is not None
     return Coverage(np.array(distances), np.array(scores), 10 * len(posterior.model.priors))
@@ -85,7 +88,7 @@ def _mass_scores(posterior: Posterior, mean: Floats, covariance: Floats, truth: 
     for members in ((BASE,), (LOAD,), names):
 
         def total(y: Floats, members: tuple[str, ...] = members) -> float:
-            bodies_there = posterior.inertials(posterior.from_linear(y[None])[0])
+            bodies_there = posterior.unknowns.inertials(posterior.unknowns.from_linear(y[None])[0])
             return sum(b.mass for name, b in zip(names, bodies_there, strict=True) if name in members)
 
         here, slope = total(mean), np.zeros(len(mean))

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, Posterior, Robot
+from bayesid.inference.noise_changes import with_manoeuvres
 from studies.whole_system.setting import bodies, model_of, spreads
 
 __all__ = ["Information", "Knowledge", "Sensors", "informed"]
@@ -116,10 +117,10 @@ def informed(truth: Robot, manoeuvres: Mapping[str, Manoeuvre]) -> dict[str, Inf
     posterior: Posterior | None = None
     for name, manoeuvre in manoeuvres.items():
         posterior = (
-            Posterior(model_of(truth, torques=True), [manoeuvre])
+            Posterior.of(model_of(truth, torques=True), [manoeuvre])
             if posterior is None
-            else posterior.with_manoeuvres([manoeuvre])  # shares what is compiled
+            else with_manoeuvres(posterior, [manoeuvre])  # shares what is compiled
         )
-        jacobian = posterior.jacobian(posterior.initial_point())[: -posterior.size]
+        jacobian = posterior.jacobian(posterior.starting_point())[: -posterior.size]
         found[name] = Information(truth, jacobian.reshape(-1, posterior.residual_shape[2], posterior.size))
     return found

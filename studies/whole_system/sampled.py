@@ -56,7 +56,7 @@ def sampled(
     progress: Callable[[str], None],
 ) -> Sampled:
     """Identify all bodies; ``rate`` is the true initial rate of the base, base axes [rad/s]."""
-    posterior = Posterior(model_of(drawings, torques=torques), [manoeuvre])
+    posterior = Posterior.of(model_of(drawings, torques=torques), [manoeuvre])
 
     def tell(state: Progress) -> None:
         progress(
@@ -66,8 +66,8 @@ def sampled(
     result = identify(posterior, seed, effective_samples=effective_samples, progress=tell)
     z = true_point(posterior, truth, rate)
     count = 10 * len(posterior.model.priors)
-    linear = posterior.to_linear(result.chains.flat)[:, :count]
-    square = distance(posterior.to_linear(z[None])[0, :count], linear.mean(axis=0), np.cov(linear.T))
+    linear = posterior.unknowns.to_linear(result.chains.flat)[:, :count]
+    square = distance(posterior.unknowns.to_linear(z[None])[0, :count], linear.mean(axis=0), np.cov(linear.T))
     described = {name: mass_com_inertia(truth.link(name).inertial.vector) for name in bodies(truth)}
     return Sampled(title, result, square, float(stats.chi2.sf(square, count)), described)
 

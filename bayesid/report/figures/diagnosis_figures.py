@@ -45,11 +45,12 @@ def residual_histories(sides: Sequence[Residuals], index: int) -> Figure:
     figure = wide_figure(0.45 + 1.2 * len(kinds))
     panels = figure.subplots(len(kinds), 3, squeeze=False, sharex=True)
     for slot, kind in enumerate(kinds):
+        columns = sides[0].posterior.model.channels.of(kind)
         for axis in range(3):
             axes, reach = panels[slot, axis], 4.5
             axes.axhspan(-2.0, 2.0, color="#e8e8e8", linewidth=0.0)
             for side, colour, label in zip(sides, (BEFORE, AFTER), ("before", "after"), strict=False):
-                time, value = side.channel(index, 3 * slot + axis)
+                time, value = side.channel(index, columns.start + axis)
                 axes.plot(time, value, ".", color=colour, markersize=1.2, alpha=0.5)
                 axes.plot(*_running_mean(time, value), color=colour, linewidth=1.0, label=_label(sides, label))
                 reach = max(reach, 1.1 * float(np.abs(value).max(initial=0.0)))
@@ -83,9 +84,10 @@ def residual_spectra(sides: Sequence[Residuals]) -> Figure:
     figure = wide_figure(0.5 + 1.45 * len(kinds))
     panels = figure.subplots(len(kinds), 3, squeeze=False)
     for slot, kind in enumerate(kinds):
+        columns = sides[0].posterior.model.channels.of(kind)
         for axis in range(3):
             axes = panels[slot, axis]
-            _draw_spectra(axes, sides, 3 * slot + axis)
+            _draw_spectra(axes, sides, columns.start + axis)
             axes.set_title(f"{SENSOR_TITLES[kind.value]} {'xyz'[axis]}")
             axes.set_xlabel("frequency [Hz]")
         panels[slot, 0].set_ylabel("power [σ² per bin]")

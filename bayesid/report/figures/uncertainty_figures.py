@@ -162,7 +162,7 @@ def prior_to_posterior(result: Identification, seed: int = 0) -> Figure:
 def widths(result: Identification, seed: int = 0) -> tuple[dict[str, float], dict[str, float]]:
     """Half the central 68 % range of every reported quantity, in the prior and in the posterior."""
     z = np.random.default_rng(seed).normal(size=(PRIOR_DRAWS, result.posterior.size))
-    values = result.posterior.values_of(z)
+    values = result.posterior.unknowns.values_of(z)
     prior = _half_ranges(bodies_of(result.posterior, z))
     posterior = _half_ranges(result.bodies)
     for effect, draws in zip(result.posterior.model.effects, values.effects, strict=True):

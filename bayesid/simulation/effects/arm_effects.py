@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Self, cast
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 import pinocchio as pin
@@ -16,7 +15,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, namespace
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.composite_tables import composite_rows, link_table
-from bayesid.robot.inertial_parameters import LOG_CHOLESKY, InertialParameters, log_cholesky_vector, mass_com_inertia
+from bayesid.robot.inertial_parameters import LOG_CHOLESKY, mass_com_inertia, upper_cholesky, vector_from_factor
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import configuration, kinematics
 from bayesid.robot.robot import Robot
@@ -40,10 +39,12 @@ class _OnLink(Placed):
     """
 
     spread = 1.0
+    constant_names = ("factor", "vector")
 
     def __init__(self, place: str = "", spread: float | None = None) -> None:
         super().__init__(place)
-        self.nominal: InertialParameters | None = None
+        self.factor: Floats | None = None
+        self.vector: Floats | None = None
         width = self.spread if spread is None else spread
         self.parameters = tuple(Parameter(key, "1", width) for key in LOG_CHOLESKY)
 
@@ -56,7 +57,7 @@ class _OnLink(Placed):
                 remedy="Name the link with mass that it is fixed on",
             )
         changed = self.copied()
-        changed.nominal = nominal
+        changed.factor, changed.vector = upper_cholesky(nominal.pseudo_inertia), nominal.vector
         return changed
 
     @property
@@ -71,9 +72,8 @@ class _OnLink(Placed):
 
     def report(self, values: Array) -> Array:
         """Return the link less the nominal link."""
-        nominal = self._attached
-        described = jax.jit(mass_com_inertia)
-        return jnp.asarray(described(log_cholesky_vector(nominal, values)) - mass_com_inertia(nominal.vector))
+        factor, nominal = self._attached
+        return mass_com_inertia(vector_from_factor(factor, values)) - mass_com_inertia(nominal)
 
     def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
         """Return the link's own table."""
@@ -81,13 +81,15 @@ class _OnLink(Placed):
 
     def loads(self, values: Array) -> Array:
         """Return the change of the ten parameters."""
-        return log_cholesky_vector(self._attached, values) - jnp.asarray(self._attached.vector)
+        factor, nominal = self._attached
+        return vector_from_factor(factor, values) - nominal
 
     @property
-    def _attached(self) -> InertialParameters:
-        if self.nominal is None:
+    def _attached(self) -> tuple[Array, Array]:
+        """Factor of the nominal link's pseudo-inertia and its ten parameters."""
+        if self.factor is None or self.vector is None:
             raise InputError(f"effect {self.label!r} belongs to no model yet", remedy="Put it into a Model")
-        return self.nominal
+        return jnp.asarray(self.factor), jnp.asarray(self.vector)
 
 
 @register

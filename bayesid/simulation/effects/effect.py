@@ -7,6 +7,7 @@ are its own states. Vectors are in base axes unless said otherwise.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
@@ -17,7 +18,7 @@ from jax import Array
 from jax.scipy.special import erf
 
 from bayesid._io.errors import InputError
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Traceable
 
 if TYPE_CHECKING:
     from bayesid.recording.joint_motion import Motion
@@ -47,6 +48,14 @@ class Prior(Enum):
     LOG_NORMAL = "log-normal"  # mean is the median, sigma the standard deviation of the logarithm
     UNIFORM = "uniform"  # within sigma of the mean
 
+    def physical(self, mean: Array | float, sigma: Array | float, z: Array) -> Array:
+        """Return the physical value of a coordinate with a standard-normal prior."""
+        if self is Prior.LOG_NORMAL:
+            return mean * jnp.exp(sigma * z)
+        if self is Prior.UNIFORM:
+            return mean + sigma * erf(z / jnp.sqrt(2.0))
+        return mean + sigma * z
+
 
 class Quantity(NamedTuple):
     """A name and a unit."""
@@ -74,11 +83,7 @@ class Parameter(NamedTuple):
 
     def value(self, z: Array) -> Array:
         """Physical value of a coordinate with a standard-normal prior."""
-        if self.prior is Prior.LOG_NORMAL:
-            return self.mean * jnp.exp(self.sigma * z)
-        if self.prior is Prior.UNIFORM:
-            return self.mean + self.sigma * erf(z / jnp.sqrt(2.0))
-        return self.mean + self.sigma * z
+        return self.prior.physical(self.mean, self.sigma, z)
 
 
 class Composite(NamedTuple):
@@ -103,16 +108,16 @@ class Composite(NamedTuple):
 class Environment(NamedTuple):
     """What is known of an instant beforehand. Orbit vectors are in orbit axes, zero away from orbit."""
 
-    time: Array
-    zenith: Array
-    gradient: Array  # mu / r^3 [1/s2]
-    velocity: Array
-    sun: Array
-    argument_of_latitude: Array  # argument of latitude [rad]
-    north: Array  # direction of the Earth's north pole
-    wheel_momentum: Array  # recorded [N m s]
-    wheel_torque: Array  # its derivative
-    wrench: Array  # known force and torque about the base origin, base axes (6,)
+    time: Traceable
+    zenith: Traceable
+    gradient: Traceable  # mu / r^3 [1/s2]
+    velocity: Traceable
+    sun: Traceable
+    argument_of_latitude: Traceable  # argument of latitude [rad]
+    north: Traceable  # direction of the Earth's north pole
+    wheel_momentum: Traceable  # recorded [N m s]
+    wheel_torque: Traceable  # its derivative
+    wrench: Traceable  # known force and torque about the base origin, base axes (6,)
 
 
 class Instant(NamedTuple):
@@ -160,16 +165,26 @@ class Modes(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What the sensors read at their sample times: rate (T, 3), accel (T, 3), attitude quaternion (T, 4), time (T,).
+    """What the sensors read at their sample times (T,), sensor axes.
 
-    ``torque`` (T, n) has a column for every joint of the robot, or none where no torque is measured.
+    ``channels`` holds the readings (T, axes) of every declared sensor by the family of its channels, and
+    ``readings.rate`` is ``readings.channels["rate"]``; ``torque`` (T, n) has a column for every joint of the robot, or
+    none where no torque is measured.
     """
 
     time: Array
-    rate: Array
-    accel: Array
-    attitude: Array
+    channels: dict[str, Array]
     torque: Array
+
+    def __getattr__(self, family: str) -> Array:
+        """Return the readings of one sensor."""
+        if family.startswith("_") or family not in self.channels:
+            raise AttributeError(f"no sensor {family!r} is declared")
+        return self.channels[family]
+
+    def replace(self, **changed: Array) -> Readings:
+        """Return the readings with those of some sensors changed."""
+        return self._replace(channels={**self.channels, **changed})
 
 
 class Effect:
@@ -233,6 +248,22 @@ class Effect:
     def link(self) -> str | None:
         """Link that `table` is a table of; None where it changes others too, which joint torques do not follow."""
         return None
+
+    constant_names: ClassVar[tuple[str, ...]] = ()
+    """Attributes that hold numbers, or trees of arrays, which compiled code takes as arguments (`EffectKey`)."""
+
+    @property
+    def constants(self) -> tuple[Any, ...]:
+        """Values of the attributes in ``constant_names``."""
+        return tuple(getattr(self, name) for name in self.constant_names)
+
+    def bound(self, constants: tuple[Any, ...]) -> Self:
+        """Return the effect with other constants, which may be traced."""
+        if not self.constant_names:
+            return self
+        changed = copy.copy(self)
+        changed.__dict__.update(zip(self.constant_names, constants, strict=True))
+        return changed
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return angular momentum relative to the base and its derivative, as a free couple [N m s, N m]."""

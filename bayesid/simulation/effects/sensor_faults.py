@@ -47,7 +47,7 @@ class SensorFault(Effect):
     def read(self, values: Array, readings: Readings) -> Readings:
         """Apply the fault to the sensor."""
         key = self.sensor.value
-        return readings._replace(**{key: self.change(values, readings.time, getattr(readings, key))})
+        return readings.replace(**{key: self.change(values, readings.time, readings.channels[key])})
 
 
 class _Axes(SensorFault):

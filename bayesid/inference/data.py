@@ -1,0 +1,154 @@
+"""Recordings as a likelihood sees them: what was measured, the time grid, the whitening of the noise. Immutable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.compiled import Arrays
+from bayesid.inference.recorded_samples import RecordedSamples, Series
+from bayesid.inference.whitening import Whitening
+from bayesid.recording.actions import Actions
+from bayesid.simulation.dynamics import Grid
+from bayesid.simulation.effects.effect import Readings
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import Kind
+from bayesid.simulation.time_grid import build_grid, lengthened, pad_grids, rounded
+
+__all__ = ["Data", "attitudes_of", "grids_of", "stacked", "with_whitenings"]
+
+
+@dataclass(frozen=True)
+class Data:
+    """Everything that was recorded, with the noise it is believed to have.
+
+    Parameters
+    ----------
+    model : Model
+        Whose sensors recorded it.
+    manoeuvres : (R,) tuple of Manoeuvre
+    recorded : (R,) tuple of RecordedSamples
+    whitenings : (R,) tuple of Whitening
+    left_out : (R,) tuple of (O, C) arrays of bool
+        Whitened scalars that do not count.
+    step : float
+        Longest integration step [s].
+    arrays : Arrays
+        The same, as compiled code takes it.
+    """
+
+    model: Model
+    manoeuvres: tuple[Manoeuvre, ...]
+    recorded: tuple[RecordedSamples, ...]
+    whitenings: tuple[Whitening, ...]
+    left_out: tuple[NDArray[np.bool_], ...]
+    step: float
+    arrays: Arrays
+
+    @property
+    def samples(self) -> int:
+        """Number of scalar samples that count."""
+        return sum(item.samples for item in self.whitenings)
+
+    @property
+    def residual_shape(self) -> tuple[int, int, int]:
+        """Shape (R, O, C) of the whitened residual."""
+        return (len(self.manoeuvres), self.arrays.start.shape[1], self.arrays.weights.shape[2])
+
+    def times(self, index: int) -> Floats:
+        """Return the times at which some sensor of a recording was sampled, shape (T,)."""
+        return self.recorded[index].time
+
+    def measured(self, index: int, kind: Kind) -> Series:
+        """Return times and values of one sensor of a recording, as recorded."""
+        return self.recorded[index].series[kind]
+
+    def torques(self, index: int) -> Series:
+        """Return times (n,) and torques (n, joints) of a recording, as recorded."""
+        return self.recorded[index].torque
+
+    def sigma(self, index: int, kind: Kind) -> Floats:
+        """Return the white noise per component of one sensor of a recording, shape (size,)."""
+        return self.recorded[index].sigma(kind)
+
+    def left_out_times(self, index: int) -> dict[Kind, Floats]:
+        """Return the times of one recording's samples that do not count, by sensor."""
+        mask, rows = self.left_out[index], self.whitenings[index].rows
+        result = {}
+        for kind in self.model.channels.kinds:
+            gone = mask[:, self.model.channels.of(kind)].any(axis=1)
+            if gone.any():
+                result[kind] = self.recorded[index].time[rows[gone]]
+        return result
+
+
+def grids_of(
+    model: Model, manoeuvres: Sequence[Manoeuvre], recorded: Sequence[RecordedSamples], step: float
+) -> list[Grid]:
+    """Reduce every recording to a grid with the given integration step [s]."""
+    return [
+        build_grid(
+            model.robot,
+            tuple(prior.name for prior in model.priors),
+            manoeuvre.motion,
+            samples.time,
+            step,
+            orbit=model.orbit,
+            argument_of_latitude=manoeuvre.argument_of_latitude,
+            actions=Actions.from_recording(manoeuvre.recording),
+            effects=model.effects,
+            torques=model.torque is not None,
+            speed_errors=model.has_speed_errors,
+        )
+        for manoeuvre, samples in zip(manoeuvres, recorded, strict=True)
+    ]
+
+
+def attitudes_of(manoeuvres: Sequence[Manoeuvre]) -> Floats:
+    """Return the attitudes at time 0, shape (R, 4)."""
+    return np.stack([np.asarray(manoeuvre.attitude, dtype=float) for manoeuvre in manoeuvres])
+
+
+def stacked(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    recorded: Sequence[RecordedSamples],
+    grids: Sequence[Grid],
+    whitenings: Sequence[Whitening],
+) -> Arrays:
+    """Stack all recordings, padded coarsely so that recordings of about one length share compiled code."""
+    steps, samples = max(len(grid.step) for grid in grids), max(len(grid.step_of) for grid in grids)
+    grid = pad_grids(grids, rounded(steps), rounded(samples))
+    count = grid.step_of.shape[1]
+
+    def padded(values: Sequence[Floats]) -> jnp.ndarray:
+        return jnp.asarray(np.stack([lengthened(item, count) for item in values]))
+
+    measured = Readings(
+        padded([item.time for item in recorded]),
+        {kind.value: padded([item.gridded(kind) for item in recorded]) for kind in model.channels.kinds},
+        padded([item.gridded_torque for item in recorded]),
+    )
+    offset = jnp.asarray(np.zeros((len(recorded), count, model.channels.count)))
+    none = jnp.zeros(0)
+    return with_whitenings(
+        Arrays(grid, jnp.asarray(attitudes_of(manoeuvres)), measured, offset, none, none), whitenings
+    )
+
+
+def with_whitenings(arrays: Arrays, whitenings: Sequence[Whitening]) -> Arrays:
+    """Return the arrays with another whitening."""
+    outputs = rounded(max(len(item.start) for item in whitenings))
+    width = max(item.weights.shape[2] for item in whitenings)
+    channels = whitenings[0].weights.shape[1]
+    weights = np.zeros((len(whitenings), outputs, channels, width, channels))
+    start = np.zeros((len(whitenings), outputs), dtype=np.int32)
+    for row, item in enumerate(whitenings):
+        weights[row, : len(item.start), :, : item.weights.shape[2]] = item.weights
+        start[row, : len(item.start)] = item.start
+    return arrays._replace(weights=jnp.asarray(weights), start=jnp.asarray(start))

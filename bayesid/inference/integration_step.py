@@ -1,0 +1,107 @@
+"""The integration step: as long as its error stays far below the sensors' noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.inference import compiled
+from bayesid.inference.compiled import Numbers, Simulated, Structure
+from bayesid.inference.data import attitudes_of, grids_of
+from bayesid.inference.recorded_samples import RecordedSamples
+from bayesid.simulation.dynamics import Grid
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.time_grid import pad_grids, rounded
+
+__all__ = ["choose_step", "integration_error", "simulate_padded"]
+
+LONGEST_STEP = 2.0
+"""Integration step tried first [s]."""
+
+STEP_TOLERANCE = 0.01
+"""Largest integration error allowed, in standard deviations of a sample."""
+
+FEWEST_STEPS = 512
+"""Steps that simulations which choose the step are padded to at least, and to a power of two."""
+
+
+def choose_step(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    recorded: Sequence[RecordedSamples],
+    structure: Structure,
+    numbers: Numbers,
+    z: Floats,
+) -> float:
+    """Return the longest step, halved from `LONGEST_STEP`, whose error at ``z`` is within `STEP_TOLERANCE` [s]."""
+    shortest = min(float(samples.time[-1]) for samples in recorded)
+    step = min([LONGEST_STEP, 0.25 * shortest, *(effect.longest_step for effect in model.effects)])
+    grids = {step: grids_of(model, manoeuvres, recorded, step)}
+    while True:
+        finer = grids_of(model, manoeuvres, recorded, 0.5 * step)
+        error = _error(model, manoeuvres, recorded, structure, numbers, z, (grids[step], finer))
+        if error <= STEP_TOLERANCE:
+            return step
+        step *= 0.5
+        grids = {step: finer}
+        if step < 1e-4 * LONGEST_STEP:
+            raise InputError(
+                "no integration step reaches 1 % of the sensors' noise",
+                remedy="Check the units of joint motion and of the sensors' sigma",
+            )
+
+
+def integration_error(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    recorded: Sequence[RecordedSamples],
+    structure: Structure,
+    numbers: Numbers,
+    z: Floats,
+    step: float,
+) -> float:
+    """Return the largest error of any sample from the integration step, in its standard deviations (Richardson)."""
+    both = [grids_of(model, manoeuvres, recorded, size) for size in (step, 0.5 * step)]
+    return _error(model, manoeuvres, recorded, structure, numbers, z, (both[0], both[1]))
+
+
+def simulate_padded(
+    manoeuvres: Sequence[Manoeuvre],
+    structure: Structure,
+    numbers: Numbers,
+    z: Floats,
+    grids: Sequence[Grid],
+    steps: int | None = None,
+) -> Simulated:
+    """Simulate with grids of any step, padded so that all share one compilation."""
+    count = steps or max(len(grid.step) for grid in grids)
+    count = max(FEWEST_STEPS, 1 << (count - 1).bit_length())
+    samples = rounded(max(len(grid.step_of) for grid in grids))
+    attitude = jnp.asarray(attitudes_of(manoeuvres))
+    return compiled.simulated(structure, numbers, jnp.asarray(z), pad_grids(grids, count, samples), attitude)
+
+
+def _error(
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    recorded: Sequence[RecordedSamples],
+    structure: Structure,
+    numbers: Numbers,
+    z: Floats,
+    grids: tuple[list[Grid], list[Grid]],
+) -> float:
+    steps = max(len(grid.step) for grid in grids[1])
+    coarse, fine = (simulate_padded(manoeuvres, structure, numbers, z, item, steps).readings for item in grids)
+    worst = 0.0
+    for kind in model.channels.kinds:
+        sigma = np.stack([item.sigma(kind) for item in recorded])
+        first, second = (np.asarray(item.channels[kind.value]) for item in (coarse, fine))
+        worst = max(worst, float((np.abs(first - second)[..., : kind.size] / sigma[:, None]).max()))
+    if model.torque is not None:
+        change = np.abs(np.asarray(coarse.torque - fine.torque))[..., model.torque.columns(model.robot)]
+        worst = max(worst, float((change / np.array(model.torque.sigma)).max()))
+    return worst * 16.0 / 15.0  # the error of a fourth-order step, from its difference to half the step

@@ -1,0 +1,159 @@
+"""Layout of the vector of unknowns: which coordinates belong to what, and their map to physical values.
+
+The layout decides the operations and is a key of compiled code; the numbers of the prior are its arguments, so that
+another centre or width of the prior compiles nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bayesid._math.arrays import Traceable
+from bayesid.robot.inertial_parameters import PARAMETERS, vector_from_factor
+from bayesid.robot.log_cholesky import absolute, log_volume, relative
+from bayesid.simulation.effects.effect import Prior
+from bayesid.simulation.simulator import Values
+
+__all__ = ["EffectLayout", "Layout", "PriorNumbers"]
+
+
+class EffectLayout(NamedTuple):
+    """What the layout needs of an effect: the shapes of its parameters' priors, and whether recordings differ."""
+
+    priors: tuple[Prior, ...]
+    per_recording: bool
+
+
+class PriorNumbers(NamedTuple):
+    """Centres and widths of the prior.
+
+    factor (B, 4, 4): of each body's pseudo-inertia at the centre (`upper_cholesky`). mixing (10 B, 10 B): log-Cholesky
+    coordinates per unit of z, with its inverse. slope (10 B, 10 B): entries of the relative pseudo-inertias per unit of
+    the coordinates linear in them, with its inverse. rate: standard deviation of initial rates [rad/s]; tilt (K,) of the
+    K uncertain attitudes [rad]; speed (R, J) of the joints' speeds at time 0. effects: per effect, mean and sigma (n,).
+    """
+
+    factor: Traceable
+    mixing: Traceable
+    inverse_mixing: Traceable
+    slope: Traceable
+    inverse_slope: Traceable
+    rate: Traceable
+    tilt: Traceable
+    speed: Traceable
+    effects: tuple[tuple[Traceable, Traceable], ...]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Which coordinates belong to what, in this order: bodies, initial rates, attitudes, joint speeds, effects.
+
+    Parameters
+    ----------
+    bodies, recordings : int
+    rates : bool
+        Whether initial rates are unknown.
+    tilts : tuple of int
+        Recordings whose initial attitude is unknown.
+    joints : int
+        Joints whose speed at time 0 is uncertain in every recording; 0 where that is of no account.
+    effects : tuple of EffectLayout
+    """
+
+    bodies: int
+    recordings: int
+    rates: bool
+    tilts: tuple[int, ...]
+    joints: int
+    effects: tuple[EffectLayout, ...]
+
+    def body(self, index: int) -> slice:
+        """Return the coordinates of one body."""
+        return slice(PARAMETERS * index, PARAMETERS * (index + 1))
+
+    @property
+    def all_bodies(self) -> slice:
+        """Coordinates of all bodies."""
+        return slice(0, PARAMETERS * self.bodies)
+
+    @property
+    def all_rates(self) -> slice:
+        """Coordinates of the initial rates, recording after recording."""
+        first = self.all_bodies.stop
+        return slice(first, first + (3 * self.recordings if self.rates else 0))
+
+    @property
+    def all_tilts(self) -> slice:
+        """Coordinates of the unknown initial attitudes."""
+        first = self.all_rates.stop
+        return slice(first, first + 3 * len(self.tilts))
+
+    @property
+    def all_speeds(self) -> slice:
+        """Coordinates of the joints' speeds at time 0, recording after recording."""
+        first = self.all_tilts.stop
+        return slice(first, first + self.recordings * self.joints)
+
+    def effect(self, index: int) -> slice:
+        """Return the coordinates of one effect, recording after recording where each has its own."""
+        first = self.all_speeds.stop + sum(self._count(effect) for effect in self.effects[:index])
+        return slice(first, first + self._count(self.effects[index]))
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return self.all_speeds.stop + sum(self._count(effect) for effect in self.effects)
+
+    def _count(self, effect: EffectLayout) -> int:
+        return len(effect.priors) * (self.recordings if effect.per_recording else 1)
+
+    # ---- maps, traced ----
+
+    def values(self, numbers: PriorNumbers, z: Array) -> Values:
+        """Return the physical values of standard-normal coordinates, shape (size,)."""
+        vectors = jax.vmap(vector_from_factor)(numbers.factor, self._theta(numbers, z))
+        rate = jnp.zeros((self.recordings, 3))
+        if self.rates:
+            rate = numbers.rate * z[self.all_rates].reshape(self.recordings, 3)
+        tilt = jnp.zeros((self.recordings, 3))
+        if self.tilts:
+            small = numbers.tilt[:, None] * z[self.all_tilts].reshape(-1, 3)
+            tilt = tilt.at[np.array(self.tilts)].set(small)
+        speed = numbers.speed * z[self.all_speeds].reshape(self.recordings, self.joints)
+        effects = []
+        for index, (effect, (mean, sigma)) in enumerate(zip(self.effects, numbers.effects, strict=True)):
+            count = len(effect.priors)
+            part = z[self.effect(index)].reshape((self.recordings, count) if effect.per_recording else (count,))
+            columns = [prior.physical(mean[k], sigma[k], part[..., k]) for k, prior in enumerate(effect.priors)]
+            effects.append(jnp.stack(columns, axis=-1) if count else part)
+        return Values(vectors.ravel(), rate, tilt, speed, tuple(effects))
+
+    def to_linear(self, numbers: PriorNumbers, z: Array) -> Array:
+        """Return coordinates linear in the inertial parameters.
+
+        They are the entries of each body's relative pseudo-inertia, less the identity, scaled so that near the centre
+        they are z itself. Whatever else is unknown keeps its coordinates. What the dynamics determines sharply are linear
+        combinations of inertial parameters up to a common factor, so ridges of the posterior are straight here.
+        """
+        entries = jax.vmap(relative)(self._theta(numbers, z)).ravel()
+        return jnp.concatenate([numbers.inverse_slope @ entries, z[self.all_bodies.stop :]])
+
+    def from_linear(self, numbers: PriorNumbers, y: Array) -> Array:
+        """Return the inverse of `to_linear`; not a number where no physical body has these coordinates."""
+        entries = numbers.slope @ y[self.all_bodies]
+        theta = jax.vmap(absolute)(entries.reshape(self.bodies, PARAMETERS)).ravel()
+        return jnp.concatenate([numbers.inverse_mixing @ theta, y[self.all_bodies.stop :]])
+
+    def log_volume(self, numbers: PriorNumbers, z: Array) -> Array:
+        """Return the logarithm of the determinant of d to_linear / d z."""
+        return jax.vmap(log_volume)(self._theta(numbers, z)).sum()
+
+    def _theta(self, numbers: PriorNumbers, z: Array) -> Array:
+        """Log-Cholesky coordinates of each body relative to its centre, shape (B, 10)."""
+        return (numbers.mixing @ z[self.all_bodies]).reshape(self.bodies, PARAMETERS)

@@ -1,0 +1,82 @@
+"""A posterior with other noise, other samples or other recordings; each returns a new one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.data import Data, grids_of, with_whitenings
+from bayesid.inference.encoder_whitening import whiten
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.whitening import Whitening
+from bayesid.simulation.joint_torques import TorqueSensor
+from bayesid.simulation.model import Manoeuvre
+from bayesid.simulation.sensors import Sensor
+
+__all__ = ["leaving_out", "relinearised", "with_manoeuvres", "with_sensors"]
+
+
+def relinearised(posterior: Posterior, z: Floats) -> Posterior:
+    """Return the posterior with the encoders' noise carried through the robot at ``z`` in place of the prior's."""
+    windows = [old.window for old in posterior.whitenings]
+    return replace(posterior, data=_renoised(posterior.data, _whitened(posterior, posterior.data, z, windows)))
+
+
+def with_sensors(
+    posterior: Posterior,
+    sensors: Sequence[Sensor],
+    z: Floats,
+    like: Posterior | None = None,
+    torque: TorqueSensor | None = None,
+) -> Posterior:
+    """Return the posterior with other noise of the same sensors, the encoders' noise carried through at ``z``.
+
+    Whitening windows are searched for where noise is coloured, or are those of ``like``. Joint torques keep their
+    noise unless ``torque`` is given.
+    """
+    torque = posterior.model.torque if torque is None else torque
+    data = replace(
+        posterior.data,
+        model=replace(posterior.model, sensors=tuple(sensors), torque=torque),
+        recorded=tuple(samples.with_sensors(sensors, torque) for samples in posterior.data.recorded),
+    )
+    search = like is None and any(sensor.coloured is not None for sensor in sensors)
+    known = posterior.whitenings if like is None else like.whitenings
+    windows = [None if search else old.window for old in known]
+    return replace(posterior, data=_renoised(data, _whitened(posterior, data, z, windows)))
+
+
+def leaving_out(posterior: Posterior, masks: Sequence[NDArray[np.bool_]]) -> Posterior:
+    """Return the posterior with some whitened scalars left out: per recording a mask (O, C)."""
+    whitenings = [item.without(mask) for item, mask in zip(posterior.whitenings, masks, strict=True)]
+    data = _renoised(posterior.data, whitenings)
+    gone = tuple(np.logical_or(mask, old) for mask, old in zip(masks, posterior.data.left_out, strict=True))
+    return replace(posterior, data=replace(data, left_out=gone))
+
+
+def with_manoeuvres(posterior: Posterior, manoeuvres: Sequence[Manoeuvre]) -> Posterior:
+    """Return the posterior of the same model given other manoeuvres, with the same integration step."""
+    return Posterior.of(posterior.model, manoeuvres, step=posterior.step, flat_prior=posterior.flat_prior)
+
+
+def _whitened(posterior: Posterior, data: Data, z: Floats, windows: Sequence[int | None]) -> list[Whitening]:
+    grids = grids_of(data.model, data.manoeuvres, data.recorded, data.step)
+    return whiten(
+        data.model,
+        data.recorded,
+        grids,
+        data.manoeuvres,
+        posterior.unknowns,
+        posterior.structure,
+        posterior.numbers,
+        z,
+        windows,
+    )
+
+
+def _renoised(data: Data, whitenings: Sequence[Whitening]) -> Data:
+    return replace(data, whitenings=tuple(whitenings), arrays=with_whitenings(data.arrays, whitenings))

@@ -1,0 +1,38 @@
+"""Responses of a posterior to what its model does not have."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.inference import compiled
+from bayesid.inference.compiled import Arrays, Perturbation, Traced, perturbed
+from bayesid.inference.posterior import BATCH, Posterior
+
+__all__ = ["Arrays", "Perturbation", "Traced", "perturbed", "responses", "trace"]
+
+
+def trace(posterior: Posterior, z: Floats, arrays: Arrays) -> Traced:
+    """Simulate with `perturbed` arrays."""
+    return compiled.traced(posterior.structure, posterior.numbers, jnp.asarray(z), arrays)
+
+
+def responses(posterior: Posterior, z: Floats, arrays: Arrays, perturbations: Perturbation) -> Floats:
+    """Return derivatives of the whitened residual along perturbations (leading axis n), shape (n, R, O, C)."""
+    count = len(perturbations.z)
+    padded = jax.tree.map(lambda x: np.concatenate([x, np.zeros((-count % BATCH, *x.shape[1:]))]), perturbations)
+    parts = [
+        np.asarray(
+            compiled.responses(
+                posterior.structure,
+                posterior.numbers,
+                jnp.asarray(z),
+                arrays,
+                jax.tree.map(lambda x, i=i: x[i : i + BATCH], padded),
+            )
+        )
+        for i in range(0, count, BATCH)
+    ]
+    return np.concatenate(parts)[:count] if parts else np.zeros((0, *posterior.residual_shape))
