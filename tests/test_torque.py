@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pinocchio as pin
 import pytest
-from bayesid.inference.sample_grid import Samples
+from bayesid.inference.recorded_samples import RecordedSamples
 
 from bayesid._io.errors import InputError
 from bayesid.inference.encoder_noise import joint_sensitivity
@@ -189,7 +189,7 @@ def test_bad_torque_sensors_are_refused(formula_motion):
     channels = {k: v for k, v in posterior.manoeuvres[0].recording.channels.items() if "torque" not in k}
     bare = Manoeuvre(Recording("bare", None, TIMES, channels), posterior.manoeuvres[0].motion)
     with pytest.raises(InputError, match=r"no column torque\.joint1, but the study declares"):
-        Samples(posterior.model, bare)
+        RecordedSamples.of(posterior.model, bare)
     assert posterior.model.without_torque.torque is None
     assert jnp.isfinite(jnp.asarray(posterior.jacobian(start(posterior)))).all()
 
