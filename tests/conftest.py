@@ -23,8 +23,8 @@ from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.sensors import Kind, Sensor, White
 from bayesid.unknowns import BodyPrior
-from tests import mujoco_truth as mj
-from tests.reference import moving_joints
+from studies.truth import mujoco as mj
+from studies.truth.urdf import moving_joints
 
 COMPILED = "BAYESID_TEST_COMPILED"
 """Names the folder in which the processes of one run share compiled functions."""

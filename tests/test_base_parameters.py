@@ -19,7 +19,7 @@ from bayesid.inertia import BASIS, InertialParameters, parameters_from_pseudo_in
 from bayesid.orbit import Orbit
 from bayesid.robot import Load, Robot
 from bayesid.tables import configuration, joint_twist
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 from tests.trees import random_body, random_tree
 
 REVOLUTE, PRISMATIC = ("revolute", "continuous"), ("prismatic",)

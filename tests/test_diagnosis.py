@@ -19,10 +19,10 @@ from bayesid.diagnosis.scores import chi2_log_sf
 from bayesid.effects import create
 from bayesid.posterior import Posterior
 from bayesid.study import Study
-from tests import hidden
-from tests.basilisk_truth import BasiliskHidden, Slosh, write_basilisk_study
+from studies.truth import hidden_causes
+from studies.truth.basilisk import BasiliskHidden, Slosh, write_basilisk_study
 
-CASES = {case.name: case for case in hidden.CASES}
+CASES = {case.name: case for case in hidden_causes.CASES}
 
 
 def run(file: Path) -> Diagnosis:

@@ -22,8 +22,8 @@ from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.sensors import Kind, Sensor, White
 from bayesid.unknowns import BodyPrior
-from tests import mujoco_truth as mj
-from tests import reference as ref
+from studies.truth import mujoco as mj
+from studies.truth import stepwise as ref
 
 PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robots" / "planar.urdf"
 HOOKS = ("momentum", "wrench", "derivative", "field", "read", "tide", "friction")

@@ -28,7 +28,7 @@ from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.sensors import Kind, Sensor, White
 from bayesid.unknowns import BodyPrior
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 
 KEYS = ("mass", "com.x", "com.y", "com.z", *(f"inertia.{pair}" for pair in ("xx", "yy", "zz", "xy", "xz", "yz")))
 

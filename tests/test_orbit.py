@@ -15,7 +15,7 @@ from bayesid.motion import JointState
 from bayesid.orbit import EARTH, Orbit
 from bayesid.robot import Robot
 from bayesid.tables import kinematics, link_table
-from tests.reference import Reference, circular_zenith
+from studies.truth.stepwise import Reference, circular_zenith
 
 TIME = np.linspace(0.0, 6000.0, 41)
 

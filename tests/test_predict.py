@@ -22,7 +22,7 @@ from bayesid.recording import Recording
 from bayesid.robot import Robot
 from bayesid.sensors import Kind, Sensor, White
 from bayesid.unknowns import BodyPrior
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 
 ATTITUDE = Rotation.from_euler("xyz", [0.3, -0.5, 1.1]).as_quat()
 DURATION = 40.0

@@ -15,14 +15,14 @@ from bayesid.motion import JointState
 from bayesid.robot import Load, Robot
 from bayesid.tables import ENTRIES, kinematics, link_table
 from bayesid.unknowns import BodyPrior, coordinates_of
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS = {
     "ets7": ROOT / "bayesid" / "robots" / "ets7.urdf",
     "planar": ROOT / "bayesid" / "robots" / "planar.urdf",
-    "branched": ROOT / "tests" / "robots" / "branched.urdf",
-    "servicer4": ROOT / "tests" / "robots" / "servicer4.urdf",
+    "branched": ROOT / "studies" / "truth" / "robots" / "branched.urdf",
+    "servicer4": ROOT / "studies" / "truth" / "robots" / "servicer4.urdf",
 }
 LOAD = InertialParameters(10.0, [0.1, -0.2, 0.15], [[1.0, 0.1, 0.0], [0.1, 1.2, 0.2], [0.0, 0.2, 0.9]])
 

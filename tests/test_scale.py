@@ -12,7 +12,7 @@ from bayesid.motion import JointState
 from bayesid.regressors import balance_regressor, gradient_regressor, torque_regressor
 from bayesid.robot import Robot
 from bayesid.tables import configuration, kinematics, link_table
-from tests.reference import Reference
+from studies.truth.stepwise import Reference
 from tests.trees import random_tree
 
 TIMES = 60

@@ -15,7 +15,7 @@ from bayesid.sensors import Kind
 from studies import base_body
 from studies.base_body import noise_free, paper, setting
 from studies.base_body.report import write
-from tests import reference
+from studies.truth import stepwise as reference
 
 GOAL = 1e-6
 REFERENCE_STEP = 0.125

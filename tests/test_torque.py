@@ -25,13 +25,13 @@ from bayesid.sensors import Kind, Sensor, White
 from bayesid.simulation import simulate_recordings
 from bayesid.torque import TorqueSensor
 from bayesid.unknowns import BodyPrior
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
+from studies.truth.urdf import moving_joints
 from tests.conftest import ROOT
-from tests.reference import moving_joints
 
 ROBOTS = {
     "ets7": ROOT / "bayesid" / "robots" / "ets7.urdf",
-    "branched": ROOT / "tests" / "robots" / "branched.urdf",
+    "branched": ROOT / "studies" / "truth" / "robots" / "branched.urdf",
 }
 ORBIT = mj.Orbit(6.9e6)
 TIMES = np.arange(0.0, 8.01, 0.5)

@@ -24,7 +24,7 @@ from bayesid.sensors import Filter, Kind, Sensor, White
 from bayesid.smoothing import JointSamples, smooth
 from bayesid.unknowns import BodyPrior
 from bayesid.whitening import Channel, NoiseModel, Whitening, apply, build
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 
 PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robots" / "planar.urdf"
 TIME = np.arange(0.0, 20.0, 0.5)

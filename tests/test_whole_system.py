@@ -22,7 +22,7 @@ from bayesid.robot import Robot
 from bayesid.sensors import Kind, Sensor, White
 from bayesid.torque import TorqueSensor
 from bayesid.unknowns import BodyPrior, draw_inertial
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 from tests.conftest import ENCODER, PLANAR, POINT, SIGMA, STEP
 
 SPREAD = 0.05

@@ -18,7 +18,8 @@ from bayesid.diagnosis import Diagnosis, Frame, diagnose
 from bayesid.diagnosis.engine import Fit
 from bayesid.diagnosis.evidence import detection_power, effect_amplitude
 from bayesid.study import Study
-from tests import hidden, mujoco_truth
+from studies.truth import hidden_causes
+from studies.truth.mujoco import Study as Written
 
 __all__ = ["Plan", "Trial", "make", "plan", "read", "run"]
 
@@ -31,7 +32,7 @@ SPOILT = ("outliers", "quantisation")
 
 @dataclass(frozen=True)
 class Plan:
-    """One trial to be made: case of `tests.hidden`, seed, strength."""
+    """One trial to be made: case of `studies.truth.hidden_causes`, seed, strength."""
 
     case: str
     seed: int
@@ -129,11 +130,11 @@ def plan(full: bool) -> list[Plan]:
     plans = [
         Plan(case.name, 200 + 100 * seed + number, strength)
         for seed in range(seeds)
-        for number, case in enumerate(hidden.CASES)
+        for number, case in enumerate(hidden_causes.CASES)
         if case.status != "adequate"
         for strength in (outside if case.status == "unknown" else strengths)
     ]
-    quiet = [case.name for case in hidden.CASES if case.status == "adequate"]
+    quiet = [case.name for case in hidden_causes.CASES if case.status == "adequate"]
     return plans + [Plan(quiet[index % len(quiet)], 1000 + index) for index in range(nulls)]
 
 
@@ -182,7 +183,7 @@ def read(kept: Path) -> list[Trial]:
 
 def make(item: Plan) -> Trial:
     """Hide, diagnose, compare."""
-    case = next(case for case in hidden.CASES if case.name == item.case)
+    case = next(case for case in hidden_causes.CASES if case.name == item.case)
     began = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         written = case.write(Path(folder) / "study", item.seed, item.strength)
@@ -216,12 +217,12 @@ def make(item: Plan) -> Trial:
     )
 
 
-def _visible(case: hidden.Case) -> bool:
+def _visible(case: hidden_causes.Case) -> bool:
     """Whether what is hidden changes the mean of the data."""
     return case.status != "adequate" and not any("noise" in c or c.startswith(SPOILT) for c in case.causes)
 
 
-def _limits(result: Diagnosis, case: hidden.Case, weaker: Study) -> tuple[float, float | None, float | None]:
+def _limits(result: Diagnosis, case: hidden_causes.Case, weaker: Study) -> tuple[float, float | None, float | None]:
     """Signal-to-noise ratio of what is hidden and theory's limits, from the same noise with less hidden."""
     fit, engine = result.before.fit, result.before.engine
     like = fit.posterior.with_manoeuvres(load_manoeuvres(weaker, fit.posterior.model.robot))
@@ -262,14 +263,14 @@ def _amplitude_errors(result: Diagnosis, truth: Mapping[str, Floats]) -> tuple[f
     return tuple(errors)
 
 
-def _body_errors(result: Diagnosis, written: mujoco_truth.Study) -> tuple[float, ...]:
+def _body_errors(result: Diagnosis, written: Written) -> tuple[float, ...]:
     base = written.base
     truth = np.array([base.mass, *base.com, *base.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
     bodies = result.gain.after.bodies
     return tuple(((bodies.mean[:10] - truth) / bodies.sd[:10]).tolist())
 
 
-def _correlation(result: Diagnosis, case: hidden.Case, item: Plan, written: mujoco_truth.Study) -> float:
+def _correlation(result: Diagnosis, case: hidden_causes.Case, item: Plan, written: Written) -> float:
     """Correlation of the reconstructed with the true torque, all axes and recordings together."""
     found, true = [], []
     for time_, torque, truth in zip(

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from bayesid import (
     BodyPrior,
-    InputError,
     Kind,
     Manoeuvre,
     MeasuredMotion,
@@ -26,8 +22,10 @@ from bayesid import (
     Sensor,
     White,
 )
+from studies.truth.mujoco import Body, Rotor, TruthModel, nearby, write_urdf
+from studies.truth.mujoco import Orbit as TrueOrbit
 
-__all__ = ["BASE", "DURATION", "RADIUS", "World", "draw_world", "model_of", "motion", "simulator"]
+__all__ = ["BASE", "DURATION", "RADIUS", "World", "draw_world", "model_of", "motion"]
 
 Floats = NDArray[np.floating]
 
@@ -59,7 +57,7 @@ RATE = 3e-4
 SPREAD, TRUE_SPREAD = 0.005, 0.003
 """Relative width of the base's prior, and of the draw of the true base about the published one."""
 
-WHEEL = {"mass": 1e-3, "spin_inertia": 1e-3}
+WHEEL_MASS, WHEEL_INERTIA = 1e-3, 1e-3
 """So light that the base with the wheel at rest is the base without it."""
 
 
@@ -96,24 +94,6 @@ def motion(time: float) -> tuple[Floats, Floats, Floats]:
     return share[0] * EXCURSION, share[1] * EXCURSION, share[2] * EXCURSION
 
 
-def simulator() -> Any:
-    """Return the independent simulator, which is part of the tests and not of the package.
-
-    Raises
-    ------
-    InputError
-        If the tests are absent.
-    """
-    tests = Path(__file__).parents[2] / "tests"
-    if not (tests / "mujoco_truth.py").is_file():
-        raise InputError("the independent simulator is absent", file=tests, remedy="Run in a clone of the repository")
-    sys.path.insert(0, str(tests.parent))
-    try:
-        return importlib.import_module("tests.mujoco_truth")
-    finally:
-        sys.path.remove(str(tests.parent))
-
-
 def draw_world(recordings: int, seed: int, momentum: float = 1.0, duration: float = DURATION) -> World:
     """Draw a true base, attitudes, places on the orbit and initial rates; simulate and measure.
 
@@ -124,24 +104,24 @@ def draw_world(recordings: int, seed: int, momentum: float = 1.0, duration: floa
     duration : float
         [s]
     """
-    truth, rng = simulator(), np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     robot = Robot.shipped("ets7")
     published = robot.link(BASE).inertial
-    base = truth.nearby(truth.Body(published.mass, published.com, published.inertia), rng, TRUE_SPREAD)
+    base = nearby(Body(published.mass, published.com, published.inertia), rng, TRUE_SPREAD)
     wheels = np.array(MOMENTUM) * momentum
     manoeuvres, rates = [], RATE * rng.standard_normal((recordings, 3))
     time = np.arange(0.0, duration + 0.5 * INTERVAL, INTERVAL)
     with tempfile.TemporaryDirectory() as folder:
         urdf, true_urdf = Path(folder) / "robot.urdf", Path(folder) / "true.urdf"
         robot.write_urdf(urdf)
-        truth.write_urdf(urdf, true_urdf, base)
+        write_urdf(urdf, true_urdf, base)
         for index in range(recordings):
             latitude = float(rng.uniform(0.0, 2.0 * np.pi))
             attitude = Rotation.random(rng=rng).as_quat()
-            model = truth.TruthModel(
+            model = TruthModel(
                 true_urdf,
-                orbit=truth.Orbit(radius=RADIUS, argument_of_latitude=latitude),
-                rotor=truth.Rotor(tuple(wheels), **WHEEL),
+                orbit=TrueOrbit(radius=RADIUS, argument_of_latitude=latitude),
+                rotor=Rotor((wheels[0], wheels[1], wheels[2]), mass=WHEEL_MASS, spin_inertia=WHEEL_INERTIA),
             )
             run = model.run(motion, time, rate0=rates[index], attitude0=attitude, step=0.25)
             channels = {
@@ -157,9 +137,7 @@ def draw_world(recordings: int, seed: int, momentum: float = 1.0, duration: floa
             sigma: dict[int, float] = {0: ENCODER_SIGMA}
             smoothed = MeasuredMotion.from_recording(recording, robot, sigma=sigma)
             manoeuvres.append(Manoeuvre(recording, smoothed, attitude, latitude=latitude))
-    tensor = base.inertia
-    quantities = [base.mass, *base.com, *np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
-    return World(wheels, rates, np.array(quantities), tuple(manoeuvres))
+    return World(wheels, rates, base.quantities, tuple(manoeuvres))
 
 
 def model_of(spread: float = SPREAD) -> Model:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, MeasuredMotion, Recording, Robot
 from bayesid.motion import Motion
-from studies.ets7_drift.world import simulator
 from studies.ets7_limits.setting import ACCEL, ENCODER, INTERVAL, POINT, RADIUS, RATE
+from studies.truth import mujoco as truth
 
 __all__ = ["fly", "record"]
 
@@ -30,7 +30,6 @@ def fly(motion: Motion, duration: float, rate: Floats, **hidden: Any) -> Any:
     **hidden
         What else acts, keywords of the simulator's ``TruthModel``: ``rotor``, ``fields``.
     """
-    truth = simulator()
     with tempfile.TemporaryDirectory() as folder:
         urdf = Path(folder) / "robot.urdf"
         Robot.shipped("ets7").write_urdf(urdf)

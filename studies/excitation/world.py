@@ -17,7 +17,7 @@ from bayesid.effects import AccelBias, GravityGradient
 from bayesid.motion import Motion
 from studies.base_body import paper
 from studies.base_body.setting import extended_wrist
-from studies.ets7_drift.world import simulator
+from studies.truth import mujoco as truth
 
 __all__ = [
     "BASE",
@@ -98,7 +98,6 @@ def problem(family: Parameterisation, limits: Limits, criteria: tuple[Criterion,
 
 def fly(motion: Motion) -> Any:
     """Fly a manoeuvre with the independent simulator and return its readings without noise."""
-    truth = simulator()
     with tempfile.TemporaryDirectory() as folder:
         urdf = Path(folder) / "robot.urdf"
         Robot.shipped("ets7").write_urdf(urdf)

@@ -22,8 +22,8 @@ from bayesid.design import (
 )
 from bayesid.effects import GravityGradient
 from studies.base_body.setting import extended_wrist
-from studies.ets7_drift.world import simulator
 from studies.load import paper
+from studies.truth import mujoco as truth
 
 __all__ = ["ENCODER", "LOAD", "MuJoCoSpacecraft", "excitation", "model", "problem", "ship"]
 
@@ -101,7 +101,6 @@ class MuJoCoSpacecraft:
 
     def execute(self, plan: Recording) -> Recording:
         """Fly a plan."""
-        truth = simulator()
         with tempfile.TemporaryDirectory() as folder:
             urdf = Path(folder) / "true.urdf"
             ship(paper.TRUTH).write_urdf(urdf)

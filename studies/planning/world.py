@@ -30,7 +30,7 @@ from bayesid.effects import GravityGradient
 from bayesid.inertia import log_cholesky_factor, parameters_from_pseudo_inertia, upper_cholesky
 from bayesid.motion import JointState, Motion
 from studies.base_body import paper
-from studies.ets7_drift.world import simulator
+from studies.truth import mujoco as truth
 
 __all__ = ["Flown", "Guess", "Swing", "drawn_guess", "fly", "guess_about", "measure", "model_of", "paper_guess"]
 
@@ -164,7 +164,6 @@ def measure(seed: int) -> Manoeuvre:
 
 def _truth() -> Any:
     """Return the real robot: base and arm as published, gravity gradient on every body."""
-    truth = simulator()
     with tempfile.TemporaryDirectory() as folder:
         urdf = Path(folder) / "robot.urdf"
         Robot.shipped("ets7").write_urdf(urdf)

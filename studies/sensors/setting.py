@@ -16,7 +16,7 @@ from bayesid.motion import Excitation
 from bayesid.sensors import StarTracker
 from studies.base_body import paper
 from studies.base_body.setting import BASE, excitation, ship
-from studies.ets7_drift.world import simulator
+from studies.truth import mujoco as truth
 
 __all__ = ["BIAS", "INTERVAL", "JOLT", "POINT", "Flight", "Noise", "fly", "joints_meet", "levels"]
 __all__ += ["model_of", "motion", "unread"]
@@ -81,7 +81,7 @@ def motion() -> Excitation:
 
 def fly(*, gradient: bool = True) -> Flight:
     """Fly the manoeuvre from rest, in orbit or far from any mass."""
-    truth, planned = simulator(), motion()
+    planned = motion()
     with tempfile.TemporaryDirectory() as folder:
         urdf = Path(folder) / "robot.urdf"
         ship().write_urdf(urdf)

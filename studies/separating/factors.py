@@ -13,9 +13,10 @@ from bayesid import Manoeuvre, Posterior
 from bayesid.inference import maximise
 from bayesid.inference.importance import choose_chart, importance_sample
 from bayesid.motion import Motion
-from studies.ets7_drift.world import WHEEL, simulator
+from studies.ets7_drift.world import WHEEL_INERTIA, WHEEL_MASS
 from studies.ets7_limits.truth import fly, record
 from studies.separating.setting import DRIFT, RIVALS, rival_model
+from studies.truth.mujoco import Rotor, leak
 
 __all__ = ["Flown", "Rivalry", "Sampled", "flown", "noisy"]
 
@@ -40,12 +41,12 @@ def flown(motion: Motion, duration: float, truth: str, amplitude: Floats) -> Flo
     amplitude : (3,) array
         Momentum of the wheels [N m s] or torque of the leak [N m], base axes.
     """
-    source = simulator()
     hidden: dict[str, Any] = {}
     if truth == "wheel-momentum":
-        hidden = {"rotor": source.Rotor(tuple(amplitude), **WHEEL)}
+        x, y, z = amplitude
+        hidden = {"rotor": Rotor((x, y, z), mass=WHEEL_MASS, spin_inertia=WHEEL_INERTIA)}
     elif truth == "thruster-leak":
-        hidden = {"fields": [source.leak((0.0, 0.0, 0.0), amplitude)]}
+        hidden = {"fields": [leak((0.0, 0.0, 0.0), amplitude)]}
     return Flown(motion, fly(motion, duration, DRIFT, **hidden))
 
 

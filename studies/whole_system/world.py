@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bayesid import Manoeuvre, MeasuredMotion, Recording, Robot
 from bayesid.motion import JointState
 from bayesid.tables import joint_motion, kinematics
-from studies.ets7_drift.world import simulator
+from studies.truth import mujoco as truth
 from studies.whole_system.setting import (
     ACCEL,
     COULOMB,
@@ -38,7 +38,7 @@ START_RATE = np.array([2e-4, -1e-4, 3e-4])
 
 def flights(duration: float) -> dict[str, dict[str, Any]]:
     """Return the manoeuvres compared, by name: arguments of `fly`."""
-    thrust = simulator().Thrust
+    thrust = truth.Thrust
     first, second = round(0.25 * duration), round(0.6 * duration)
     pulses = (
         thrust(first, first + 2.0, force=(20.0, 0.0, 0.0)),
@@ -72,7 +72,6 @@ def fly(
     **hidden
         What else acts, keywords of the simulator's ``TruthModel``.
     """
-    truth = simulator()
     with tempfile.TemporaryDirectory() as folder:
         urdf = Path(folder) / "robot.urdf"
         robot.write_urdf(urdf)
