@@ -23,7 +23,7 @@ from bayesid.recording import Recording
 from bayesid.report import design as report
 from bayesid.robot import Robot
 from bayesid.study import Study
-from studies.base_body.setting import extended_wrist
+from studies.common.ets7 import extended_wrist
 
 TIP_SPEED, TIP_RATE = 0.15, 0.12
 

@@ -21,6 +21,7 @@ from studies.base_parameters.recovery import identify_by_torques
 from studies.base_parameters.report import Result, write_report
 from studies.base_parameters.scale import scale_cases
 from studies.base_parameters.structure import equations_at, structure
+from studies.common.ets7 import ets7
 
 __all__ = ["Result", "main", "run"]
 
@@ -28,7 +29,7 @@ __all__ = ["Result", "main", "run"]
 @threadpool_limits.wrap(limits=1)  # small factorisations: threads only get in each other's way
 def run(*, seed: int = 1) -> Result:
     """Run the study; every random state follows from the seed."""
-    planar, arm = Robot.shipped("planar"), Robot.shipped("ets7")
+    planar, arm = Robot.shipped("planar"), ets7()
     rngs = [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(5)]
     return Result(
         planar=structure(planar),

@@ -13,8 +13,8 @@ from bayesid.inertia import mass_com_inertia
 from bayesid.inference import maximise
 from bayesid.motion import Motion
 from studies.base_body.physical import physical_sd, physical_slope
+from studies.ets7_limits.flights import fly, record
 from studies.ets7_limits.setting import model_of
-from studies.ets7_limits.truth import fly, record
 
 __all__ = ["RATE_AT_START", "Check", "check"]
 

@@ -17,14 +17,15 @@ import numpy as np
 
 from bayesid.compiled import keep_compiled
 from bayesid.design import Search
+from studies.common.ets7 import LIMITS
 from studies.excitation.cloud import Cloud, Sensitivity, random_cloud, sensitivity
 from studies.excitation.contest import Contest, compete
 from studies.excitation.realised import Realised, realise
-from studies.excitation.world import FAST, RULE
+from studies.excitation.world import FAST
 
 __all__ = ["Result", "main", "run"]
 
-SETS = {"within the flight's rule": RULE, "without a rule for the tip": FAST}
+SETS = {"within the flight's rule": LIMITS, "without a rule for the tip": FAST}
 
 
 @dataclass(frozen=True)

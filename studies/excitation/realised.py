@@ -12,7 +12,8 @@ from bayesid import Posterior, identify
 from bayesid.design import Design
 from bayesid.inertia import mass_com_inertia
 from bayesid.inference import maximise
-from studies.excitation.world import BASE, fly, recorded
+from studies.common.ets7 import BASE
+from studies.excitation.world import fly, recorded
 
 __all__ = ["Realised", "realise"]
 

@@ -16,9 +16,9 @@ from bayesid.design import BSplines, Criterion, DOptimal, Limits, Loop, Paper26I
 from bayesid.design.update import bodies_of_draws
 from bayesid.inference.identification import BodyDraws
 from bayesid.recording import Recording
-from studies.base_body.setting import extended_wrist
+from studies.common.ets7 import ENCODER, extended_wrist
 from studies.load import paper
-from studies.load.setting import DURATION, ENCODER, LIMITS, LOAD, MuJoCoSpacecraft, excitation, model, problem
+from studies.load.setting import DURATION, LIMITS, LOAD, MuJoCoSpacecraft, excitation, model, problem
 
 __all__ = ["Flight", "fly_all"]
 

@@ -13,10 +13,10 @@ from bayesid import Manoeuvre, Posterior
 from bayesid.inference import maximise
 from bayesid.inference.importance import choose_chart, importance_sample
 from bayesid.motion import Motion
-from studies.ets7_drift.world import WHEEL_INERTIA, WHEEL_MASS
-from studies.ets7_limits.truth import fly, record
+from studies.common.ets7 import light_wheel
+from studies.ets7_limits.flights import fly, record
 from studies.separating.setting import DRIFT, RIVALS, rival_model
-from studies.truth.mujoco import Rotor, leak
+from studies.truth.mujoco import Truth, leak
 
 __all__ = ["Flown", "Rivalry", "Sampled", "flown", "noisy"]
 
@@ -28,7 +28,7 @@ class Flown:
     """A flight: what the joints did, and what truly happened."""
 
     motion: Motion
-    run: Any
+    run: Truth
 
 
 def flown(motion: Motion, duration: float, truth: str, amplitude: Floats) -> Flown:
@@ -43,8 +43,7 @@ def flown(motion: Motion, duration: float, truth: str, amplitude: Floats) -> Flo
     """
     hidden: dict[str, Any] = {}
     if truth == "wheel-momentum":
-        x, y, z = amplitude
-        hidden = {"rotor": Rotor((x, y, z), mass=WHEEL_MASS, spin_inertia=WHEEL_INERTIA)}
+        hidden = {"rotor": light_wheel(amplitude)}
     elif truth == "thruster-leak":
         hidden = {"fields": [leak((0.0, 0.0, 0.0), amplitude)]}
     return Flown(motion, fly(motion, duration, DRIFT, **hidden))

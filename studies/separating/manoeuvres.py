@@ -14,7 +14,8 @@ from bayesid.design import BSplines, DOptimal, Plan, Problem, Search, Separation
 from bayesid.design.parameterisation import ParameterisedMotion
 from bayesid.design.planned import Trajectory
 from bayesid.design.problem import Reached
-from studies.ets7_limits.setting import DURATION, INTERVAL, LIMITS, POINTS, START, TIP
+from studies.common.ets7 import LIMITS, START, TIP
+from studies.ets7_limits.setting import DURATION, INTERVAL, POINTS
 from studies.separating.setting import RIVALS, drifting, rival_model
 
 __all__ = ["Designed", "Drifting", "design_both", "separating_problem"]

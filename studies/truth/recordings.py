@@ -104,8 +104,10 @@ def add_noise(table: Table, sensors: Sensors, generator: np.random.Generator) ->
             column += sigma * generator.standard_normal(column.shape)
     if "attitude.x" in table:
         true = np.stack([table[f"attitude.{axis}"] for axis in "xyzw"], axis=1)
-        turn = Rotation.from_rotvec(sensors.attitude_sigma * generator.standard_normal((len(true), 3)))
-        table |= by_axis("attitude", "xyzw", (Rotation.from_quat(true) * turn).as_quat())
+        turn, taken = sensors.attitude_sigma * generator.standard_normal((len(true), 3)), ~np.isnan(true[:, 0])
+        noisy = Rotation.from_quat(true[taken]) * Rotation.from_rotvec(turn[taken])
+        true[taken] = noisy.as_quat()
+        table |= by_axis("attitude", "xyzw", true)
 
 
 def cut_gaps(table: Table, times: Array, gaps: Mapping[str, Sequence[tuple[float, float]]]) -> None:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from bayesid import Posterior, Robot
 from bayesid.inference.optimum import fit
+from studies.common.ets7 import BASE
 from studies.whole_system.linear import regress
 from studies.whole_system.sampled import true_point
-from studies.whole_system.setting import BASE, LOAD, bodies, model_of
+from studies.whole_system.setting import LOAD, bodies, model_of
 from studies.whole_system.world import START_RATE, record
 
 __all__ = ["Method", "contest"]

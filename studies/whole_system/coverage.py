@@ -13,8 +13,9 @@ from bayesid import Posterior, Robot
 from bayesid.inference.charts import LinearChart
 from bayesid.inference.optimum import fit
 from bayesid.unknowns import draw_inertial
+from studies.common.ets7 import BASE
 from studies.whole_system.sampled import distance, true_point
-from studies.whole_system.setting import BASE, LOAD, bodies, model_of, spreads
+from studies.whole_system.setting import LOAD, bodies, model_of, spreads
 from studies.whole_system.world import START_RATE, fly, record
 
 __all__ = ["Coverage", "covered"]
