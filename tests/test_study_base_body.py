@@ -14,7 +14,7 @@ from bayesid.sensors import Kind
 from studies import base_body
 from studies.base_body import noise_free, paper, setting
 from studies.base_body.report import write
-from studies.common.ets7 import RADIUS, ets7, excitation
+from studies.common.ets7 import BASE, RADIUS, ets7, excitation
 from studies.truth import stepwise as reference
 
 GOAL = 1e-6
@@ -111,7 +111,7 @@ def test_a_slower_manoeuvre_keeps_the_limits_of_the_flight(result):
 def test_the_arm_is_scaled_to_a_seventh():
     robot = setting.heavy_arm(ets7())
     moving = sum(robot.link(f"link{index}").inertial.mass for index in range(2, 7))
-    assert moving / robot.link(setting.BASE).inertial.mass == pytest.approx(1.0 / 7.0)
+    assert moving / robot.link(BASE).inertial.mass == pytest.approx(1.0 / 7.0)
 
 
 def test_the_report_is_written(result, tmp_path: Path):

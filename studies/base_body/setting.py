@@ -29,7 +29,7 @@ __all__ = [
 Floats = NDArray[np.float64]
 
 INTERVAL = 0.5
-"""Between samples [s]."""
+"""Time between samples [s]."""
 
 POOR = np.array([0.68, -0.03, 1.04, -0.53, 1.17, -0.37])
 """Found by Nelder-Mead from the best of 150 random manoeuvres within the paper's joint limits, for the least rate about

@@ -1,4 +1,4 @@
-"""The flight-like manoeuvre, the true motion from an independent simulator, and the model that lacks the causes."""
+"""Recordings of the flight's manoeuvre, flown in MuJoCo with the causes, and the model that lacks them."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ __all__ = ["DURATION", "MOTION", "World", "draw_world", "model_of"]
 Floats = NDArray[np.floating]
 
 DURATION = 300.0
-"""Of a recording [s]; the attitude control is off throughout."""
+"""Length of a recording [s]; the attitude control is off throughout."""
 
 INTERVAL = 1.0
-"""Between samples of all sensors [s]."""
+"""Time between samples of all sensors [s]."""
 
 MOTION = FlightManoeuvre(np.zeros(6), corner=None)
 """The flight's manoeuvre from joints at zero, its linear ramps made quintic and smooth."""
@@ -42,7 +42,7 @@ RATE_SIGMA, ATTITUDE_SIGMA, ENCODER_SIGMA = 1e-5, 1e-4, 1e-5
 """Noise of rates (two seconds of arc per second), attitude (twenty seconds of arc) and joints [rad/s, rad, rad]."""
 
 MOMENTUM = (0.6, -0.4, 0.8)
-"""Left in the reaction wheels [N m s]."""
+"""Momentum left in the reaction wheels [N m s]."""
 
 RATE = 3e-4
 """Standard deviation of the initial rates about each axis [rad/s]: a degree in a minute."""
@@ -58,7 +58,7 @@ class World:
     Attributes
     ----------
     momentum : (3,) array
-        Of the wheels [N m s].
+        Momentum of the wheels [N m s].
     rates : (R, 3) array
         Initial rates [rad/s].
     base : (10,) array
@@ -78,10 +78,12 @@ def draw_world(recordings: int, seed: int, momentum: float = 1.0, duration: floa
 
     Parameters
     ----------
+    recordings, seed : int
+        Number of recordings, and seed of every random number.
     momentum : float
-        Times `MOMENTUM`.
+        Momentum of the wheels over `MOMENTUM`.
     duration : float
-        [s]
+        Length of a recording [s].
     """
     rng = np.random.default_rng(seed)
     published_robot = ets7()

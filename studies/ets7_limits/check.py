@@ -21,7 +21,7 @@ __all__ = ["RATE_AT_START", "Check", "check"]
 Floats = NDArray[np.floating]
 
 RATE_AT_START = np.array([1e-4, -5e-5, 8e-5])
-"""Of the base in the independent simulator [rad/s]; unknown to the fits."""
+"""Rate of the base at the start in MuJoCo [rad/s]; unknown to the fits."""
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,13 @@ from studies.common.ets7 import ACCEL, ACCELEROMETER, BASE, BIAS, LIMITS, RADIUS
 __all__ = ["ARM_SPREAD", "DURATION", "INTERVAL", "POINTS", "SPREAD", "limits_problem", "model_of"]
 
 DURATION, INTERVAL = 240.0, 0.5
-"""Of a manoeuvre, and between samples of all sensors [s]."""
+"""Length of a manoeuvre, and time between samples of all sensors [s]."""
 
 SPREAD = 1.0
-"""Of the prior of the base: its mass is then uncertain by a factor of e^2."""
+"""Relative width of the prior of the base: its mass is then uncertain by a factor of e^2."""
 
 ARM_SPREAD = 0.025
-"""Of a link where the arm is not known exactly: its mass is then known to 5 %."""
+"""Relative width of a link's prior where the arm is not known exactly: its mass is then known to 5 %."""
 
 POINTS = 6
 """Free control points of every joint."""

@@ -21,10 +21,10 @@ __all__ = ["DURATION", "FAST", "fly", "model_of", "paper_family", "problem", "re
 Floats = NDArray[np.floating]
 
 DURATION = 120.0
-"""Of every manoeuvre [s]."""
+"""Length of every manoeuvre [s]."""
 
 INTERVAL = 0.5
-"""Between samples of all sensors [s]."""
+"""Time between samples of all sensors [s]."""
 
 REACH = 2.6
 """Joint range allowed to all, either way [rad]; the paper's printed optimum needs 2.5, more than its own limit."""
@@ -33,7 +33,7 @@ FAST = Limits(joint_speed=0.4)
 """No rule for the tip: what the paper's printed optimum needs at this duration [rad/s]."""
 
 STEP = 0.1
-"""Of the independent simulator [s]."""
+"""Integration step of MuJoCo [s]."""
 
 
 @cache

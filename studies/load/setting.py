@@ -29,7 +29,7 @@ Floats = NDArray[np.floating]
 
 LOAD, LINK = "load", "link6"
 DURATION, INTERVAL = 120.0, 0.5
-"""Of a manoeuvre, and between samples of all sensors [s]."""
+"""Length of a manoeuvre, and time between samples of all sensors [s]."""
 
 RANGE = np.pi / 2.0
 """Joint range the paper states [rad]."""

@@ -33,7 +33,7 @@ __all__ = ["Flown", "Guess", "Swing", "drawn_guess", "fly", "guess_about", "meas
 Floats = NDArray[np.floating]
 
 INTERVAL = 0.5
-"""Between samples of all sensors [s]."""
+"""Time between samples of all sensors [s]."""
 
 EXCITATION = Excitation(
     offset=np.array([0.6, -2.2, 0.1, 0.0, 0.0, 0.0]),
@@ -46,16 +46,16 @@ INITIAL_RATE = 1e-4
 """Standard deviation of the true initial rate of that manoeuvre about each axis [rad/s]."""
 
 ATTITUDE = Rotation.from_euler("xyz", [0.4, -0.3, 0.8]).as_quat()
-"""Of the base when the planned path starts, base to orbit axes."""
+"""Attitude of the base when the planned path starts, a quaternion from base to orbit axes."""
 
 DURATION = 60.0
-"""Of the planned path [s]."""
+"""Length of the planned path [s]."""
 
 SPREAD, FAR = 0.15, 1.0
 """Relative widths of the priors in log-Cholesky coordinates."""
 
 STEP = 0.1
-"""Of the independent simulator [s]."""
+"""Integration step of MuJoCo [s]."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ __all__ += ["model_of", "motion", "unread"]
 Floats = NDArray[np.floating]
 
 INTERVAL = 0.5
-"""Between samples of all sensors [s]."""
+"""Time between samples of all sensors [s]."""
 
 JOLT = 2.0
 """Where (27) meets its connecting splines the joints' third derivative jumps; samples of the base's sensors this near

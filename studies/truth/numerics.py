@@ -39,7 +39,7 @@ def runge_kutta_step(
         Time, state and the time at which actions are looked up -> derivative of the state. Actions are held between
         samples and jump at the end of a step: the last stage looks up those just before it.
     time, step : float
-        [s]
+        Start and length of the step [s].
     state : (n,) array
     """
     middle = time + 0.5 * step

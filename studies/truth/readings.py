@@ -18,7 +18,7 @@ class Truth(NamedTuple):
     ------
     times : (n,) array [s]
     position, speed, acceleration, torque : (n, joints) array
-        Of the driven joints, in the order of the URDF.
+        Motion and torque of the driven joints, in the order of the URDF.
     rate : (n, 3) array [rad/s]
     attitude : (n, 4) array
         Quaternion x, y, z, w, base axes to orbit axes.

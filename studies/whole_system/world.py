@@ -20,7 +20,7 @@ __all__ = ["START_RATE", "flights", "fly", "hand_speed", "record"]
 Floats = NDArray[np.floating]
 
 STEP, INTERVAL = 0.1, 0.5
-"""Of the independent simulator, and between samples [s]."""
+"""Integration step of MuJoCo, and time between samples [s]."""
 
 START_RATE = np.array([2e-4, -1e-4, 3e-4])
 """True rate of the base at the start [rad/s]."""
@@ -49,13 +49,13 @@ def fly(
     Parameters
     ----------
     robot : Robot
-        The true one.
+        The robot as it truly is.
     seed : int
-        Of the manoeuvre.
+        Seed of the manoeuvre.
     duration : float
-        [s]
+        Length of the manoeuvre [s].
     joints : tuple of int
-        Those that move.
+        Joints that move.
     amplitude : float
         Typical excursion [rad].
     **hidden

@@ -19,7 +19,7 @@ class Panel:
     Parameters
     ----------
     mass : float
-        [kg].
+        Mass [kg].
     hinge : (3,) tuple
         A point of the hinge line, base frame [m].
     rpy : (3,) tuple
