@@ -19,11 +19,10 @@ from bayesid.design import Limits
 from bayesid.motion import Excitation, JointState
 from bayesid.robot import Robot
 from bayesid.tables import kinematics
-from studies.truth.mujoco import Rotor
 
 __all__ = ["ACCEL", "ACCELEROMETER", "BASE", "BIAS", "CORNER", "ENCODER", "EXCURSION", "LIMITS", "PERIOD", "PERIODS"]
 __all__ += ["RADIUS", "RAMP", "RAMPS", "RATE", "START", "TIP", "TIP_RATE", "TIP_SPEED", "FlightManoeuvre", "ets7"]
-__all__ += ["excitation", "extended_wrist", "light_wheel", "tip_of"]
+__all__ += ["excitation", "extended_wrist", "tip_of"]
 
 Floats = NDArray[np.floating]
 
@@ -71,12 +70,6 @@ PERIOD, RAMP, PERIODS = 30.0, 30.0, 2
 def ets7() -> Robot:
     """Return ETS-VII as it is shipped."""
     return Robot.shipped("ets7")
-
-
-def light_wheel(momentum: Floats) -> Rotor:
-    """Return a wheel of given momentum [N m s], so light that the base with it at rest is the base without it."""
-    x, y, z = momentum
-    return Rotor((x, y, z), mass=1e-3, spin_inertia=1e-3)
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,21 @@ from bayesid.recording import Recording
 from bayesid.robot import Robot
 from studies.common.ets7 import ACCELEROMETER, RADIUS
 from studies.truth.motions import Motion as TrueMotion
-from studies.truth.mujoco import Orbit, Truth, TruthModel
+from studies.truth.mujoco import Orbit, Rotor, Truth, TruthModel
 from studies.truth.numerics import substeps
 from studies.truth.recordings import by_axis
 
-__all__ = ["ORBIT", "fly", "prescribed", "readings", "record", "smoothed", "true_robot"]
+__all__ = ["ORBIT", "fly", "light_wheel", "prescribed", "readings", "record", "smoothed", "true_robot"]
 
 Floats = NDArray[np.floating]
 
 ORBIT = Orbit(radius=RADIUS)
+
+
+def light_wheel(momentum: Floats) -> Rotor:
+    """Return a wheel of given momentum [N m s], so light that the base with it at rest is the base without it."""
+    x, y, z = momentum
+    return Rotor((x, y, z), mass=1e-3, spin_inertia=1e-3)
 
 
 def true_robot(robot: Robot, orbit: Orbit | None = ORBIT, **hidden: Any) -> TruthModel:

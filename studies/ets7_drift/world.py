@@ -18,8 +18,8 @@ from bayesid import (
     Sensor,
     White,
 )
-from studies.common.ets7 import BASE, RADIUS, FlightManoeuvre, ets7, light_wheel
-from studies.common.flight import ORBIT, fly, record
+from studies.common.ets7 import BASE, RADIUS, FlightManoeuvre, ets7
+from studies.common.flight import ORBIT, fly, light_wheel, record
 from studies.truth.mujoco import Body, nearby
 
 __all__ = ["DURATION", "MOTION", "World", "draw_world", "model_of"]

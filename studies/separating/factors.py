@@ -13,7 +13,7 @@ from bayesid import Manoeuvre, Posterior
 from bayesid.inference import maximise
 from bayesid.inference.importance import choose_chart, importance_sample
 from bayesid.motion import Motion
-from studies.common.ets7 import light_wheel
+from studies.common.flight import light_wheel
 from studies.ets7_limits.flights import fly, record
 from studies.separating.setting import DRIFT, RIVALS, rival_model
 from studies.truth.mujoco import Truth, leak
