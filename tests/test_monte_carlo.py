@@ -9,6 +9,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -129,6 +130,16 @@ def test_a_trial_that_raises_is_recorded_and_tried_again(tmp_path):
         first.complete()
     Path(tasks[1]).touch()
     assert run_trials(fragile, tasks, store).complete() == [1, 1]
+
+
+def test_arrays_of_any_kind_are_results():
+    def arrays(task: int, rng: np.random.Generator) -> dict[str, object]:
+        return {"numpy": np.arange(2), "jax": jnp.arange(2), "scalar": np.float64(0.5), "both": (1, None)}
+
+    (result,) = run_trials(arrays, [0]).complete()
+    assert result == {"numpy": [0, 1], "jax": [0, 1], "scalar": 0.5, "both": [1, None]}
+    with pytest.raises(TypeError, match="JSON has no complex"):
+        run_trials(lambda task, rng: 1j, [0])
 
 
 def test_an_interruption_says_what_is_kept(tmp_path):

@@ -200,7 +200,7 @@ def _append(file: Path, line: str) -> None:
 
 def _plain(value: Any) -> Any:
     """Arrays and dataclasses as JSON has them."""
-    if isinstance(value, (np.ndarray, np.generic)):
+    if hasattr(value, "tolist"):  # arrays of numpy and of others, and their scalars
         return value.tolist()
     if is_dataclass(value) and not isinstance(value, type):
         return asdict(value)
