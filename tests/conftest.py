@@ -24,8 +24,8 @@ from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Kind, Sensor, White
-from tests import mujoco_truth as mj
-from tests.reference import moving_joints
+from studies.truth import mujoco as mj
+from studies.truth.urdf import moving_joints
 
 COMPILED = "BAYESID_TEST_COMPILED"
 """Names the folder in which the processes of one run share compiled functions."""

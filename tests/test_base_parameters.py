@@ -19,7 +19,7 @@ from bayesid.simulation.dynamics import Start, simulate
 from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.time_grid import build_grid
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 from tests.sensed import read
 from tests.trees import random_body, random_tree
 

@@ -1,8 +1,8 @@
 """Causes hidden in MuJoCo's data must be found, outside effects called unknown, and nothing hidden raise no alarm.
 
-A part of the cases of `tests.hidden` runs by default, all of them with ``pytest --catalogue`` (half an hour). The same
-seed gives studies of one robot the same circumstances, so that they share compiled functions; the campaign in
-studies/blind_injections varies them.
+A part of the cases of `studies.truth.hidden_causes` runs by default, all of them with ``pytest --catalogue`` (half an
+hour). The same seed gives studies of one robot the same circumstances, so that they share compiled functions; the
+campaign in studies/blind_injections varies them.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import pytest
 
 from bayesid.diagnosis import Diagnosis, Status
-from tests import hidden
+from studies.truth import hidden_causes
 from tests.test_diagnosis import run
 
 SEED = 5
@@ -23,7 +23,7 @@ FOUND = (
 """Cases that always run."""
 
 
-def right(result: Diagnosis, case: hidden.Case) -> bool:
+def right(result: Diagnosis, case: hidden_causes.Case) -> bool:
     """Whether a named set is the hidden one, by any of its names."""
     names = set(case.causes) | set(case.accept)
 
@@ -38,7 +38,7 @@ def right(result: Diagnosis, case: hidden.Case) -> bool:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     every = metafunc.config.getoption("--catalogue")
-    cases = [case for case in hidden.CASES if every or case.name in FOUND]
+    cases = [case for case in hidden_causes.CASES if every or case.name in FOUND]
     metafunc.parametrize("case", cases, ids=[case.name for case in cases])
 
 

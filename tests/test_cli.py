@@ -9,12 +9,11 @@ from pathlib import Path
 import arviz as az
 import numpy as np
 import pytest
-from mujoco_truth import Manoeuvres, TruthModel, write_study
 from typer.testing import CliRunner
 
 from bayesid.app.command_line import app
-
-ROBOTS = Path(__file__).parent / "robots"
+from studies.truth.mujoco import Manoeuvres, TruthModel, write_study
+from studies.truth.urdf import SERVICER4
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +22,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("study")
     made = write_study(
         folder,
-        ROBOTS / "servicer4.urdf",
+        SERVICER4,
         np.random.default_rng(3),
         manoeuvres=Manoeuvres(count=1, duration=60.0),
         title="Servicer",

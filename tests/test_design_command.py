@@ -23,7 +23,7 @@ from bayesid.recording.recording import Recording
 from bayesid.report import design_report as report
 from bayesid.robot.end_effector import Tip
 from bayesid.robot.robot import Robot
-from studies.base_body.setting import extended_wrist
+from studies.common.ets7 import extended_wrist
 
 TIP_SPEED, TIP_RATE = 0.15, 0.12
 

@@ -20,10 +20,10 @@ from bayesid.diagnosis.score_tests import chi2_log_sf
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create
-from tests import hidden
-from tests.basilisk_truth import BasiliskHidden, Slosh, write_basilisk_study
+from studies.truth import hidden_causes
+from studies.truth.basilisk import BasiliskHidden, Slosh, write_basilisk_study
 
-CASES = {case.name: case for case in hidden.CASES}
+CASES = {case.name: case for case in hidden_causes.CASES}
 
 
 def run(file: Path) -> Diagnosis:

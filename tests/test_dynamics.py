@@ -19,16 +19,17 @@ from bayesid.simulation.dynamics import Start, simulate
 from bayesid.simulation.effects import GravityGradient, Readings, WheelMomentum
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.time_grid import build_grid, pad_grids
-from tests import mujoco_truth as mj
-from tests import reference as ref
+from studies.truth import mujoco as mj
+from studies.truth import stepwise as ref
+from studies.truth.urdf import moving_joints
 from tests.sensed import read
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS = {
     "ets7": ROOT / "bayesid" / "robot" / "models" / "ets7.urdf",
     "planar": ROOT / "bayesid" / "robot" / "models" / "planar.urdf",
-    "branched": ROOT / "tests" / "robots" / "branched.urdf",
-    "servicer4": ROOT / "tests" / "robots" / "servicer4.urdf",
+    "branched": ROOT / "studies" / "truth" / "robots" / "branched.urdf",
+    "servicer4": ROOT / "studies" / "truth" / "robots" / "servicer4.urdf",
 }
 ATTITUDE = np.array([0.3, -0.5, 0.2, 0.8]) / np.linalg.norm([0.3, -0.5, 0.2, 0.8])
 RATE = np.array([0.004, -0.003, 0.005])
@@ -43,7 +44,7 @@ SIMULATE = jax.jit(simulate, static_argnums=3)
 
 
 def motion_of(urdf: Path) -> mj.Motion:
-    return mj.smooth_motion(len(ref.moving_joints(urdf)), 60.0, seed=3, amplitude=0.6)
+    return mj.smooth_motion(len(moving_joints(urdf)), 60.0, seed=3, amplitude=0.6)
 
 
 def run(robot, motion, times, step, *, effects=(), values=(), unknown=(), rate=RATE, attitude=ATTITUDE, **options):

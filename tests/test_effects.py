@@ -22,8 +22,8 @@ from bayesid.simulation.effects import Effect, Parameter, Readings, Wrench, crea
 from bayesid.simulation.effects.effect import _REGISTER, Composite, Environment, Instant
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor, White
-from tests import mujoco_truth as mj
-from tests import reference as ref
+from studies.truth import mujoco as mj
+from studies.truth import stepwise as ref
 
 PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf"
 HOOKS = ("momentum", "wrench", "derivative", "specific_force", "read", "gravity_gradient_tensor", "friction")

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests import hidden
-from tests import mujoco_truth as mj
-from tests.hidden import SERVICER3, SERVICER4
+from studies.truth import hidden_causes
+from studies.truth import mujoco as mj
+from studies.truth.urdf import SERVICER3, SERVICER4, link_body
 
 REST = (np.zeros(3), np.zeros(3), np.zeros(3))
 CATALOGUE = {
@@ -39,7 +39,7 @@ def still(time: float) -> tuple[np.ndarray, ...]:
 
 def with_and_without(folder: Path, name: str) -> tuple[pd.DataFrame, pd.DataFrame, dict]:
     """First recordings of a case at strength 1 and at (almost) none: their noise is the same."""
-    make = next(c.make for c in hidden.CASES if c.name == name)
+    make = next(c.make for c in hidden_causes.CASES if c.name == name)
     files = make(folder / "with", 3), make(folder / "without", 3, 1e-9)
     tables = [pd.read_csv(file.with_name("manoeuvre-1.csv")) for file in files]
     return *tables, tomllib.loads(files[0].read_text())
@@ -142,7 +142,7 @@ def test_positive_latency_shows_the_past(tmp_path: Path) -> None:
 
 
 def test_payload_is_in_the_truth_only(tmp_path: Path) -> None:
-    link = hidden.link_body(SERVICER4, "link4")
+    link = link_body(SERVICER4, "link4")
     added = mj.Body(2.0, np.array([0.1, 0.0, 0.2]), 0.01 * np.eye(3))
     plain, loaded = mj.TruthModel(SERVICER4), mj.TruthModel(SERVICER4, changed={"link4": mj.join(link, added)})
     assert loaded.model.body_mass.sum() - plain.model.body_mass.sum() == pytest.approx(2.0)
@@ -157,11 +157,13 @@ def test_payload_is_in_the_truth_only(tmp_path: Path) -> None:
 def test_faults_have_the_contract_signs() -> None:
     truth = mj.Truth(np.array([0.0, 2.0]), *([None] * 9))
     table = {"rate.x": np.array([1.0, 1.0]), "rate.y": np.zeros(2), "rate.z": np.zeros(2)}
-    fault = hidden.VectorFault("rate", [0.0, 0.0, 5.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.5 * np.pi])
+    fault = hidden_causes.VectorFault(
+        "rate", [0.0, 0.0, 5.0], [0.0, 0.0, 1.0], [1.0, 1.0, 0.0], [0.0, 0.0, 0.5 * np.pi]
+    )
     fault(table, truth)
     np.testing.assert_allclose(np.transpose([table[f"rate.{a}"] for a in "xyz"]), [[0, 2, 5], [0, 2, 7]], atol=1e-12)
     table = {"position.joint1": np.zeros(2)}
-    hidden.EncoderOffset("joint1", 0.1)(table, truth)
+    hidden_causes.EncoderOffset("joint1", 0.1)(table, truth)
     np.testing.assert_allclose(table["position.joint1"], 0.1)
 
 
@@ -173,10 +175,10 @@ def test_faults_after_the_noise_have_their_statistics() -> None:
         fault(table, times, generator)
         return np.stack(list(table.values()))
 
-    coloured = error(hidden.ColouredNoise("rate", 2.0, 4.0))
+    coloured = error(hidden_causes.ColouredNoise("rate", 2.0, 4.0))
     assert coloured.std() == pytest.approx(2.0, rel=0.05)
     assert (coloured[:, :-8] * coloured[:, 8:]).mean() / coloured.var() == pytest.approx(np.exp(-1.0), abs=0.05)
-    wild = error(hidden.Outliers("rate", 0.02, 1e-3))
+    wild = error(hidden_causes.Outliers("rate", 0.02, 1e-3))
     assert (wild != 0.0).mean() == pytest.approx(0.02, rel=0.1)
     assert np.abs(wild[wild != 0.0]).min() > 0.01
     assert np.abs(wild).max() < 0.02
@@ -192,10 +194,12 @@ def test_causes_change_the_data_and_not_the_study(tmp_path: Path) -> None:
 
 
 def test_table_covers_the_catalogue() -> None:
-    hidden_names = {name.split(":")[0] for case in hidden.CASES if case.status == "effect" for name in case.causes}
+    hidden_names = {
+        name.split(":")[0] for case in hidden_causes.CASES if case.status == "effect" for name in case.causes
+    }
     assert hidden_names == CATALOGUE
-    assert len({case.name for case in hidden.CASES}) == len(hidden.CASES)
-    statuses = [case.status for case in hidden.CASES]
+    assert len({case.name for case in hidden_causes.CASES}) == len(hidden_causes.CASES)
+    statuses = [case.status for case in hidden_causes.CASES]
     assert statuses.count("unknown") >= 4
     assert statuses.count("adequate") >= 6
-    assert sum(len(case.causes) == 2 for case in hidden.CASES) >= 3
+    assert sum(len(case.causes) == 2 for case in hidden_causes.CASES) >= 3

@@ -29,7 +29,7 @@ from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Kind, Sensor, White
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 
 KEYS = ("mass", "com.x", "com.y", "com.z", *(f"inertia.{pair}" for pair in ("xx", "yy", "zz", "xy", "xz", "yz")))
 

@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from mujoco_truth import Hidden, Manoeuvres, Rotor, Sensors, Thrust, write_study
 from scipy.stats import chi2
 
 import bayesid
 from bayesid.inference import maximise
 from bayesid.inference.body_quantities import bodies_of
 from bayesid.inference.predicted_readings import integration_error_at
+from studies.truth.mujoco import Hidden, Manoeuvres, Rotor, Sensors, Thrust, write_study
+from studies.truth.urdf import BRANCHED, SERVICER4
 
-ROBOTS = Path(__file__).parent / "robots"
 SHIPPED = Path(bayesid.__file__).parent / "robot" / "models"
 EXAMPLES = Path(__file__).parents[2] / "shared" / "examples"
 
@@ -31,7 +31,7 @@ class Case(NamedTuple):
 CASES = {
     "ets7": Case(SHIPPED / "ets7.urdf", "base_link", {"sensors": Sensors(encoder_sigma=2e-6)}),
     "four joints, other rates and a gap": Case(
-        ROBOTS / "servicer4.urdf",
+        SERVICER4,
         "base_link",
         {
             "sensors": Sensors(rate_period=0.4, accel_period=0.2, encoder_period=0.2, encoder_sigma=1e-5),
@@ -39,17 +39,17 @@ CASES = {
         },
     ),
     "branched, attitude in place of rate": Case(
-        ROBOTS / "branched.urdf",
+        BRANCHED,
         "bus",
         {"sensors": Sensors(rate_period=None, attitude_period=0.5, attitude_sigma=2e-5)},
     ),
     "known thrust": Case(
-        ROBOTS / "servicer4.urdf",
+        SERVICER4,
         "base_link",
         {"hidden": Hidden(thrusts=(Thrust(20.0, 35.0, (0.4, -0.3, 0.2), (0.05, 0.1, -0.08)),))},
     ),
     "wheel in the model": Case(
-        ROBOTS / "servicer4.urdf",
+        SERVICER4,
         "base_link",
         {"hidden": Hidden(rotor=Rotor((0.05, -0.08, 0.04))), "effects": ["gravity-gradient", "wheel-momentum"]},
     ),
@@ -100,9 +100,7 @@ def test_the_contracts_example_is_identified() -> None:
 @pytest.mark.usefixtures("slow")  # whole systems drawn from the prior show the same
 def test_an_arm_known_to_five_percent_widens_the_answer_and_still_covers(tmp_path: Path) -> None:
     """The truth's arm is off by its declared spread; an exact arm would then exclude the true base."""
-    made = write_study(
-        tmp_path, ROBOTS / "servicer4.urdf", np.random.default_rng(5), manoeuvres=Manoeuvres(count=2, duration=100.0)
-    )
+    made = write_study(tmp_path, SERVICER4, np.random.default_rng(5), manoeuvres=Manoeuvres(count=2, duration=100.0))
     file = tmp_path / "robot.urdf"
     robot = bayesid.Robot.from_urdf(file)
     rng = np.random.default_rng(8)

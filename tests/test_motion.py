@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,8 +9,8 @@ from bayesid._io.errors import InputError
 from bayesid.recording.joint_motion import Excitation, MeasuredMotion, sample_joints
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
+from studies.truth.urdf import BRANCHED
 
-BRANCHED = Path(__file__).parent / "robots" / "branched.urdf"
 EXCITATION = Excitation([0.3, -0.5], [0.6, 0.2], 0.25, periods=2, ramp=10.0, start=[0.1, 0.0])
 
 

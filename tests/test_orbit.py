@@ -17,7 +17,7 @@ from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.effects.effect import Environment, Instant
 from bayesid.simulation.orbit import EARTH, Orbit
-from tests.reference import Reference, circular_zenith
+from studies.truth.stepwise import Reference, circular_zenith
 
 TIME = np.linspace(0.0, 6000.0, 41)
 

@@ -22,7 +22,7 @@ from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Kind, Sensor, White
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 
 ATTITUDE = Rotation.from_euler("xyz", [0.3, -0.5, 1.1]).as_quat()
 DURATION = 40.0

@@ -15,16 +15,17 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_lsq_spline
 
-from tests import mujoco_truth as mj
-from tests.reference import Response, circular_zenith, moving_joints, simulate
+from studies.truth import mujoco as mj
+from studies.truth.stepwise import Response, circular_zenith, simulate
+from studies.truth.urdf import moving_joints
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT.parent / "shared" / "examples"
 ROBOTS = {
     "ets7": ROOT / "bayesid" / "robot" / "models" / "ets7.urdf",
     "planar": ROOT / "bayesid" / "robot" / "models" / "planar.urdf",
-    "branched": ROOT / "tests" / "robots" / "branched.urdf",
-    "servicer4": ROOT / "tests" / "robots" / "servicer4.urdf",
+    "branched": ROOT / "studies" / "truth" / "robots" / "branched.urdf",
+    "servicer4": ROOT / "studies" / "truth" / "robots" / "servicer4.urdf",
 }
 ATTITUDE = np.array([0.3, -0.5, 0.2, 0.8]) / np.linalg.norm([0.3, -0.5, 0.2, 0.8])
 RATE = (0.004, -0.003, 0.005)

@@ -157,7 +157,9 @@ def test_equivalent_box_has_the_body_s_inertia():
     np.testing.assert_allclose(np.trace(instant) * np.eye(3) - instant, body.inertia, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("file", sorted((ROOT / "tests" / "robots").glob("*.urdf")), ids=lambda file: file.stem)
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "studies" / "truth" / "robots").glob("*.urdf")), ids=lambda file: file.stem
+)
 def test_any_robot_can_be_drawn(file, tmp_path):
     robot = Robot.from_urdf(file)
     joints = len(robot.joints)

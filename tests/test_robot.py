@@ -16,14 +16,14 @@ from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Load, Robot
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 
 ROOT = Path(__file__).resolve().parents[1]
 ROBOTS = {
     "ets7": ROOT / "bayesid" / "robot" / "models" / "ets7.urdf",
     "planar": ROOT / "bayesid" / "robot" / "models" / "planar.urdf",
-    "branched": ROOT / "tests" / "robots" / "branched.urdf",
-    "servicer4": ROOT / "tests" / "robots" / "servicer4.urdf",
+    "branched": ROOT / "studies" / "truth" / "robots" / "branched.urdf",
+    "servicer4": ROOT / "studies" / "truth" / "robots" / "servicer4.urdf",
 }
 LOAD = InertialParameters(10.0, [0.1, -0.2, 0.15], [[1.0, 0.1, 0.0], [0.1, 1.2, 0.2], [0.0, 0.2, 0.9]])
 

@@ -13,7 +13,7 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import configuration, kinematics
 from bayesid.robot.regressors import balance_regressor, gradient_regressor, torque_regressor
 from bayesid.robot.robot import Robot
-from tests.reference import Reference
+from studies.truth.stepwise import Reference
 from tests.trees import random_tree
 
 TIMES = 60

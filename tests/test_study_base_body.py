@@ -9,13 +9,13 @@ import pytest
 
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.recording import Recording
-from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre
 from bayesid.simulation.sensors import Kind
 from studies import base_body
 from studies.base_body import noise_free, paper, setting
 from studies.base_body.report import write
-from tests import reference
+from studies.common.ets7 import BASE, RADIUS, ets7, excitation
+from studies.truth import stepwise as reference
 
 GOAL = 1e-6
 REFERENCE_STEP = 0.125
@@ -34,7 +34,7 @@ def test_every_parameter_is_found_without_noise(result):
 
 
 def test_data_of_an_independent_simulator_give_the_same(tmp_path: Path):
-    robot, motion = Robot.shipped("ets7"), setting.excitation(paper.EXCITATION)
+    robot, motion = ets7(), excitation(paper.EXCITATION)
     robot.write_urdf(tmp_path / "ets7.urdf")
     planned = setting.blank(motion, noise_free.KINDS, interval=2.0)
 
@@ -50,7 +50,7 @@ def test_data_of_an_independent_simulator_give_the_same(tmp_path: Path):
         planned.time,
         REFERENCE_STEP,
         accel_position=noise_free.ACCELEROMETER,
-        zenith=reference.circular_zenith(paper.RADIUS),
+        zenith=reference.circular_zenith(RADIUS),
     )
     channels = {
         f"{kind}.{axis}": values[:, index]
@@ -102,16 +102,16 @@ def test_sigma_in_radians_per_second_exceeds_the_signal(result):
 
 
 def test_a_slower_manoeuvre_keeps_the_limits_of_the_flight(result):
-    speed, rate = setting.tip_speed(setting.excitation(paper.EXCITATION, result.slowness))
+    speed, rate = setting.tip_speed(excitation(paper.EXCITATION, result.slowness))
     assert speed == pytest.approx(0.05, rel=0.02) or rate == pytest.approx(np.radians(5.0), rel=0.02)
     assert speed < 0.0505
     assert rate < np.radians(5.05)
 
 
 def test_the_arm_is_scaled_to_a_seventh():
-    robot = setting.heavy_arm(setting.ship())
+    robot = setting.heavy_arm(ets7())
     moving = sum(robot.link(f"link{index}").inertial.mass for index in range(2, 7))
-    assert moving / robot.link(setting.BASE).inertial.mass == pytest.approx(1.0 / 7.0)
+    assert moving / robot.link(BASE).inertial.mass == pytest.approx(1.0 / 7.0)
 
 
 def test_the_report_is_written(result, tmp_path: Path):

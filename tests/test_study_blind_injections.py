@@ -1,6 +1,5 @@
 """The campaign on two trials: kept, resumed, reported."""
 
-import json
 from dataclasses import replace
 
 import pytest
@@ -8,6 +7,7 @@ import pytest
 from studies.blind_injections import Trial, plan, run, write_report
 from studies.blind_injections.report import confusion, rates
 from studies.blind_injections.trials import Plan, read
+from studies.common.monte_carlo import read_store
 
 PLANS = [Plan("rate-bias", 5, 0.3), Plan("null, three joints", 5)]
 
@@ -41,13 +41,13 @@ def test_what_was_hidden_is_compared_with_what_is_said(trials):
 @pytest.mark.usefixtures("slow")
 def test_a_run_goes_on_where_it_was_cut_off(trials, kept, monkeypatch):
     lines = kept.read_text(encoding="utf-8").splitlines()
-    kept.write_text(lines[0] + "\n" + lines[1][:40], encoding="utf-8")
+    kept.write_text("\n".join([*lines[:2], lines[2][:40]]), encoding="utf-8")
     assert read(kept) == [trials[0]]
     made = []
     monkeypatch.setattr("studies.blind_injections.trials.make", lambda item: made.append(item) or trials[1])
     assert run(PLANS, kept) == trials
     assert made == PLANS[1:]
-    assert [json.loads(line)["case"] for line in kept.read_text(encoding="utf-8").splitlines() if line[-1] == "}"]
+    assert [line["task"]["case"] for line in read_store(kept)] == [item.case for item in PLANS]
 
 
 @pytest.mark.usefixtures("slow")

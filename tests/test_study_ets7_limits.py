@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from studies.common.ets7 import EXCURSION, RAMPS, START, FlightManoeuvre
 from studies.ets7_limits.analysis import Answer
-from studies.ets7_limits.flight import EXCURSION, RAMPS, Flight
 from studies.ets7_limits.information import Repeated
 from studies.ets7_limits.report import time_needed
-from studies.ets7_limits.setting import START
 
 TRUTH = np.ones(10)
 
@@ -21,12 +20,12 @@ def repeated(information: np.ndarray) -> Repeated:
 
 def test_the_flight_ramps_at_constant_speed_between_rounded_corners():
     time = np.linspace(50.0, 160.0, 11001)
-    state = Flight(START).evaluate(time)
+    state = FlightManoeuvre(START).evaluate(time)
     np.testing.assert_allclose(np.gradient(state.position, time, axis=0)[5:-5], state.velocity[5:-5], atol=1e-7)
     np.testing.assert_allclose(np.gradient(state.velocity, time, axis=0)[5:-5], state.acceleration[5:-5], atol=1e-5)
-    held = Flight(START).evaluate(np.array([0.0, 100.0, 200.0])).position - START
+    held = FlightManoeuvre(START).evaluate(np.array([0.0, 100.0, 200.0])).position - START
     np.testing.assert_allclose(held, [0.0 * EXCURSION, EXCURSION, 0.0 * EXCURSION], atol=1e-12)
-    middle = Flight(START).evaluate(np.array([np.mean(RAMPS[0])]))
+    middle = FlightManoeuvre(START).evaluate(np.array([np.mean(RAMPS[0])]))
     np.testing.assert_allclose(middle.velocity[0], EXCURSION / 22.6)
 
 

@@ -7,16 +7,17 @@ import pytest
 
 from bayesid.design import Paper26, Search
 from studies.base_body import paper
+from studies.common.ets7 import LIMITS
 from studies.excitation import run
 from studies.excitation.cloud import Cloud
 from studies.excitation.contest import shrunk
 from studies.excitation.realised import Realised
 from studies.excitation.report import write_report
-from studies.excitation.world import RULE, paper_family, problem
+from studies.excitation.world import paper_family, problem
 
 
 def test_the_printed_optimum_is_made_smaller_until_it_keeps_the_rule():
-    own = problem(paper_family(), RULE, (Paper26(),))
+    own = problem(paper_family(), LIMITS, (Paper26(),))
     parameters, part = shrunk(own, paper.EXCITATION)
     assert 0.01 < part < 0.5  # it is far faster
     reached = {item.name: item for item in own.reached(parameters)}

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from bayesid.robot.robot import Robot
+from studies.common.ets7 import BASE, START
 from studies.planning.analysis import flight_of, plan, predictor_of
-from studies.planning.world import BASE, START, Guess, Swing, fly, model_of
+from studies.planning.world import Guess, Swing, fly, model_of
 
 DURATION = 20.0
 REACHED = START + np.array([0.4, -0.3, 0.2, 0.1, -0.2, 0.2])

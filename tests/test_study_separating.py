@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bayesid.robot.joint_state import JointState
-from studies.ets7_limits.setting import START
+from studies.common.ets7 import START
 from studies.separating.expected import Linearised
 from studies.separating.factors import flown, noisy
 from studies.separating.setting import TRUTHS

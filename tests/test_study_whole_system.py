@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from bayesid.robot.inertial_parameters import InertialParameters
+from studies.common.ets7 import BASE
 from studies.whole_system import run, write_report
 from studies.whole_system.information import Information, Sensors
 from studies.whole_system.linear import linear_prior, regress
-from studies.whole_system.setting import BASE, LOAD, bodies, drawn, spreads, true_robot
+from studies.whole_system.setting import LOAD, bodies, drawn, spreads, true_robot
 from studies.whole_system.world import fly, record
 
 

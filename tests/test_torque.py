@@ -8,13 +8,13 @@ import jax.numpy as jnp
 import numpy as np
 import pinocchio as pin
 import pytest
-from bayesid.inference.recorded_samples import RecordedSamples
 
 from bayesid._io.errors import InputError
 from bayesid.inference.encoder_noise import joint_sensitivity
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import predicted_readings
+from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.inference.recording_check import refuse_wrong_units
 from bayesid.inference.simulated_recordings import simulate_recordings
 from bayesid.recording.recording import Recording
@@ -27,13 +27,13 @@ from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Kind, Sensor, White
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
+from studies.truth.urdf import moving_joints
 from tests.conftest import ROOT
-from tests.reference import moving_joints
 
 ROBOTS = {
     "ets7": ROOT / "bayesid" / "robot" / "models" / "ets7.urdf",
-    "branched": ROOT / "tests" / "robots" / "branched.urdf",
+    "branched": ROOT / "studies" / "truth" / "robots" / "branched.urdf",
 }
 ORBIT = mj.Orbit(6.9e6)
 TIMES = np.arange(0.0, 8.01, 0.5)

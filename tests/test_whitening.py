@@ -24,7 +24,7 @@ from bayesid.simulation.dynamics import Start, simulate
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Filter, Kind, Sensor, White
 from bayesid.simulation.time_grid import build_grid
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 from tests.sensed import read
 
 PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf"

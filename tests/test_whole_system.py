@@ -23,7 +23,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor, White
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
 from tests.conftest import ENCODER, PLANAR, POINT, SIGMA, STEP
 
 SPREAD = 0.05

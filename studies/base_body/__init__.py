@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
-from pathlib import Path
+from collections.abc import Sequence
 
 from studies.base_body.figures import draw
 from studies.base_body.report import write
 from studies.base_body.result import BaseBody, compute
+from studies.common.command import Command
 
 __all__ = ["BaseBody", "main", "run"]
 
@@ -27,12 +27,15 @@ def run(*, full: bool = False, seed: int = 0) -> BaseBody:
     return result
 
 
-def main() -> None:
+COMMAND = Command(
+    "base_body",
+    "Identify the base body of ETS-VII, beside what the paper printed.",
+    full="add what takes minutes",
+    seed=0,
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--full", action="store_true", help="add what takes minutes")
-    parser.add_argument("--output", type=Path, default=Path("reports/base_body.pdf"))
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options = COMMAND.parse(arguments)
     write(run(full=options.full, seed=options.seed), options.output)

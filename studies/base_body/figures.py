@@ -12,7 +12,7 @@ from bayesid.report.figures import corner
 from bayesid.report.figures.figure_style import COLOURS, curve_style, styled, wide_figure
 from studies.base_body import paper
 from studies.base_body.result import GRADES, BaseBody
-from studies.base_body.setting import BASE
+from studies.common.ets7 import BASE
 
 __all__ = ["draw"]
 

@@ -26,7 +26,8 @@ from bayesid.simulation.sensors import ARCSEC, Kind, Sensor, White
 from studies.base_body import paper
 from studies.base_body.noise_free import ACCELEROMETER, STEP
 from studies.base_body.physical import physical_sd, physical_slope
-from studies.base_body.setting import BASE, blank, ship
+from studies.base_body.setting import blank
+from studies.common.ets7 import BASE, RADIUS, ets7
 
 __all__ = ["ACCEL_BIAS", "ARM", "ARM_SPREAD", "BIAS", "RATE", "STAR", "TILT", "Information", "wide_model"]
 
@@ -50,7 +51,7 @@ ARM, RATE, TILT, ACCEL_BIAS = "arm", "initial rate", "initial attitude", "accele
 
 def wide_model() -> Model:
     """Return the model with everything unknown that a question may fix: arm, initial rate, accelerometer bias."""
-    robot = ship()
+    robot = ets7()
     base = BodyPrior(BASE, paper.body(paper.TRUTH), 1.0)
     return Model(
         robot=robot,
@@ -60,7 +61,7 @@ def wide_model() -> Model:
             Sensor(Kind.ATTITUDE, White(UNIT)),
         ),
         priors=(base, *spread_links(robot, ARM_SPREAD, (BASE,))),
-        orbit=Orbit(paper.RADIUS),
+        orbit=Orbit(RADIUS),
         effects=(GravityGradient(), AccelBias(BIAS)),
     )
 

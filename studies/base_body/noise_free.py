@@ -23,7 +23,8 @@ from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Kind, Sensor, White
 from studies.base_body import paper
 from studies.base_body.physical import physical_sd, physical_slope
-from studies.base_body.setting import BASE, POOR, blank, excitation, heavy_arm, ship
+from studies.base_body.setting import POOR, blank, heavy_arm
+from studies.common.ets7 import BASE, RADIUS, ets7, excitation
 
 __all__ = ["ACCELEROMETER", "NoiseFree", "guess_model", "identify_exact", "record", "run_noise_free"]
 
@@ -75,10 +76,10 @@ class NoiseFree:
 def guess_model(robot: Robot | None = None, *, gradient: bool = True, rate_sigma: float = 0.0) -> Model:
     """Return the model whose prior centre, where fits start, is the paper's initial guess."""
     return Model(
-        robot=ship() if robot is None else robot,
+        robot=ets7() if robot is None else robot,
         sensors=(Sensor(Kind.RATE, White(WEIGHT)), Sensor(Kind.ACCEL, White(WEIGHT), position=ACCELEROMETER)),
         priors=(BodyPrior(BASE, paper.body(paper.GUESS), 1.0),),
-        orbit=Orbit(paper.RADIUS),
+        orbit=Orbit(RADIUS),
         effects=(GravityGradient(),) if gradient else (),
         rate_sigma=rate_sigma,
     )
@@ -124,7 +125,7 @@ def run_noise_free(*, full: bool) -> dict[str, NoiseFree]:
         cases["poor, no gradient"] = identify_exact(with_manoeuvres(blind, [poor]))
         free = guess_model(rate_sigma=0.1)
         cases["well, rate unknown"] = identify_exact(Posterior.of(free, [well], step=STEP, flat_prior=True))
-        heavy = guess_model(heavy_arm(ship()))
+        heavy = guess_model(heavy_arm(ets7()))
         own = Manoeuvre(record(heavy, motions[:1])[0], motions[0])
         cases["well, arm 1/7"] = identify_exact(Posterior.of(heavy, [own], step=STEP, flat_prior=True))
     return cases

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from bayesid.robot.inertial_parameters import InertialParameters
 
-__all__ = ["EXCITATION", "GUESS", "LIMIT", "RADIUS", "RESULT_POOR", "RESULT_WELL", "TRUTH", "body"]
+__all__ = ["EXCITATION", "GUESS", "LIMIT", "RESULT_POOR", "RESULT_WELL", "TRUTH", "body"]
 
 Floats = NDArray[np.float64]
 
@@ -22,9 +22,6 @@ EXCITATION = np.array([0.63, -1.87, -2.18, -0.15, 5.3e-2, -0.56])
 
 LIMIT = np.pi / 2.0
 """Joint limit the paper states [rad]."""
-
-RADIUS = 6.916e6
-"""Of the orbit [m]."""
 
 
 def body(quantities: Floats) -> InertialParameters:

@@ -9,8 +9,9 @@ from bayesid.report.numbers import format_number
 from bayesid.simulation.sensors import Kind
 from studies.base_body import paper, rows
 from studies.base_body.result import BaseBody
-from studies.base_body.setting import PERIOD, RAMP, extended_wrist, limits_broken
+from studies.base_body.setting import limits_broken
 from studies.base_body.texts import ARM, ASSUMED, GRADES, NOISE, READINGS, SAMPLED
+from studies.common.ets7 import PERIOD, RAMP, extended_wrist
 
 __all__ = ["write"]
 

@@ -16,7 +16,8 @@ from studies.base_body.information import ARM, ARM_SPREAD, STAR, Information
 from studies.base_body.noise_free import NoiseFree, run_noise_free
 from studies.base_body.readings import Reading, read_sigmas
 from studies.base_body.sampled import encoder_grades, sample_posterior
-from studies.base_body.setting import INTERVAL, excitation, slowest
+from studies.base_body.setting import INTERVAL, slowest
+from studies.common.ets7 import excitation
 
 __all__ = ["GRADES", "BaseBody", "compute"]
 

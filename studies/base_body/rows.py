@@ -15,7 +15,7 @@ from studies.base_body.information import ARM, STAR
 from studies.base_body.noise_free import NoiseFree
 from studies.base_body.readings import CLAIM
 from studies.base_body.result import GRADES, BaseBody
-from studies.base_body.setting import BASE
+from studies.common.ets7 import BASE
 
 __all__ = ["arm_table", "case_table", "goal_rows", "grade_table", "posterior_table", "printed_table", "reading_table"]
 

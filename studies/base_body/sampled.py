@@ -25,7 +25,8 @@ from studies.base_body import paper
 from studies.base_body.information import BIAS, STAR
 from studies.base_body.noise_free import ACCELEROMETER
 from studies.base_body.physical import physical_sd, physical_slope
-from studies.base_body.setting import BASE, blank, excitation, ship
+from studies.base_body.setting import blank
+from studies.common.ets7 import BASE, RADIUS, ets7, excitation
 
 __all__ = ["ACCEL", "ENCODER", "encoder_grades", "sample_posterior"]
 
@@ -45,7 +46,7 @@ KINDS = (Kind.ACCEL, Kind.ATTITUDE)
 
 def _model(accel: float, centre: InertialParameters, arm_spread: float) -> Model:
     """Return the model of a star sensor, an accelerometer with an unknown bias and an unknown initial rate."""
-    robot = ship()
+    robot = ets7()
     return Model(
         robot=robot,
         sensors=(
@@ -53,14 +54,14 @@ def _model(accel: float, centre: InertialParameters, arm_spread: float) -> Model
             Sensor(Kind.ATTITUDE, White(STAR)),
         ),
         priors=(BodyPrior(BASE, centre, 1.0), *spread_links(robot, arm_spread, (BASE,))),
-        orbit=Orbit(paper.RADIUS),
+        orbit=Orbit(RADIUS),
         effects=(GravityGradient(), AccelBias(BIAS)),
     )
 
 
 def _planned(seed: int) -> Manoeuvre:
     """Return the paper's manoeuvre with recorded, hence noisy and smoothed, joints."""
-    rng, motion, robot = np.random.default_rng(seed), excitation(paper.EXCITATION), ship()
+    rng, motion, robot = np.random.default_rng(seed), excitation(paper.EXCITATION), ets7()
     exact = blank(motion, KINDS, robot)
     noisy = {
         key: values + ENCODER * rng.normal(size=len(values)) if key.startswith("position") else values

@@ -7,9 +7,7 @@ parameters that follow once the dependent ones are known, and which data tell th
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -21,6 +19,8 @@ from studies.base_parameters.recovery import identify_by_torques
 from studies.base_parameters.report import Result, write_report
 from studies.base_parameters.scale import scale_cases
 from studies.base_parameters.structure import equations_at, structure
+from studies.common.command import Command
+from studies.common.ets7 import ets7
 
 __all__ = ["Result", "main", "run"]
 
@@ -28,7 +28,7 @@ __all__ = ["Result", "main", "run"]
 @threadpool_limits.wrap(limits=1)  # small factorisations: threads only get in each other's way
 def run(*, seed: int = 1) -> Result:
     """Run the study; every random state follows from the seed."""
-    planar, arm = Robot.shipped("planar"), Robot.shipped("ets7")
+    planar, arm = Robot.shipped("planar"), ets7()
     rngs = [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(5)]
     return Result(
         planar=structure(planar),
@@ -43,11 +43,10 @@ def run(*, seed: int = 1) -> Result:
     )
 
 
+COMMAND = Command("base_parameters", "Say which inertial parameters can be identified at all.", seed=1)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description="Say which inertial parameters can be identified at all.")
-    parser.add_argument("--output", type=Path, default=Path("reports/base_parameters.pdf"))
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options = COMMAND.parse(arguments)
     write_report(run(seed=options.seed), options.output)

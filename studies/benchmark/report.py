@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 from bayesid.report import Document
 from studies.benchmark.run import Benchmark, run
+from studies.common.command import Command
 
 GOALS = {"Pinocchio, step by step in Python": 2000.0, "MuJoCo rollouts in C": 100.0}
 
@@ -75,10 +76,10 @@ def write_report(result: Benchmark, file: Path) -> None:
     document.write(file)
 
 
-def main() -> None:
+COMMAND = Command("benchmark", "Cost of simulations and of effective samples.", full="longer chains, more repeats")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
     """Run the benchmark and write its report."""
-    parser = argparse.ArgumentParser(description="Cost of simulations and of effective samples.")
-    parser.add_argument("--full", action="store_true", help="longer chains, more repeats")
-    parser.add_argument("--output", type=Path, default=Path("reports/benchmark.pdf"))
-    arguments = parser.parse_args()
-    write_report(run(full=arguments.full), arguments.output)
+    options = COMMAND.parse(arguments)
+    write_report(run(full=options.full), options.output)

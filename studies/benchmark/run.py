@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bayesid import Robot
 from bayesid.inference.predicted_readings import integration_error_at
 from studies.benchmark.cases import chain, posterior_of
 from studies.benchmark.sampling import Sampling, compare_moves
 from studies.benchmark.timing import Rival, rivals, seconds_per_evaluation
+from studies.common.ets7 import ets7
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ def run(*, full: bool = False, seed: int = 0) -> Benchmark:
     seed : int
         Of the samplers.
     """
-    robot = Robot.shipped("ets7")
+    robot = ets7()
     single = posterior_of(robot)
     whitening = {"white": 0.0, "encoder 1e-6 rad": 1e-6, "encoder 1e-4 rad": 1e-4}
     posteriors = {name: posterior_of(robot, encoder_sigma=sigma) for name, sigma in whitening.items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -16,6 +15,7 @@ from scipy import stats
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from studies.blind_injections.trials import Trial, plan, read, run
+from studies.common.command import Command
 
 __all__ = ["confusion", "main", "rates", "write_report"]
 
@@ -26,22 +26,29 @@ CLEAR = 7.0
 """Signal-to-noise ratio from which the hidden causes should be in the reported set."""
 
 
+COMMAND = Command(
+    "blind_injections",
+    "How often a hidden cause is named rightly or wrongly, and how often nothing raises alarm.",
+    full="hundreds of injections and a thousand nulls (many hours)",
+    extra={
+        "--trials": {"type": Path, "default": Path("out/blind_injections.jsonl"), "help": "kept between runs"},
+        "--made": {"action": "store_true", "help": "report the trials made so far, make no more"},
+        "--workers": {"type": int, "default": 1, "help": "processes that make trials"},
+    },
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the campaign and write its report."""
-    parser = argparse.ArgumentParser(prog="python -m studies.blind_injections", description=__doc__)
-    parser.add_argument("--full", action="store_true", help="hundreds of injections and a thousand nulls (many hours)")
-    parser.add_argument("--output", type=Path, default=Path("reports/blind_injections.pdf"))
-    parser.add_argument("--trials", type=Path, default=Path("out/blind_injections.jsonl"), help="kept between runs")
-    parser.add_argument("--made", action="store_true", help="report the trials made so far, make no more")
-    given = parser.parse_args(arguments)
+    options = COMMAND.parse(arguments)
 
-    def show(number: int, total: int, trial: Trial) -> None:
-        print(f"{number}/{total} {trial.case}: {trial.status} {list(trial.causes)}", file=sys.stderr)
+    def show(text: str) -> None:
+        print(text, file=sys.stderr)
 
-    plans = plan(given.full)
-    trials = read(given.trials) if given.made else run(plans, given.trials, show)
-    write_report(trials, given.output, planned=len(plans))
-    print(f"Wrote {given.output}.")
+    plans = plan(options.full)
+    trials = read(options.trials) if options.made else run(plans, options.trials, show, options.workers)
+    write_report(trials, options.output, planned=len(plans))
+    print(f"Wrote {options.output}.")
 
 
 def rates(trials: Sequence[Trial]) -> list[list[str]]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -19,7 +19,9 @@ from bayesid.diagnosis import Diagnosis, Frame, diagnose
 from bayesid.diagnosis.candidate_table import detection_power, effect_amplitude
 from bayesid.diagnosis.perturbed_fit import Fit
 from bayesid.inference.noise_changes import with_manoeuvres
-from tests import hidden, mujoco_truth
+from studies.common.monte_carlo import read_store, run_trials
+from studies.truth import hidden_causes
+from studies.truth.mujoco import Study as Written
 
 __all__ = ["Plan", "Trial", "make", "plan", "read", "run"]
 
@@ -32,7 +34,7 @@ SPOILT = ("outliers", "quantisation")
 
 @dataclass(frozen=True)
 class Plan:
-    """One trial to be made: case of `tests.hidden`, seed, strength."""
+    """One trial to be made: case of `studies.truth.hidden_causes`, seed, strength."""
 
     case: str
     seed: int
@@ -130,60 +132,57 @@ def plan(full: bool) -> list[Plan]:
     plans = [
         Plan(case.name, 200 + 100 * seed + number, strength)
         for seed in range(seeds)
-        for number, case in enumerate(hidden.CASES)
+        for number, case in enumerate(hidden_causes.CASES)
         if case.status != "adequate"
         for strength in (outside if case.status == "unknown" else strengths)
     ]
-    quiet = [case.name for case in hidden.CASES if case.status == "adequate"]
+    quiet = [case.name for case in hidden_causes.CASES if case.status == "adequate"]
     return plans + [Plan(quiet[index % len(quiet)], 1000 + index) for index in range(nulls)]
 
 
-def run(plans: Sequence[Plan], kept: Path, progress: Callable[[int, int, Trial], None] | None = None) -> list[Trial]:
+def run(
+    plans: Sequence[Plan], kept: Path, progress: Callable[[str], None] = lambda text: None, workers: int = 1
+) -> list[Trial]:
     """Make the trials that the file does not hold yet.
 
     Parameters
     ----------
     plans : sequence of Plan
     kept : path
-        JSON lines; it is created, and extended after every trial.
+        Store of the trials, see `studies.common.monte_carlo`.
+    progress : callable, optional
+        Receives one line per finished trial.
+    workers : int
+        Number of processes.
+
+    Raises
+    ------
+    RuntimeError
+        If a trial has failed; the others are kept.
     """
-    done = {(t.case, t.seed, t.strength): t for t in read(kept)}
-    trials = []
-    for number, item in enumerate(plans, start=1):
-        key = (item.case, item.seed, item.strength)
-        if key not in done:
-            done[key] = make(item)
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            whole = not kept.is_file() or kept.read_text(encoding="utf-8")[-1:] in ("", "\n")
-            with kept.open("a", encoding="utf-8") as file:
-                file.write("" if whole else "\n")  # after a line cut off
-                file.write(json.dumps(asdict(done[key])) + "\n")
-        trials.append(done[key])
-        if progress is not None:
-            progress(number, len(plans), done[key])
-    return trials
+    made = run_trials(_attempt, plans, kept, workers=workers, progress=progress)
+    return [_trial(content) for content in made.complete()]
 
 
 def read(kept: Path) -> list[Trial]:
-    """Read the trials made so far; a last line cut off by an interruption is left out."""
-    if not kept.is_file():
-        return []
-    trials = []
-    for line in kept.read_text(encoding="utf-8").splitlines():
-        try:
-            content = json.loads(line)
-        except json.JSONDecodeError:
-            continue
-        for key in ("hidden", "accept", "causes", "amplitude_errors", "body_errors"):
-            content[key] = tuple(content[key])
-        content["sets"] = tuple(tuple(labels) for labels in content["sets"])
-        trials.append(Trial(**content))
-    return trials
+    """Read the trials made so far; those that failed or were cut off are left out."""
+    return [_trial(line["result"]) for line in read_store(kept) if "result" in line]
+
+
+def _attempt(item: Plan, rng: np.random.Generator) -> dict[str, Any]:
+    """Make a trial, whose random numbers follow from the seed of its plan."""
+    return asdict(make(item))
+
+
+def _trial(content: Mapping[str, Any]) -> Trial:
+    """Return a trial from what JSON has of it."""
+    tuples = {key: tuple(content[key]) for key in ("hidden", "accept", "causes", "amplitude_errors", "body_errors")}
+    return Trial(**{**content, **tuples, "sets": tuple(tuple(labels) for labels in content["sets"])})
 
 
 def make(item: Plan) -> Trial:
     """Hide, diagnose, compare."""
-    case = next(case for case in hidden.CASES if case.name == item.case)
+    case = next(case for case in hidden_causes.CASES if case.name == item.case)
     began = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         written = case.write(Path(folder) / "study", item.seed, item.strength)
@@ -217,12 +216,12 @@ def make(item: Plan) -> Trial:
     )
 
 
-def _visible(case: hidden.Case) -> bool:
+def _visible(case: hidden_causes.Case) -> bool:
     """Whether what is hidden changes the mean of the data."""
     return case.status != "adequate" and not any("noise" in c or c.startswith(SPOILT) for c in case.causes)
 
 
-def _limits(result: Diagnosis, case: hidden.Case, weaker: Study) -> tuple[float, float | None, float | None]:
+def _limits(result: Diagnosis, case: hidden_causes.Case, weaker: Study) -> tuple[float, float | None, float | None]:
     """Signal-to-noise ratio of what is hidden and theory's limits, from the same noise with less hidden."""
     fit, engine = result.before.fit, result.before.engine
     like = with_manoeuvres(fit.posterior, load_manoeuvres(weaker, fit.posterior.model.robot))
@@ -263,14 +262,12 @@ def _amplitude_errors(result: Diagnosis, truth: Mapping[str, Floats]) -> tuple[f
     return tuple(errors)
 
 
-def _body_errors(result: Diagnosis, written: mujoco_truth.Study) -> tuple[float, ...]:
-    base = written.base
-    truth = np.array([base.mass, *base.com, *base.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
+def _body_errors(result: Diagnosis, written: Written) -> tuple[float, ...]:
     bodies = result.gain.after.bodies
-    return tuple(((bodies.mean[:10] - truth) / bodies.sd[:10]).tolist())
+    return tuple(((bodies.mean[:10] - written.base.quantities) / bodies.sd[:10]).tolist())
 
 
-def _correlation(result: Diagnosis, case: hidden.Case, item: Plan, written: mujoco_truth.Study) -> float:
+def _correlation(result: Diagnosis, case: hidden_causes.Case, item: Plan, written: Written) -> float:
     """Correlation of the reconstructed with the true torque, all axes and recordings together."""
     found, true = [], []
     for time_, torque, truth in zip(

@@ -6,10 +6,9 @@ simulation starts without the three. ``python -m studies.ets7_drift --full`` wri
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
+from studies.common.command import Command
 from studies.ets7_drift.analysis import CAUSES, Case, Result, analyse
 from studies.ets7_drift.report import write_report
 from studies.ets7_drift.world import DURATION, SPREAD, draw_world
@@ -54,12 +53,12 @@ def run(
     return Result(cases)
 
 
+COMMAND = Command(
+    "ets7_drift", "Name what makes the attitude of ETS-VII drift.", full="three recordings, and a harder case", seed=1
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description="Name what makes the attitude of ETS-VII drift.")
-    parser.add_argument("--full", action="store_true", help="three recordings, and a harder case")
-    parser.add_argument("--output", type=Path, default=Path("reports/ets7_drift.pdf"))
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options = COMMAND.parse(arguments)
     write_report(run(full=options.full, seed=options.seed), options.output)

@@ -12,16 +12,15 @@ from bayesid.report import Document, format_quantity
 from bayesid.report.diagnosis_tables import hypothesis_rows
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number, format_unit
+from studies.common.ets7 import RADIUS, RAMPS
 from studies.ets7_drift.analysis import CAUSES, Case, Result
 from studies.ets7_drift.world import (
     ATTITUDE_SIGMA,
     ENCODER_SIGMA,
     INTERVAL,
     MOMENTUM,
-    RADIUS,
     RATE,
     RATE_SIGMA,
-    STEPS,
     TRUE_SPREAD,
 )
 
@@ -222,7 +221,7 @@ def _harder(document: Document, title: str, case: Case) -> None:
 
 def _assumed(document: Document, case: Case) -> None:
     document.section("Assumed")
-    ramps = " and ".join(f"{start:g} to {stop:g} s" for start, stop in STEPS)
+    ramps = " and ".join(f"{start:g} to {stop:g} s" for start, stop in RAMPS)
     document.items(
         [
             "No flight telemetry, wheel momentum or drift of ETS-VII is public as far as found; all numbers of the "

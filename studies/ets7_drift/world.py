@@ -1,66 +1,45 @@
-"""The flight-like manoeuvre, the true motion from an independent simulator, and the model that lacks the causes."""
+"""Recordings of the flight's manoeuvre, flown in MuJoCo with the causes, and the model that lacks them."""
 
 from __future__ import annotations
 
-import importlib
-import sys
-import tempfile
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from bayesid import (
-    BodyPrior,
-    InputError,
-    Kind,
-    Manoeuvre,
-    MeasuredMotion,
-    Model,
-    Orbit,
-    Recording,
-    Robot,
-    Sensor,
-    White,
-)
+from bayesid import BodyPrior, InertialParameters, Kind, Manoeuvre, Model, Orbit, Sensor, White
+from studies.common.ets7 import BASE, RADIUS, FlightManoeuvre, ets7
+from studies.common.flight import ORBIT, fly, light_wheel, record
+from studies.truth.mujoco import Body, nearby
 
-__all__ = ["BASE", "DURATION", "RADIUS", "World", "draw_world", "model_of", "motion", "simulator"]
+__all__ = ["DURATION", "MOTION", "World", "draw_world", "model_of"]
 
 Floats = NDArray[np.floating]
 
-BASE = "base_link"
-RADIUS = 6.916e6
-"""Of the orbit, as the paper states it [m]."""
-
 DURATION = 300.0
-"""Of a recording [s]; the attitude control is off throughout."""
+"""Length of a recording [s]; the attitude control is off throughout."""
 
 INTERVAL = 1.0
-"""Between samples of all sensors [s]."""
+"""Time between samples of all sensors [s]."""
 
-STEPS = ((60.0, 82.6), (122.0, 144.6))
-"""When the arm goes out and comes back [s]: the flight's own times, from a minute after the start."""
+MOTION = FlightManoeuvre(np.zeros(6), corner=None)
+"""The flight's manoeuvre from joints at zero, its linear ramps made quintic and smooth."""
 
-EXCURSION = np.array([0.0, 0.264, -0.321, 0.057, 0.0, 0.0])
-"""Of the six joints in between [rad], those of the flight manoeuvre."""
+STEP = 0.25
+"""Integration step of MuJoCo [s]."""
 
 RATE_SIGMA, ATTITUDE_SIGMA, ENCODER_SIGMA = 1e-5, 1e-4, 1e-5
 """Noise of rates (two seconds of arc per second), attitude (twenty seconds of arc) and joints [rad/s, rad, rad]."""
 
 MOMENTUM = (0.6, -0.4, 0.8)
-"""Left in the reaction wheels [N m s]."""
+"""Momentum left in the reaction wheels [N m s]."""
 
 RATE = 3e-4
 """Standard deviation of the initial rates about each axis [rad/s]: a degree in a minute."""
 
 SPREAD, TRUE_SPREAD = 0.005, 0.003
 """Relative width of the base's prior, and of the draw of the true base about the published one."""
-
-WHEEL = {"mass": 1e-3, "spin_inertia": 1e-3}
-"""So light that the base with the wheel at rest is the base without it."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +49,7 @@ class World:
     Attributes
     ----------
     momentum : (3,) array
-        Of the wheels [N m s].
+        Momentum of the wheels [N m s].
     rates : (R, 3) array
         Initial rates [rad/s].
     base : (10,) array
@@ -85,81 +64,37 @@ class World:
     manoeuvres: tuple[Manoeuvre, ...]
 
 
-def motion(time: float) -> tuple[Floats, Floats, Floats]:
-    """Joint positions, speeds and accelerations: the flight's linear ramps made quintic and smooth."""
-    share = np.zeros(3)
-    for sign, (start, stop) in zip((1.0, -1.0), STEPS, strict=True):
-        length = stop - start
-        x = min(max((time - start) / length, 0.0), 1.0)
-        slope, bend = 30.0 * x**2 * (1.0 - x) ** 2 / length, 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / length**2
-        share += sign * np.array([x**3 * (10.0 - 15.0 * x + 6.0 * x**2), slope, bend])
-    return share[0] * EXCURSION, share[1] * EXCURSION, share[2] * EXCURSION
-
-
-def simulator() -> Any:
-    """Return the independent simulator, which is part of the tests and not of the package.
-
-    Raises
-    ------
-    InputError
-        If the tests are absent.
-    """
-    tests = Path(__file__).parents[2] / "tests"
-    if not (tests / "mujoco_truth.py").is_file():
-        raise InputError("the independent simulator is absent", file=tests, remedy="Run in a clone of the repository")
-    sys.path.insert(0, str(tests.parent))
-    try:
-        return importlib.import_module("tests.mujoco_truth")
-    finally:
-        sys.path.remove(str(tests.parent))
-
-
 def draw_world(recordings: int, seed: int, momentum: float = 1.0, duration: float = DURATION) -> World:
     """Draw a true base, attitudes, places on the orbit and initial rates; simulate and measure.
 
     Parameters
     ----------
+    recordings, seed : int
+        Number of recordings, and seed of every random number.
     momentum : float
-        Times `MOMENTUM`.
+        Momentum of the wheels over `MOMENTUM`.
     duration : float
-        [s]
+        Length of a recording [s].
     """
-    truth, rng = simulator(), np.random.default_rng(seed)
-    robot = Robot.shipped("ets7")
-    published = robot.link(BASE).inertial
-    base = truth.nearby(truth.Body(published.mass, published.com, published.inertia), rng, TRUE_SPREAD)
+    rng = np.random.default_rng(seed)
+    published_robot = ets7()
+    published = published_robot.link(BASE).inertial
+    base = nearby(Body(published.mass, published.com, published.inertia), rng, TRUE_SPREAD)
     wheels = np.array(MOMENTUM) * momentum
     manoeuvres, rates = [], RATE * rng.standard_normal((recordings, 3))
     time = np.arange(0.0, duration + 0.5 * INTERVAL, INTERVAL)
-    with tempfile.TemporaryDirectory() as folder:
-        urdf, true_urdf = Path(folder) / "robot.urdf", Path(folder) / "true.urdf"
-        robot.write_urdf(urdf)
-        truth.write_urdf(urdf, true_urdf, base)
-        for index in range(recordings):
-            argument_of_latitude = float(rng.uniform(0.0, 2.0 * np.pi))
-            attitude = Rotation.random(rng=rng).as_quat()
-            model = truth.TruthModel(
-                true_urdf,
-                orbit=truth.Orbit(radius=RADIUS, argument_of_latitude=argument_of_latitude),
-                rotor=truth.Rotor(tuple(wheels), **WHEEL),
-            )
-            run = model.run(motion, time, rate0=rates[index], attitude0=attitude, step=0.25)
-            channels = {
-                f"position.{joint}": run.position[:, k] + ENCODER_SIGMA * rng.standard_normal(len(time))
-                for k, joint in enumerate(model.joints)
-            }
-            turn = Rotation.from_rotvec(ATTITUDE_SIGMA * rng.standard_normal((len(time), 3)))
-            measured = (Rotation.from_quat(run.attitude) * turn).as_quat()
-            noisy = run.rate + RATE_SIGMA * rng.standard_normal(run.rate.shape)
-            channels |= {f"rate.{axis}": noisy[:, k] for k, axis in enumerate("xyz")}
-            channels |= {f"attitude.{axis}": measured[:, k] for k, axis in enumerate("xyzw")}
-            recording = Recording(f"flight {index + 1}", None, time, channels)
-            sigma: dict[int, float] = {0: ENCODER_SIGMA}
-            smoothed = MeasuredMotion.from_recording(recording, robot, sigma=sigma)
-            manoeuvres.append(Manoeuvre(recording, smoothed, attitude, argument_of_latitude=argument_of_latitude))
-    tensor = base.inertia
-    quantities = [base.mass, *base.com, *np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
-    return World(wheels, rates, np.array(quantities), tuple(manoeuvres))
+    true = published_robot.with_inertial(BASE, InertialParameters(base.mass, base.com, base.inertia))
+    noise = {"position": ENCODER_SIGMA, "attitude": ATTITUDE_SIGMA, "rate": RATE_SIGMA}
+    for index in range(recordings):
+        argument_of_latitude = float(rng.uniform(0.0, 2.0 * np.pi))
+        attitude = Rotation.random(rng=rng).as_quat()
+        orbit = replace(ORBIT, argument_of_latitude=argument_of_latitude)
+        truth = fly(
+            true, MOTION, time, step=STEP, rate=rates[index], attitude=attitude, orbit=orbit, rotor=light_wheel(wheels)
+        )
+        manoeuvre = record(truth, f"flight {index + 1}", published_robot, noise, rng)
+        manoeuvres.append(replace(manoeuvre, attitude=attitude, argument_of_latitude=argument_of_latitude))
+    return World(wheels, rates, base.quantities, tuple(manoeuvres))
 
 
 def model_of(spread: float = SPREAD) -> Model:
@@ -167,7 +102,7 @@ def model_of(spread: float = SPREAD) -> Model:
 
     It sees the rates alone; the measured attitude is kept to compare with.
     """
-    robot = Robot.shipped("ets7")
+    robot = ets7()
     return Model(
         robot,
         (Sensor(Kind.RATE, White(RATE_SIGMA)),),

@@ -8,12 +8,12 @@ it, and the predicted widths are checked with MuJoCo. ``python -m studies.ets7_l
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import Search, Store
+from studies.common.command import Command
 from studies.ets7_limits.analysis import ACCELS, CHECKED, RATES, answers, design_manoeuvre, knowledge_of, tell
 from studies.ets7_limits.check import check
 from studies.ets7_limits.report import Result, write_report
@@ -71,14 +71,17 @@ def run(
     return Result(designed, table, tell(own), tell(flown), REPETITIONS, curves, checked, duration)
 
 
+COMMAND = Command(
+    "ets7_limits",
+    "Say what ETS-VII could have identified within its rules.",
+    seed=1,
+    extra={"--store": {"type": Path, "help": "file that keeps what the search found, for an interrupted run"}},
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description="Say what ETS-VII could have identified within its rules.")
-    parser.add_argument("--output", type=Path, default=Path("reports/ets7_limits.pdf"))
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--store", type=Path, help="file that keeps what the search found, for an interrupted run")
-    options = parser.parse_args(arguments)
+    options = COMMAND.parse(arguments)
     keep_compiled()
-    options.output.parent.mkdir(parents=True, exist_ok=True)
     store = None if options.store is None else Store.open(options.store, f"ets7-limits {options.seed} {SEARCH}")
     write_report(run(seed=options.seed, store=store, progress=print), options.output)

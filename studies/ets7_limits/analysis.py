@@ -14,9 +14,9 @@ from bayesid.design.design_problem import Reached
 from bayesid.design.plan import Trajectory
 from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.simulation.sensors import Noise, StarTracker
-from studies.ets7_limits.flight import Flight
+from studies.common.ets7 import ACCEL, RATE, START, FlightManoeuvre
 from studies.ets7_limits.information import LONGEST, Grade, Knowledge, wide_posterior
-from studies.ets7_limits.setting import ACCEL, ARM_SPREAD, RATE, START
+from studies.ets7_limits.setting import ARM_SPREAD
 
 __all__ = [
     "ACCELS",
@@ -114,7 +114,7 @@ def knowledge_of(designed: Designed, arm_spread: float = ARM_SPREAD) -> tuple[Kn
     """Return what can be asked of the designed manoeuvre and of the flight's."""
     duration = designed.motion.family.duration
     own = wide_posterior(designed.motion, None, duration, arm_spread)
-    return Knowledge(own, duration), Knowledge(wide_posterior(Flight(START), own, duration), duration)
+    return Knowledge(own, duration), Knowledge(wide_posterior(FlightManoeuvre(START), own, duration), duration)
 
 
 def tell(knowledge: Knowledge) -> Telling:

@@ -14,15 +14,15 @@ from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.base_body.physical import physical_sd, physical_slope
+from studies.ets7_limits.flights import fly, record
 from studies.ets7_limits.setting import model_of
-from studies.ets7_limits.truth import fly, record
 
 __all__ = ["RATE_AT_START", "Check", "check"]
 
 Floats = NDArray[np.floating]
 
 RATE_AT_START = np.array([1e-4, -5e-5, 8e-5])
-"""Of the base in the independent simulator [rad/s]; unknown to the fits."""
+"""Rate of the base at the start in MuJoCo [rad/s]; unknown to the fits."""
 
 
 @dataclass(frozen=True)

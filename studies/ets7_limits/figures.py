@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from bayesid.design.plan import Trajectory
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
-from studies.ets7_limits.setting import LIMITS
+from studies.common.ets7 import LIMITS
 
 __all__ = ["manoeuvre_figure", "repetition_figure"]
 

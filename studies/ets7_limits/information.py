@@ -18,7 +18,8 @@ from bayesid.recording.joint_motion import Motion
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.simulation.sensors import Noise
 from studies.base_body.physical import physical_sd, physical_slope
-from studies.ets7_limits.setting import ARM_SPREAD, DURATION, ENCODER, INTERVAL, POINT, model_of
+from studies.common.ets7 import ACCELEROMETER, ENCODER
+from studies.ets7_limits.setting import ARM_SPREAD, DURATION, INTERVAL, model_of
 
 __all__ = ["LONGEST", "Grade", "Knowledge", "Repeated", "wide_posterior"]
 
@@ -115,7 +116,7 @@ class Knowledge:
         """Information of one manoeuvre, without prior, the encoders' noise carried into the sensors; kept."""
         accel = ABSENT if grade.accel is None else grade.accel
         if (grade.rate, accel) not in self._fisher:
-            sensors = (Sensor(Kind.RATE, grade.rate), Sensor(Kind.ACCEL, White(accel), position=POINT))
+            sensors = (Sensor(Kind.RATE, grade.rate), Sensor(Kind.ACCEL, White(accel), position=ACCELEROMETER))
             z = np.zeros(self.posterior.size)
             jacobian = with_sensors(self.posterior, sensors, z).jacobian(z)[: -self.posterior.size]
             self._fisher[grade.rate, accel] = jacobian.T @ jacobian

@@ -11,12 +11,12 @@ import numpy as np
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report import Document
 from bayesid.report.numbers import format_number
+from studies.common.ets7 import ACCEL, ACCELEROMETER, BIAS, CORNER, ENCODER, RATE, START
 from studies.ets7_limits.analysis import Answer, Designed, Telling
 from studies.ets7_limits.check import RATE_AT_START, Check
 from studies.ets7_limits.figures import manoeuvre_figure, repetition_figure
-from studies.ets7_limits.flight import ROUNDING
 from studies.ets7_limits.information import LONGEST
-from studies.ets7_limits.setting import ACCEL, BIAS, ENCODER, INTERVAL, POINT, RATE, START
+from studies.ets7_limits.setting import INTERVAL
 
 __all__ = ["Result", "time_needed", "write_report"]
 
@@ -168,7 +168,7 @@ def _alone(document: Document, result: Result) -> None:
     document.paragraph(
         "The flight's manoeuvre: joints 2 to 4 by 0.264, −0.321 and 0.057 rad out and back in 22.6 s each, "
         "39.4 s apart, "
-        f"its corners rounded over {ROUNDING:g} s; the time around it is recorded too, so that both last "
+        f"its corners rounded over {CORNER:g} s; the time around it is recorded too, so that both last "
         f"{result.duration:g} s."
     )
 
@@ -207,7 +207,7 @@ def _assumed(document: Document, result: Result) -> None:
         [
             "Base as published in the paper, under a prior of relative width one; arm with nominal inertias. Start of "
             f"every manoeuvre: joints at {', '.join(f'{value:g}' for value in START)} rad; accelerometer at "
-            f"{', '.join(f'{value:g}' for value in POINT)} m. Neither is published.",
+            f"{', '.join(f'{value:g}' for value in ACCELEROMETER)} m. Neither is published.",
             f"Samples each {INTERVAL:g} s; noise is white. The star sensor's 2 seconds of arc, differenced, "
             "are taken as "
             f"white too (2.7 × 10⁻⁵ rad/s). Joints have {format_number(ENCODER)} rad of noise, "

@@ -8,23 +8,23 @@ is compared with emcee on data of an independent simulator and with the errors r
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import Search
+from studies.common.command import Command
+from studies.common.ets7 import LIMITS
 from studies.excitation.cloud import Cloud, Sensitivity, random_cloud, sensitivity
 from studies.excitation.contest import Contest, compete
 from studies.excitation.realised import Realised, realise
-from studies.excitation.world import FAST, RULE
+from studies.excitation.world import FAST
 
 __all__ = ["Result", "main", "run"]
 
-SETS = {"within the flight's rule": RULE, "without a rule for the tip": FAST}
+SETS = {"within the flight's rule": LIMITS, "without a rule for the tip": FAST}
 
 
 @dataclass(frozen=True)
@@ -99,15 +99,18 @@ def run(
     return Result(contests, realised, clouds, weights)
 
 
+COMMAND = Command(
+    "excitation",
+    "Compare manoeuvres by the posterior they lead to.",
+    full="all criteria, 400 recordings per design (half an hour)",
+    seed=1,
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     from studies.excitation.report import write_report
 
-    parser = argparse.ArgumentParser(description="Compare manoeuvres by the posterior they lead to.")
-    parser.add_argument("--full", action="store_true", help="all criteria, 400 recordings per design (half an hour)")
-    parser.add_argument("--output", type=Path, default=Path("reports/excitation.pdf"))
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options = COMMAND.parse(arguments)
     keep_compiled()
     write_report(run(full=options.full, seed=options.seed, progress=print), options.output)

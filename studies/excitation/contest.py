@@ -29,7 +29,8 @@ from bayesid.design import (
 from bayesid.design.design_problem import Known
 from studies.base_body import paper
 from studies.base_body.setting import POOR
-from studies.excitation.world import ENCODER, paper_family, problem, splines
+from studies.common.ets7 import ENCODER
+from studies.excitation.world import paper_family, problem, splines
 
 __all__ = ["Contest", "compete", "shrunk"]
 

@@ -12,7 +12,9 @@ from bayesid import Posterior, identify
 from bayesid.design import Design
 from bayesid.inference import maximise
 from bayesid.robot.inertial_parameters import mass_com_inertia
-from studies.excitation.world import BASE, fly, recorded
+from studies.common.ets7 import BASE
+from studies.common.monte_carlo import run_trials
+from studies.excitation.world import fly, recorded
 
 __all__ = ["Realised", "realise"]
 
@@ -63,23 +65,23 @@ def realise(
     item: Design, seed: int, repeats: int, effective_samples: float, progress: Callable[[str], None]
 ) -> Realised:
     """Fly a design with the independent simulator, record it many times, and identify the base from each."""
-    run = fly(item.motion)
-    seeds = np.random.SeedSequence(seed).spawn(repeats)
-    truth = mass_com_inertia(item.posterior.model.robot.link(BASE).inertial.vector)
-    errors: list[Floats] = []
-    sampled: Floats = np.zeros(10)
-    offset: Floats = np.zeros(10)
-    for index, own in enumerate(seeds):
-        rng = np.random.default_rng(own)
-        posterior = Posterior.of(item.posterior.model, [recorded(run, rng)], step=item.posterior.step)
-        if index == 0:
-            result = identify(posterior, seed, effective_samples=effective_samples)
-            sampled, offset = result.bodies[BASE].sd, result.bodies[BASE].mean - truth
+    truth, flown = mass_com_inertia(item.posterior.model.robot.link(BASE).inertial.vector), fly(item.motion)
+
+    def identified(number: int, rng: np.random.Generator) -> dict[str, Floats]:
+        """Errors of the fit to one recording, and on the first recording what emcee says."""
+        manoeuvre = recorded(flown, rng)
+        posterior = Posterior.of(item.posterior.model, [manoeuvre], step=item.posterior.step)
+        outcome = {}
+        if number == 0:
+            body = identify(posterior, seed, effective_samples=effective_samples).bodies[BASE]
+            outcome = {"sampled": body.sd, "offset": body.mean - truth}
         _, optimum = maximise(posterior, rng, np.zeros(posterior.size))
-        errors.append(mass_com_inertia(posterior.unknowns.inertials(optimum.z)[0].vector) - truth)
-        if index % 50 == 49:
-            progress(f"{item.name}: {index + 1} of {repeats} recordings identified")
-    every = np.array(errors)
+        return outcome | {"error": mass_com_inertia(posterior.unknowns.inertials(optimum.z)[0].vector) - truth}
+
+    trials = run_trials(identified, range(repeats), seed=seed, progress=lambda text: progress(f"{item.name}: {text}"))
+    outcomes = trials.complete()
+    every = np.array([outcome["error"] for outcome in outcomes])
+    sampled, offset = np.array(outcomes[0]["sampled"]), np.array(outcomes[0]["offset"])
     scale = item.predicted.sd
     inverse = np.linalg.inv(item.predicted.covariance / np.outer(scale, scale))
     distances = np.einsum("ij,jk,ik->i", every / scale, inverse, every / scale)

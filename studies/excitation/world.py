@@ -2,76 +2,48 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid import BodyPrior, Kind, Manoeuvre, MeasuredMotion, Model, Orbit, Recording, Robot, Sensor, White
+from bayesid import BodyPrior, Kind, Manoeuvre, Model, Orbit, Sensor, White
 from bayesid.design import BSplines, Criterion, Limits, PaperExcitation, Plan, Problem, Tip, TrajectoryFamily
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.effects import AccelBias, GravityGradient
-from studies.base_body import paper
-from studies.base_body.setting import extended_wrist
-from studies.ets7_drift.world import simulator
+from studies.common import flight
+from studies.common.ets7 import ACCEL, ACCELEROMETER, BASE, BIAS, ENCODER, RADIUS, RATE, ets7, extended_wrist
+from studies.truth.mujoco import Truth
 
-__all__ = [
-    "BASE",
-    "DURATION",
-    "ENCODER",
-    "FAST",
-    "RULE",
-    "fly",
-    "model_of",
-    "paper_family",
-    "problem",
-    "recorded",
-    "splines",
-]
+__all__ = ["DURATION", "FAST", "fly", "model_of", "paper_family", "problem", "recorded", "splines"]
 
 Floats = NDArray[np.floating]
 
-BASE = "base_link"
 DURATION = 120.0
-"""Of every manoeuvre [s]."""
+"""Length of every manoeuvre [s]."""
 
 INTERVAL = 0.5
-"""Between samples of all sensors [s]."""
-
-RATE_SIGMA, ACCEL_SIGMA, ENCODER = 1e-5, 1e-5, 1e-6
-"""Noise per sample: two seconds of arc per second, a good accelerometer, encoders [rad/s, m/s2, rad]."""
-
-ACCEL_BIAS = 1e-4
-"""Prior standard deviation of the accelerometer's constant error [m/s2]."""
-
-POINT = (0.4, 0.3, 0.8)
-"""Of the accelerometer in the base [m]."""
+"""Time between samples of all sensors [s]."""
 
 REACH = 2.6
 """Joint range allowed to all, either way [rad]; the paper's printed optimum needs 2.5, more than its own limit."""
-
-RULE = Limits(tip_speed=0.05, tip_rate=float(np.radians(5.0)))
-"""What was allowed on ETS-VII."""
 
 FAST = Limits(joint_speed=0.4)
 """No rule for the tip: what the paper's printed optimum needs at this duration [rad/s]."""
 
 STEP = 0.1
-"""Of the independent simulator [s]."""
+"""Integration step of MuJoCo [s]."""
 
 
 @cache
 def model_of() -> Model:
     """Return the model: base unknown, arm known, the accelerometer's bias and the initial rate to be marginalised."""
-    robot = Robot.shipped("ets7")
+    robot = ets7()
     robot = replace(robot, joints=tuple(replace(joint, lower=-REACH, upper=REACH) for joint in robot.joints))
-    sensors = (Sensor(Kind.RATE, White(RATE_SIGMA)), Sensor(Kind.ACCEL, White(ACCEL_SIGMA), position=POINT))
+    sensors = (Sensor(Kind.RATE, White(RATE)), Sensor(Kind.ACCEL, White(ACCEL), position=ACCELEROMETER))
     base = BodyPrior(BASE, robot.link(BASE).inertial, 1.0)
-    return Model(robot, sensors, (base,), Orbit(paper.RADIUS), (GravityGradient(), AccelBias(ACCEL_BIAS)))
+    return Model(robot, sensors, (base,), Orbit(RADIUS), (GravityGradient(), AccelBias(BIAS)))
 
 
 def posture() -> Floats:
@@ -96,27 +68,16 @@ def problem(family: TrajectoryFamily, limits: Limits, criteria: tuple[Criterion,
     return Problem(plan, limits, criteria)
 
 
-def fly(motion: Motion) -> Any:
-    """Fly a manoeuvre with the independent simulator and return its readings without noise."""
-    truth = simulator()
-    with tempfile.TemporaryDirectory() as folder:
-        urdf = Path(folder) / "robot.urdf"
-        Robot.shipped("ets7").write_urdf(urdf)
-        model = truth.TruthModel(urdf, orbit=truth.Orbit(radius=paper.RADIUS), accel_position=POINT)
-    time = np.arange(0.0, DURATION + 1e-9, INTERVAL)
-    return model.run(lambda t: tuple(part[0] for part in motion.evaluate(np.array([t]))), time, step=STEP)
+def fly(motion: Motion) -> Truth:
+    """Fly a manoeuvre in MuJoCo and return its readings without noise."""
+    return flight.fly(ets7(), motion, np.arange(0.0, DURATION + 1e-9, INTERVAL), step=STEP)
 
 
-def recorded(run: Any, rng: np.random.Generator) -> Manoeuvre:
+def recorded(truth: Truth, rng: np.random.Generator) -> Manoeuvre:
     """Record a flight with fresh noise of all sensors and encoders, and a fresh bias of the accelerometer."""
-    time, robot = np.asarray(run.times), model_of().robot
-    channels = {
-        f"position.{joint.name}": run.position[:, k] + ENCODER * rng.standard_normal(len(time))
-        for k, joint in enumerate(robot.joints)
-    }
-    bias = ACCEL_BIAS * rng.standard_normal(3)
-    for family, values, sigma in (("rate", run.rate, RATE_SIGMA), ("accel", run.accel + bias, ACCEL_SIGMA)):
-        noisy = values + sigma * rng.standard_normal(values.shape)
-        channels |= {f"{family}.{axis}": noisy[:, k] for k, axis in enumerate("xyz")}
-    recording = Recording("manoeuvre", None, time, channels)
-    return Manoeuvre(recording, MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODER}))
+    robot = model_of().robot
+    joints = [joint.name for joint in robot.joints]
+    channels = flight.readings(truth, joints, {"position": ENCODER}, rng)
+    biased = truth._replace(accel=truth.accel + BIAS * rng.standard_normal(3))
+    channels |= flight.readings(biased, joints, {"rate": RATE, "accel": ACCEL}, rng)
+    return flight.smoothed("manoeuvre", truth.times, channels, robot, ENCODER)

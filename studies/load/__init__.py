@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from bayesid.design import Search
+from studies.common.command import Command
 from studies.load.noise_free import Iteration, iterate
 from studies.load.report import write
 from studies.load.sampled import Flight, fly_all
@@ -50,13 +49,13 @@ def run(*, full: bool = False, seed: int = 0) -> Result:
     return Result(iterate(seed=seed, search=search), fly_all(seed=seed, search=search))
 
 
+COMMAND = Command(
+    "load", "Identify a load on the arm of ETS-VII.", full="search for the manoeuvres, and fly with noise", seed=0
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description="Identify a load on the arm of ETS-VII.")
-    parser.add_argument("--full", action="store_true", help="search for the manoeuvres, and fly with noise")
-    parser.add_argument("--output", type=Path, default=Path("reports/load.pdf"))
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args(arguments)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options = COMMAND.parse(arguments)
     result = run(full=options.full, seed=options.seed)
     write(result.iterations, result.flights, options.output)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from bayesid.robot.inertial_parameters import InertialParameters
 
-__all__ = ["GUESS", "RADIUS", "RESULTS", "TRUTH", "Reading", "body", "readings"]
+__all__ = ["GUESS", "RESULTS", "TRUTH", "Reading", "body", "readings"]
 
 Floats = NDArray[np.floating]
 
@@ -21,9 +21,6 @@ RESULTS = (
     np.array([370.12, 0.33, 0.50, 1.04, 700.3, 700.7, 700.2, 0.0, 0.0, 0.0]),
 )
 """After the first and the second iteration."""
-
-RADIUS = 6.916e6
-"""Of the orbit [m]."""
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from bayesid.design.knowledge_update import bodies_of_draws
 from bayesid.inference.body_quantities import BodyDraws
 from bayesid.inference.posterior_as_prior import InertialDraws
 from bayesid.recording.recording import Recording
-from studies.base_body.setting import extended_wrist
+from studies.common.ets7 import ENCODER, extended_wrist
 from studies.load import paper
-from studies.load.setting import DURATION, ENCODER, LIMITS, LOAD, MuJoCoSpacecraft, excitation, model, problem
+from studies.load.setting import DURATION, LIMITS, LOAD, MuJoCoSpacecraft, excitation, model, problem
 
 __all__ = ["Flight", "fly_all"]
 

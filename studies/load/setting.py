@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,29 +10,23 @@ from numpy.typing import NDArray
 from bayesid import BodyPrior, Kind, Load, Model, Orbit, Recording, Robot, Sensor, White
 from bayesid.design import Criterion, Limits, PaperExcitation, Plan, PlannedMotion, Problem, Tip, TrajectoryFamily
 from bayesid.simulation.effects import GravityGradient
-from studies.base_body.setting import extended_wrist
-from studies.ets7_drift.world import simulator
+from studies.common.ets7 import ACCEL, ACCELEROMETER, ENCODER, RADIUS, RATE, ets7, extended_wrist
+from studies.common.flight import fly, readings
 from studies.load import paper
 
-__all__ = ["ENCODER", "LOAD", "MuJoCoSpacecraft", "excitation", "model", "problem", "ship"]
+__all__ = ["LOAD", "MuJoCoSpacecraft", "excitation", "model", "problem", "ship"]
 
 Floats = NDArray[np.floating]
 
 LOAD, LINK = "load", "link6"
 DURATION, INTERVAL = 120.0, 0.5
-"""Of a manoeuvre, and between samples of all sensors [s]."""
+"""Length of a manoeuvre, and time between samples of all sensors [s]."""
 
 RANGE = np.pi / 2.0
 """Joint range the paper states [rad]."""
 
 LIMITS = Limits(joint_speed=0.2)
 """The paper states no speed [rad/s]."""
-
-RATE_SIGMA, ACCEL_SIGMA, ENCODER = 1e-5, 1e-5, 1e-6
-"""Noise per sample [rad/s, m/s2, rad]."""
-
-ACCELEROMETER = (0.4, 0.3, 0.8)
-"""Mounting point [m]; the paper does not state one."""
 
 JOLT = 2.0
 """Where (27) meets its connecting splines the third derivative jumps, which no smoothing of samples at 2 Hz follows:
@@ -47,7 +39,7 @@ PLAN_STEP, TRUTH_STEP = 2.0, 0.1
 
 def ship(load: Floats = paper.GUESS) -> Robot:
     """Return ETS-VII with the paper's joint ranges and a load."""
-    shipped = Robot.shipped("ets7")
+    shipped = ets7()
     urdf = shipped.urdf.replace('"-6.283185307179586"', f'"{-RANGE!r}"').replace('"6.283185307179586"', f'"{RANGE!r}"')
     return Robot.from_string(urdf).with_load(Load(LOAD, LINK, paper.body(load)))
 
@@ -56,9 +48,9 @@ def model(spread: float) -> Model:
     """Return what is known before the first manoeuvre: the paper's guess, in orbit, at rest."""
     return Model(
         robot=ship(),
-        sensors=(Sensor(Kind.RATE, White(RATE_SIGMA)), Sensor(Kind.ACCEL, White(ACCEL_SIGMA), position=ACCELEROMETER)),
+        sensors=(Sensor(Kind.RATE, White(RATE)), Sensor(Kind.ACCEL, White(ACCEL), position=ACCELEROMETER)),
         priors=(BodyPrior(LOAD, paper.body(paper.GUESS), spread),),
-        orbit=Orbit(paper.RADIUS),
+        orbit=Orbit(RADIUS),
         effects=(GravityGradient(),),
         rate_sigma=0.0,
     )
@@ -92,25 +84,12 @@ class MuJoCoSpacecraft:
 
     def execute(self, plan: Recording) -> Recording:
         """Fly a plan."""
-        truth = simulator()
-        with tempfile.TemporaryDirectory() as folder:
-            urdf = Path(folder) / "true.urdf"
-            ship(paper.TRUTH).write_urdf(urdf)
-            robot = truth.TruthModel(urdf, orbit=truth.Orbit(radius=paper.RADIUS), accel_position=ACCELEROMETER)
-        motion = PlannedMotion(plan, robot.joints)
-        # on a grid of half steps, all that the integration asks for
-        half = 0.5 * TRUTH_STEP
-        states = np.stack(motion.evaluate(np.arange(0.0, plan.time[-1] + 2.0 * half, half)), axis=1)
-        run = robot.run(lambda time: tuple(states[round(time / half)]), plan.time, step=TRUTH_STEP)
-        parts = (("rate", run.rate, RATE_SIGMA), ("accel", run.accel, ACCEL_SIGMA))
-        channels = {f"position.{joint}": run.position[:, k] for k, joint in enumerate(robot.joints)}
-        sigma = dict.fromkeys(channels, ENCODER)
-        for name, values, width in parts:
-            for k, axis in enumerate("xyz"):
-                channels[f"{name}.{axis}"], sigma[f"{name}.{axis}"] = values[:, k], width
-        if self.seed is not None:
-            rng = np.random.default_rng([self.seed, *plan.name.encode()])
-            channels = {name: values + sigma[name] * rng.normal(size=len(values)) for name, values in channels.items()}
+        robot = ship(paper.TRUTH)
+        joints = [joint.name for joint in robot.joints]
+        run = fly(robot, PlannedMotion(plan, joints), plan.time, step=TRUTH_STEP)
+        noise = {"position": ENCODER, "rate": RATE, "accel": ACCEL}
+        rng = None if self.seed is None else np.random.default_rng([self.seed, *plan.name.encode()])
+        channels = readings(run, joints, noise, rng, by_channel=noise)
         unread = np.zeros(len(plan.time), dtype=bool)
         for jolt in self.jolts:
             unread |= np.abs(plan.time - jolt) <= JOLT

@@ -7,10 +7,9 @@ with the identified base is flown too. ``python -m studies.planning --full`` wri
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
+from studies.common.command import Command
 from studies.planning.analysis import Case, analyse
 from studies.planning.calibration import calibrate
 from studies.planning.report import Result, write_report
@@ -67,12 +66,12 @@ def run(
     return Result(cases, tuple(found))
 
 
+COMMAND = Command(
+    "planning", "Say what identification buys the planner.", full="also from the paper's initial guess", seed=1
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description="Say what identification buys the planner.")
-    parser.add_argument("--full", action="store_true", help="also from the paper's initial guess")
-    parser.add_argument("--output", type=Path, default=Path("reports/planning.pdf"))
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options = COMMAND.parse(arguments)
     write_report(run(full=options.full, seed=options.seed, progress=print), options.output)

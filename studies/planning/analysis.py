@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from bayesid import Identification, InertialParameters, Manoeuvre, Model, Posterior, Recording, Robot, identify
+from bayesid import Identification, InertialParameters, Manoeuvre, Model, Posterior, Recording, identify
 from bayesid.design.base_prediction import BasePredictor, Prediction
 from bayesid.design.pose_region import Pose
 from bayesid.inference.posterior_as_prior import InertialDraws, joint_prior
-from studies.planning.world import ATTITUDE, BASE, START, TIP, Flown, Guess, Swing, fly, measure, model_of
+from studies.common.ets7 import BASE, START, TIP, ets7
+from studies.planning.world import ATTITUDE, Flown, Guess, Swing, fly, measure, model_of
 
 __all__ = ["Case", "Flight", "Trial", "analyse", "flight_of", "identified", "plan", "predictor_of"]
 
@@ -97,7 +98,7 @@ def analyse(
     ):
         swing = Swing(START, flight.goal, duration)
         trials.append(_trial(title, predictor_of(model, swing, like).predict(draws, rng), flight.flown))
-    truth = Robot.shipped("ets7").link(BASE).inertial
+    truth = ets7().link(BASE).inertial
     return Case(guess, target, truth, result, first, again, tuple(trials))
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid import Robot
 from bayesid.design.pose_region import Pose
 from bayesid.robot.body_prior import coordinates_of, draw_inertial
+from studies.common.ets7 import BASE, START, ets7
 from studies.planning.analysis import predictor_of
-from studies.planning.world import BASE, START, Flown, Guess, Swing, guess_about, model_of
+from studies.planning.world import Flown, Guess, Swing, guess_about, model_of
 
 __all__ = ["Calibration", "calibrate"]
 
@@ -55,7 +55,7 @@ def calibrate(
     guesses, draws : int
         Priors, and draws of each.
     """
-    rng, truth = np.random.default_rng(seed), Robot.shipped("ets7").link(BASE).inertial
+    rng, truth = np.random.default_rng(seed), ets7().link(BASE).inertial
     model = model_of(Guess("truth", truth, spread))
     predictor = predictor_of(model, Swing(START, goal, duration))
     held = np.zeros((2, 2), dtype=int)

@@ -14,17 +14,10 @@ from bayesid.design.pose_region import CONTENT
 from bayesid.report import Document, figures, format_quantity
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number
+from studies.common.ets7 import ACCEL, BASE, ENCODER, RATE
 from studies.planning.analysis import Case
 from studies.planning.calibration import Calibration
-from studies.planning.world import (
-    ACCEL_SIGMA,
-    BASE,
-    ENCODER_SIGMA,
-    EXCITATION,
-    INITIAL_RATE,
-    INTERVAL,
-    RATE_SIGMA,
-)
+from studies.planning.world import EXCITATION, INITIAL_RATE, INTERVAL
 
 __all__ = ["Result", "miss_figure", "write_report"]
 
@@ -210,7 +203,7 @@ def _assumed(document: Document, result: Result) -> None:
             "is where one true flight ended, so that it can be reached. Joints move from rest to rest on quintics "
             f"within {case.trials[0].prediction.base.time[-1]:g} s; the planner finds their goals by least squares.",
             f"Identification: {EXCITATION.duration:.0f} s of joints 1 to 3, sensors each {INTERVAL:g} s with "
-            f"{format_number(RATE_SIGMA)} rad/s, {format_number(ACCEL_SIGMA)} m/s² and {format_number(ENCODER_SIGMA)} "
+            f"{format_number(RATE)} rad/s, {format_number(ACCEL)} m/s² and {format_number(ENCODER)} "
             f"rad of white noise, a true initial rate of about {format_number(INITIAL_RATE)} rad/s that is unknown, "
             "emcee. Predicted paths start at rest.",
             "No external force: the centre of mass rests.",

@@ -2,50 +2,29 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from bayesid import (
-    BodyPrior,
-    Excitation,
-    InertialParameters,
-    Kind,
-    Manoeuvre,
-    MeasuredMotion,
-    Model,
-    Orbit,
-    Recording,
-    Robot,
-    Sensor,
-    White,
-)
+from bayesid import BodyPrior, Excitation, InertialParameters, Kind, Manoeuvre, Model, Orbit, Sensor, White
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.inertial_parameters import log_cholesky_factor, parameters_from_pseudo_inertia, upper_cholesky
 from bayesid.robot.joint_state import JointState
 from bayesid.simulation.effects import GravityGradient
 from studies.base_body import paper
-from studies.ets7_drift.world import simulator
+from studies.common import flight
+from studies.common.ets7 import ACCEL, ACCELEROMETER, BASE, ENCODER, RADIUS, RATE, TIP, ets7
+from studies.common.flight import prescribed, true_robot
 
 __all__ = ["Flown", "Guess", "Swing", "drawn_guess", "fly", "guess_about", "measure", "model_of", "paper_guess"]
 
 Floats = NDArray[np.floating]
 
-BASE, TIP = "base_link", "tip"
-RATE_SIGMA, ACCEL_SIGMA, ENCODER_SIGMA = 1e-5, 1e-5, 1e-6
-"""Noise of rates, accelerations and joints [rad/s, m/s2, rad]."""
-
 INTERVAL = 0.5
-"""Between samples of all sensors [s]."""
-
-POINT = (0.4, 0.3, 0.8)
-"""Of the accelerometer in the base [m]."""
+"""Time between samples of all sensors [s]."""
 
 EXCITATION = Excitation(
     offset=np.array([0.6, -2.2, 0.1, 0.0, 0.0, 0.0]),
@@ -58,19 +37,16 @@ INITIAL_RATE = 1e-4
 """Standard deviation of the true initial rate of that manoeuvre about each axis [rad/s]."""
 
 ATTITUDE = Rotation.from_euler("xyz", [0.4, -0.3, 0.8]).as_quat()
-"""Of the base when the planned path starts, base to orbit axes."""
-
-START = np.array([0.0, -0.6, 1.0, -0.4, 0.3, 0.0])
-"""Joint positions there [rad]."""
+"""Attitude of the base when the planned path starts, a quaternion from base to orbit axes."""
 
 DURATION = 60.0
-"""Of the planned path [s]."""
+"""Length of the planned path [s]."""
 
 SPREAD, FAR = 0.15, 1.0
 """Relative widths of the priors in log-Cholesky coordinates."""
 
 STEP = 0.1
-"""Of the independent simulator [s]."""
+"""Integration step of MuJoCo [s]."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +86,7 @@ class Swing:
 
 def drawn_guess(seed: int) -> Guess:
     """Draw a guess of the base (`guess_about`)."""
-    truth = Robot.shipped("ets7").link(BASE).inertial
+    truth = ets7().link(BASE).inertial
     body = guess_about(truth, SPREAD, np.random.default_rng(seed))
     return Guess(f"Base guessed to {100.0 * SPREAD:g} %", body, SPREAD)
 
@@ -129,49 +105,23 @@ def paper_guess() -> Guess:
 
 def model_of(guess: Guess) -> Model:
     """Return the model of the planner: the arm is known, the base is not."""
-    robot = Robot.shipped("ets7").with_inertial(BASE, guess.body)
-    sensors = (Sensor(Kind.RATE, White(RATE_SIGMA)), Sensor(Kind.ACCEL, White(ACCEL_SIGMA), position=POINT))
-    return Model(
-        robot, sensors, (BodyPrior(BASE, guess.body, guess.spread),), Orbit(paper.RADIUS), (GravityGradient(),)
-    )
+    robot = ets7().with_inertial(BASE, guess.body)
+    sensors = (Sensor(Kind.RATE, White(RATE)), Sensor(Kind.ACCEL, White(ACCEL), position=ACCELEROMETER))
+    return Model(robot, sensors, (BodyPrior(BASE, guess.body, guess.spread),), Orbit(RADIUS), (GravityGradient(),))
 
 
 def fly(motion: Motion, duration: float) -> Flown:
     """Fly a planned path from rest."""
-    model = _truth()
-    run = model.run(_scalar(motion), [duration], attitude0=ATTITUDE, step=STEP)
+    model = true_robot(ets7())
+    truth = model.run(prescribed(motion, [duration], STEP), [duration], attitude0=ATTITUDE, step=STEP)
     body = model.data.body(TIP)
     tip = Rotation.from_matrix(np.array(body.xmat).reshape(3, 3)).as_quat()
-    return Flown((np.array(model.data.qpos[:3]), run.attitude[-1]), (np.array(body.xpos), tip))
+    return Flown((np.array(model.data.qpos[:3]), truth.attitude[-1]), (np.array(body.xpos), tip))
 
 
 def measure(seed: int) -> Manoeuvre:
     """Fly the identifying manoeuvre and record it with noise."""
     rng = np.random.default_rng(seed)
-    model, robot = _truth(), Robot.shipped("ets7")
     time = np.arange(0.0, EXCITATION.duration, INTERVAL)
-    run = model.run(_scalar(EXCITATION), time, rate0=INITIAL_RATE * rng.standard_normal(3), step=STEP)
-    channels = {
-        f"position.{joint}": run.position[:, k] + ENCODER_SIGMA * rng.standard_normal(len(time))
-        for k, joint in enumerate(model.joints)
-    }
-    for family, values, sigma in (("rate", run.rate, RATE_SIGMA), ("accel", run.accel, ACCEL_SIGMA)):
-        noisy = values + sigma * rng.standard_normal(values.shape)
-        channels |= {f"{family}.{axis}": noisy[:, k] for k, axis in enumerate("xyz")}
-    recording = Recording("identification", None, time, channels)
-    sigmas: dict[int, float] = {0: ENCODER_SIGMA}
-    return Manoeuvre(recording, MeasuredMotion.from_recording(recording, robot, sigma=sigmas))
-
-
-def _truth() -> Any:
-    """Return the real robot: base and arm as published, gravity gradient on every body."""
-    truth = simulator()
-    with tempfile.TemporaryDirectory() as folder:
-        urdf = Path(folder) / "robot.urdf"
-        Robot.shipped("ets7").write_urdf(urdf)
-        return truth.TruthModel(urdf, orbit=truth.Orbit(radius=paper.RADIUS), accel_position=POINT)
-
-
-def _scalar(motion: Motion) -> Any:
-    """Return a motion as the simulator wants it: one time, joints in the order of the URDF, which is Pinocchio's."""
-    return lambda time: tuple(part[0] for part in motion.evaluate(np.array([time])))
+    truth = flight.fly(ets7(), EXCITATION, time, rate=INITIAL_RATE * rng.standard_normal(3), step=STEP)
+    return flight.record(truth, "identification", ets7(), {"position": ENCODER, "rate": RATE, "accel": ACCEL}, rng)

@@ -7,11 +7,10 @@ independent simulator. ``python -m studies.sensors --full`` writes ``reports/sen
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 from bayesid.app.compilation_cache import keep_compiled
+from studies.common.command import Command
 from studies.sensors.report import write_report
 from studies.sensors.result import REALISTIC, Effort, Result, compute
 
@@ -44,13 +43,16 @@ def run(
     return compute(effort or (FULL if full else SMALL), seed, progress)
 
 
+COMMAND = Command(
+    "sensors",
+    "Verify what the paper expects of noise and sensors.",
+    full="all levels of noise, enough draws: minutes",
+    seed=1,
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description="Verify what the paper expects of noise and sensors.")
-    parser.add_argument("--full", action="store_true", help="all levels of noise, enough draws: minutes")
-    parser.add_argument("--output", type=Path, default=Path("reports/sensors.pdf"))
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
+    options = COMMAND.parse(arguments)
     keep_compiled()
-    options.output.parent.mkdir(parents=True, exist_ok=True)
     write_report(run(full=options.full, seed=options.seed, progress=print), options.output)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import MeasuredMotion, Recording
-from studies.base_body.setting import ship
+from studies.common.ets7 import ets7
 from studies.sensors.linear import recording_of
 from studies.sensors.setting import Flight, Noise, motion
 from studies.sensors.treatments import Treatment
@@ -81,7 +81,7 @@ class Draws:
 
     def measured_motion(self, noise: Noise, index: int = 0) -> MeasuredMotion:
         """Return the package's smoothed joints of one draw."""
-        return MeasuredMotion.from_recording(self.recording(noise, index), ship(), sigma={0: noise.encoder})
+        return MeasuredMotion.from_recording(self.recording(noise, index), ets7(), sigma={0: noise.encoder})
 
     def recording(self, noise: Noise, index: int = 0) -> Recording:
         """Return one draw as a recording."""

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.base_body import paper
+from studies.common.ets7 import BIAS
 from studies.sensors.linear import Linear
 from studies.sensors.montecarlo import velocity_estimators
-from studies.sensors.setting import BIAS, Flight, Noise
+from studies.sensors.setting import Flight, Noise
 from studies.sensors.weights import integral
 
 __all__ = ["Falsified", "Scalar", "falsified", "scalars"]

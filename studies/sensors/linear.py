@@ -18,7 +18,8 @@ from bayesid.inference.whitening import NoiseChannel, NoiseModel, build
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.sensors import Filter
 from studies.base_body.physical import physical_slope
-from studies.sensors.setting import POINT, Flight, Noise, model_of, motion
+from studies.common.ets7 import ACCELEROMETER
+from studies.sensors.setting import Flight, Noise, model_of, motion
 
 __all__ = ["STEP", "Estimator", "Linear", "raw_posterior", "recording_of"]
 
@@ -75,7 +76,7 @@ class Linear:
         """Compute them from `raw_posterior`."""
         z, count = np.zeros(posterior.size), len(flight.time)
         response = joint_sensitivity(
-            posterior.model.robot, motion().evaluate(flight.time), flight.rate, np.array(POINT)
+            posterior.model.robot, motion().evaluate(flight.time), flight.rate, np.array(ACCELEROMETER)
         )
         return cls(
             flight.time,

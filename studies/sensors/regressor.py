@@ -25,10 +25,10 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.regressors import balance_regressor
 from studies.base_body import paper
-from studies.base_body.setting import BASE, ship
+from studies.common.ets7 import ACCELEROMETER, BASE, ets7
 from studies.sensors.draws import Draws
 from studies.sensors.montecarlo import PIECES
-from studies.sensors.setting import POINT, Flight, Noise, motion
+from studies.sensors.setting import Flight, Noise, motion
 from studies.sensors.treatments import Differences, LowPass, Treatment, Wiener
 
 __all__ = ["TREATED", "Balance", "Regression", "attenuation", "regress", "solve_balance"]
@@ -49,7 +49,7 @@ class Balance:
     """
 
     def __init__(self, states: Floats) -> None:
-        robot = ship()
+        robot = ets7()
         moved = kinematics(robot, JointState(*states))
         self.base = link_table(robot, BASE, moved)
         self.arm = composite_rows(robot, moved, leave_out=(BASE,))[:, :, None]
@@ -72,7 +72,7 @@ class Balance:
 def _balance(
     base: jax.Array, arm: jax.Array, rate: jax.Array, change: jax.Array, accel: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
-    point = jnp.array(POINT)
+    point = jnp.array(ACCELEROMETER)
     origin = accel - jnp.cross(change, point) - jnp.cross(rate, jnp.cross(rate, point))
     return balance_regressor(base, rate, change, origin), balance_regressor(arm, rate, change, origin)
 
@@ -122,7 +122,7 @@ def attenuation(flight: Flight, noise: Noise) -> Floats:
     signals = [flight.rate, flight.rate_change, flight.accel]
     base, arm = (part[1:-1] for part in balance(*signals))
     normal, right = np.einsum("tci,tcj->ij", base, base), np.zeros(10)
-    true = ship().link(BASE).inertial.vector
+    true = ets7().link(BASE).inertial.vector
     for index, sd in enumerate((noise.rate, noise.rate / (np.sqrt(2.0) * step), noise.accel)):
         for axis in range(3):
             shifted = [np.array(signal) for signal in signals]

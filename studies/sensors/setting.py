@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,22 +13,16 @@ from bayesid.recording.joint_motion import Excitation
 from bayesid.simulation.effects import AccelBias, GravityGradient
 from bayesid.simulation.sensors import StarTracker
 from studies.base_body import paper
-from studies.base_body.setting import BASE, excitation, ship
-from studies.ets7_drift.world import simulator
+from studies.common import flight
+from studies.common.ets7 import ACCELEROMETER, BASE, BIAS, RADIUS, ets7, excitation
 
-__all__ = ["BIAS", "INTERVAL", "JOLT", "POINT", "Flight", "Noise", "fly", "joints_meet", "levels"]
+__all__ = ["INTERVAL", "JOLT", "Flight", "Noise", "fly", "joints_meet", "levels"]
 __all__ += ["model_of", "motion", "unread"]
 
 Floats = NDArray[np.floating]
 
 INTERVAL = 0.5
-"""Between samples of all sensors [s]."""
-
-POINT = (0.4, 0.3, 0.8)
-"""Of the accelerometer in the base [m]; the paper does not state one."""
-
-BIAS = 1e-4
-"""Constant error of the accelerometer where one is looked at [m/s2]."""
+"""Time between samples of all sensors [s]."""
 
 JOLT = 2.0
 """Where (27) meets its connecting splines the joints' third derivative jumps; samples of the base's sensors this near
@@ -81,17 +73,9 @@ def motion() -> Excitation:
 
 def fly(*, gradient: bool = True) -> Flight:
     """Fly the manoeuvre from rest, in orbit or far from any mass."""
-    truth, planned = simulator(), motion()
-    with tempfile.TemporaryDirectory() as folder:
-        urdf = Path(folder) / "robot.urdf"
-        ship().write_urdf(urdf)
-        orbit = truth.Orbit(radius=paper.RADIUS) if gradient else None
-        robot = truth.TruthModel(urdf, orbit=orbit, accel_position=POINT)
-    half = 0.5 * FINE
-    # on a grid of half steps, all that the integration asks for
-    states = np.stack(planned.evaluate(np.arange(0.0, planned.duration + 2.0 * half, half)), axis=1)
+    planned = motion()
     fine = FINE * np.arange(round(planned.duration / FINE) + 1)
-    run = robot.run(lambda time: tuple(states[round(time / half)]), fine, step=FINE)
+    run = flight.fly(ets7(), planned, fine, step=FINE, orbit=flight.ORBIT if gradient else None)
     every = round(INTERVAL / FINE)
     velocity = cumulative_simpson(run.accel, dx=FINE, axis=0, initial=0.0)
     change = np.gradient(run.rate, FINE, axis=0, edge_order=2)
@@ -101,12 +85,12 @@ def fly(*, gradient: bool = True) -> Flight:
 
 def model_of(noise: Noise, *, gradient: bool = True, biased: bool = True) -> Model:
     """Return the model: base and initial rate unknown, and where ``biased`` the accelerometer's constant error."""
-    robot: Robot = ship()
+    robot: Robot = ets7()
     return Model(
         robot,
-        (Sensor(Kind.RATE, White(noise.rate)), Sensor(Kind.ACCEL, White(noise.accel), position=POINT)),
+        (Sensor(Kind.RATE, White(noise.rate)), Sensor(Kind.ACCEL, White(noise.accel), position=ACCELEROMETER)),
         (BodyPrior(BASE, robot.link(BASE).inertial, 1.0),),
-        Orbit(paper.RADIUS) if gradient else None,
+        Orbit(RADIUS) if gradient else None,
         (*((GravityGradient(),) if gradient else ()), *((AccelBias(BIAS),) if biased else ())),
     )
 

@@ -7,12 +7,12 @@ manoeuvre. ``python -m studies.separating`` writes ``reports/separating.pdf``.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import Search, Store
+from studies.common.command import Command
 from studies.ets7_limits.setting import DURATION, POINTS
 from studies.separating.analysis import STAGES, Result, design_stage, expectations, motions_of, realise
 from studies.separating.pairs import pairs
@@ -61,14 +61,17 @@ def run(
     return Result(pairs(duration), designs, expected, directions, realised, sampled, found, duration)
 
 
+COMMAND = Command(
+    "separating",
+    "Tell apart what a first manoeuvre confuses.",
+    seed=1,
+    extra={"--store": {"type": Path, "help": "file that keeps what the search found, for an interrupted run"}},
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description="Tell apart what a first manoeuvre confuses.")
-    parser.add_argument("--output", type=Path, default=Path("reports/separating.pdf"))
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--store", type=Path, help="file that keeps what the search found, for an interrupted run")
-    options = parser.parse_args(arguments)
+    options = COMMAND.parse(arguments)
     keep_compiled()
-    options.output.parent.mkdir(parents=True, exist_ok=True)
     store = None if options.store is None else Store.open(options.store, f"separating {options.seed} {SEARCH}")
     write_report(run(seed=options.seed, store=store, progress=print), options.output)

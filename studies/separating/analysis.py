@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from bayesid.design import Search, Store
 from bayesid.recording.joint_motion import Motion
-from studies.ets7_limits.flight import Flight
-from studies.ets7_limits.setting import START
+from studies.common.ets7 import START, FlightManoeuvre
 from studies.separating.expected import Expected, Linearised
 from studies.separating.factors import Rivalry, Sampled, flown, noisy
 from studies.separating.manoeuvres import Designed, design_both, separating_problem
@@ -79,7 +78,7 @@ def design_stage(
 
 def motions_of(designs: Mapping[str, Designed]) -> dict[str, Motion]:
     """Return all manoeuvres by name."""
-    return {"first": Flight(START), **{name: item.motion for name, item in designs.items()}}
+    return {"first": FlightManoeuvre(START), **{name: item.motion for name, item in designs.items()}}
 
 
 def expectations(

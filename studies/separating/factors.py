@@ -14,9 +14,10 @@ from bayesid.inference import maximise
 from bayesid.inference.importance import choose_parameterisation, importance_sample
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.recording.joint_motion import Motion
-from studies.ets7_drift.world import WHEEL, simulator
-from studies.ets7_limits.truth import fly, record
+from studies.common.flight import light_wheel
+from studies.ets7_limits.flights import fly, record
 from studies.separating.setting import DRIFT, RIVALS, rival_model
+from studies.truth.mujoco import Truth, leak
 
 __all__ = ["Flown", "Rivalry", "Sampled", "flown", "noisy"]
 
@@ -28,7 +29,7 @@ class Flown:
     """A flight: what the joints did, and what truly happened."""
 
     motion: Motion
-    run: Any
+    run: Truth
 
 
 def flown(motion: Motion, duration: float, truth: str, amplitude: Floats) -> Flown:
@@ -41,12 +42,11 @@ def flown(motion: Motion, duration: float, truth: str, amplitude: Floats) -> Flo
     amplitude : (3,) array
         Momentum of the wheels [N m s] or torque of the leak [N m], base axes.
     """
-    source = simulator()
     hidden: dict[str, Any] = {}
     if truth == "wheel-momentum":
-        hidden = {"rotor": source.Rotor(tuple(amplitude), **WHEEL)}
+        hidden = {"rotor": light_wheel(amplitude)}
     elif truth == "thruster-leak":
-        hidden = {"fields": [source.leak((0.0, 0.0, 0.0), amplitude)]}
+        hidden = {"fields": [leak((0.0, 0.0, 0.0), amplitude)]}
     return Flown(motion, fly(motion, duration, DRIFT, **hidden))
 
 

@@ -24,7 +24,8 @@ from bayesid.design import (
 from bayesid.design.design_problem import Reached
 from bayesid.design.plan import Trajectory
 from bayesid.design.trajectories import ParameterisedMotion
-from studies.ets7_limits.setting import DURATION, INTERVAL, LIMITS, POINTS, START, TIP
+from studies.common.ets7 import LIMITS, START, TIP
+from studies.ets7_limits.setting import DURATION, INTERVAL, POINTS
 from studies.separating.setting import RIVALS, drifting, rival_model
 
 __all__ = ["Designed", "Drifting", "design_both", "separating_problem"]

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid.design import Plan, Separation, Tip
-from studies.ets7_limits.setting import INTERVAL, TIP
+from studies.common.ets7 import TIP
+from studies.ets7_limits.setting import INTERVAL
 from studies.separating.setting import CANDIDATES, FlightFamily, drifting, rival_model
 
 __all__ = ["Pair", "pairs"]

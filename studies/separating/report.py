@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number
+from studies.common.ets7 import ACCEL, RATE
 from studies.ets7_limits.figures import manoeuvre_figure
-from studies.ets7_limits.setting import ACCEL, INTERVAL, RATE
+from studies.ets7_limits.setting import INTERVAL
 from studies.separating.analysis import STAGES, Result
 from studies.separating.setting import DRIFT, SPREAD, TRUTHS
 

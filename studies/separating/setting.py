@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from bayesid import Effect, Model
 from bayesid.design import Linear
 from bayesid.simulation.effects import AccelBias, GravityGradient, RateBias, RateDrift, ThrusterLeak, WheelMomentum
-from studies.ets7_limits.flight import Flight
-from studies.ets7_limits.setting import DURATION, START, model_of
+from studies.common.ets7 import START, FlightManoeuvre
+from studies.ets7_limits.setting import DURATION, model_of
 
 __all__ = ["CANDIDATES", "DRIFT", "RIVALS", "SPREAD", "TRUTHS", "FlightFamily", "amplitude", "drifting", "rival_model"]
 
@@ -53,8 +53,8 @@ class FlightFamily(Linear):
 
     def matrices(self, time: Floats) -> tuple[Floats, Floats]:
         """Return rest (3, T, joints) and basis (3, T, joints, 1)."""
-        rest = np.stack(Flight(START, 0.0 * START).evaluate(time))
-        return rest, (np.stack(Flight(START).evaluate(time)) - rest)[..., None]
+        rest = np.stack(FlightManoeuvre(START, 0.0 * START).evaluate(time))
+        return rest, (np.stack(FlightManoeuvre(START).evaluate(time)) - rest)[..., None]
 
 
 def rival_model(labels: Sequence[str], spread: float = SPREAD) -> Model:

@@ -6,7 +6,6 @@ arXiv:2503.13137; not part of the project. ``python -m studies.throws --full`` w
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from studies.common.command import Command
 from studies.throws.analysis import Analysis, BodyResult, analyse, configure, prepare
 from studies.throws.data import DEFAULT_FOLDER, Timing, read_truth
 from studies.throws.model import TORQUE, Settings, is_fitted, is_rigid
@@ -103,13 +103,16 @@ def _variants() -> dict[str, tuple[Settings, Timing, Callable[[str], bool]]]:
     }
 
 
+COMMAND = Command(
+    "throws",
+    "Identify thrown rigid bodies from real measurements.",
+    full="all throws, other settings and posterior samples",
+    extra={"--data": {"type": Path, "help": "folder of the measurements"}},
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description="Identify thrown rigid bodies from real measurements.")
-    parser.add_argument("--full", action="store_true", help="all throws, other settings and posterior samples")
-    parser.add_argument("--data", type=Path, default=None, help="folder of the measurements")
-    parser.add_argument("--output", type=Path, default=Path("reports"), help="folder of the report")
-    options = parser.parse_args(arguments)
+    options = COMMAND.parse(arguments)
     result = run(options.data, full=options.full)
-    options.output.mkdir(parents=True, exist_ok=True)
-    write_report(result, options.output / "throws.pdf")
+    write_report(result, options.output)

@@ -5,11 +5,11 @@ Data as in `studies.throws`; ``python -m studies.throws_drag --full`` writes ``r
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from studies.common.command import Command
 from studies.throws.data import DEFAULT_FOLDER, read_truth
 from studies.throws_drag.analysis import Comparison, Study, Wheel, compare, find_wheel, study_body
 from studies.throws_drag.report import write_report
@@ -82,13 +82,16 @@ def run(
     return Result(studies, comparison, wheel, full)
 
 
+COMMAND = Command(
+    "throws_drag",
+    "Name what a rigid body with its wheel gets wrong about real throws.",
+    full="both bodies and more throws",
+    seed=1,
+    extra={"--data": {"type": Path, "help": "folder of the measurements"}},
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description="Name what a rigid body with its wheel gets wrong about real throws.")
-    parser.add_argument("--full", action="store_true", help="both bodies and more throws")
-    parser.add_argument("--data", type=Path, default=None, help="folder of the measurements")
-    parser.add_argument("--output", type=Path, default=Path("reports/throws_drag.pdf"))
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options = COMMAND.parse(arguments)
     write_report(run(options.data, full=options.full, seed=options.seed), options.output)

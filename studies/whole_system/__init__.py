@@ -8,12 +8,11 @@ truth; and the paper's linear regressor method on the same data. Flown by an ind
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 
+from studies.common.command import Command
 from studies.whole_system.contest import contest
 from studies.whole_system.coverage import covered
 from studies.whole_system.information import informed
@@ -81,12 +80,15 @@ def run(
     return Result(truth, drawings, known, tuple(cases), coverage, methods, duration, hand_speed(best, truth))
 
 
+COMMAND = Command(
+    "whole_system",
+    "Identify every body of the robot.",
+    full="also sample the posteriors and check the coverage",
+    seed=1,
+)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
-    parser = argparse.ArgumentParser(description="Identify every body of the robot.")
-    parser.add_argument("--full", action="store_true", help="also sample the posteriors and check the coverage")
-    parser.add_argument("--output", type=Path, default=Path("reports/whole_system.pdf"))
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args(arguments)
-    options.output.parent.mkdir(parents=True, exist_ok=True)
+    options = COMMAND.parse(arguments)
     write_report(run(full=options.full, seed=options.seed, progress=print), options.output)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,13 @@ from scipy import stats
 
 from bayesid import Posterior, Robot
 from bayesid.inference.mode import fit
-from bayesid.inference.noise_changes import relinearised, with_manoeuvres
+from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.robot.body_prior import draw_inertial
+from studies.common.ets7 import BASE
+from studies.common.monte_carlo import run_trials
 from studies.whole_system.sampled import distance, true_point
-from studies.whole_system.setting import BASE, LOAD, bodies, model_of, spreads
+from studies.whole_system.setting import LOAD, bodies, model_of, spreads
 from studies.whole_system.world import START_RATE, fly, record
 
 __all__ = ["Coverage", "covered"]
@@ -54,31 +57,35 @@ def covered(
     The posterior is the normal approximation in coordinates linear in the parameters. The fit starts at the truth, to
     save time: another start finds the same mode.
     """
-    distances, scores = [], []
-    posterior: Posterior | None = None
-    for number, stream in enumerate(np.random.SeedSequence(seed).spawn(count)):
-        progress(f"coverage: system {number + 1} of {count}")
-        rng = np.random.default_rng(stream)
+    first: list[Posterior] = []  # its compiled functions serve all systems
+
+    def system(number: int, rng: np.random.Generator) -> dict[str, Any]:
+        """Distance and scores of one system."""
         truth = drawings
         for name, spread in spreads(drawings).items():
             truth = truth.with_inertial(name, draw_inertial(drawings.link(name).inertial, spread, rng))
         run = fly(truth, int(rng.integers(1000)), duration=duration, joints=tuple(range(len(drawings.joints))))
         manoeuvre = record(run, truth, "drawn", rng)
-        if posterior is None:
-            posterior = Posterior.of(model_of(drawings, torques=torques), [manoeuvre])
-        posterior = with_manoeuvres(posterior, [manoeuvre])
+        if not first:
+            first.append(Posterior.of(model_of(drawings, torques=torques), [manoeuvre]))
+        posterior = first[0].with_manoeuvres([manoeuvre])
         z = true_point(posterior, truth, START_RATE)
         refined = relinearised(posterior, z)
         optimum = fit(refined, z)
         proposal = LinearParameterisation(refined).proposal(optimum)
         covariance = proposal.factor @ proposal.factor.T
         own = slice(0, 10 * len(posterior.model.priors))  # not the initial rate: errors of joint speed enter it
-        distances.append(
-            distance(posterior.unknowns.to_linear(z[None])[0, own], proposal.mean[own], covariance[own, own])
-        )
-        scores.append(_mass_scores(posterior, proposal.mean, covariance, truth))
-    assert posterior is not None
-    return Coverage(np.array(distances), np.array(scores), 10 * len(posterior.model.priors))
+        return {
+            "distance": distance(
+                posterior.unknowns.to_linear(z[None])[0, own], proposal.mean[own], covariance[own, own]
+            ),
+            "scores": _mass_scores(posterior, proposal.mean, covariance, truth),
+        }
+
+    trials = run_trials(system, range(count), seed=seed, progress=lambda text: progress(f"coverage: {text}"))
+    outcomes = trials.complete()
+    distances, scores = (np.array([outcome[key] for outcome in outcomes]) for key in ("distance", "scores"))
+    return Coverage(distances, scores, 10 * len(spreads(drawings)))
 
 
 def _mass_scores(posterior: Posterior, mean: Floats, covariance: Floats, truth: Robot) -> Floats:

@@ -18,7 +18,8 @@ from bayesid.inference.unknowns import Unknowns
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.regressors import torque_regressor
-from studies.whole_system.setting import LOAD, POINT, bodies, spreads
+from studies.common.ets7 import ACCELEROMETER
+from studies.whole_system.setting import LOAD, bodies, spreads
 
 __all__ = ["linear_prior", "regress"]
 
@@ -53,7 +54,7 @@ def regress(manoeuvre: Manoeuvre, drawings: Robot, *, torques: bool) -> tuple[Fl
     interval = float(np.median(np.diff(time)))
     rate = savgol_filter(measured, WINDOW, ORDER, axis=0)
     change = savgol_filter(measured, WINDOW, ORDER, deriv=1, delta=interval, axis=0)
-    felt, point = recording.vector("accel")[1], np.array(POINT)
+    felt, point = recording.vector("accel")[1], np.array(ACCELEROMETER)
     origin = felt - np.cross(change, point) - np.cross(rate, np.cross(rate, point))
     state = manoeuvre.motion.evaluate(time)
     moved = kinematics(drawings, state)

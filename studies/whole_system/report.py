@@ -14,24 +14,12 @@ from bayesid import Robot
 from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number
+from studies.common.ets7 import ACCEL, BASE, ENCODER, RATE
 from studies.whole_system.contest import QUANTITIES, Method
 from studies.whole_system.coverage import Coverage
 from studies.whole_system.information import Information, Knowledge, Sensors
 from studies.whole_system.sampled import Sampled
-from studies.whole_system.setting import (
-    ACCEL,
-    ARM,
-    BASE,
-    BASE_SPREAD,
-    COULOMB,
-    ENCODER,
-    LOAD,
-    LOAD_SPREAD,
-    RATE,
-    TORQUE,
-    VISCOUS,
-    bodies,
-)
+from studies.whole_system.setting import ARM, BASE_SPREAD, COULOMB, LOAD, LOAD_SPREAD, TORQUE, VISCOUS, bodies
 
 __all__ = ["Result", "write_report"]
 

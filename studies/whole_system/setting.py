@@ -12,25 +12,20 @@ from bayesid import BodyPrior, InertialParameters, Kind, Model, Orbit, Robot, Se
 from bayesid.robot.robot import Load
 from bayesid.simulation.effects import Effect, GravityGradient, JointFriction
 from bayesid.simulation.joint_torques import TorqueSensor
+from studies.common.ets7 import ACCEL, ACCELEROMETER, BASE, RADIUS, RATE, ets7
 from studies.planning.world import guess_about
 
-__all__ = ["BASE", "LOAD", "TIP", "bodies", "drawn", "friction_effects", "model_of", "spreads", "true_robot"]
+__all__ = ["LOAD", "bodies", "drawn", "friction_effects", "model_of", "spreads", "true_robot"]
 
 Floats = NDArray[np.floating]
 
-BASE, LOAD, HAND, TIP = "base_link", "load", "link6", "tip"
+LOAD, HAND = "load", "link6"
 
 ARM, BASE_SPREAD, LOAD_SPREAD = 0.05, 0.3, 1.0
 """Relative widths of the priors in log-Cholesky coordinates: drawings of the arm, a base partly out of fuel, a load."""
 
-RADIUS = 6.916e6
-"""Of the orbit [m]."""
-
-RATE, ACCEL, ENCODER, TORQUE = 1e-5, 1e-5, 1e-6, 0.1
-"""Noise per sample [rad/s, m/s2, rad, N m]."""
-
-POINT = (0.4, 0.3, 0.8)
-"""Of the accelerometer in the base [m]."""
+TORQUE = 0.1
+"""Noise per sample of the joint torques [N m]."""
 
 COULOMB, VISCOUS = 1.5, 8.0
 """True friction of every joint [N m, N m s]."""
@@ -39,7 +34,7 @@ COULOMB, VISCOUS = 1.5, 8.0
 def true_robot() -> Robot:
     """Return what is really there: the published robot, holding a load of 120 kg."""
     body = InertialParameters(120.0, [0.05, -0.1, 0.45], np.diag([14.0, 11.0, 9.0]))
-    return Robot.shipped("ets7").with_load(Load(LOAD, HAND, body))
+    return ets7().with_load(Load(LOAD, HAND, body))
 
 
 def spreads(robot: Robot) -> dict[str, float]:
@@ -85,7 +80,7 @@ def model_of(robot: Robot, *, known: Sequence[str] = (), torques: bool = False) 
     )
     model = Model(
         robot,
-        (Sensor(Kind.RATE, White(RATE)), Sensor(Kind.ACCEL, White(ACCEL), position=POINT)),
+        (Sensor(Kind.RATE, White(RATE)), Sensor(Kind.ACCEL, White(ACCEL), position=ACCELEROMETER)),
         priors,
         Orbit(RADIUS),
         (GravityGradient(),),

@@ -1,4 +1,4 @@
-"""A slow, obvious simulator of a free-flying robot: the reference for the package, of which it imports nothing.
+"""Step-by-step integration of a free-flying robot with Pinocchio, in the plainest way: the reference for the package.
 
 At every evaluation Pinocchio's joint-space inertia (CRBA) and bias (RNEA) of the whole robot are formed, the gravity
 gradient acts body by body as in (12)-(16) of Lampariello and Hirzinger (IDETC 2005), and the six rows of the base are
@@ -14,20 +14,26 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
-from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
-Motion = Callable[[float], tuple[Array, Array, Array]]
+from studies.truth.motions import Motion
+from studies.truth.numerics import Array, runge_kutta_step, substeps
+from studies.truth.orbit import MU
+from studies.truth.urdf import moving_joints
+
+__all__ = ["Reference", "Response", "Wheel", "Wrench", "Zenith", "circular_zenith", "simulate"]
+
 Zenith = Callable[[float], tuple[Array, float]]
-Wrench = Callable[[float], ArrayLike]
-Wheel = Callable[[float], tuple[ArrayLike, ArrayLike]]
+"""Time [s] -> unit vector in orbit axes and mu / R^3 [1/s2]."""
 
-MU = 3.986004418e14
-"""Gravitational parameter of the Earth [m3/s2]."""
+Wrench = Callable[[float], ArrayLike]
+"""Time [s] -> force or torque at the base origin, base axes [N or N m]."""
+
+Wheel = Callable[[float], tuple[ArrayLike, ArrayLike]]
+"""Time [s] -> momentum of the wheels relative to the base [N m s] and its derivative, base axes."""
 
 
 class Response(NamedTuple):
@@ -55,12 +61,6 @@ class Response(NamedTuple):
     com: Array
     com_velocity: Array
     angular_momentum: Array
-
-
-def moving_joints(urdf: str | Path) -> tuple[str, ...]:
-    """Names of the joints that are not fixed, in the order of the URDF: the order of all joint vectors here."""
-    joints = ElementTree.parse(urdf).getroot().iterfind("joint")
-    return tuple(joint.attrib["name"] for joint in joints if joint.attrib["type"] != "fixed")
 
 
 def circular_zenith(radius: float) -> Zenith:
@@ -133,7 +133,7 @@ class Reference:
     def applied_wrench(self, time: float, rate: Array) -> Array:
         """Wheel and external actions on the base, about its origin, base axes."""
         momentum, change = self.wheel(time)
-        wrench = np.concatenate([np.zeros(3), -np.cross(rate, momentum) - np.asarray(change)])
+        wrench = np.concatenate([np.zeros(3), -np.cross(rate, np.asarray(momentum)) - np.asarray(change)])
         if self.base_force is not None:
             wrench[:3] += self.base_force(time)
         if self.base_torque is not None:
@@ -159,16 +159,10 @@ class Reference:
 
     def advance(self, time: float, state: Array, step: float) -> Array:
         """One classical Runge-Kutta step."""
-        # External actions are held between samples and jump at a step's end: the last stage takes the value before.
-        before = time + step * (1.0 - 1e-9)
-        k1 = self.derivative(time, state, time)
-        k2 = self.derivative(time + 0.5 * step, state + 0.5 * step * k1, time + 0.5 * step)
-        k3 = self.derivative(time + 0.5 * step, state + 0.5 * step * k2, time + 0.5 * step)
-        k4 = self.derivative(time + step, state + step * k3, before)
-        return state + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        return runge_kutta_step(self.derivative, time, state, step)
 
     def initial_state(self, rate: ArrayLike, attitude: Array) -> Array:
-        """Base at the origin, turning with `rate`, moving such that the centre of mass is at rest."""
+        """State with the base at the origin, turning with `rate`, and the centre of mass at rest."""
         state = np.concatenate(
             [np.zeros(3), pin.Quaternion(attitude).coeffs(), np.zeros(3), np.asarray(rate, dtype=float)]
         )
@@ -178,7 +172,7 @@ class Reference:
         return state
 
     def accelerometer(self, time: float, state: Array, position: Array) -> Array:
-        """Reading at `position` (base frame): inertial acceleration less the tidal acceleration, base axes."""
+        """Accelerometer's reading at `position`: inertial acceleration less the gravity gradient's, base axes."""
         q, _, _ = self.configuration(time, state)
         rate, spatial = state[10:], self.acceleration(time, state, time)
         reading = spatial[:3] + np.cross(rate, state[7:10])
@@ -260,9 +254,8 @@ def simulate(
     state, time = reference.initial_state(rate0, rotation), 0.0
     position, rows = np.asarray(accel_position, dtype=float), []
     for target in np.asarray(times_out, dtype=float):
-        count = int(np.ceil((target - time) / step - 1e-9))
-        for index in range(count):
-            state = reference.advance(time + index * (target - time) / count, state, (target - time) / count)
+        for now, size in substeps(time, target, step):
+            state = reference.advance(now, state, size)
         state[3:7] /= np.linalg.norm(state[3:7])
         time = target
         attitude = pin.Quaternion(state[3:7].copy()).toRotationMatrix()

@@ -1,0 +1,31 @@
+"""Manoeuvres flown in MuJoCo, and recorded with noise."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid.recording.joint_motion import Motion
+from bayesid.simulation.model import Manoeuvre
+from studies.common import flight
+from studies.common.ets7 import ACCEL, ENCODER, RATE, ets7
+from studies.ets7_limits.setting import INTERVAL
+from studies.truth.mujoco import Truth
+
+__all__ = ["fly", "record"]
+
+STEP = 0.25
+"""Integration step of MuJoCo [s]."""
+
+
+def fly(motion: Motion, duration: float, rate: NDArray[np.floating], **hidden: Any) -> Truth:
+    """Fly a manoeuvre from a given rate [rad/s] and return what truly happened at the samples."""
+    times = np.arange(0.0, duration + 1e-9, INTERVAL)
+    return flight.fly(ets7(), motion, times, rate=rate, step=STEP, **hidden)
+
+
+def record(truth: Truth, name: str, rng: np.random.Generator) -> Manoeuvre:
+    """Record a flight with the noise that manoeuvres are designed for."""
+    return flight.record(truth, name, ets7(), {"position": ENCODER, "rate": RATE, "accel": ACCEL}, rng)
