@@ -1,8 +1,8 @@
 """Compiled functions of a model given data, shared by every model and every recording that does the same operations.
 
-What decides the operations is a `Structure`, a key of the compiled code; all numbers, of the prior, the sensors, the effects
-and the recordings, are arguments. So another width of the prior, another noise or another recording of about the same
-length compiles nothing.
+What decides the operations is a `Structure`, a key of the compiled code; all numbers, of the prior, the sensors, the
+effects and the recordings, are arguments. So another width of the prior, another noise or another recording of about
+the same length compiles nothing.
 """
 
 from __future__ import annotations

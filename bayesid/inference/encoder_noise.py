@@ -1,10 +1,10 @@
 """How errors of the joints' motion reach the sensors, at the same instant.
 
 The angular momentum in inertial axes does not depend on what the joints are believed to do, so an error of joint
-position, velocity or acceleration changes the base's rate and acceleration through the momentum's balance alone. An error
-of a joint's position also turns the base, and with it the momentum in base axes; what external torques make of that is far
-below any sensor's noise. Joint torques follow with the bodies that each joint carries; what friction makes of an error
-of speed is left out.
+position, velocity or acceleration changes the base's rate and acceleration through the momentum's balance alone. An
+error of a joint's position also turns the base, and with it the momentum in base axes; what external torques make of
+that is far below any sensor's noise. Joint torques follow with the bodies that each joint carries; what friction makes
+of an error of speed is left out.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ STEP = 1e-6
 
 
 class SampledMotion(NamedTuple):
-    """The base's motion at T instants: attitude quaternion (T, 4), angular velocity (T, 3) in base axes, surroundings."""
+    """The base's motion at T instants: attitude quaternion (T, 4), rate (T, 3) in base axes, surroundings."""
 
     quaternion: Floats
     rate: Floats

@@ -34,8 +34,8 @@ class PriorNumbers(NamedTuple):
     """Centres and widths of the prior.
 
     factor (B, 4, 4): of each body's pseudo-inertia at the centre (`upper_cholesky`). mixing (10 B, 10 B): log-Cholesky
-    coordinates per unit of z, with its inverse. slope (10 B, 10 B): entries of the relative pseudo-inertias per unit of
-    the coordinates linear in them, with its inverse. rate: standard deviation of initial rates [rad/s]; tilt (K,) of the
+    coordinates per unit of z, with its inverse. slope (10 B, 10 B): entries of relative pseudo-inertias per unit of the
+    coordinates linear in them, with its inverse. rate: standard deviation of initial rates [rad/s]; tilt (K,) of the
     K uncertain attitudes [rad]; speed (R, J) of the joints' speeds at time 0. effects: per effect, mean and sigma (n,).
     """
 
@@ -138,8 +138,8 @@ class Layout:
         """Return coordinates linear in the inertial parameters.
 
         They are the entries of each body's relative pseudo-inertia, less the identity, scaled so that near the centre
-        they are z itself. Whatever else is unknown keeps its coordinates. What the dynamics determines sharply are linear
-        combinations of inertial parameters up to a common factor, so ridges of the posterior are straight here.
+        they are z itself. Whatever else is unknown keeps its coordinates. What the dynamics determines sharply are
+        linear combinations of inertial parameters up to a common factor, so ridges of the posterior are straight here.
         """
         entries = jax.vmap(relative)(self._theta(numbers, z)).ravel()
         return jnp.concatenate([numbers.inverse_slope @ entries, z[self.all_bodies.stop :]])

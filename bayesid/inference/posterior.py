@@ -34,8 +34,8 @@ BATCH = 8
 class Posterior:
     """Posterior of the unknowns of a model given recorded manoeuvres.
 
-    Coordinates ``z`` have a standard-normal prior (`Unknowns`). Build one with `Posterior.of`; other noise, other samples
-    and predictions are functions of `bayesid.inference.noise_changes` and `bayesid.inference.predicted_readings`.
+    Coordinates ``z`` have a standard-normal prior (`Unknowns`). Build one with `Posterior.of`; other noise, other
+    samples and predictions are functions (`bayesid.inference.noise_changes`, `bayesid.inference.predicted_readings`).
 
     Attributes
     ----------

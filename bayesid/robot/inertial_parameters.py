@@ -175,7 +175,7 @@ def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array
 
 @jax.jit  # traced once for all bodies
 def vector_from_factor(centre: Array, coordinates: Array) -> Array:
-    """Return `log_cholesky_vector` for a centre given by the factor of its pseudo-inertia (`upper_cholesky`), (4, 4)."""
+    """Return `log_cholesky_vector` for a centre given by the factor (4, 4) of its pseudo-inertia (`upper_cholesky`)."""
     factor = centre @ log_cholesky_factor(coordinates)
     return parameters_from_pseudo_inertia(factor @ factor.T)
 

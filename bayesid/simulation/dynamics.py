@@ -69,8 +69,8 @@ class Grid(NamedTuple):
 class Start(NamedTuple):
     """State of a recording at time 0.
 
-    attitude (4,): quaternion, base to orbit axes; rate (3,): angular velocity, base axes [rad/s]; speed_error (n,): what
-    the smoothed joint speeds have too much [rad/s or m/s], or nothing (0,) where that is of no account.
+    attitude (4,): quaternion, base to orbit axes; rate (3,): angular velocity, base axes [rad/s]; speed_error (n,): the
+    excess of the smoothed joint speeds [rad/s or m/s], empty where it is of no account.
     """
 
     attitude: Traceable

@@ -150,8 +150,8 @@ class Model:
     def has_speed_errors(self) -> bool:
         """Whether errors of the smoothed joint speeds at time 0 are unknowns.
 
-        They are where the initial rate is declared zero: the base rests if the joints truly do, and a smoothed speed that
-        is not the true one would be read as momentum. An unknown initial rate takes them up.
+        They are where the initial rate is declared zero: the base rests if the joints truly do, and a smoothed speed
+        that is not the true one would be read as momentum. An unknown initial rate takes them up.
         """
         return self.rate_sigma == 0.0 if self.speed_errors is None else self.speed_errors
 

@@ -52,8 +52,8 @@ __all__ = [
 class Sensed(NamedTuple):
     """One instant of the simulation as a sensor meets it.
 
-    ``quaternion`` (4,) turns base to orbit axes; ``point`` (3,) is the sensor's mounting point in the base [m]; ``specific_force`` (3,) is what effects add to an
-    accelerometer there [m/s2], base axes.
+    ``quaternion`` (4,) turns base to orbit axes; ``point`` (3,) is the sensor's mounting point in the base [m];
+    ``specific_force`` (3,) is what effects add to an accelerometer there [m/s2], base axes.
     """
 
     instant: Instant

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.predicted_readings import PredictedReadings
+from bayesid.inference.predicted_readings import PredictedReadings, predicted_readings
 from bayesid.inference.simulated_recordings import simulate_recordings
 from bayesid.recording.joint_motion import Excitation
 from bayesid.robot.body_prior import BodyPrior

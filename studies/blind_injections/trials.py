@@ -224,9 +224,10 @@ def _visible(case: hidden_causes.Case) -> bool:
 def _limits(result: Diagnosis, case: hidden_causes.Case, weaker: Study) -> tuple[float, float | None, float | None]:
     """Signal-to-noise ratio of what is hidden and theory's limits, from the same noise with less hidden."""
     fit, engine = result.before.fit, result.before.engine
+    arrays = fit.posterior.data.arrays
     like = with_manoeuvres(fit.posterior, load_manoeuvres(weaker, fit.posterior.model.robot))
-    other = like.data._replace(weights=fit.posterior.data.weights, start=fit.posterior.data.start)
-    change = (engine.residual(fit.z, fit.posterior.data) - engine.residual(fit.z, other)) / (1.0 - WEAKER)
+    other = like.data.arrays._replace(weights=arrays.weights, start=arrays.start)
+    change = (engine.residual(fit.z, arrays) - engine.residual(fit.z, other)) / (1.0 - WEAKER)
     if case.status == "unknown":
         tried = result.search.tried
         left = tried[min(1, len(tried) - 1)].fit

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import jax
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Kind, Manoeuvre, MeasuredMotion, Posterior, Recording
-from bayesid.inference.encoder_noise import joint_sensitivity
+from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
 from bayesid.inference.whitening import NoiseChannel, NoiseModel, build
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.sensors import Filter
 from studies.base_body.physical import physical_slope
-from studies.common.ets7 import ACCELEROMETER
 from studies.sensors.setting import Flight, Noise, model_of, motion
 
 __all__ = ["STEP", "Estimator", "Linear", "raw_posterior", "recording_of"]
@@ -75,13 +75,15 @@ class Linear:
     def of(cls, flight: Flight, posterior: Posterior) -> Linear:
         """Compute them from `raw_posterior`."""
         z, count = np.zeros(posterior.size), len(flight.time)
+        environment = jax.tree.map(lambda x: np.asarray(x)[0, :count], posterior.data.arrays.grid.sample.environment)
+        seen = SampledMotion(np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)), flight.rate, environment)  # no star sensor
         response = joint_sensitivity(
-            posterior.model.robot, motion().evaluate(flight.time), flight.rate, np.array(ACCELEROMETER)
+            posterior.model.robot, motion().evaluate(flight.time), seen, posterior.model.sensors
         )
         return cls(
             flight.time,
             -posterior.jacobian(z)[: 6 * count],  # what is left is padding
-            np.concatenate([response.rate, response.accel], axis=-1),
+            response,
             physical_slope(posterior, z),
             posterior.unknowns.names,
         )

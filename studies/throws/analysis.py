@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from bayesid import Manoeuvre, MeasuredMotion, Posterior
-from bayesid.inference.noise_changes import leaving_out, with_manoeuvres
+from bayesid.inference.noise_changes import with_manoeuvres
 from studies.throws.bodies import object_moments, tensors, truth_sd, wheel_inertia
 from studies.throws.data import BODIES, Timing, Truth, read_throws
 from studies.throws.effects import SmoothTorque
@@ -185,7 +185,7 @@ def analyse(
     posteriors = {throw.body: throw.posterior for throw in throws}
     wheel, moments = _bodies(posteriors, joint, joint.value[None], truth)
     wheel_draws, draws = _bodies(posteriors, joint, joint.draw(DRAWS, rng), truth)
-    wheel_left, left = _bodies(posteriors, joint, np.stack([leaving_out(joint, i) for i in range(len(throws))]), truth)
+    wheel_left, left = _bodies(posteriors, joint, np.stack([joint.without(i) for i in range(len(throws))]), truth)
     groups = [throw.body for throw in throws]
     results = {}
     for body in OBJECTS:

@@ -28,7 +28,7 @@ class GyroCross(Effect):
         xy, xz, yz = values
         one = jnp.ones(())
         matrix = jnp.stack([jnp.stack([one, xy, xz]), jnp.stack([xy, one, yz]), jnp.stack([xz, yz, one])])
-        return readings._replace(rate=readings.rate @ matrix)
+        return readings.replace(rate=readings.rate @ matrix)
 
 
 class WheelTilt(Effect):

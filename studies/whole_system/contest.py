@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesid import Posterior, Robot
 from bayesid.inference.mode import fit
-from bayesid.inference.noise_changes import relinearised
+from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from studies.common.ets7 import BASE
 from studies.common.monte_carlo import run_trials
 from studies.truth.mujoco import Truth
@@ -60,7 +60,7 @@ def contest(
             outcome[f"regressors, {suffix}"] = gather @ estimate[::10] / true - 1.0, deviations / true
             if torques not in first:
                 first[torques] = Posterior.of(model_of(drawings, torques=torques), [manoeuvre])
-            posterior = first[torques].with_manoeuvres([manoeuvre])
+            posterior = with_manoeuvres(first[torques], [manoeuvre])
             z = true_point(posterior, truth, START_RATE)
             optimum = fit(relinearised(posterior, z), z)
             masses = np.array([body.mass for body in posterior.unknowns.inertials(optimum.z)])

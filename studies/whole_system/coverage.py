@@ -12,7 +12,7 @@ from scipy import stats
 
 from bayesid import Posterior, Robot
 from bayesid.inference.mode import fit
-from bayesid.inference.noise_changes import relinearised
+from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.robot.body_prior import draw_inertial
 from studies.common.ets7 import BASE
@@ -68,7 +68,7 @@ def covered(
         manoeuvre = record(run, truth, "drawn", rng)
         if not first:
             first.append(Posterior.of(model_of(drawings, torques=torques), [manoeuvre]))
-        posterior = first[0].with_manoeuvres([manoeuvre])
+        posterior = with_manoeuvres(first[0], [manoeuvre])
         z = true_point(posterior, truth, START_RATE)
         refined = relinearised(posterior, z)
         optimum = fit(refined, z)

@@ -84,8 +84,9 @@ def _summary(document: Document, result: Result) -> None:
             f"{_percent(torques[3][1])}. A known thrust does the same without them: {_percent(thrust[3][1])}.",
             f"Of the 80 directions in which the bodies could differ, the data narrow "
             f"{six.knowledge(Sensors.MOTION).contraction} (motion) or "
-            f"{six.knowledge(Sensors.TORQUES).contraction} (torques too) to less than half of the prior. The rest is the prior and is reported as such: the base parameters tell "
-            "which combinations could ever be learnt, the manoeuvre and the noise which of them are.",
+            f"{six.knowledge(Sensors.TORQUES).contraction} (torques too) to less than half of the prior. The rest "
+            "is the prior and is reported as such: the base parameters tell which combinations could "
+            "ever be learnt, the manoeuvre and the noise which of them are.",
             _regressor_sentence(result),
         ]
     )

@@ -13,8 +13,8 @@ class EffectKey:
     """An effect, equal to every other whose hooks do the same operations.
 
     Equal are effects of one class whose attributes are equal, but for the centres and widths of their priors and what
-    `Effect.constants` names: those are arguments of the compiled code. An effect with an attribute that cannot be hashed
-    equals itself only.
+    `Effect.constants` names: those are arguments of the compiled code. An effect with an attribute that cannot be
+    hashed equals itself only.
     """
 
     def __init__(self, effect: Effect) -> None:
