@@ -81,7 +81,8 @@ def readings() -> Readings:
     quaternion = rng.normal(size=(count, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1)[:, None]
     rate, accel = rng.normal(size=(2, count, 3))
-    return Readings(*map(jnp.asarray, (np.arange(count) * 0.5, rate, accel, quaternion, rng.normal(size=(count, 2)))))
+    channels = {"rate": jnp.asarray(rate), "accel": jnp.asarray(accel), "attitude": jnp.asarray(quaternion)}
+    return Readings(jnp.arange(count) * 0.5, channels, jnp.asarray(rng.normal(size=(count, 2))))
 
 
 def call(effect: Effect, hook: str, values):
@@ -102,7 +103,7 @@ SHAPES = {
     "wrench": lambda _: Wrench((3,), (3,)),
     "derivative": lambda effect: (effect.states,),
     "specific_force": lambda _: (3,),
-    "read": lambda _: Readings((12,), (12, 3), (12, 3), (12, 4), (12, 2)),
+    "read": lambda _: Readings((12,), {"rate": (12, 3), "accel": (12, 3), "attitude": (12, 4)}, (12, 2)),
     "gravity_gradient_tensor": lambda _: (3, 3),
     "friction": lambda _: (6, 2),
 }
@@ -183,7 +184,7 @@ def test_zero_values_change_nothing(effect):
     for hook in ("momentum", "wrench", "specific_force"):
         for leaf in jax.tree.leaves(call(effect, hook, values)):
             np.testing.assert_array_equal(leaf, 0.0)
-    for left, right in zip(call(effect, "read", values), readings(), strict=True):
+    for left, right in zip(*map(jax.tree.leaves, (call(effect, "read", values), readings())), strict=True):
         np.testing.assert_allclose(left, right, rtol=1e-14, atol=1e-15)
 
 

@@ -25,7 +25,7 @@ from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 
-__all__ = ["Hypothesis", "CauseSearch"]
+__all__ = ["CauseSearch", "Hypothesis"]
 
 MOST_CAUSES = 3
 BEAM = (4, 3)

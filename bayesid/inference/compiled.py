@@ -26,15 +26,15 @@ __all__ = [
     "Arrays",
     "Numbers",
     "Perturbation",
+    "Simulated",
     "Structure",
     "Traced",
     "chi2",
     "jacobian",
-    "Simulated",
     "perturbed",
-    "simulated",
     "residuals",
     "responses",
+    "simulated",
     "traced",
 ]
 

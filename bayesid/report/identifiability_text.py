@@ -96,10 +96,10 @@ def method_sentences(result: Practical) -> list[str]:
     return [
         "Prior and posterior are compared in the normal approximation about the fit (for a prediction, about the "
         "prior's centre): C = D (J'J)⁻¹ D' and C₀ = D D', with J the derivative of whitened residuals and prior and "
-        "D that of the parameters. Initial rates, effects and links that are known to a few percent are "
-        "marginalised.",
-        f"A parameter or direction is learnt if the data narrow the prior by at least {100 * CONTRACTED:.0f} %, and not "
-        f"learnt if by less than {100 * PRIOR_ONLY:.0f} %.",
+        "D that of the parameters. Initial rates, effects and links that are known to a few percent "
+        "are marginalised.",
+        f"A parameter or direction is learnt if the data narrow the prior by at least {100 * CONTRACTED:.0f} %, and "
+        f"not learnt if by less than {100 * PRIOR_ONLY:.0f} %.",
         "Learning counts what the data carry over: a mass tied by the data to others is known as well as the priors of "
         "all of these together say.",
         "A direction is a combination of parameters whose weights are scaled so that the largest, times the prior sd "

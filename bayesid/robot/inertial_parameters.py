@@ -25,10 +25,10 @@ __all__ = [
     "InertialParameters",
     "log_cholesky_factor",
     "log_cholesky_vector",
-    "vector_from_factor",
     "mass_com_inertia",
     "parameters_from_pseudo_inertia",
     "upper_cholesky",
+    "vector_from_factor",
 ]
 
 A = TypeVar("A", Floats, Array)
