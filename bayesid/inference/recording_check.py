@@ -222,7 +222,7 @@ def _detrend(time: Floats, values: Floats) -> Floats:
 
 
 def _channels(recording: Recording, model: Model) -> tuple[ChannelSampling, ...]:
-    series = [(sensor.kind.value, recording.series(f"{sensor.kind.value}.x")[0]) for sensor in model.sensors]
+    series = [(sensor.kind.value, recording.series(sensor.kind.columns[0])[0]) for sensor in model.sensors]
     joints = [f"{family}.{joint.name}" for joint in model.robot.joints for family in JOINT_FAMILIES]
     series += [(name, recording.series(name)[0]) for name in joints if name in recording.channels]
     return tuple(

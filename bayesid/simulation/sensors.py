@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.recording.recording import declare_family
 from bayesid.simulation.sensor_noise import (
     ARCSEC,
     AngleRandomWalk,
@@ -63,7 +64,7 @@ class Sensed(NamedTuple):
 
 
 class Kind:
-    """What a sensor measures. Subclass it, set the attributes, define `read`, and register an instance.
+    """What a sensor measures. Subclass it, set the attributes, define `read`, and decorate it with `Kind.register`.
 
     Attributes
     ----------
@@ -104,11 +105,13 @@ class Kind:
     _known: ClassVar[dict[str, Kind]] = {}
 
     @staticmethod
-    def register(kind: K) -> K:
-        """Make a kind known by the family of its channels."""
-        if kind.value in Kind._known and type(Kind._known[kind.value]) is not type(kind):
+    def register(kind: type[K]) -> type[K]:
+        """Class decorator: make a kind known by the family of its channels."""
+        known = Kind._known.get(kind.value)
+        if known is not None and type(known).__qualname__ != kind.__qualname__:
             raise InputError(f"two kinds of sensor are named {kind.value!r}", remedy="Give each channels of its own")
-        Kind._known[kind.value] = kind
+        declare_family(kind.value, kind.axes)
+        Kind._known[kind.value] = kind()
         return kind
 
     @staticmethod
@@ -157,6 +160,7 @@ class Kind:
 K = TypeVar("K", bound=Kind)
 
 
+@Kind.register
 class AngularRate(Kind):
     """Angular velocity of the base relative to inertial space."""
 
@@ -169,6 +173,7 @@ class AngularRate(Kind):
         return sensed.instant.rate
 
 
+@Kind.register
 class SpecificForce(Kind):
     """Non-gravitational acceleration of the mounting point."""
 
@@ -186,6 +191,7 @@ class SpecificForce(Kind):
         return instant.acceleration + rotating + sensed.specific_force
 
 
+@Kind.register
 class StarAttitude(Kind):
     """Attitude of the base, a quaternion x, y, z, w from base to orbit axes; its residual is a small rotation."""
 
@@ -219,9 +225,7 @@ class StarAttitude(Kind):
         return (Rotation.from_quat(reference).inv() * Rotation.from_quat(readings)).as_rotvec()
 
 
-Kind.RATE = Kind.register(AngularRate())
-Kind.ACCEL = Kind.register(SpecificForce())
-Kind.ATTITUDE = Kind.register(StarAttitude())
+Kind.RATE, Kind.ACCEL, Kind.ATTITUDE = Kind.of("rate"), Kind.of("accel"), Kind.of("attitude")
 
 
 @dataclass(frozen=True)

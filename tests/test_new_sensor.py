@@ -1,0 +1,185 @@
+"""A sensor that the package lacks is one class and its registration: it simulates, identifies and is stored."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from bayesid._io.errors import InputError
+from bayesid.inference.mode import maximise
+from bayesid.inference.noise_changes import relinearised, with_manoeuvres
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import noise_of, noisy, predicted_readings
+from bayesid.inference.recording_check import check_recording
+from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
+from bayesid.recording.joint_motion import Excitation, MeasuredMotion, sample_joints
+from bayesid.recording.recording import Recording
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects import GravityGradient
+from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Coloured, Kind, Sensor, White
+
+SUN = (0.6, 0.64, 0.48)
+TIME = np.arange(0.0, 60.1, 0.5)
+
+
+@Kind.register
+class SunDirection(Kind):
+    """Direction of the Sun in the axes of a Sun sensor: a unit vector."""
+
+    value, unit = "sun", "1"
+    rest = (1.0, 0.0, 0.0)
+    frame = "direction of the Sun, sensor axes"
+
+    def read(self, sensed):
+        return sensed.instant.to_base(sensed.instant.environment.sun)
+
+
+@Kind.register
+class SecondGyro(Kind):
+    """A gyro about two axes, recorded at times of its own."""
+
+    value, unit = "gyro2", "rad/s"
+    axes: ClassVar[tuple[str, ...]] = ("a", "b")
+    rest: ClassVar[tuple[float, ...]] = (0.0, 0.0)
+    size, mounted = 2, False
+    frame = "angular velocity about base x and z"
+
+    def read(self, sensed):
+        return sensed.instant.rate[jnp.array([0, 2])]
+
+
+@dataclass(frozen=True)
+class TwoAxes:
+    """White noise of two axes."""
+
+    value: float
+
+    def sigma(self, interval: float) -> np.ndarray:
+        return np.full(2, self.value)
+
+
+@pytest.fixture(scope="module")
+def flown() -> tuple[Model, Posterior, np.ndarray]:
+    """The planar robot with a Sun sensor, turned against the base, and the second gyro; recorded with noise."""
+    robot = Robot.shipped("planar")
+    sensors = (
+        Sensor(Kind.of("sun"), White(1e-5), mounting=(0.0, 0.0, 0.6, 0.8)),
+        Sensor(Kind.RATE, White(1e-5)),
+        Sensor(Kind.of("gyro2"), TwoAxes(1e-6)),
+    )
+    prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.3)
+    model = Model(robot, sensors, (prior,), Orbit(6.9e6, sun=SUN), (GravityGradient(),))
+    motion = Excitation(offset=[0.4, -0.3], amplitude=[0.3, 0.4], frequency=0.3, periods=1, ramp=15.0)
+    channels = {**sample_joints(motion, robot, TIME), **blank_channels(sensors, len(TIME))}
+    for name in ("gyro2.a", "gyro2.b"):
+        channels[name] = np.where(np.arange(len(TIME)) % 3 == 1, channels[name], np.nan)
+    blank = Posterior.of(model, [Manoeuvre(Recording("sunny", None, TIME, channels), motion)], step=1.0)
+    z = np.random.default_rng(5).normal(size=blank.size) * 0.3
+    z[blank.unknowns.layout.all_rates] = 0.05
+    recording = simulate_recordings(blank, np.random.default_rng(6), z)[0]
+    noise = np.random.default_rng(7)
+    positions = [name for name in recording.channels if name.startswith("position.")]
+    joints = {name: recording.channels[name] + 1e-6 * noise.normal(size=len(TIME)) for name in positions}
+    recording = Recording("sunny", None, TIME, {**recording.channels, **joints})
+    measured = MeasuredMotion.from_recording(recording, robot, sigma={0: 1e-6})
+    return model, Posterior.of(model, [Manoeuvre(recording, measured)], step=1.0), z
+
+
+def test_it_reads_what_it_should(flown):
+    """Against the geometry itself: the Sun turned into the base by the attitude, then into the sensor."""
+    model, posterior, z = flown
+    star = Sensor(Kind.ATTITUDE, White(1e-5))
+    seen = Model(model.robot, (star, *model.sensors), model.priors, model.orbit, model.effects)
+    channels = {**posterior.manoeuvres[0].recording.channels, **blank_channels((star,), len(TIME))}
+    manoeuvre = Manoeuvre(Recording("sunny", None, TIME, channels), posterior.manoeuvres[0].motion)
+    both = predicted_readings(Posterior.of(seen, [manoeuvre], step=1.0), z)[0]
+    x, y, zz, w = both.attitude.T
+    rows = [
+        [1.0 - 2.0 * (y * y + zz * zz), 2.0 * (x * y - zz * w), 2.0 * (x * zz + y * w)],
+        [2.0 * (x * y + zz * w), 1.0 - 2.0 * (x * x + zz * zz), 2.0 * (y * zz - x * w)],
+        [2.0 * (x * zz - y * w), 2.0 * (y * zz + x * w), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    attitude = np.moveaxis(np.array(rows), -1, 0)
+    sun = np.asarray(posterior.data.arrays.grid.sample.environment.sun)[0, : len(both.time)]
+    in_base = np.einsum("tji,tj->ti", attitude, sun)
+    np.testing.assert_allclose(both.sun, in_base @ model.sensors[0].rotation, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(both.sun, axis=1), 1.0, atol=1e-12)
+    np.testing.assert_allclose(both.gyro2, both.rate[:, [0, 2]], atol=1e-15)
+    assert np.ptp(both.sun, axis=0).max() > 0.1  # the base does turn
+
+
+def test_it_identifies(flown):
+    _, posterior, z = flown
+    assert posterior.model.channels.names == (
+        "sun.x",
+        "sun.y",
+        "sun.z",
+        "rate.x",
+        "rate.y",
+        "rate.z",
+        "gyro2.a",
+        "gyro2.b",
+    )
+    assert posterior.samples == 6 * len(TIME) + 2 * len(TIME[1::3])
+    refined, optimum = maximise(posterior, np.random.default_rng(0))
+    assert abs(optimum.chi2 - posterior.samples) < 5.0 * np.sqrt(2.0 * posterior.samples)
+    own = posterior.unknowns.layout.all_bodies  # the rate is the one that goes with the smoothed joint speed at time 0
+    miss = (optimum.z - z)[own]
+    distance = float(miss @ np.linalg.solve(optimum.covariance[own, own], miss))
+    assert distance < 10.0 + 5.0 * np.sqrt(20.0)
+    assert refined.whitenings[0].outputs.shape[1] == 8
+
+
+def test_its_encoder_noise_is_carried(flown):
+    """A direction does not move with the joints' speed at an instant, but with their position, as the attitude does."""
+    _, posterior, _ = flown
+    assert relinearised(posterior, np.zeros(posterior.size)).samples == posterior.samples
+    check = check_recording(posterior, 0)
+    assert [sensor.kind.value for sensor in check.sensors] == ["sun", "rate", "gyro2"]
+
+
+def test_other_recordings_and_noise_draws(flown):
+    _, posterior, z = flown
+    again = with_manoeuvres(posterior, posterior.manoeuvres)
+    np.testing.assert_array_equal(again.residuals(z), posterior.residuals(z))
+    predicted = predicted_readings(posterior, z)[0]
+    drawn = noisy(posterior, 0, predicted, np.random.default_rng(1))
+    off = drawn.gyro2 - predicted.gyro2
+    assert 0.7e-6 < off.std() < 1.3e-6
+
+
+def test_two_kinds_of_one_name_are_an_error():
+    class Impostor(Kind):
+        value = "sun"
+
+    with pytest.raises(InputError, match="two kinds of sensor are named 'sun'"):
+        Kind.register(Impostor)
+
+
+def test_coloured_noise_is_drawn_with_its_correlation():
+    sensor = Sensor(Kind.RATE, White(1.0), coloured=Coloured((3.0, 0.0, 1.0), 4.0))
+    time = np.arange(0.0, 20000.0, 1.0)
+    noise = noise_of(sensor, time, np.zeros(3), np.random.default_rng(2))
+    assert noise[:, 0].std() == pytest.approx(3.0, rel=0.05)
+    assert not noise[:, 1].any()
+    lag = (noise[4:, 0] * noise[:-4, 0]).mean() / noise[:, 0].var()
+    assert lag == pytest.approx(np.exp(-1.0), abs=0.05)
+
+
+def test_the_noise_of_an_attitude_is_a_small_rotation():
+    kind, rng = Kind.ATTITUDE, np.random.default_rng(3)
+    quaternion = rng.normal(size=(4000, 4))
+    quaternion /= np.linalg.norm(quaternion, axis=1)[:, None]
+    noise = 1e-4 * rng.normal(size=(4000, 3))
+    turned = kind.noisy(quaternion, noise)
+    np.testing.assert_allclose(np.linalg.norm(turned, axis=1), 1.0, atol=1e-14)
+    pairs = zip(jnp.asarray(turned[:50]), jnp.asarray(quaternion[:50]), strict=True)
+    back = np.array([kind.residual(new, old) for new, old in pairs])
+    np.testing.assert_allclose(back, noise[:50], atol=1e-10)
