@@ -10,11 +10,11 @@ from bayesid.diagnosis.verdict import Status, Verdict
 
 __all__ = [
     "Candidate",
+    "CauseSearch",
     "Diagnosis",
     "Frame",
     "Gain",
     "Hypothesis",
-    "CauseSearch",
     "Status",
     "Unexplained",
     "Verdict",

@@ -15,7 +15,8 @@ from bayesid.diagnosis.cause_search import CauseSearch, Hypothesis, significance
 from bayesid.diagnosis.perturbation import physical
 from bayesid.diagnosis.score_tests import DRAWS
 from bayesid.diagnosis.test_suite import FALSE_ALARM
-from bayesid.simulation.effects.effect import Effect, Quantity
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import Quantity
 
 __all__ = ["Candidate", "candidate_table", "detection_power", "effect_amplitude"]
 

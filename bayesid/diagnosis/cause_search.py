@@ -25,7 +25,7 @@ from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 
-__all__ = ["Hypothesis", "CauseSearch"]
+__all__ = ["CauseSearch", "Hypothesis"]
 
 MOST_CAUSES = 3
 BEAM = (4, 3)
@@ -234,7 +234,7 @@ class CauseSearch:
         places: list[tuple[Floats | None, OperatingTrajectory | None]] = [(parent.fit.z, parent.fit.operating)]
         if _strayed(parent.fit):
             places.append((None, None))
-        starts = starts_of(effect, parent.engine, parent.fit, self._battery(parent))
+        starts = starts_of(effect, parent.fit, self._battery(parent))
         for (z, operating), start in product(places, starts):
             try:
                 fit = parent.engine.fit(

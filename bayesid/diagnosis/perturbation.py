@@ -28,10 +28,10 @@ from bayesid.simulation.sensors import Kind
 __all__ = [
     "OperatingTrajectory",
     "coordinates_shape",
-    "perturb",
     "linear_perturbation",
-    "physical",
     "operating_trajectory_of",
+    "perturb",
+    "physical",
 ]
 
 DIFFERENCE = 1e-3

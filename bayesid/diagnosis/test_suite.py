@@ -12,7 +12,7 @@ from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.score_tests import Calibration, Score, score
 from bayesid.simulation.effects.effect import Effect
 
-__all__ = ["TestSuite", "SuiteOutcome"]
+__all__ = ["SuiteOutcome", "TestSuite"]
 
 FALSE_ALARM = 0.01
 """Family-wise probability of an alarm where there is only noise."""
