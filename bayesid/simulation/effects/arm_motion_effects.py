@@ -110,8 +110,8 @@ class JointFlexibility(DisplacedMotion, OnJoint):
     ``frequency`` is that of everything beyond the joint swinging on the spring with the base held and all joints at
     zero, so that one frequency is one stiffness in all recordings. The deflection follows the torque through the joint
     as long as the motion is slow against that frequency: to second order in the ratio of frequencies here, which holds
-    above about 0.2 Hz. It is computed with the robot's present bodies: an unknown load counts in what its deflection
-    does with its unknown parameters, but in the deflection per stiffness with those it has in the robot.
+    above about 0.2 Hz. Deflection and what it displaces are computed with the robot's present bodies: those of unknown
+    ones must be near the truth there, within some tens of per cent.
     """
 
     name = "joint-flexibility"
@@ -157,6 +157,9 @@ class JointFlexibility(DisplacedMotion, OnJoint):
                 motions.append(kinematics(robot, JointState(*changed)))
         return Displaced(motions, np.kron(np.eye(3), [-0.5, 0.5]))
 
+    # a heavier body beyond the joint is displaced less: proportional to its parameters alone would be far too much
+    body_tables, body_loads = Effect.body_tables, Effect.body_loads
+
     def loads(self, values: Array) -> Array:
         """Expand the slow response of the oscillator in the inverse of its frequency."""
         omega, damping = 2.0 * jnp.pi * values[0], values[1]
@@ -197,15 +200,18 @@ class _Deflection:
         ratio = np.zeros(len(knots))
         beyond = pin.crba(model, data, configuration(robot, np.zeros(len(robot.joints))))[6 + index, 6 + index]
         for row in range(len(knots)):
-            q = configuration(robot, state.position[row])
-            velocity = np.concatenate([np.zeros(6), state.velocity[row]])
-            acceleration = np.concatenate([np.zeros(6), state.acceleration[row]])
+            q, speed, acceleration = (
+                configuration(robot, state.position[row]),
+                state.velocity[row],
+                state.acceleration[row],
+            )
             mass = pin.crba(model, data, q)
             mass = np.triu(mass) + np.triu(mass, 1).T
-            drift = pin.nonLinearEffects(model, data, q, velocity)
-            # the base floats: its acceleration leaves no wrench on it
-            base = np.linalg.solve(mass[:6, :6], -mass[:6, 6:] @ acceleration[6:] - drift[:6])
-            torque = mass[6 + index, :6] @ base + mass[6 + index, 6:] @ acceleration[6:] + drift[6 + index]
+            # the base floats, without momentum: it answers the joints' speed, and no wrench is left on it
+            base_speed = -np.linalg.solve(mass[:6, :6], mass[:6, 6:] @ speed)
+            drift = pin.nonLinearEffects(model, data, q, np.concatenate([base_speed, speed]))
+            base = -np.linalg.solve(mass[:6, :6], mass[:6, 6:] @ acceleration + drift[:6])
+            torque = mass[6 + index, :6] @ base + mass[6 + index, 6:] @ acceleration + drift[6 + index]
             ratio[row] = -torque / beyond
         self.spline = make_interp_spline(knots, ratio, k=5)
         self.span = (knots[0], knots[-1])
