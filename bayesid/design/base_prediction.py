@@ -27,7 +27,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor, White
 
-__all__ = ["Prediction", "BasePredictor", "last_link", "predict"]
+__all__ = ["BasePredictor", "Prediction", "last_link", "predict"]
 
 ATTITUDE = Sensor(Kind.ATTITUDE, White(1e-6))
 """Fixes the integration step: its error is below a hundredth of this angle [rad]."""

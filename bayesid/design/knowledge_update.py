@@ -29,9 +29,9 @@ __all__ = [
     "Laplace",
     "Sampled",
     "bodies_of_draws",
-    "updated_model",
     "describe_bodies",
     "known_of",
+    "updated_model",
     "worst_relative_sd",
 ]
 

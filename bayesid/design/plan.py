@@ -24,7 +24,7 @@ from bayesid.simulation.model import Model
 from bayesid.simulation.simulator import ModelConstants, Simulator
 from bayesid.simulation.time_grid import build_grid
 
-__all__ = ["PlannedOutcome", "Plan", "Trajectory"]
+__all__ = ["Plan", "PlannedOutcome", "Trajectory"]
 
 
 class Trajectory(NamedTuple):

@@ -23,7 +23,7 @@ from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Excitation
 from bayesid.robot.joint_state import JointState
 
-__all__ = ["BSplines", "Fourier", "Linear", "PaperExcitation", "TrajectoryFamily", "ParameterisedMotion"]
+__all__ = ["BSplines", "Fourier", "Linear", "PaperExcitation", "ParameterisedMotion", "TrajectoryFamily"]
 
 
 class TrajectoryFamily:

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.omnibus_tests import MODAL, PAIRS
 from bayesid.diagnosis.perturbed_fit import Fit
-from bayesid.diagnosis.test_suite import TestSuite
 from bayesid.simulation.effects.effect import Effect, Resonance
 
-__all__ = ["starts_of"]
+if TYPE_CHECKING:
+    from bayesid.diagnosis.test_suite import TestSuite
+
+__all__ = ["start_coordinates", "starts_of"]
 
 RIDGE = 1.0
 """Prior information on the entries of the coupling matrix, at its scale."""
+
+
+def start_coordinates(effect: Effect, recordings: int) -> Floats:
+    """Return the first of the effect's starts, flat: once, or for each recording where each has values of its own."""
+    return np.tile(effect.starts[0], recordings if effect.per_recording else 1)
 
 
 def starts_of(effect: Effect, fit: Fit, suite: TestSuite) -> Sequence[Floats]:

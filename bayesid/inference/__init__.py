@@ -8,13 +8,13 @@ from bayesid.inference.parameterisation import LinearParameterisation, LogCholes
 
 __all__ = [
     "Chains",
-    "Parameterisation",
     "Evidence",
     "Identification",
     "LaplaceMove",
     "LinearParameterisation",
     "LogCholeskyParameterisation",
     "Optimum",
+    "Parameterisation",
     "choose_parameterisation",
     "identify",
     "importance_sample",

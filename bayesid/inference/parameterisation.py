@@ -16,7 +16,7 @@ from bayesid.inference.mode import Optimum
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.proposal import StudentT
 
-__all__ = ["Parameterisation", "LinearParameterisation", "LogCholeskyParameterisation"]
+__all__ = ["LinearParameterisation", "LogCholeskyParameterisation", "Parameterisation"]
 
 
 class Parameterisation(Protocol):

@@ -22,7 +22,6 @@ __all__ = [
     "convergence",
     "corner",
     "correlations",
-    "trajectory_bands",
     "covariance_ellipses",
     "direction_widths",
     "displacements",
@@ -37,6 +36,7 @@ __all__ = [
     "robot_pose",
     "tip_motion",
     "torques_over_time",
+    "trajectory_bands",
     "wrench_histories",
     "wrench_spectrum",
 ]

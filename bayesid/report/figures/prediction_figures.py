@@ -13,7 +13,7 @@ from bayesid.design.pose_region import REACH, Pose, Region
 from bayesid.design.pose_trajectory import PoseTrajectory
 from bayesid.report.figures.figure_style import curve_style, styled, wide_figure
 
-__all__ = ["trajectory_bands", "final_positions"]
+__all__ = ["final_positions", "trajectory_bands"]
 
 PLANES = ((0, 1), (0, 2), (1, 2))
 
