@@ -29,7 +29,7 @@ from bayesid.report.diagnosis_report import diagnosis_sentences
 from bayesid.report.figures.diagnosis_figures import torque_amplitudes
 from bayesid.report.residual_series import Residuals
 from bayesid.simulation.effects import known_effects
-from bayesid.simulation.effects.effect import Quantity
+from bayesid.simulation.effects.effect_parameters import Quantity
 from bayesid.simulation.model import Manoeuvre
 
 BIAS = 4e-5

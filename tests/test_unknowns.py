@@ -13,7 +13,7 @@ from bayesid._io.errors import InputError
 from bayesid.inference.unknowns import LOG_CHOLESKY, Unknowns
 from bayesid.robot.body_prior import BodyPrior, check_mixing, coordinates_of, draw_inertial
 from bayesid.robot.inertial_parameters import InertialParameters
-from bayesid.simulation.effects.effect import Effect, Parameter
+from bayesid.simulation.effects import Effect, Parameter
 
 CENTRE = InertialParameters(60.0, [0.05, -0.03, 0.1], [[2.4, 0.05, 0.1], [0.05, 2.6, -0.2], [0.1, -0.2, 2.8]])
 OTHER = InertialParameters(5.0, [0.5, 0.0, 0.02], [[0.1, 0.0, 0.0], [0.0, 0.44, 0.01], [0.0, 0.01, 0.46]])

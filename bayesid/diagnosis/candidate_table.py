@@ -8,18 +8,21 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy import stats
+from scipy.optimize import brentq
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.amplitude_scale import effect_mixture
 from bayesid.diagnosis.cause_search import CauseSearch, Hypothesis, significance
+from bayesid.diagnosis.detection_power import average_power, vibration_power
+from bayesid.diagnosis.fit_starts import start_coordinates
 from bayesid.diagnosis.perturbation import physical
-from bayesid.diagnosis.score_tests import DRAWS
-from bayesid.diagnosis.test_suite import FALSE_ALARM
-from bayesid.simulation.effects.effect import Effect, Quantity
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import Quantity
 
-__all__ = ["Candidate", "candidate_table", "detection_power", "effect_amplitude"]
+__all__ = ["Candidate", "candidate_table", "effect_amplitude", "magnitude_limit"]
 
-ONE_SIDED_95 = 1.645
+LIMIT = 0.95
+"""Probability with which a magnitude stays below its upper limit."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,7 @@ class Candidate:
     mean, sd : arrays
         Amplitude.
     power : float or None
-        Probability that an effect of its prior's size would have raised the alarm.
+        Probability that an effect drawn from its prior would have raised the alarm.
     refitted : bool
         Whether the figures come from a fit rather than from the linear response.
     """
@@ -56,8 +59,22 @@ class Candidate:
 
     @property
     def upper_limit(self) -> Floats:
-        """Size that the quantities' magnitudes stay below with 95 %."""
-        return np.abs(self.mean) + ONE_SIDED_95 * self.sd
+        """Size that the quantities' magnitudes stay below with 95 %, their posterior being normal."""
+        return np.array([magnitude_limit(mean, sd) for mean, sd in zip(self.mean, self.sd, strict=True)])
+
+
+def magnitude_limit(mean: float, sd: float, probability: float = LIMIT) -> float:
+    """Return the quantile of the magnitude of a normal variable (folded normal distribution)."""
+    if not sd > 0.0:
+        return abs(mean)
+    centre = abs(mean) / sd
+
+    def missing(over: float) -> float:
+        return float(stats.norm.cdf(over) - stats.norm.cdf(-over - 2.0 * centre)) - probability
+
+    # far from zero one tail counts, at zero both
+    over = brentq(missing, stats.norm.ppf(probability) - 1e-6, stats.norm.ppf(0.5 + 0.5 * probability) + 1e-6)
+    return sd * (centre + float(over))
 
 
 def candidate_table(search: CauseSearch) -> list[Candidate]:
@@ -118,7 +135,7 @@ def _fitted(hypothesis: Hypothesis, search: CauseSearch, effect: Effect) -> Cand
         tuple(effect.quantities),
         mean,
         sd,
-        None if item is None else detection_power(item.degrees, item.information, search),
+        None if item is None else average_power(effect, item, search),
         True,
     )
 
@@ -127,15 +144,16 @@ def _linear(effect: Effect, search: CauseSearch) -> Candidate:
     fit = search.base.fit
     columns = search.suite.effects[effect.label]
     item = search.base.outcome.scores[effect.label]
+    linear = effect.in_amplitudes()
     information = fit.project(columns)
     gradient = columns.T @ fit.residual
-    if effect.parameters:
+    if linear.parameters:
         hessian = information + np.eye(len(information))
         covariance = np.linalg.inv(hessian)
-        point = np.resize(effect.starts[0], len(information)) - covariance @ gradient
-        mean, sd = _reported(effect, point, covariance)
+        point = start_coordinates(linear, len(fit.posterior.manoeuvres)) - covariance @ gradient
+        mean, sd = _reported(linear, point, covariance)
         gain = 0.5 * float(gradient @ covariance @ gradient) - 0.5 * float(np.linalg.slogdet(hessian)[1])
-        gain += effect_mixture(effect, point, covariance)
+        gain += effect_mixture(linear, point, covariance)
     else:
         mean = sd = np.zeros(0)
         gain = float(-gradient[0] - 0.5 * information[0, 0])  # there at full size, or not
@@ -145,10 +163,10 @@ def _linear(effect: Effect, search: CauseSearch) -> Candidate:
         float(np.exp(item.log_p)),
         search.suite.calibration.adjusted(item.log_p),
         gain,
-        tuple(effect.quantities),
+        tuple(linear.quantities),
         mean,
         sd,
-        detection_power(item.degrees, item.information, search),
+        average_power(effect, item, search),
         False,
     )
 
@@ -157,7 +175,7 @@ def _vibrating(effect: Effect, search: CauseSearch) -> Candidate:
     items = [item for name, item in search.base.outcome.scores.items() if name.startswith("vibration")]
     best = min(items, key=lambda item: item.log_p)
     log_p = min(0.0, best.log_p + float(np.log(len(items))))
-    power = float(np.mean([detection_power(item.degrees, item.information, search) for item in items]))
+    power = vibration_power(effect, search)
     nothing = np.zeros(0)
     return Candidate(
         effect.label,
@@ -188,11 +206,3 @@ def _noise(label: str, log_p: float, hypothesis: Hypothesis | None, search: Caus
         None,
         hypothesis is not None,
     )
-
-
-def detection_power(degrees: int, information: float, search: CauseSearch) -> float:
-    """Probability of an alarm by an effect with this noncentrality and so many degrees of freedom."""
-    if degrees == 0:
-        return FALSE_ALARM
-    threshold = np.exp(search.suite.calibration.smallest[DRAWS // 100])
-    return float(stats.ncx2.sf(stats.chi2.isf(threshold, degrees), degrees, max(information, 1e-9)))

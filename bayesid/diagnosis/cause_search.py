@@ -234,7 +234,7 @@ class CauseSearch:
         places: list[tuple[Floats | None, OperatingTrajectory | None]] = [(parent.fit.z, parent.fit.operating)]
         if _strayed(parent.fit):
             places.append((None, None))
-        starts = starts_of(effect, parent.engine, parent.fit, self._battery(parent))
+        starts = starts_of(effect, parent.fit, self._battery(parent))
         for (z, operating), start in product(places, starts):
             try:
                 fit = parent.engine.fit(

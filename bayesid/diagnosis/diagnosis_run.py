@@ -22,7 +22,6 @@ from bayesid.inference.body_quantities import quantity
 from bayesid.inference.ensemble import Progress
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model
 
 __all__ = ["Diagnosis", "diagnose", "extended_posterior", "identify_extended"]
@@ -169,7 +168,7 @@ def extended_posterior(hypothesis: Hypothesis) -> Posterior:
     fit = hypothesis.fit
     model = fit.posterior.model
     for index, effect in enumerate(fit.effects):
-        model = model.extend(_tuned(effect, fit.values(index)))
+        model = model.extend(effect.tuned(fit.values(index)))
     if hypothesis.engine.frozen.size:
         model = replace(model, rate_sigma=0.0)
     manoeuvres = [_without(manoeuvre, fit.posterior, index) for index, manoeuvre in enumerate(fit.posterior.manoeuvres)]
@@ -194,14 +193,6 @@ def identify_extended(
     return identify(
         diagnosis.posterior, seed, start=diagnosis.start, effective_samples=effective_samples, progress=progress
     )
-
-
-def _tuned(effect: Effect, values: Floats) -> Effect:
-    """Choose a vibration's integration step by the frequency found."""
-    if isinstance(effect, FlexibleAppendage | FuelSlosh):
-        names = [parameter.name for parameter in effect.parameters]
-        return effect.at_frequency(float(values[names.index("frequency")]))
-    return effect
 
 
 def _without(manoeuvre: Manoeuvre, posterior: Posterior, index: int) -> Manoeuvre:

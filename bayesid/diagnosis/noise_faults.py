@@ -15,7 +15,7 @@ from bayesid.diagnosis.noise_tests import lattice, leverage
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.inference.noise_changes import leaving_out, with_sensors
 from bayesid.inference.posterior import Posterior
-from bayesid.simulation.effects.effect import Quantity
+from bayesid.simulation.effects.effect_parameters import Quantity
 from bayesid.simulation.sensors import Coloured, Kind, Quantised, Scaled, Sensor
 
 __all__ = ["SUMMARIES", "NoiseFault", "noise_fault", "refined"]

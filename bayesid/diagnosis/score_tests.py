@@ -40,14 +40,15 @@ class Score:
         Columns orthonormal after all that is fitted has taken its share.
     statistic : float
         Chi-square with ``d`` degrees of freedom if there is only noise.
-    information : float
-        Expected statistic of a candidate drawn from its prior, beyond ``d``.
+    response : (d, p) array
+        Mean of the columns' part along the basis for unit amplitudes of the p columns: the noncentrality of amplitudes
+        ``a`` is the square of ``response @ a``.
     """
 
     name: str
     basis: Floats
     statistic: float
-    information: float
+    response: Floats
 
     @property
     def degrees(self) -> int:
@@ -78,7 +79,7 @@ def score(name: str, columns: Floats, fit: Fit, most: int | None = None) -> Scor
     kept = order[values[order] > VISIBLE]
     basis = columns @ (vectors[:, kept] / np.sqrt(values[kept]))
     found = basis.T @ fit.residual
-    return Score(name, basis, float(found @ found), float(values[kept].sum()))
+    return Score(name, basis, float(found @ found), (vectors[:, kept] * np.sqrt(values[kept])).T)
 
 
 def chi2_log_sf(statistic: float, degrees: float) -> float:

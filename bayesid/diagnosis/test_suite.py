@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.fit_starts import start_coordinates
 from bayesid.diagnosis.noise_tests import noise_tests
 from bayesid.diagnosis.omnibus_tests import omnibus, variance_tests, vibrations
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
@@ -58,7 +59,9 @@ class TestSuite:
         for effect in effects:
             if effect.modes_count:
                 continue
-            self.effects[effect.label] = engine.columns(effect, effect.starts[0], fit.operating, fit.z, data)
+            linear = effect.in_amplitudes()
+            start = start_coordinates(linear, len(engine.posterior.manoeuvres))
+            self.effects[effect.label] = engine.columns(linear, start, fit.operating, fit.z, data)
         self.vibrations = vibrations(engine, fit)
         self.others = omnibus(engine, fit)
         self.others |= {f"vibration at {f:g} Hz": columns for f, columns in self.vibrations.items()}

@@ -17,7 +17,7 @@ from jax import Array
 from bayesid._math.arrays import Traceable
 from bayesid.robot.inertial_parameters import PARAMETERS, vector_from_factor
 from bayesid.robot.log_cholesky import absolute, log_volume, relative
-from bayesid.simulation.effects.effect import Prior
+from bayesid.simulation.effects.effect_parameters import Prior
 from bayesid.simulation.simulator import Values
 
 __all__ = ["EffectLayout", "Layout", "PriorNumbers"]

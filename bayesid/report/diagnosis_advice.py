@@ -9,6 +9,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Candidate, Diagnosis, Frame, Hypothesis, Unexplained
 from bayesid.diagnosis.verdict import fit_without
+from bayesid.simulation.effects import known_effects
 
 __all__ = ["adequate_too", "advice", "differing", "imitation", "moves_with", "unseen"]
 
@@ -19,56 +20,20 @@ VISIBLE = 1.0
 """Information, at the prior's scale, from which on a direction of a cause can be seen."""
 
 ADVICE = {
-    "wheel-momentum": "Its torque grows with the base's rate: repeat with the base turning faster, and about other "
-    "axes; a torque that is there at rest is not of wheels.",
-    "gravity-gradient": "It turns with the direction of the Earth: repeat with the base turned to another attitude, "
-    "or with the arm stretched along another axis.",
-    "aerodynamic-drag": "It keeps the direction of flight: repeat with the base turned to another attitude.",
-    "solar-pressure": "It keeps the direction of the Sun and ends in eclipse: repeat with the base turned to another "
-    "attitude, or on the orbit's night side.",
-    "magnetic-dipole": "It follows the Earth's field along the orbit: repeat at another argument of latitude, a "
-    "quarter of an orbit away, and in another attitude.",
-    "thruster-leak": "It keeps its direction in the base: repeat with the base turned to another attitude, so that "
-    "what is fixed in the orbit or in inertial space changes its direction in base axes and the leak does not; record "
-    "with the arm at rest too.",
-    "rotational-drag": "It brakes every rotation: let the base turn freely, with the arm at rest, at two rates.",
-    "flexible-appendage": "It swings on: excite it with one quick motion, then record with the arm at rest.",
-    "fuel-slosh": "It swings on: excite it with one quick motion, then record with the arm at rest.",
-    "payload": "It moves with its link: move that joint through another range with the other joints still, and with "
-    "the wrist in another posture, so that mass, centre of mass and inertia act apart.",
-    "link-inertia": "It moves with its link: move that joint through another range with the other joints still; two "
-    "neighbouring links act apart only if the joint between them moves alone.",
-    "encoder-offset": "It acts as a wrong posture: move that joint through another range with the others still; the "
-    "offset stays the same, an error of a mass does not.",
-    "joint-flexibility": "It grows with the joint's acceleration: repeat the motion of that joint twice as fast.",
-    "joint-friction": "It changes sign with the joint's speed, not with its acceleration: run that joint at two "
-    "constant speeds, forwards and back, with the others still.",
-    "torque-bias": "It is there when the joint stands free of load: read the torques at rest, before and after "
-    "the motion.",
-    "latency": "It grows with speed: repeat the same motion twice as fast; errors of bodies keep their ratio to the "
-    "motion, a delay's grow with frequency.",
-    "bias": "It is there at rest and does not care for motion: record a longer rest before and after the motion, and "
-    "run the motion the other way; what the dynamics do changes its sign, a bias does not.",
-    "drift": "It grows with the clock and does not care for motion: record a longer rest before and after the motion, "
-    "and repeat the motion the other way.",
-    "scale": "It grows with the reading: move the other way and faster, with larger readings about each axis in turn.",
-    "misalignment": "It mixes the axes: turn about one axis at a time, with large readings.",
-    "accel-position": "It grows with the base's rate squared and angular acceleration: turn the base faster about "
-    "each axis in turn.",
     "initial-rate": "It is there before the arm moves: record a rest before the motion.",
     "noise": "It is there at rest: record the sensor with the arm at rest.",
     "outliers": "They are single samples: look at the readings themselves, and record at rest.",
     "quantisation": "The readings lie on a lattice: record at rest, and look up the sensor's resolution.",
 }
-"""By the name of the catalogue, or its last part: what would bring the cause out."""
+"""What would bring a cause out that is no effect, by its name or a part of it."""
 
 
 def advice(name: str) -> str:
-    """Return the manoeuvre that would bring a cause out, as a sentence."""
+    """Return the manoeuvre that would bring a cause out, as a sentence; of an effect its class states it."""
     bare = name.partition(":")[0]
-    keys = (bare, *(bare.removeprefix(f"{sensor}-") for sensor in ("rate", "accel", "joint", "coloured", "attitude")))
-    found = next((ADVICE[key] for key in keys if key in ADVICE), None)
-    return found or "Repeat with other amplitudes, other speeds and the base in another attitude."
+    effect = known_effects().get(bare)
+    said = effect.separated_by if effect else next((text for key, text in ADVICE.items() if key in bare), "")
+    return said or "Repeat with other amplitudes, other speeds and the base in another attitude."
 
 
 def differing(first: Hypothesis, second: Hypothesis) -> tuple[list[str], list[str]]:

@@ -60,8 +60,8 @@ def add_candidates(document: Document, result: Diagnosis) -> None:
         "model were fitted together; linear: the figures come from the response at the present fit, which is enough "
         "where the candidate does little. The signal-to-noise ratio is the root of what chi-square loses, less the "
         "candidate's degrees of freedom. The p-value is adjusted for the number of tests. The Bayes factor is against "
-        "the present model, natural logarithm. Power is the probability that a candidate of the size its prior "
-        "expects would have raised the alarm. Sizes are given where they are seen, and otherwise the magnitudes that "
+        "the present model, natural logarithm. Power is the probability that a candidate drawn from its prior "
+        "would have raised the alarm. Sizes are given where they are seen, and otherwise the magnitudes that "
         "they stay below with 95 %."
     )
     ranked = sorted(result.candidates, key=lambda row: (-row.signal_to_noise, -(row.log_bayes_factor or 0.0)))

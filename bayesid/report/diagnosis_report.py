@@ -175,7 +175,7 @@ def _add_advice(document: Document, result: Diagnosis) -> None:
         )
     elif not rivals and verdict.status in (Status.ADEQUATE, Status.EXPLAINED):
         document.paragraph(
-            "Every candidate of the size its prior expects would have raised the alarm in at least half of all cases: "
+            "Every candidate, drawn from its prior, would have raised the alarm in at least half of all cases: "
             "these manoeuvres are enough."
         )
 

@@ -14,7 +14,8 @@ from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report.diagnosis_advice import differing, imitation
 from bayesid.report.numbers import format_number, format_quantity, format_unit
 from bayesid.report.report_tables import prior_range
-from bayesid.simulation.effects.effect import Effect, Prior, Quantity
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import Prior, Quantity
 
 __all__ = ["amplitude_text", "amplitudes_of", "cause_rows", "format_p"]
 

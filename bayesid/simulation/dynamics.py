@@ -171,7 +171,8 @@ def _integrate(
 ) -> tuple[_System, Array, _StateTrajectory]:
     """Run the classical Runge-Kutta method over the grid; also return what multiplies its tables."""
     system = _System(tuple(effects), tuple(values))
-    loads = jnp.concatenate([inertial, *(effect.loads(v) for effect, v in zip(effects, values, strict=True))])
+    more = [effect.body_loads(v, inertial) for effect, v in zip(effects, values, strict=True)]
+    loads = jnp.concatenate([inertial, *more])
     bodies = jax.vmap(composite)(grid.node.known + grid.node.unknown @ loads)
     stages = (bodies, grid.node.environment)
     first, middle, last = (

@@ -120,7 +120,9 @@ def _instants(
     moved = kinematics(robot, joints)
     known = composite_rows(robot, moved, leave_out=unknown)
     tables: list[tuple[str | None, Floats]] = [(name, link_table(robot, name, moved)) for name in unknown]
-    tables += [(effect.link, effect.table(robot, motion, time)) for effect in effects if effect.uses("table")]
+    for effect in effects:
+        if effect.uses("table"):
+            tables += effect.body_tables(robot, unknown, motion, time)
     owners = [name for name, table in tables for _ in range(table.shape[2])]
     none = OrbitState(*(np.zeros((len(time), *shape)) for shape in ((3,), (), (3,), (3,), (), (3,))))
     state = none if orbit is None else orbit.state(time, argument_of_latitude)

@@ -1,19 +1,13 @@
-"""Effects a model can carry; see `bayesid.simulation.effects.effect.Effect` for writing one's own."""
+"""Effects a model can carry; see `bayesid.simulation.effects.effect.Effect` for writing a new one.
 
-from bayesid.simulation.effects.arm_effects import EncoderOffset, JointFlexibility, JointLatency, LinkInertia, Payload
-from bayesid.simulation.effects.effect import (
-    Effect,
-    Instant,
-    Modes,
-    Parameter,
-    Prior,
-    Quantity,
-    Readings,
-    Wrench,
-    create,
-    known_effects,
-    register,
-)
+This file is the list of shipped effects: importing a class that is decorated with `register` makes it known to study
+files, and everything else that the package needs to know of an effect its class states itself.
+"""
+
+from bayesid.simulation.effects.arm_effects import LinkInertia, Payload
+from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointFlexibility, JointLatency
+from bayesid.simulation.effects.effect import Effect, Instant, Modes, Readings, Resonance, Wrench
+from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity
 from bayesid.simulation.effects.environment_effects import (
     AerodynamicDrag,
     GravityGradient,
@@ -24,6 +18,7 @@ from bayesid.simulation.effects.environment_effects import (
 )
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh, WheelMomentum
 from bayesid.simulation.effects.joint_friction import JointFriction, TorqueBias
+from bayesid.simulation.effects.register import create, known_effects, register
 from bayesid.simulation.effects.sensor_faults import (
     AccelBias,
     AccelDrift,
@@ -69,6 +64,7 @@ __all__ = [
     "RateMisalignment",
     "RateScale",
     "Readings",
+    "Resonance",
     "RotationalDrag",
     "SensorFault",
     "SolarPressure",

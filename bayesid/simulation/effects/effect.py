@@ -1,28 +1,29 @@
-"""The unit of extension: a physical effect that a model can carry, and the register of those known by name.
+"""The unit of extension: a physical effect that a model can carry.
 
-An effect states its parameters with units and a prior on a physical scale, and overrides only the hooks it needs. All
-hooks are pure functions of JAX arrays. ``values`` are the effect's parameters in the order of ``parameters``; ``inner``
+An effect states its parameters with units and a prior on a physical scale, where it can occur, how a fit of it may
+start and what separates it from others, and overrides only the hooks it needs. All hooks are pure functions of JAX
+arrays. ``values`` are the effect's parameters in the order of ``parameters``; ``inner``
 are its own states. Vectors are in base axes unless said otherwise.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
-from enum import Enum
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.scipy.special import erf
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Traceable
+from bayesid.simulation.effects.effect_parameters import Parameter, Quantity
 
 if TYPE_CHECKING:
     from bayesid.recording.joint_motion import Motion
     from bayesid.robot.robot import Robot
+    from bayesid.simulation.model import Model
 
 __all__ = [
     "Composite",
@@ -30,60 +31,10 @@ __all__ = [
     "Environment",
     "Instant",
     "Modes",
-    "Parameter",
-    "Prior",
-    "Quantity",
     "Readings",
+    "Resonance",
     "Wrench",
-    "create",
-    "known_effects",
-    "register",
 ]
-
-
-class Prior(Enum):
-    """Shape of a parameter's prior, and what its mean and sigma then are."""
-
-    NORMAL = "normal"
-    LOG_NORMAL = "log-normal"  # mean is the median, sigma the standard deviation of the logarithm
-    UNIFORM = "uniform"  # within sigma of the mean
-
-    def physical(self, mean: Array | float, sigma: Array | float, z: Array) -> Array:
-        """Return the physical value of a coordinate with a standard-normal prior."""
-        if self is Prior.LOG_NORMAL:
-            return mean * jnp.exp(sigma * z)
-        if self is Prior.UNIFORM:
-            return mean + sigma * erf(z / jnp.sqrt(2.0))
-        return mean + sigma * z
-
-
-class Quantity(NamedTuple):
-    """A name and a unit."""
-
-    name: str
-    unit: str
-
-
-class Parameter(NamedTuple):
-    """One parameter of an effect, with its prior.
-
-    ``sigma`` is the prior's standard deviation and ``mean`` its centre; see `Prior` for other shapes.
-    """
-
-    name: str
-    unit: str
-    sigma: float
-    mean: float = 0.0
-    prior: Prior = Prior.NORMAL
-
-    @property
-    def is_amplitude(self) -> bool:
-        """Whether zero means that nothing is there."""
-        return self.prior is Prior.NORMAL and self.mean == 0.0
-
-    def value(self, z: Array) -> Array:
-        """Physical value of a coordinate with a standard-normal prior."""
-        return self.prior.physical(self.mean, self.sigma, z)
 
 
 class Composite(NamedTuple):
@@ -187,6 +138,17 @@ class Readings(NamedTuple):
         return self._replace(channels={**self.channels, **changed})
 
 
+class Resonance(NamedTuple):
+    """A frequency at which a residual asks for a hidden vibration.
+
+    frequency [Hz]; coupling (6, 6), the sum over the modes of the outer products of linear and angular momentum per
+    modal speed [sqrt(kg), sqrt(kg) m] that fits best, no matter whether any mode can have it.
+    """
+
+    frequency: float
+    coupling: Floats
+
+
 class Effect:
     """A physical effect. Subclass it, set ``name`` and ``parameters``, override the hooks that apply, and `register`.
 
@@ -194,11 +156,17 @@ class Effect:
     ----------
     name : str
         As used in study files; a class that needs a place is written ``name:place``.
+    summary : str
+        What the effect is, in one sentence of a report.
+    separated_by : str
+        What the effect looks like and which manoeuvre or sensor separates it from rivals, in one sentence of a report.
     parameters : tuple of Parameter
     per_recording : bool
         Whether every recording has its own values.
     needs_orbit : bool
         Whether the effect exists only in orbit.
+    needs_latitude : bool
+        Whether it cannot be computed unless the recordings say where on the orbit they were made.
     states : int
         Number of inner states, zero at time 0.
     modes_count : int
@@ -207,11 +175,27 @@ class Effect:
 
     name: ClassVar[str] = ""
     summary: ClassVar[str] = ""
+    separated_by: ClassVar[str] = ""
     parameters: tuple[Parameter, ...] = ()
     per_recording: ClassVar[bool] = False
     needs_orbit: ClassVar[bool] = False
+    needs_latitude: ClassVar[bool] = False
     states: ClassVar[int] = 0
     modes_count: ClassVar[int] = 0
+
+    @classmethod
+    def instances(cls, model: Model) -> Sequence[Effect]:
+        """Return the effect at every place of a model's robot where it can occur and show in the model's sensors.
+
+        By default once, without an orbit only if `needs_orbit` is not set, and nowhere if the class needs arguments or
+        a place, which cannot be guessed.
+        """
+        if cls.needs_orbit and model.orbit is None:
+            return []
+        try:
+            return [cls().attach(model.robot)]
+        except (InputError, TypeError):
+            return []
 
     @property
     def longest_step(self) -> float:
@@ -233,11 +217,43 @@ class Effect:
 
     @property
     def starts(self) -> Sequence[Floats]:
-        """Coordinates, with a standard-normal prior, from which a fit of the effect is started; by default zero.
-
-        Effects with an inner frequency give a range of them.
-        """
+        """Coordinates, with a standard-normal prior, from which a fit of the effect is started; by default zero."""
         return [np.zeros(len(self.parameters))]
+
+    @property
+    def absent(self) -> Floats:
+        """Values at which nothing is there, by default zero amplitudes and the others at their centre, (n,).
+
+        An effect whose size is no amplitude overrides it; one without parameters is there or is not in the model.
+        """
+        return np.array([0.0 if parameter.is_amplitude else parameter.mean for parameter in self.parameters])
+
+    def in_amplitudes(self) -> Effect:
+        """Return the effect in amplitudes that are zero where it is absent, for linear tests; by default itself.
+
+        An effect whose prior is not centred where it is absent overrides it, and `amplitudes` with it.
+        """
+        return self
+
+    def amplitudes(self, values: Array) -> Array:
+        """Turn values of the parameters into those of the parameters of `in_amplitudes`."""
+        return values
+
+    def starts_near(self, resonances: Sequence[Resonance], alone: bool) -> Sequence[Floats]:
+        """Return the coordinates from which a fit of a vibration is started, by default `starts`.
+
+        Parameters
+        ----------
+        resonances : sequence of Resonance
+            What the residual asks for, the most wanted first.
+        alone : bool
+            Whether no other effect is fitted beside it, so that more starts can be afforded.
+        """
+        return self.starts
+
+    def tuned(self, values: Floats) -> Self:
+        """Return the effect with what depends on the size of its values, as `longest_step` may, chosen for them."""
+        return self
 
     @property
     def label(self) -> str:
@@ -297,6 +313,16 @@ class Effect:
         """Return what multiplies the coefficients of `table`, shape (m,)."""
         return jnp.zeros(0)
 
+    def body_tables(
+        self, robot: Robot, unknown: Sequence[str], motion: Motion, time: Floats
+    ) -> list[tuple[str | None, Floats]]:
+        """Return `table` in parts (T, 28, n), each with the link it is a table of, where some links are unknown."""
+        return [(self.link, self.table(robot, motion, time))]
+
+    def body_loads(self, values: Array, inertial: Array) -> Array:
+        """Return what multiplies all columns of `body_tables`, given all unknown links' parameters, ten each."""
+        return self.loads(values)
+
     def read(self, values: Array, readings: Readings) -> Readings:
         """Return what faulty sensors make of the true readings, in sensor axes."""
         return readings
@@ -308,38 +334,3 @@ class Effect:
     def uses(self, hook: str) -> bool:
         """Whether the class overrides a hook."""
         return getattr(type(self), hook) is not getattr(Effect, hook)
-
-
-_REGISTER: dict[str, Callable[..., Effect]] = {}
-
-E = TypeVar("E", bound=type[Effect])
-
-
-def register(effect: E) -> E:
-    """Class decorator: make an effect known to study files by its name."""
-    if not effect.name:
-        raise InputError(f"effect {effect.__name__} has no name", remedy="Set the class attribute `name`")
-    _REGISTER[effect.name] = effect
-    return effect
-
-
-def known_effects() -> dict[str, Callable[..., Effect]]:
-    """Every registered effect by its name."""
-    return dict(_REGISTER)
-
-
-def create(label: str, **options: Any) -> Effect:
-    """Build an effect by the label used in study files, such as ``"gravity-gradient"``.
-
-    Raises
-    ------
-    InputError
-        If no effect of that name is registered.
-    """
-    name, _, place = label.partition(":")
-    if name not in _REGISTER:
-        raise InputError(
-            f"unknown effect {label!r}",
-            remedy=f"Choose from {', '.join(sorted(_REGISTER))}, or name your file under model.plugins",
-        )
-    return _REGISTER[name](place, **options) if place else _REGISTER[name](**options)

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
-from bayesid.simulation.effects.effect import Effect, Instant, Parameter, Prior, Wrench, register
+from bayesid._math.arrays import Floats
+from bayesid.simulation.effects.effect import Effect, Instant, Wrench
+from bayesid.simulation.effects.effect_parameters import Parameter, Prior
+from bayesid.simulation.effects.register import register
+
+if TYPE_CHECKING:
+    from bayesid.simulation.model import Model
 
 __all__ = ["AerodynamicDrag", "GravityGradient", "MagneticDipole", "RotationalDrag", "SolarPressure", "ThrusterLeak"]
 
@@ -28,6 +38,10 @@ class GravityGradient(Effect):
     summary = (
         "Gravity pulls harder on what is nearer the Earth. The difference over the robot's extent turns it, "
         "and an accelerometer away from the centre of mass feels it."
+    )
+    separated_by = (
+        "It turns with the direction of the Earth: repeat with the base turned to another attitude, or with the arm "
+        "stretched along another axis."
     )
     needs_orbit = True
 
@@ -57,6 +71,19 @@ class _Pressure(Effect):
             *(Parameter(f"cp.{axis}", "m", REACH, 0.0, Prior.UNIFORM) for axis in "xyz"),
         )
 
+    @property
+    def absent(self) -> Floats:
+        """No force, in the middle."""
+        return np.zeros(4)
+
+    def in_amplitudes(self) -> Effect:
+        """Return the effect in its force and the product of force and lever."""
+        return _LinearPressure(self)
+
+    def amplitudes(self, values: Array) -> Array:
+        """Return the force and its products with the lever."""
+        return jnp.concatenate([values[:1], values[0] * values[1:]])
+
     def direction(self, instant: Instant) -> Array:
         """Return the force's direction in orbit axes."""
         raise NotImplementedError
@@ -65,6 +92,34 @@ class _Pressure(Effect):
         """Return the force and its torque about the base origin."""
         force = values[0] * instant.to_base(self.direction(instant))
         return Wrench(force, jnp.cross(values[1:], force))
+
+
+class _LinearPressure(Effect):
+    """A pressure in amplitudes in which it is linear: its force, and force times lever, whose moment it exerts.
+
+    The scales are those of the pressure's prior: the force's change by one standard deviation of its logarithm at the
+    median, and the median at the farthest lever.
+    """
+
+    needs_orbit = True
+
+    def __init__(self, pressure: _Pressure) -> None:
+        self.pressure = pressure
+        force = pressure.parameters[0]
+        self.parameters = (
+            Parameter("force", "N", force.mean * force.sigma),
+            *(Parameter(f"force-lever.{axis}", "N m", force.mean * REACH) for axis in "xyz"),
+        )
+
+    @property
+    def label(self) -> str:
+        """Name of the pressure."""
+        return self.pressure.label
+
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
+        """Return the force and its torque about the base origin."""
+        unit = instant.to_base(self.pressure.direction(instant))
+        return Wrench(values[0] * unit, jnp.cross(values[1:], unit))
 
 
 @register
@@ -80,6 +135,7 @@ class AerodynamicDrag(_Pressure):
         "The thin air of a low orbit pushes against the direction of flight. Where the push acts beside the "
         "centre of mass it also turns the robot, and the turn follows the attitude to the direction of flight."
     )
+    separated_by = "It keeps the direction of flight: repeat with the base turned to another attitude."
 
     def __init__(self, force: float = 5.0e-3, spread: float = 1.5) -> None:
         super().__init__(force, spread)
@@ -101,6 +157,16 @@ class SolarPressure(_Pressure):
         "Sunlight pushes the robot away from the Sun. Where the push acts beside the centre of mass it also turns "
         "the robot, about an axis that stays with the stars."
     )
+    separated_by = (
+        "It keeps the direction of the Sun and ends in eclipse: repeat with the base turned to another attitude, or on "
+        "the orbit's night side."
+    )
+    needs_latitude = True
+
+    @classmethod
+    def instances(cls, model: Model) -> Sequence[Effect]:
+        """Return the effect where the direction of the Sun is known."""
+        return [] if model.orbit is None or model.orbit.sun is None else super().instances(model)
 
     def __init__(self, force: float = 3.0e-4, spread: float = 2.0) -> None:
         super().__init__(force, spread)
@@ -119,7 +185,17 @@ class MagneticDipole(Effect):
 
     name = "magnetic-dipole"
     summary = "Currents and magnets on board make the base a compass needle in the Earth's magnetic field."
+    separated_by = (
+        "It follows the Earth's field along the orbit: repeat at another argument of latitude, a quarter of an orbit "
+        "away, and in another attitude."
+    )
+    needs_latitude = True
     needs_orbit = True
+
+    @classmethod
+    def instances(cls, model: Model) -> Sequence[Effect]:
+        """Return the effect where the inclination says how the Earth's field lies."""
+        return [] if model.orbit is None or model.orbit.inclination is None else super().instances(model)
 
     def __init__(self, sigma: float = 10.0) -> None:
         self.parameters = tuple(Parameter(axis, "A m2", sigma) for axis in "xyz")
@@ -140,6 +216,11 @@ class ThrusterLeak(Effect):
 
     name = "thruster-leak"
     summary = "A leaking valve pushes steadily with a force and a torque that are fixed in the base."
+    separated_by = (
+        "It keeps its direction in the base: repeat with the base turned to another attitude, so that what is fixed in "
+        "the orbit or in inertial space changes its direction in base axes and the leak does not; record with the arm "
+        "at rest too."
+    )
 
     def __init__(self, force: float = 0.05, torque: float = 0.05) -> None:
         self.parameters = tuple(
@@ -162,6 +243,7 @@ class RotationalDrag(Effect):
 
     name = "rotational-drag"
     summary = "The air of a laboratory, or a bearing, brakes the rotation of the base in proportion to its rate."
+    separated_by = "It brakes every rotation: let the base turn freely, with the arm at rest, at two rates."
 
     def __init__(self, sigma: float = 0.1) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,7 +11,9 @@ from jax import Array
 
 from bayesid._math.arrays import Floats
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects.effect import Effect, Instant, Modes, Parameter, Prior, Quantity, register
+from bayesid.simulation.effects.effect import Effect, Instant, Modes, Resonance
+from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity, coordinates_of
+from bayesid.simulation.effects.register import register
 
 __all__ = ["FlexibleAppendage", "FuelSlosh", "WheelMomentum"]
 
@@ -22,6 +25,21 @@ DAMPING, DAMPING_SPREAD = 0.01, 1.0
 
 STEPS_PER_PERIOD = 10.0
 """Integration steps in one period of the vibration."""
+
+RESONANCES = 2
+"""Number of resonances from which the fit of an appendage is started."""
+
+SMALLEST_COUPLING = 0.1
+"""Least square of a mode's coupling at which a fit is started [kg m2]; from zero it would not find its sign."""
+
+SLOSH_FREQUENCIES, SLOSH_MASS = (0.06, 0.25), 5.0
+"""Frequencies [Hz] and mass [kg] at which the fit of slosh is started: it converges from afar."""
+
+TANK_DISTANCE = 0.4
+"""Distance of further starting places of the tank from the middle of the spacecraft, along each axis [m]."""
+
+TANK_CORNERS = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
+"""Directions of those places, the corners of a tetrahedron."""
 
 
 @register
@@ -35,6 +53,10 @@ class WheelMomentum(Effect):
     summary = (
         "Reaction wheels left spinning make the base a gyroscope: turning it about one axis turns it about another."
     )
+    separated_by = (
+        "Its torque grows with the base's rate: repeat with the base turning faster, and about other axes; a torque "
+        "that is there at rest is not of wheels."
+    )
 
     def __init__(self, sigma: float = 1.0) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
@@ -47,6 +69,7 @@ class WheelMomentum(Effect):
 class _Vibration(Effect):
     """Something on a spring inside the base: what such effects share."""
 
+    separated_by = "It swings on: excite it with one quick motion, then record with the arm at rest."
     frequency: float = FREQUENCY
 
     @property
@@ -54,11 +77,11 @@ class _Vibration(Effect):
         """A tenth of the period at the frequency the fit starts from [s]."""
         return 1.0 / (STEPS_PER_PERIOD * self.frequency)
 
-    def at_frequency(self, frequency: float) -> _Vibration:
-        """Return the effect with its integration step for another frequency [Hz]."""
+    def tuned(self, values: Floats) -> Self:
+        """Return the effect with its integration step for the frequency among the values."""
         changed = type(self).__new__(type(self))
         changed.__dict__.update(self.__dict__)
-        changed.frequency = frequency
+        changed.frequency = float(values[[parameter.name for parameter in self.parameters].index("frequency")])
         return changed
 
 
@@ -100,8 +123,17 @@ class FlexibleAppendage(_Vibration):
         return jnp.concatenate([values[:2], jnp.linalg.norm(coupling[3:])[None], sign * coupling])
 
     def modes(self, values: Array) -> Modes:
-        """Return the one mode."""
+        """Return the mode."""
         return Modes(2.0 * jnp.pi * values[:1], values[1:2], values[None, 2:5], values[None, 5:8], jnp.zeros((1, 3, 3)))
+
+    def starts_near(self, resonances: Sequence[Resonance], alone: bool) -> Sequence[Floats]:
+        """Return one mode per resonance: the largest eigenvector of its coupling."""
+        starts = []
+        for frequency, matrix in resonances[:RESONANCES]:
+            values, vectors = np.linalg.eigh(matrix)
+            coupling = vectors[:, -1] * np.sqrt(max(values[-1], SMALLEST_COUPLING))
+            starts.append(coordinates_of(self.parameters, [frequency, DAMPING, *coupling]))
+        return starts
 
 
 @register
@@ -124,7 +156,12 @@ class FuelSlosh(_Vibration):
             *(Parameter(f"position.{axis}", "m", reach, 0.0, Prior.UNIFORM) for axis in "xyz"),
         )
 
-    def attach(self, robot: Robot) -> FuelSlosh:
+    @property
+    def absent(self) -> Floats:
+        """No mass, all else in the middle of the prior."""
+        return np.array([0.0, *(parameter.mean for parameter in self.parameters[1:])])
+
+    def attach(self, robot: Robot) -> Self:
         """Bound the tank to the spacecraft."""
         centre, reach = spacecraft_box(robot)
         changed = type(self).__new__(type(self))
@@ -137,6 +174,16 @@ class FuelSlosh(_Vibration):
             ),
         )
         return changed
+
+    def starts_near(self, resonances: Sequence[Resonance], alone: bool) -> Sequence[Floats]:
+        """Return two frequencies in the middle of the spacecraft, and where affordable other places of the tank."""
+        middle = np.array([parameter.mean for parameter in self.parameters[3:]])
+        places = [(frequency, middle) for frequency in SLOSH_FREQUENCIES]
+        if alone:  # the place may have several optima
+            places += [(resonances[0].frequency, middle + TANK_DISTANCE * corner) for corner in TANK_CORNERS]
+        return [
+            coordinates_of(self.parameters, [SLOSH_MASS, frequency, DAMPING, *place]) for frequency, place in places
+        ]
 
     def modes(self, values: Array) -> Modes:
         """Return one mode per axis."""

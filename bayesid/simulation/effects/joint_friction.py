@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Self
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Self
 
 import jax.numpy as jnp
 from jax import Array
 
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects.effect import Parameter, register
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import Parameter
 from bayesid.simulation.effects.placed import OnJoint
+from bayesid.simulation.effects.register import register
+
+if TYPE_CHECKING:
+    from bayesid.simulation.model import Model
 
 __all__ = ["STANDSTILL", "JointFriction", "TorqueBias"]
 
@@ -23,6 +29,11 @@ REVERSAL = 1e-4
 class _OnTorque(OnJoint):
     """An effect on what the torque sensor of one joint reads."""
 
+    @classmethod
+    def instances(cls, model: Model) -> Sequence[Effect]:
+        """Return the effect at every joint whose torque is measured."""
+        return [] if model.torque is None else [cls(joint) for joint in model.torque.joints]
+
     def attach(self, robot: Robot) -> Self:
         """Take the joint's index from the robot."""
         changed = self.copied()
@@ -32,7 +43,7 @@ class _OnTorque(OnJoint):
     index: int = -1
 
     def friction(self, values: Array, velocity: Array) -> Array:
-        """Add the joint's own."""
+        """Return the torque of the effect in the column of its joint, zero in the others."""
         return jnp.zeros_like(velocity).at[:, self.index].set(self.extra(values, velocity[:, self.index]))
 
     def extra(self, values: Array, velocity: Array) -> Array:
@@ -50,6 +61,10 @@ class JointFriction(_OnTorque):
 
     name = "joint-friction"
     summary = "The motor works against friction in the joint, which its torque sensor reads with the rest."
+    separated_by = (
+        "It changes sign with the joint's speed, not with its acceleration: run that joint at two constant speeds, "
+        "forwards and back, with the others still."
+    )
 
     def __init__(self, place: str = "", coulomb: float = 5.0, viscous: float = 50.0) -> None:
         super().__init__(place)
@@ -66,6 +81,9 @@ class TorqueBias(_OnTorque):
 
     name = "torque-bias"
     summary = "The torque sensor of the joint reads a constant without load."
+    separated_by = (
+        "It is there when the joint stands free of load: read the torques at rest, before and after the motion."
+    )
 
     def __init__(self, place: str = "", sigma: float = 2.0) -> None:
         super().__init__(place)

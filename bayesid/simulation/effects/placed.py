@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Self
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Self
 
 from bayesid._io.errors import InputError
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect
+
+if TYPE_CHECKING:
+    from bayesid.simulation.model import Model
 
 __all__ = ["OnJoint", "Placed"]
 
@@ -35,6 +39,11 @@ class Placed(Effect):
 
 class OnJoint(Placed):
     """An effect at one joint."""
+
+    @classmethod
+    def instances(cls, model: Model) -> Sequence[Effect]:
+        """Return the effect at every moving joint."""
+        return [cls(joint.name) for joint in model.robot.joints]
 
     def attach(self, robot: Robot) -> Self:
         """Check that the joint exists."""

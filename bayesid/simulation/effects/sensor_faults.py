@@ -6,13 +6,19 @@ that the sample stamped t shows the past.
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar
 
 import jax.numpy as jnp
 from jax import Array
 
-from bayesid.simulation.effects.effect import Effect, Instant, Parameter, Readings, register
+from bayesid.simulation.effects.effect import Effect, Instant, Readings
+from bayesid.simulation.effects.effect_parameters import Parameter
+from bayesid.simulation.effects.register import register
 from bayesid.simulation.sensors import Kind
+
+if TYPE_CHECKING:
+    from bayesid.simulation.model import Model
 
 __all__ = [
     "AccelBias",
@@ -26,6 +32,7 @@ __all__ = [
     "RateLatency",
     "RateMisalignment",
     "RateScale",
+    "SensorFault",
 ]
 
 
@@ -39,6 +46,11 @@ class SensorFault(Effect):
     """
 
     sensor: ClassVar[Kind]
+
+    @classmethod
+    def instances(cls, model: Model) -> Sequence[Effect]:
+        """Return the effect where the sensor is declared."""
+        return super().instances(model) if any(sensor.kind is cls.sensor for sensor in model.sensors) else []
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         """Return what the faulty sensor reads, shape (T, 3), of the true reading."""
@@ -65,17 +77,30 @@ class _Axes(SensorFault):
 
 
 class _Bias(_Axes):
+    separated_by = (
+        "It is there at rest and does not care for motion: record a longer rest before and after the motion, and run "
+        "the motion the other way; what the dynamics do changes its sign, a bias does not."
+    )
+
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         return reading + values
 
 
 class _Drift(_Axes):
+    separated_by = (
+        "It grows with the clock and does not care for motion: record a longer rest before and after the motion, and "
+        "repeat the motion the other way."
+    )
+
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         return reading + values * time[:, None]
 
 
 class _Scale(_Axes):
     unit = "1"
+    separated_by = (
+        "It grows with the reading: move the other way and faster, with larger readings about each axis in turn."
+    )
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         return (1.0 + values) * reading
@@ -83,12 +108,18 @@ class _Scale(_Axes):
 
 class _Misalignment(_Axes):
     unit = "rad"
+    separated_by = "It mixes the axes: turn about one axis at a time, with large readings."
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         return reading @ _rotation(values).T
 
 
 class _Latency(SensorFault):
+    separated_by = (
+        "It grows with speed: repeat the same motion twice as fast; errors of bodies keep their ratio to the motion, a "
+        "delay's grow with frequency."
+    )
+
     def __init__(self, sigma: float = 0.2) -> None:
         self.parameters = (Parameter("delay", "s", sigma),)
 
@@ -178,6 +209,9 @@ class AccelPosition(_Axes):
 
     name = "accel-position"
     summary = "The accelerometer sits elsewhere than stated and feels another part of the base's rotation."
+    separated_by = (
+        "It grows with the base's rate squared and angular acceleration: turn the base faster about each axis in turn."
+    )
     sensor, unit, sigma = Kind.ACCEL, "m", 0.05
 
     def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:

@@ -1,0 +1,234 @@
+"""What the joints do, differently from what the recording says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import jax.numpy as jnp
+import numpy as np
+import pinocchio as pin
+from jax import Array
+from scipy.interpolate import make_interp_spline
+
+from bayesid._math.arrays import Floats
+from bayesid.recording.joint_motion import Motion
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import configuration, kinematics
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects.displaced_motion import Displaced, DisplacedMotion
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import Parameter, Prior
+from bayesid.simulation.effects.placed import OnJoint
+from bayesid.simulation.effects.register import register
+
+if TYPE_CHECKING:
+    from bayesid.simulation.model import Model
+
+__all__ = ["EncoderOffset", "JointFlexibility", "JointLatency"]
+
+OFFSET_STEP = 0.02
+"""Joint offset at which the tables are sampled for a quadratic [rad or m]; its cubic rest is below 1e-5 at 0.03 rad."""
+
+
+@register
+class EncoderOffset(DisplacedMotion, OnJoint):
+    """Constant error of a joint's recorded position: recorded = true + offset.
+
+    The prior of 0.02 rad is a wrong zero by a degree.
+    """
+
+    name = "encoder-offset"
+    summary = "The joint's encoder has a wrong zero: the arm stands elsewhere than the recording says."
+    separated_by = (
+        "It acts as a wrong posture: move that joint through another range with the others still; the offset stays the "
+        "same, an error of a mass does not."
+    )
+
+    def __init__(self, place: str = "", sigma: float = 0.02) -> None:
+        super().__init__(place)
+        self.parameters = (Parameter("offset", "rad", sigma),)
+
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
+        """Return first and second differences in the joint's position."""
+        unit = np.eye(len(robot.joints))[self.index_in(robot)]
+        state = motion.evaluate(time)
+        motions = [
+            kinematics(robot, state._replace(position=state.position + step * unit))
+            for step in (-OFFSET_STEP, 0.0, OFFSET_STEP)
+        ]
+        first = np.array([-0.5, 0.0, 0.5]) / OFFSET_STEP
+        second = np.array([0.5, -1.0, 0.5]) / OFFSET_STEP**2
+        return Displaced(motions, np.stack([first, second]))
+
+    def loads(self, values: Array) -> Array:
+        """Return the powers of the offset: the true position is the recorded one less it."""
+        return jnp.stack([-values[0], values[0] ** 2])
+
+
+LATENCY_STEP = 0.15
+"""Delay at which the tables are sampled for a quartic [s]."""
+
+
+@register
+class JointLatency(DisplacedMotion):
+    """Delay of the joint record: the position stamped t is that of t - delay.
+
+    The prior of 0.2 s is a few cycles of a slow data bus.
+    """
+
+    name = "joint-latency"
+    summary = "The joints' record is late: the arm has moved on from where the recording says it is."
+    separated_by = (
+        "It grows with speed: repeat the same motion twice as fast; errors of bodies keep their ratio to the motion, a "
+        "delay's grow with frequency."
+    )
+
+    @classmethod
+    def instances(cls, model: Model) -> Sequence[Effect]:
+        """Return the effect where any joint moves."""
+        return super().instances(model) if model.robot.joints else []
+
+    def __init__(self, sigma: float = 0.2) -> None:
+        self.parameters = (Parameter("delay", "s", sigma),)
+
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
+        """Return the quartic's coefficients through five samples in time."""
+        shifts = LATENCY_STEP * np.arange(-2, 3)
+        motions = [kinematics(robot, motion.evaluate(time + shift)) for shift in shifts]
+        return Displaced(motions, np.linalg.inv(np.vander(shifts, increasing=True))[1:])
+
+    def loads(self, values: Array) -> Array:
+        """Return the powers of the delay, after which the record will show the arm."""
+        return values[0] ** jnp.arange(1, 5)
+
+
+@register
+class JointFlexibility(DisplacedMotion, OnJoint):
+    """A joint whose link side gives way behind the measured motor side, on a damped spring.
+
+    ``frequency`` is that of everything beyond the joint swinging on the spring with the base held and all joints at
+    zero, so that one frequency is one stiffness in all recordings. The deflection follows the torque through the joint
+    as long as the motion is slow against that frequency: to second order in the ratio of frequencies here, which holds
+    above about 0.2 Hz. Deflection and what it displaces are computed with the robot's present bodies: those of unknown
+    ones must be near the truth there, within some tens of per cent.
+    """
+
+    name = "joint-flexibility"
+    summary = "The joint's gear is elastic: what is beyond it lags behind the encoder when the arm accelerates."
+    separated_by = "It grows with the joint's acceleration: repeat the motion of that joint twice as fast."
+
+    def __init__(self, place: str = "", frequency: float = 1.0, spread: float = 0.7) -> None:
+        super().__init__(place)
+        self.parameters = (
+            Parameter("frequency", "Hz", spread, frequency, Prior.LOG_NORMAL),
+            Parameter("damping", "1", 1.0, 0.03, Prior.LOG_NORMAL),
+        )
+
+    @property
+    def starts(self) -> Sequence[Floats]:
+        """Stiff, so that the fit is nearly linear in the compliance."""
+        return [np.array([1.5, 0.0])]
+
+    @property
+    def absent(self) -> Floats:
+        """A rigid joint: an infinite frequency."""
+        return np.array([np.inf, self.parameters[1].mean])
+
+    def in_amplitudes(self) -> Effect:
+        """Return the effect in its compliance and the lag of its damping."""
+        return _JointCompliance(self)
+
+    def amplitudes(self, values: Array) -> Array:
+        """Return compliance and lag, each times the inertia beyond the joint at zero."""
+        omega = 2.0 * jnp.pi * values[0]
+        return jnp.stack([omega**-2, 2.0 * values[1] * omega**-3])
+
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
+        """Return what the deflection that the joint's torque makes does, and what its derivatives do."""
+        index, state = self.index_in(robot), motion.evaluate(time)
+        deflection = _Deflection(robot, motion, index, float(time[-1]))
+        motions = []
+        for order in (0, 2, 1):
+            for sign in (-1.0, 1.0):
+                changed = [np.array(values) for values in state]
+                for derivative in range(3):
+                    changed[derivative][:, index] += sign * deflection.derivative(time, order + derivative)
+                motions.append(kinematics(robot, JointState(*changed)))
+        return Displaced(motions, np.kron(np.eye(3), [-0.5, 0.5]))
+
+    # a heavier body beyond the joint is displaced less: proportional to its parameters alone would be far too much
+    body_tables, body_loads = Effect.body_tables, Effect.body_loads
+
+    def loads(self, values: Array) -> Array:
+        """Expand the slow response of the oscillator in the inverse of its frequency."""
+        omega, damping = 2.0 * jnp.pi * values[0], values[1]
+        return jnp.stack([omega**-2, -(1.0 - 4.0 * damping**2) * omega**-4, -2.0 * damping * omega**-3])
+
+
+class _JointCompliance(JointFlexibility):
+    """A flexible joint in amplitudes in which it is linear to first order; their scales are those at the median."""
+
+    def __init__(self, flexibility: JointFlexibility) -> None:
+        super().__init__(flexibility.place)
+        median = flexibility.amplitudes(jnp.array([parameter.mean for parameter in flexibility.parameters]))
+        self.parameters = (
+            Parameter("compliance", "s2", float(median[0])),
+            Parameter("damping-lag", "s3", float(median[1])),
+        )
+
+    starts, absent = Effect.starts, Effect.absent
+    in_amplitudes, amplitudes = Effect.in_amplitudes, Effect.amplitudes
+
+    def loads(self, values: Array) -> Array:
+        """Return the compliance and the lag as coefficients of the deflection and of its speed."""
+        return jnp.stack([values[0], jnp.zeros(()), -values[1]])
+
+
+KNOTS = 0.5
+"""Distance of the instants at which a joint's torque is computed [s]."""
+
+
+class _Deflection:
+    """Less the torque through a joint over the inertia beyond it at zero [1/s2], as a function of time."""
+
+    def __init__(self, robot: Robot, motion: Motion, index: int, end: float) -> None:
+        knots = np.linspace(0.0, end, int(np.ceil(end / KNOTS)) + 1)
+        model = _loaded(robot)
+        data = model.createData()
+        state = motion.evaluate(knots)
+        ratio = np.zeros(len(knots))
+        beyond = pin.crba(model, data, configuration(robot, np.zeros(len(robot.joints))))[6 + index, 6 + index]
+        for row in range(len(knots)):
+            q, speed, acceleration = (
+                configuration(robot, state.position[row]),
+                state.velocity[row],
+                state.acceleration[row],
+            )
+            mass = pin.crba(model, data, q)
+            mass = np.triu(mass) + np.triu(mass, 1).T
+            # the base floats, without momentum: it answers the joints' speed, and no wrench is left on it
+            base_speed = -np.linalg.solve(mass[:6, :6], mass[:6, 6:] @ speed)
+            drift = pin.nonLinearEffects(model, data, q, np.concatenate([base_speed, speed]))
+            base = -np.linalg.solve(mass[:6, :6], mass[:6, 6:] @ acceleration + drift[:6])
+            torque = mass[6 + index, :6] @ base + mass[6 + index, 6:] @ acceleration + drift[6 + index]
+            ratio[row] = -torque / beyond
+        self.spline = make_interp_spline(knots, ratio, k=5)
+        self.span = (knots[0], knots[-1])
+
+    def derivative(self, time: Floats, order: int) -> Floats:
+        """Return a derivative at some times."""
+        return np.asarray(self.spline(np.clip(time, *self.span), nu=order))
+
+
+def _loaded(robot: Robot) -> pin.Model:
+    """Pinocchio's model with the robot's present links and loads."""
+    model = robot.model.copy()
+    for joint in range(1, model.njoints):
+        model.inertias[joint] = pin.Inertia.Zero()
+    for link in robot.links.values():
+        if link.inertial.mass > 0.0:
+            model.inertias[link.joint + 2] += pin.SE3(link.placement).act(
+                pin.Inertia.FromDynamicParameters(link.inertial.vector)
+            )
+    return model

@@ -1,0 +1,78 @@
+"""Effects by which the links move otherwise than the recording says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple, cast
+
+import jax.numpy as jnp
+from jax import Array
+
+from bayesid._math.arrays import Floats, namespace
+from bayesid.recording.joint_motion import Motion
+from bayesid.robot.composite_tables import composite_rows, link_table
+from bayesid.robot.kinematics import Kinematics
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects.effect import Effect
+
+if TYPE_CHECKING:
+    from bayesid.simulation.model import Model
+
+__all__ = ["Displaced", "DisplacedMotion"]
+
+
+class Displaced(NamedTuple):
+    """Change of the motion of all links, as motions to compare and m columns of weights.
+
+    The change of any body's kinematic table is ``sum_k c_k sum_s weights[k, s] table(motions[s])``, where the c_k are
+    the effect's coefficients (`Effect.loads`) and weights has the shape (m, S).
+    """
+
+    motions: Sequence[Kinematics]
+    weights: Floats
+
+    def weighted(self, tables: Sequence[Floats]) -> Floats:
+        """Contract tables along the motions, each (T, 28, ...), to columns (T, 28, m, ...)."""
+        xp = namespace(tables[0])
+        return cast("Floats", xp.einsum("ks,std...->tdk...", self.weights, xp.stack(list(tables))))
+
+
+class DisplacedMotion(Effect):
+    """An effect that displaces links against the recorded motion.
+
+    It changes the tables of every body that is carried along. The tables of bodies whose parameters are unknown change
+    in proportion to those parameters, so that they are kept apart from the tables of the known ones. Joint torques are
+    not followed.
+    """
+
+    @classmethod
+    def instances(cls, model: Model) -> Sequence[Effect]:
+        """Return the effect wherever it can occur, but not beside torque sensors."""
+        return [] if model.torque is not None else super().instances(model)
+
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
+        """Return the change of the links' motion at T instants."""
+        raise NotImplementedError
+
+    def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
+        """Return the change of the tables of all bodies with the robot's parameters, (T, 28, m)."""
+        change = self.displaced(robot, motion, time)
+        return change.weighted([composite_rows(robot, moved) for moved in change.motions])
+
+    def body_tables(
+        self, robot: Robot, unknown: Sequence[str], motion: Motion, time: Floats
+    ) -> list[tuple[str | None, Floats]]:
+        """Return the change of the known bodies' tables, (T, 28, m), then of each unknown body's, (T, 28, 10 m)."""
+        change = self.displaced(robot, motion, time)
+        known = change.weighted([composite_rows(robot, moved, leave_out=unknown) for moved in change.motions])
+        tables: list[tuple[str | None, Floats]] = [(None, known)]
+        for name in unknown:
+            own = change.weighted([link_table(robot, name, moved) for moved in change.motions])
+            tables.append((None, own.reshape(*own.shape[:2], -1)))
+        return tables
+
+    def body_loads(self, values: Array, inertial: Array) -> Array:
+        """Return the coefficients, then for each unknown body their products with its ten parameters."""
+        coefficients = self.loads(values)
+        products = coefficients[None, :, None] * inertial.reshape(-1, 1, 10)
+        return jnp.concatenate([coefficients, products.ravel()])

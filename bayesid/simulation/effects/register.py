@@ -1,0 +1,46 @@
+"""The register of effects that study files know by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from bayesid._io.errors import InputError
+from bayesid.simulation.effects.effect import Effect
+
+__all__ = ["create", "known_effects", "register"]
+
+_REGISTER: dict[str, type[Effect]] = {}
+
+E = TypeVar("E", bound=type[Effect])
+
+
+def register(effect: E) -> E:
+    """Class decorator: make an effect known to study files by its name."""
+    if not effect.name:
+        raise InputError(f"effect {effect.__name__} has no name", remedy="Set the class attribute `name`")
+    _REGISTER[effect.name] = effect
+    return effect
+
+
+def known_effects() -> dict[str, type[Effect]]:
+    """Return every registered effect by its name, in the order of registration."""
+    return dict(_REGISTER)
+
+
+def create(label: str, **options: Any) -> Effect:
+    """Build an effect by the label used in study files, such as ``"gravity-gradient"``.
+
+    Raises
+    ------
+    InputError
+        If no effect of that name is registered.
+    """
+    name, _, place = label.partition(":")
+    if name not in _REGISTER:
+        raise InputError(
+            f"unknown effect {label!r}",
+            remedy=f"Choose from {', '.join(sorted(_REGISTER))}, or name your file under model.plugins",
+        )
+    build: Callable[..., Effect] = _REGISTER[name]
+    return build(place, **options) if place else build(**options)

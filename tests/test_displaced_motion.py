@@ -1,0 +1,118 @@
+"""Effects that displace links, against MuJoCo with a load that is far heavier than its prior."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from bayesid.recording.joint_motion import Motion
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.robot import Load, Robot
+from bayesid.simulation.effects import Effect, EncoderOffset, JointFlexibility, JointLatency
+from bayesid.simulation.model import Model
+from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.simulator import Simulator, Values
+from bayesid.simulation.time_grid import build_grid, pad_grids
+from tests import hidden
+from tests import mujoco_truth as mj
+
+SERVICER = Path(__file__).parent / "robots" / "servicer3.urdf"
+POINT = (0.2, -0.1, 0.3)
+RATE0 = (0.004, -0.003, 0.002)
+TIMES = np.arange(0.0, 40.01, 0.5)
+HEAVY, COM = 370.0, np.array([1.4, 0.1, 0.05])
+INERTIA = np.array([[60.0, 4.0, -2.0], [4.0, 75.0, 3.0], [-2.0, 3.0, 50.0]])
+GUESSED = 10.0
+"""Mass of the load in the robot, a thirty-seventh of the truth [kg]."""
+
+WIDTH = 3.0
+"""Of the bumps that the joints' positions follow [s]: without a kink that would make a spring ring."""
+START = np.array([0.5, -0.8, 1.4])
+"""Posture at both ends [rad]."""
+
+SIZES, CENTRES = np.array([[0.4, -0.5, 0.6], [-0.3, 0.5, 0.2]]), np.array([[17.0, 19.0, 16.0], [23.0, 22.0, 24.0]])
+
+
+def formula(time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions, speeds and accelerations of the joints, at rest at the ends."""
+    away = (time - CENTRES) / WIDTH
+    bump = SIZES * np.exp(-0.5 * away**2)
+    parts = bump, -bump * away / WIDTH, bump * (away**2 - 1.0) / WIDTH**2
+    position, speed, acceleration = (part.sum(axis=0) for part in parts)
+    return START + position, speed, acceleration
+
+
+def robot(mass: float = GUESSED) -> Robot:
+    """The robot with the load's true shape and some mass."""
+    load = InertialParameters(mass, COM, INERTIA * mass / HEAVY)
+    return Robot.from_urdf(SERVICER).with_load(Load("target", "link3", load))
+
+
+class Recorded(Motion):
+    """What encoders show of the formula's motion: joint positions with an offset, late by some time."""
+
+    def __init__(self, offset: tuple[float, ...] = (0.0, 0.0, 0.0), delay: float = 0.0) -> None:
+        self.offset, self.delay = np.array(offset), delay
+
+    def evaluate(self, time):
+        state = np.array([formula(float(t) - self.delay) for t in time]).transpose(1, 0, 2)
+        return JointState(state[0] + self.offset, state[1], state[2])
+
+
+def truth(**options) -> np.ndarray:
+    """Rate and acceleration that MuJoCo gives the robot with the heavy load, (T, 6)."""
+    carrying = mj.join(hidden.link_body(SERVICER, "link3"), mj.Body(HEAVY, COM, INERTIA))
+    model = mj.TruthModel(SERVICER, accel_position=POINT, changed={"link3": carrying}, **options)
+    run = model.run(formula, TIMES, rate0=RATE0, step=0.05)
+    return np.concatenate([run.rate, run.accel], axis=1)
+
+
+def simulated(
+    motion: Motion, effect: Effect | None = None, values: tuple[float, ...] = (), mass: float = GUESSED
+) -> np.ndarray:
+    """Rate and acceleration where the load is unknown, ``mass`` in the robot, and gets its true parameters, (T, 6)."""
+    sensors = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(1e-5), position=POINT))
+    carrier = robot(mass)
+    prior = BodyPrior("target", carrier.link("target").inertial, 1.0)
+    model = Model(carrier, sensors, (prior,), effects=() if effect is None else (effect,))
+    grid = pad_grids([build_grid(carrier, ("target",), motion, TIMES, 0.25, effects=model.effects)])
+    heavy = jnp.asarray(InertialParameters(HEAVY, COM, INERTIA).vector)
+    present = tuple(jnp.asarray(values) for _ in model.effects)
+    unknown = Values(heavy, jnp.asarray([RATE0]), jnp.zeros((1, 3)), present)
+    readings = Simulator(model).readings(unknown, grid, jnp.asarray([[0.0, 0.0, 0.0, 1.0]]))
+    return np.concatenate([readings.rate[0], readings.accel[0]], axis=1)
+
+
+def share(truth: np.ndarray, without: np.ndarray, carried: np.ndarray) -> float:
+    """Error of a prediction that carries the effect, relative to that of one that does not; rate and acceleration."""
+    parts = [slice(0, 3), slice(3, 6)]
+    return max(np.linalg.norm((carried - truth)[:, p]) / np.linalg.norm((without - truth)[:, p]) for p in parts)
+
+
+def test_the_rigid_robot_is_that_of_mujoco():
+    exact, error = truth(), simulated(Recorded()) - truth()
+    assert np.abs(error[:, :3]).max() < 1e-6 * np.abs(exact[:, :3]).max()
+    assert np.abs(error[:, 3:]).max() < 1e-5 * np.abs(exact[:, 3:]).max()
+
+
+def test_an_encoder_offset_displaces_the_unknown_load():
+    shown = Recorded(offset=(0.0, 0.02, 0.0))
+    assert share(truth(), simulated(shown), simulated(shown, EncoderOffset("joint2"), (0.02,))) < 1e-4
+
+
+def test_a_late_joint_record_displaces_the_unknown_load():
+    shown = Recorded(delay=0.2)
+    assert share(truth(), simulated(shown), simulated(shown, JointLatency(), (0.2,))) < 1e-3
+
+
+@pytest.mark.parametrize("joint", ["joint1", "joint2", "joint3"])
+def test_a_flexible_joint_has_one_stiffness_whatever_the_posture_at_the_start(joint):
+    """The stiffness is that at zero, where no joint ever is; the robot's load is the true one."""
+    bent = truth(flexible=[mj.Flexibility(joint, 1.5)])
+    carried = simulated(Recorded(), JointFlexibility(joint), (1.5, 0.02), mass=HEAVY)
+    assert share(bent, simulated(Recorded()), carried) < 0.15
