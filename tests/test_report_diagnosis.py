@@ -326,9 +326,11 @@ def test_the_reconstructed_wrench_is_drawn_with_its_uncertainty(disturbance):
             line.get_xydata(), np.column_stack([time, disturbance.torque[frame][0][:, 0] / scale])
         )
         assert len(torque.collections) == (frame is Frame.BASE)  # the band of ± 1 sd
-    band = figures.wrench_histories(disturbance, Frame.BASE).axes[0].collections[0].get_datalim(torque.transData)
-    expected = disturbance.torque[Frame.BASE][0][:, 0] / scale
-    assert band.ymin == pytest.approx(expected.min() - 1e-4 / scale)
+    band = figures.wrench_histories(disturbance, Frame.BASE).axes[0].collections[0].get_paths()[0].vertices
+    value, sd = (part[0][:, 0] / scale for part in (disturbance.torque[Frame.BASE], disturbance.torque_sd))
+    assert sd.min() > 0.0
+    assert band[:, 1].min() == pytest.approx((value - sd).min())
+    assert band[:, 1].max() == pytest.approx((value + sd).max())
     spectrum = figures.wrench_spectrum(disturbance).axes[0]
     frequency, amplitude = torque_amplitudes(disturbance, 0)
     drawn = spectrum.lines[0].get_xydata()
