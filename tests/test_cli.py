@@ -12,9 +12,9 @@ import pytest
 from typer.testing import CliRunner
 
 from bayesid.app.command_line import app
+from bayesid.report.numbers import format_fixed, format_number, format_quantity
 from studies.truth.mujoco import Manoeuvres, TruthModel, write_study
 from studies.truth.urdf import SERVICER4
-from bayesid.report.numbers import format_fixed, format_number, format_quantity
 from tests.pdf_text import PdfText
 
 

@@ -250,7 +250,7 @@ class Recording:
                 row=row,
                 remedy="Time must strictly increase; sort the rows and join those with the same time",
             )
-        # the clock was not reset, or nothing is known of the motion between 0 and the first row
+        # such a clock was hardly reset: nothing is known of the motion between 0 and the first row
         if time[0] > time[-1] - time[0]:
             raise self._error(
                 f"the first time, {time[0]:.12g} s, is later than the recording is long ({time[-1] - time[0]:.6g} s)",

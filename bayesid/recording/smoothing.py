@@ -133,7 +133,7 @@ class SmoothedJoint:
         return result
 
     def _interpolation(self, time: Floats) -> tuple[Integers, Floats]:
-        """Return the node left of each time, and the weights (T, 3, 2 order) of both nodes' states in the derivatives."""
+        """Return the node left of each time, and the weights (T, 3, 2 order) of both nodes' states."""
         left = np.clip(np.searchsorted(self.nodes, time, side="right") - 1, 0, len(self.nodes) - 2)
         length = np.diff(self.nodes)[left]
         s = (time - self.nodes[left]) / length
@@ -285,7 +285,7 @@ class _Problem:
         return float(np.sqrt(np.mean(rough**2) / 70.0)) / 3.0
 
     def solve(self, intensity: float, sigmas: list[float]) -> tuple[float, Floats, Floats, float]:
-        """Return the log marginal likelihood, the states (n, order), the banded factor, and chi-square of the samples."""
+        """Return the log marginal likelihood, the states (n, order), the banded factor and chi-square."""
         order, weight = self.order, intensity**-2
         diagonal = weight * self.diagonal
         diagonal[0] += np.diag(self.initial)

@@ -118,7 +118,7 @@ def axis_title(kind: Kind, axis: int) -> str:
 
 
 def sensor_panels(figure: Figure, kinds: Sequence[Kind], sharex: bool = False) -> Any:
-    """Return an array of panels with a row for each sensor and a column for each axis; those without an axis are hidden."""
+    """Return panels (sensors, axes) with a row for each sensor; those without an axis are hidden."""
     columns = max(kind.size for kind in kinds)
     panels = figure.subplots(len(kinds), columns, squeeze=False, sharex=sharex)
     for row, kind in zip(panels, kinds, strict=True):
