@@ -31,6 +31,7 @@ from bayesid.report.figures.diagnosis_figures import torque_amplitudes
 from bayesid.report.figures.residual_figures import NOISE_BAND
 from bayesid.report.numbers import format_quantity
 from bayesid.report.sentences import diagnosis_sentences as sentences
+from bayesid.report.sentences.amplitude_words import amplitude_text
 from bayesid.report.sentences.model_assumptions import model_sentences
 from bayesid.report.sentences.next_experiment import ANYTHING, advice
 from bayesid.report.tables import diagnosis_tables as tables
@@ -152,11 +153,11 @@ def test_amplitudes_have_units_and_the_value_that_was_hidden(biased):
     for item in others:
         assert item.distance < 4.0
     pair = [CauseAmplitude(Quantity(name, "N m s"), mean, 0.1) for name, mean in (("x", 1.0), ("y", 2.0))]
-    assert tables.amplitude_text(pair) == "x 1.00 ± 0.10, y 2.00 ± 0.10 N m s"
+    assert amplitude_text(pair) == "x 1.00 ± 0.10, y 2.00 ± 0.10 N m s"
     several = [CauseAmplitude(Quantity(f"k{i}", "1"), float(i), 1.0) for i in range(6)]
-    assert tables.amplitude_text(several) == "k3 3.0 ± 1.0, k4 4.0 ± 1.0, k5 5.0 ± 1.0"
+    assert amplitude_text(several) == "k3 3.0 ± 1.0, k4 4.0 ± 1.0, k5 5.0 ± 1.0"
     mixed = [CauseAmplitude(Quantity("m", "kg"), 1.0, 0.1), CauseAmplitude(Quantity("x", "m"), 2.0, 0.1)]
-    assert tables.amplitude_text(mixed) == "m 1.00 ± 0.10 kg, x 2.00 ± 0.10 m"
+    assert amplitude_text(mixed) == "m 1.00 ± 0.10 kg, x 2.00 ± 0.10 m"
 
 
 def test_a_candidate_that_is_not_seen_has_a_limit():

@@ -13,8 +13,8 @@ from bayesid.diagnosis.rival_causes import differing
 from bayesid.diagnosis.test_suite import FALSE_ALARM
 from bayesid.diagnosis.verdict import RIVALRY
 from bayesid.report.numbers import format_fixed, format_number, format_p_value, format_signed
+from bayesid.report.sentences.amplitude_words import amplitude_text
 from bayesid.report.sentences.next_experiment import advice
-from bayesid.report.tables.diagnosis_tables import amplitude_text
 
 __all__ = [
     "advice_sentences",

@@ -21,11 +21,11 @@ from bayesid.report.numbers import (
     format_signed,
     format_unit,
 )
+from bayesid.report.sentences.amplitude_words import amplitude_text, limit_text
 from bayesid.report.tables.identification_tables import prior_range
 from bayesid.simulation.effects.effect import Effect, Prior
 
 __all__ = [
-    "amplitude_text",
     "candidate_rows",
     "cause_rows",
     "correlation_rows",
@@ -37,52 +37,11 @@ __all__ = [
     "unseen_rows",
 ]
 
-SHOWN = 3
-"""Largest number of quantities of one candidate in a table's cell."""
-
 LIMITS = 6
 """Largest number of limits in a cell of the table of candidates out of reach."""
 
 SEEN = 2.0
 """Distance from zero, in standard deviations, above which an amplitude is given and below which a limit."""
-
-NOT_OF_SIZE = ("frequency", "damping")
-"""Quantities of a vibration that say nothing of its size, so that a limit on them would mislead."""
-
-
-def amplitude_text(amplitude: Sequence[CauseAmplitude], shown: int = SHOWN) -> str:
-    """Return an amplitude in words, with the unit behind every run of quantities that share it.
-
-    Parameters
-    ----------
-    amplitude : sequence of CauseAmplitude
-    shown : int
-        Largest number of quantities given; of more, those furthest from zero in their standard deviations.
-    """
-    furthest = sorted(amplitude, key=lambda item: -item.distance)[:shown]
-    chosen = [item for item in amplitude if item in furthest]
-    return _with_units(
-        [(f"{item.quantity.name} {format_quantity(item.mean, item.sd)}", item.quantity.unit) for item in chosen]
-    )
-
-
-def _limit_text(row: Candidate, shown: int = SHOWN) -> str:
-    """Return the magnitudes that a candidate's quantities stay below with 95 %."""
-    limits = [
-        (f"{quantity.name} < {format_number(limit, 2)}", quantity.unit)
-        for quantity, limit in zip(row.quantities, row.upper_limit.tolist(), strict=False)
-        if quantity.name not in NOT_OF_SIZE
-    ]
-    return _with_units(limits[:shown]) + (", ..." if len(limits) > shown else "")
-
-
-def _with_units(parts: Sequence[tuple[str, str]]) -> str:
-    """Join texts, each with its unit, and print the unit behind the last of every run that shares it."""
-    texts = []
-    for place, (text, unit) in enumerate(parts):
-        last = place + 1 == len(parts) or parts[place + 1][1] != unit
-        texts.append(f"{text} {format_unit(unit)}".rstrip() if last else text)
-    return ", ".join(texts)
 
 
 def candidate_rows(rows: Sequence[Candidate], alarm: float) -> Rows:
@@ -111,7 +70,7 @@ def candidate_rows(rows: Sequence[Candidate], alarm: float) -> Rows:
 def _size_text(row: Candidate, alarm: float) -> str:
     amplitude = list(map(CauseAmplitude, row.quantities, np.asarray(row.mean).tolist(), np.asarray(row.sd).tolist()))
     seen = row.p_value_adjusted < alarm and any(item.distance > SEEN for item in amplitude)
-    return amplitude_text(amplitude) if seen else _limit_text(row)
+    return amplitude_text(amplitude) if seen else limit_text(row)
 
 
 def hypothesis_rows(hypotheses: Sequence[Hypothesis], base: Hypothesis) -> Rows:
@@ -227,7 +186,7 @@ def rival_rows(result: Diagnosis, rivals: Sequence[Hypothesis]) -> Rows:
 
 def unseen_rows(rows: Sequence[Candidate]) -> Rows:
     """Return name, power and 95 % limits of candidates that could hardly have been seen."""
-    return [[row.name, f"{row.power:.2f}", _limit_text(row, LIMITS) or "no limit"] for row in rows]
+    return [[row.name, f"{row.power:.2f}", limit_text(row, LIMITS) or "no limit"] for row in rows]
 
 
 def correlation_rows(correlations: Sequence[TorqueCorrelation]) -> Rows:
