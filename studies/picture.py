@@ -13,6 +13,7 @@ import numpy as np
 from bayesid import Study, load_posterior
 from bayesid.app.demonstration import write_demo
 from bayesid.inference import maximise
+from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.report import figures
 
 
@@ -23,7 +24,7 @@ def run(output: Path, *, seed: int = 0) -> None:
         posterior, optimum = maximise(
             load_posterior(Study.load(Path(folder) / "study.toml")), np.random.default_rng(seed)
         )
-        figures.measured_against_simulated(posterior, optimum.z, 0).savefig(output, dpi=110)
+        figures.measured_against_simulated(sensor_fits(posterior, optimum.z)[0]).savefig(output, dpi=110)
 
 
 if __name__ == "__main__":

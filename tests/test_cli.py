@@ -12,8 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from bayesid.app.command_line import app
+from bayesid.report.numbers import format_fixed, format_number, format_quantity
 from studies.truth.mujoco import Manoeuvres, TruthModel, write_study
 from studies.truth.urdf import SERVICER4
+from tests.pdf_text import PdfText
 
 
 @pytest.fixture(scope="module")
@@ -64,19 +66,43 @@ def test_identify_writes_what_the_contract_names(study: Path, tmp_path: Path) ->
     data = az.from_netcdf(tmp_path / "posterior.nc")
     assert {"posterior", "log_likelihood", "posterior_predictive", "observed_data"} <= set(data.groups())
     assert data.posterior["base_link.mass"].attrs["unit"] == "kg"
-    assert (tmp_path / "report.pdf").read_bytes()[:5] == b"%PDF-"
+    report = PdfText.read(tmp_path / "report.pdf")
+    assert "Servicer" in report
+    for key, unit in (("mass", "kg"), ("com", "m"), ("inertia", "kg m²")):
+        items = {f"{key}.xx": body[key]["xx"]} if key == "inertia" else {key: body[key]}
+        items = {f"com.{axis}": item for axis, item in zip("xyz", body[key], strict=True)} if key == "com" else items
+        for name, item in items.items():
+            assert f"base_link.{name}{unit}" in report
+            assert format_quantity(item["mean"], item["sd"]) in report
 
 
 def test_check_and_simulate(study: Path, tmp_path: Path) -> None:
     status, output = run("check", study, "--output", tmp_path / "check")
     assert status == 0, output
     assert sorted(item.name for item in (tmp_path / "check").iterdir()) == ["check.json", "report.pdf"]
-    channels = json.loads((tmp_path / "check" / "check.json").read_text())["recordings"][0]["channels"]
-    assert {"rate", "accel", "position.joint1"} <= {channel["name"] for channel in channels}
+    checked = json.loads((tmp_path / "check" / "check.json").read_text())["recordings"][0]
+    assert {"rate", "accel", "position.joint1"} <= {channel["name"] for channel in checked["channels"]}
     status, output = run("simulate", study, "--output", tmp_path / "simulate", "--seed", 5)
     assert status == 0, output
+    report = PdfText.read(tmp_path / "check" / "report.pdf")
+    assert "Check of the study and its recordings" in report
+    for channel in checked["channels"]:
+        assert report.row(
+            channel["name"],
+            str(channel["samples"]),
+            format_number(channel["interval"], 4),
+            format_number(channel["longest_gap"], 4),
+        )
+    assert {joint["name"] for joint in checked["joints"]} == {f"joint{k}" for k in (1, 2, 3, 4)}
+    for joint in checked["joints"]:
+        span = f"{format_fixed(joint['lowest'], 3)} to {format_fixed(joint['highest'], 3)} {joint['unit']}"
+        assert report.row(joint["name"], span, f"{format_number(joint['speed'])} {joint['unit']}/s")
     names = sorted(item.name for item in (tmp_path / "simulate").iterdir())
     assert "simulation.json" in names
+    largest = json.loads((tmp_path / "simulate" / "simulation.json").read_text())["recordings"][0]["largest"]
+    report = PdfText.read(tmp_path / "simulate" / "report.pdf")
+    for kind, unit in (("rate", "rad/s"), ("accel", "m/s²")):
+        assert report.row(kind, unit, *(format_number(value, 4) for value in largest[kind]))
     assert sum(name.endswith(".csv") for name in names) == 1
     again = tmp_path / "again"
     run("simulate", study, "--output", again, "--seed", 5)
@@ -203,14 +229,18 @@ def test_a_users_effect_joins_a_study(study: Path, tmp_path: Path) -> None:
             + '\nplugins = ["mine.py"]\n'
         ),
     )
+    status, text = run("check", study, "--output", tmp_path / "without")
+    assert status == 0, text
+    without = int(re.search(r"(\d+) unknowns", text)[1])
     status, text = run("check", file, "--output", tmp_path / "out")
     assert status == 0, text
-    assert "22" in text or "unknowns" in text
+    assert f"{without + 3} unknowns" in text
+    assert f"and {without + 3} unknowns." in PdfText.read(tmp_path / "out" / "report.pdf")
 
 
 PLUGIN = '''
 import jax.numpy as jnp
-from bayesid.effects import Effect, Parameter, Wrench, register
+from bayesid.simulation.effects import Effect, Parameter, Wrench, register
 
 
 @register

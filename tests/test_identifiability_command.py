@@ -12,7 +12,8 @@ from conftest import ENCODER, ORBIT, PLANAR, POINT, SIGMA
 from test_cli import run
 
 from bayesid.recording.recording import Recording
-from bayesid.report import document
+from bayesid.report.numbers import format_percent, format_quantity, format_unit
+from tests.pdf_text import PdfText
 
 STUDY = f"""
 title = "Table"
@@ -47,19 +48,20 @@ def study(noisy: Callable[..., Recording], tmp_path_factory: pytest.TempPathFact
 
 
 @pytest.fixture(scope="module")
-def made(study: Path) -> tuple[dict, str, str]:
-    """The command's JSON, what it said, and what its report was told."""
-    told, write, patch = [], document.Document.write, pytest.MonkeyPatch()
-    with patch.context() as watched:
-        watched.setattr(document.Document, "write", lambda self, path: (told.extend(self._parts), write(self, path)))
-        status, text = run("identifiability", study, "--output", study.parent / "out", "--seed", 3)
+def made(study: Path) -> tuple[dict, str, PdfText]:
+    """The command's JSON, its output, and the text of its report."""
+    status, text = run("identifiability", study, "--output", study.parent / "out", "--seed", 3)
     assert status == 0, text
     names = sorted(item.name for item in (study.parent / "out").iterdir())
     assert names == ["identifiability.json", "report.pdf"]
-    return json.loads((study.parent / "out" / "identifiability.json").read_text()), text, "".join(told)
+    return (
+        json.loads((study.parent / "out" / "identifiability.json").read_text()),
+        text,
+        PdfText.read(study.parent / "out" / "report.pdf"),
+    )
 
 
-def test_the_json_is_that_of_the_contract(made: tuple[dict, str, str]) -> None:
+def test_the_json_is_that_of_the_contract(made: tuple[dict, str, PdfText]) -> None:
     content = made[0]
     assert (content["standard_parameters"], content["base_parameters"], content["basis"]) == (30, 24, "fit")
     assert len(content["independent"]) == 24
@@ -92,7 +94,9 @@ def test_the_json_is_that_of_the_contract(made: tuple[dict, str, str]) -> None:
 
 
 @pytest.mark.usefixtures("slow")
-def test_identify_agrees_on_every_direction_and_says_what_it_learnt(made: tuple[dict, str, str], study: Path) -> None:
+def test_identify_agrees_on_every_direction_and_says_what_it_learnt(
+    made: tuple[dict, str, PdfText], study: Path
+) -> None:
     status, text = run("identify", study, "--output", study.parent / "identified", "--samples", 600)
     assert status == 0, text
     found = json.loads((study.parent / "identified" / "identification.json").read_text())
@@ -110,14 +114,29 @@ def test_identify_agrees_on_every_direction_and_says_what_it_learnt(made: tuple[
         assert 1.0 - contraction["shrinkage"] == pytest.approx(1.0 - parameter["shrinkage"], rel=0.5)
 
 
-def test_the_report_says_what_was_found(made: tuple[dict, str, str]) -> None:
+def test_the_report_holds_directions_parameters_and_structure(made: tuple[dict, str, PdfText]) -> None:
     content, text, report = made
     worst = content["directions"][0]["words"]
     assert worst in report
     assert worst in text
     for words in ("Of 30 standard inertial parameters", "depend on 24", "was fitted to 1 recording", "nats"):
         assert words in report, words
-    assert "link1.mass" in report
+    for number, direction in enumerate(content["directions"], start=1):
+        left = format_percent(direction["sd"] / direction["prior_sd"])
+        assert report.row(str(number), left, direction["verdict"], direction["words"].partition(": ")[0])
+    for item in content["parameters"]:
+        assert report.row(item["name"], format_unit(item["unit"]), format_quantity(item["mean"], item["sd"])), item[
+            "name"
+        ]
+    dependent = content["dependent"]
+    assert f"the {len(dependent)} dependent parameters are {', '.join(dependent)}." in report
+    alone = [
+        name
+        for name, row in zip(content["independent"], content["regrouping"], strict=True)
+        if np.abs(row).max() < 1e-9
+    ]
+    assert alone
+    assert f"These stand for themselves: {', '.join(alone)}." in report
 
 
 def test_a_study_without_recordings_gets_the_structure_alone(tmp_path: Path) -> None:
@@ -129,12 +148,15 @@ def test_a_study_without_recordings_gets_the_structure_alone(tmp_path: Path) -> 
     content = json.loads((tmp_path / "out" / "identifiability.json").read_text())
     assert (content["base_parameters"], content["directions"], content["basis"]) == (24, [], "not evaluated")
     assert "not evaluated: the study names no [[recordings]]" in content["statement"]
-    assert (tmp_path / "out" / "report.pdf").read_bytes()[:5] == b"%PDF-"
+    report = PdfText.read(tmp_path / "out" / "report.pdf")
+    assert "Of 30 standard inertial parameters of the robot, motion and torques depend on 24 combinations" in report
+    assert content["statement"] in report
+    assert "Directions" not in report
 
 
 @pytest.mark.usefixtures("slow")
 def test_joint_motion_alone_gives_a_prediction_that_the_fit_bears_out(
-    made: tuple[dict, str, str], study: Path, tmp_path: Path
+    made: tuple[dict, str, PdfText], study: Path, tmp_path: Path
 ) -> None:
     recording = Recording.read(study.parent / "planar.csv")
     joints = {name: values for name, values in recording.channels.items() if name.startswith("position.")}

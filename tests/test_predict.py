@@ -16,6 +16,7 @@ from bayesid.design.base_prediction import BasePredictor
 from bayesid.design.pose_region import REACH, Region
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
+from bayesid.report.numbers import format_quantity
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import GravityGradient
@@ -23,6 +24,7 @@ from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Kind, Sensor, White
 from studies.truth import mujoco as mj
+from tests.pdf_text import PdfText
 
 ATTITUDE = Rotation.from_euler("xyz", [0.3, -0.5, 1.1]).as_quat()
 DURATION = 40.0
@@ -160,7 +162,14 @@ def test_predict_writes_a_pose_with_its_region(plan: Path, tmp_path: Path) -> No
         assert len(content[body]["course"]["position"]["sd"]) == len(content[body]["course"]["time"])
     # every draw starts where the base starts
     assert content["base"]["course"]["position"]["sd"][0] == [0.0, 0.0, 0.0]
-    assert (output / "report.pdf").read_bytes()[:5] == b"%PDF-"
+    report = PdfText.read(output / "report.pdf")
+    assert "Every ± is one standard deviation of 40 draws from the present knowledge of the robot." in report
+    assert "plan: the base starts with the first measured rate" not in report
+    for key, name in (("base", "base"), ("tip", "end-effector tip")):
+        for quantity, unit in (("position", "mm"), ("rotation", "deg")):
+            poses = [content[key][quantity][axis] for axis in "xyz"]
+            cells = [format_quantity(pose["mean"], pose["sd"]) for pose in poses]
+            assert report.row("plan", name, f"{quantity} [{unit}]", *cells)
 
 
 def test_a_plan_without_a_joint_or_a_frame_is_an_error(plan: Path, tmp_path: Path) -> None:

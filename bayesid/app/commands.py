@@ -42,8 +42,8 @@ from bayesid.report import (
     prediction_report,
     simulation_report,
 )
-from bayesid.report.design_text import design_sentences
-from bayesid.report.diagnosis_report import diagnosis_sentences
+from bayesid.report.sentences.design_sentences import design_sentences
+from bayesid.report.sentences.diagnosis_sentences import diagnosis_sentences
 
 __all__ = ["run_check", "run_demo", "run_design", "run_diagnose", "run_identify", "run_predict", "run_simulate"]
 

@@ -12,8 +12,8 @@ from bayesid.app.study_to_linearisation import missing_part, prepare
 from bayesid.app.study_to_model import load_robot
 from bayesid.identifiability.base_parameters import BaseParameters, base_parameters
 from bayesid.identifiability.practical_identifiability import practical
-from bayesid.report.identifiability_report import identifiability_report
-from bayesid.report.identifiability_text import advice_sentences, practical_sentences, structure_sentence
+from bayesid.report import identifiability_report
+from bayesid.report.sentences.identifiability_sentences import advice_sentences, practical_sentences, structure_sentence
 
 __all__ = ["run_identifiability"]
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import Enum
 
 import numpy as np
 
+from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
 from bayesid.identifiability.directions import Direction, common_factor
 from bayesid.inference.contraction import ContractionVerdict
@@ -59,7 +59,7 @@ def subject(direction: Direction, values: Floats, prior_sd: Floats, whole: bool 
     owner = np.array([bodies.index(name.split(".")[0]) for name in direction.names])
     factor = common_factor(direction.names, values)
     if len(bodies) > 1 and _cosine(moved, factor / prior_sd) > ALIKE:
-        return "all masses and inertias in proportion (the scale)" if whole else f"{_list(bodies)} in proportion"
+        return "all masses and inertias in proportion (the scale)" if whole else f"{joined(bodies)} in proportion"
     for index, body in enumerate(bodies):
         if _cosine(moved, np.where(owner == index, factor, 0.0) / prior_sd) > ALIKE:
             return f"mass and inertia of {body} in proportion"
@@ -93,7 +93,3 @@ def _cosine(first: Floats, second: Floats) -> float:
 def _percent(ratio: float) -> str:
     value = 100.0 * ratio
     return f"{value:.0f} %" if value >= 1.0 else f"{value:.1g} %"
-
-
-def _list(items: Sequence[str]) -> str:
-    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bayesid._io.words import abridged
 from bayesid.identifiability.direction_words import subject
 from bayesid.identifiability.directions import directions
 from bayesid.identifiability.local_knowledge import Knowledge
@@ -10,9 +11,6 @@ from bayesid.inference.contraction import ContractionVerdict
 from bayesid.inference.identification import Identification
 
 __all__ = ["unidentifiable_sentences"]
-
-NAMED = 8
-"""Quantities or directions a sentence names at most."""
 
 
 def unidentifiable_sentences(result: Identification) -> list[str]:
@@ -26,7 +24,7 @@ def unidentifiable_sentences(result: Identification) -> list[str]:
     ):
         names = [name for name, item in result.contraction.items() if item.verdict is verdict]
         if names:
-            found.append(f"What is said of {listed(names)} {text}.")
+            found.append(f"What is said of {abridged(names)} {text}.")
     knowledge = Knowledge.at(result.posterior, result.optimum.z)
     subjects = [
         subject(item, knowledge.values, knowledge.prior_sd, covers_all(result.posterior))
@@ -34,11 +32,5 @@ def unidentifiable_sentences(result: Identification) -> list[str]:
         if item.verdict is ContractionVerdict.NOT
     ]
     if subjects:
-        found.append(f"The data do not tell of these directions: {listed(subjects, '; ')}.")
+        found.append(f"The data do not tell of these directions: {abridged(subjects, separator='; ')}.")
     return found
-
-
-def listed(texts: list[str], separator: str = ", ") -> str:
-    """Join texts, the first few by name."""
-    more = len(texts) - NAMED
-    return separator.join(texts[:NAMED]) + (f" and {more} more" if more > 0 else "")

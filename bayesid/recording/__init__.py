@@ -1,1 +1,1 @@
-"""Recordings: read and written, joint motion smoothed, known actions, impossible values refused."""
+"""Recordings: their files, the smoothing of joint motion, known actions, and the refusal of impossible values."""

@@ -1,4 +1,4 @@
-"""Known actions on the base: forces, torques and the momentum of wheels."""
+"""Known actions on the base: force, torque, and the momentum of wheels."""
 
 from __future__ import annotations
 
@@ -15,15 +15,18 @@ __all__ = ["Actions"]
 
 @dataclass(frozen=True)
 class Actions:
-    """Known actions on the base: a wrench held from each time to the next, and the wheels' momentum.
+    """Known actions on the base: a wrench held from each time to the next, and the momentum of the wheels.
 
     Parameters
     ----------
     time : (n,) array
+        Times at which the wrench changes [s].
     wrench : (n, 6) array
-        Force and torque at the base origin, base axes.
+        Force and torque at the base origin, base axes [N, N m].
     wheel_time : (m,) array
+        Times of the samples of the momentum [s].
     wheel_momentum : (m, 3) array
+        Momentum of the wheels, base axes [N m s].
     """
 
     time: Floats
@@ -38,18 +41,21 @@ class Actions:
 
     @classmethod
     def from_recording(cls, recording: Recording) -> Actions:
-        """Read the actions a recording holds; what it does not hold is zero."""
+        """Return the actions that a recording holds; those that it lacks are zero."""
         series = [_vector(recording, family) for family in ("base_force", "base_torque")]
         time = np.unique(np.concatenate([t for t, _ in series]))
         wrench = np.concatenate([_zero_order_hold(t, values, time) for t, values in series], axis=1)
         return cls(time, wrench, *_vector(recording, "wheel_momentum"))
 
     def zero_order_hold(self, time: Floats) -> Floats:
-        """Wrench in force at the times, shape (T, 6)."""
+        """Return the wrench that is held at the times (T,), shape (T, 6); it is zero before the first sample."""
         return _zero_order_hold(self.time, self.wrench, time)
 
     def wheels(self, time: Floats) -> tuple[Floats, Floats]:
-        """Momentum of the wheels and its derivative at the times, each (T, 3)."""
+        """Return the momentum of the wheels and its derivative at the times (T,), each of shape (T, 3).
+
+        The momentum follows a modified Akima spline; of fewer than three samples the first is held.
+        """
         if len(self.wheel_time) == 0:
             return np.zeros((len(time), 3)), np.zeros((len(time), 3))
         if len(self.wheel_time) < 3:

@@ -1,6 +1,6 @@
-"""Joint motion: prescribed by a formula, or measured and smoothed.
+"""Motion of the joints, prescribed by a formula or measured and smoothed.
 
-Everything downstream asks a motion one question: positions, velocities and accelerations of all joints at given times.
+A motion gives the positions, velocities and accelerations of all joints at any time.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ __all__ = ["Excitation", "MeasuredMotion", "Motion"]
 
 
 class Motion(Protocol):
-    """What a joint motion must offer."""
+    """Motion of all joints as a function of time."""
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,)."""
@@ -33,7 +33,7 @@ class Motion(Protocol):
 
 @dataclass(frozen=True)
 class Excitation:
-    """The paper's excitation (27) with its connecting splines.
+    """Excitation by the paper's equation (27), with its connecting splines.
 
     Each joint goes from ``start`` at rest to ``offset + amplitude``, oscillates as
     ``offset + amplitude cos(frequency (t - ramp))`` for a whole number of periods, and returns. The paper
@@ -43,15 +43,15 @@ class Excitation:
     Parameters
     ----------
     offset, amplitude : (joints,) array_like
-        q1 and q2 of (27) [rad].
+        Offset q1 and amplitude q2 of (27) [rad].
     frequency : float
-        omega_e [rad/s]; the paper does not state it.
+        Angular frequency omega_e of (27), which the paper does not state [rad/s].
     periods : int
-        Oscillations.
+        Number of oscillations.
     ramp : float
         Duration of each connecting spline [s].
     start : (joints,) array_like, optional
-        Joint positions at rest before and after [rad].
+        Joint positions at rest before and after the motion, by default zero [rad].
     """
 
     offset: Floats
@@ -69,7 +69,7 @@ class Excitation:
 
     @property
     def duration(self) -> float:
-        """Length of the whole manoeuvre [s]."""
+        """Duration of the whole manoeuvre [s]."""
         return 2.0 * self.ramp + self.periods * 2.0 * np.pi / self.frequency
 
     def evaluate(self, time: ArrayLike) -> JointState:
@@ -100,7 +100,7 @@ class Excitation:
 
 @dataclass(frozen=True)
 class MeasuredMotion:
-    """Joint motion smoothed from a recording; joints in the robot's order."""
+    """Joint motion smoothed from a recording, with the joints in the order of the robot."""
 
     joints: tuple[SmoothedJoint, ...]
     names: tuple[str, ...]
@@ -119,10 +119,15 @@ class MeasuredMotion:
         Parameters
         ----------
         sigma : mapping, optional
-            Noise of position (0), velocity (1) and acceleration (2), for all joints or by joint; what is missing is
-            estimated from the data.
+            Standard deviation of the noise of position (0), velocity (1) and acceleration (2), for all joints or by
+            joint. Those left out are estimated from the data.
         start : mapping of str to float, optional
-            Position at time 0 of joints recorded by speed only; zero where left out.
+            Positions at time 0 of joints that are recorded by speed only, by default zero.
+
+        Raises
+        ------
+        InputError
+            If a joint of the robot is not recorded, or the recording holds a joint that the robot lacks.
         """
         _check_names(recording, robot)
         joints = tuple(
@@ -141,7 +146,7 @@ class MeasuredMotion:
         return JointState(*np.stack([joint.evaluate(time) for joint in self.joints], axis=-1))
 
     def lag_covariance(self, time: Floats, lags: int) -> Floats:
-        """Covariance of the derivatives' errors, shape (joints, lags + 1, T, 3, 3) (`SmoothedJoint.lag_covariance`)."""
+        """Return the covariances of `SmoothedJoint.lag_covariance` for all joints, (joints, lags + 1, T, 3, 3)."""
         if not self.joints:
             return np.zeros((0, lags + 1, len(time), 3, 3))
         return np.stack([joint.lag_covariance(time, lags) for joint in self.joints])
@@ -180,6 +185,6 @@ def _check_names(recording: Recording, robot: Robot) -> None:
 
 
 def sample_joints(motion: Motion, robot: Robot, time: Sequence[float] | Floats) -> dict[str, Floats]:
-    """Return ``position.<joint>`` channels of a motion, as a recording holds them."""
+    """Return the channels ``position.<joint>`` of a recording that samples a motion at the times (T,)."""
     position = motion.evaluate(np.asarray(time, dtype=float)).position
     return {f"position.{joint.name}": position[:, index] for index, joint in enumerate(robot.joints)}

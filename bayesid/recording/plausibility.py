@@ -12,7 +12,13 @@ __all__ = ["refuse_impossible_joints"]
 
 
 def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
-    """Refuse joint positions far outside the joints' limits, as degrees taken for radians are."""
+    """Refuse joint positions and speeds far outside the joints' limits, such as degrees taken for radians.
+
+    Raises
+    ------
+    InputError
+        If a position is beyond a limit by more than a tenth of the range, or a speed is above five times its limit.
+    """
     for joint in robot.joints:
         name = f"position.{joint.name}"
         if name not in recording.channels:

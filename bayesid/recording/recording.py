@@ -1,8 +1,8 @@
-"""Recordings: measured data read from and written to CSV or Parquet, checked completely before anything uses them.
+"""Recordings of measured data in CSV or Parquet files, checked completely when they are made.
 
-One row per time stamp, one column per channel, SI units. An empty cell (a null in Parquet) means that the channel was
-not sampled at that time; in memory it is NaN. A `Recording` that exists is valid: every rule below is checked when it
-is made, whether from a file or from arrays.
+A file has one row per time stamp and one column per channel, in SI units. An empty cell (a null in Parquet) means that
+the channel was not sampled at that time; in memory it is NaN. Every rule below is checked when a `Recording` is made,
+from a file as from arrays, so that a `Recording` that exists is valid.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ __all__ = ["JOINT_FAMILIES", "VECTOR_FAMILIES", "Recording", "declare_family"]
 Array = Floats
 
 JOINT_FAMILIES = ("position", "velocity", "acceleration", "torque")
-"""Families with one column per joint: ``position.<joint>`` [rad, m], its derivatives, ``torque.<joint>`` [N m, N]."""
+"""Families with one column per joint, such as ``position.<joint>`` [rad, m]; torques are in N m, forces in N."""
 
 _VECTOR_FAMILIES = {
     "rate": ("x", "y", "z"),
@@ -40,7 +40,7 @@ _VECTOR_FAMILIES = {
     "wheel_momentum": ("x", "y", "z"),
 }
 VECTOR_FAMILIES: Mapping[str, tuple[str, ...]] = MappingProxyType(_VECTOR_FAMILIES)
-"""Families with one column per axis, all of which must be present: [rad/s], [m/s2], [1], [N], [N m], [N m s]."""
+"""Families with one column per axis, all of them or none: [rad/s], [m/s2], [1], [N], [N m], [N m s]."""
 
 
 def declare_family(name: str, axes: tuple[str, ...]) -> None:
@@ -57,10 +57,10 @@ def declare_family(name: str, axes: tuple[str, ...]) -> None:
 
 
 MINIMUM_ROWS = 8
-"""Fewer rows than this do not determine a motion."""
+"""Number of rows below which a motion is not determined."""
 
 NORM_TOLERANCE = 1e-3
-"""How far a quaternion's norm may be from one before it is taken for an error."""
+"""Deviation of a quaternion's norm from one above which it is taken for an error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +70,14 @@ class Recording:
     Parameters
     ----------
     name : str
-        A name for reports; the file's stem if there is a file.
+        Name in reports, which is the stem of the file where there is one.
     file : Path or None
-        The file it came from.
+        File that was read, None for a recording made of arrays.
     time : (T,) array_like
-        Strictly increasing [s]; 0 is the start of the recording.
+        Time stamps, strictly increasing from the start of the recording at 0 [s].
     channels : mapping of str to (T,) array_like
-        Column name to samples; NaN where the channel has no sample. Arrays are copied and locked read-only.
-        Attitude quaternions are normalised.
+        Samples by the name of their column, NaN where a channel has no sample. Arrays are copied and locked
+        read-only; attitude quaternions are normalised.
 
     Raises
     ------
@@ -125,7 +125,7 @@ class Recording:
         return cls(file.stem, file, columns.pop("time"), columns)
 
     def write(self, path: str | Path) -> None:
-        """Write to ``.csv`` (12 significant digits) or ``.parquet`` (exact), whole or not at all."""
+        """Write a ``.csv`` (12 significant digits) or ``.parquet`` (exact) file, whole or not at all."""
         file = Path(path)
         writer = {".csv": _write_csv, ".parquet": _write_parquet}.get(file.suffix.lower())
         if writer is None:
@@ -151,11 +151,12 @@ class Recording:
         Parameters
         ----------
         name : str
-            A column, for example ``"position.joint1"``.
+            Column, for example ``"position.joint1"``.
 
         Returns
         -------
         times, values : (n,) arrays
+            Times [s] and samples in the unit of the channel.
         """
         times, values = self._select((name,))
         return times, values[:, 0]
@@ -166,15 +167,16 @@ class Recording:
         Parameters
         ----------
         family : str
-            For example ``"rate"``; ``"position"`` with joints as the axes works as well.
+            First part of the columns' names, for example ``"rate"``, or ``"position"`` with joints as the axes.
         axes : sequence of str
-            The columns' second part, k of them.
+            Second parts of the columns' names, k of them.
 
         Returns
         -------
         times : (n,) array
-            [s]
+            Times [s]
         values : (n, k) array
+            Samples in the unit of the family.
 
         Raises
         ------
@@ -184,7 +186,7 @@ class Recording:
         return self._select(tuple(f"{family}.{axis}" for axis in axes))
 
     def interval(self, name: str) -> float:
-        """Median time between the samples of one channel [s]."""
+        """Return the median time between the samples of one channel [s]."""
         times, _ = self.series(name)
         if len(times) < 2:
             raise InputError(
@@ -261,7 +263,7 @@ class Recording:
                 row=row,
                 remedy="Time must strictly increase; sort the rows and join those with the same time",
             )
-        # a clock that was not reset: nothing is known of the motion between 0 and the first row
+        # such a clock was hardly reset: nothing is known of the motion between 0 and the first row
         if time[0] > time[-1] - time[0]:
             raise self._error(
                 f"the first time, {time[0]:.12g} s, is later than the recording is long ({time[-1] - time[0]:.6g} s)",
@@ -327,7 +329,7 @@ def _locked(values: ArrayLike) -> Array:
 
 
 def _row(file: Path | None, row: int) -> str:
-    """Where the reader finds a row (counted from 0): a line of the CSV file, else a row counted from 1."""
+    """Return the place of a row, counted from 0, as the user counts it: a line of a CSV file, or a row from 1."""
     is_text = file is not None and file.suffix.lower() == ".csv"
     return f"line {row + 2}" if is_text else f"row {row + 1}"
 
@@ -340,7 +342,7 @@ def _is_known(column: str) -> bool:
 
 
 def _nearest(column: str) -> str:
-    """Return a remedy for an unknown column: the nearest known name, else all families."""
+    """Return the remedy for an unknown column: the nearest known name, or all families where none is near."""
     family, _, rest = column.partition(".")
     vectors = [f"{name}.{axis}" for name, axes in VECTOR_FAMILIES.items() for axis in axes]
     near = difflib.get_close_matches(column.lower(), ["time", *vectors], n=1, cutoff=0.7)
@@ -437,7 +439,7 @@ def _number(cell: object) -> float:
 
 
 def _numbers(cells: Sequence[object], column: str, file: Path, convert: Callable[..., float], missing: object) -> Array:
-    """Convert the cells of one column, NaN where missing; anything but a finite number raises."""
+    """Return the cells of one column as numbers, NaN where missing; raise where a cell is not a finite number."""
     absent = np.array([cell == missing for cell in cells])
     values = np.array([convert(cell) for cell in cells])
     bad = ~np.isfinite(values) & ~absent

@@ -24,12 +24,12 @@ __all__ = ["JointSamples", "SmoothedJoint", "smooth"]
 
 
 ORDERS = (4, 3, 5)
-"""Derivatives of the position that may be the white one; 3 gives the quintic spline, the roughest with a continuous
-acceleration. The marginal likelihood chooses: on smooth motion 5 leaves a fiftieth of the error that 3 leaves. Order 6
-would need square-root algebra."""
+"""Orders of the derivative that may be white noise, of which the marginal likelihood chooses one: 3 gives the quintic
+spline, the roughest with a continuous acceleration, 5 leaves a fiftieth of its error on smooth motion, and 6 would need
+square-root algebra."""
 
 SNAP = 0.02
-"""Sample times closer than this fraction of the median step are one node: the algebra needs separate nodes."""
+"""Fraction of the median step below which two sample times share a node, because the algebra needs separate nodes."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +39,11 @@ class JointSamples:
     Parameters
     ----------
     derivative : int
-        0 position, 1 velocity, 2 acceleration.
+        Order of the derivative: 0 for position, 1 for velocity, 2 for acceleration.
     time, value : (n,) array
+        Times [s] and samples.
     sigma : float, optional
-        White noise of the samples; None to have it estimated.
+        Standard deviation of the white noise of the samples, estimated where it is None.
     """
 
     derivative: int
@@ -58,21 +59,21 @@ class SmoothedJoint:
     Attributes
     ----------
     sigmas : tuple of float
-        Noise of each series of samples, declared or estimated.
+        Standard deviation of the noise of each series of samples, declared or estimated.
     declared : tuple of bool
-        Which of them the user declared.
+        Whether the user declared the noise of each series.
     order : int
-        Derivative of the position that is white noise.
+        Order of the derivative of the position that is white noise.
     intensity : float
-        Square root of that noise's spectral density.
+        Square root of the spectral density of that derivative.
     chi2, samples : float, int
-        Misfit of the samples in their noise: chi2 / samples well above one says that the spline does not follow them.
+        Chi-square of the samples and their number. A ratio well above one says that the spline does not follow them.
     """
 
     nodes: Floats
-    states: Floats  # (n, order), scaled derivatives
-    scale: float  # time unit of the scaled derivatives
-    factor: Floats  # banded Cholesky factor of the posterior precision, scaled
+    states: Floats  # derivatives (n, order) in scaled time
+    scale: float  # unit of the scaled time [s]
+    factor: Floats  # banded Cholesky factor of the posterior precision in scaled time
     sigmas: tuple[float, ...]
     declared: tuple[bool, ...]
     order: int
@@ -86,7 +87,7 @@ class SmoothedJoint:
         return self.scale ** -np.arange(self.order, dtype=float)
 
     def evaluate(self, time: Floats) -> Floats:
-        """Return position, velocity and acceleration, shape (3, T)."""
+        """Return position, velocity and acceleration at the times (T,), shape (3, T)."""
         return np.stack([spline(time) for spline in self._splines])
 
     @cached_property
@@ -95,23 +96,25 @@ class SmoothedJoint:
         return spline, spline.derivative(1), spline.derivative(2)
 
     def lag_covariance(self, time: Floats, lags: int) -> Floats:
-        """Covariance of the errors of position, velocity and acceleration with those of earlier times.
+        """Return the covariance of the errors of position, velocity and acceleration with those at earlier times.
 
         Between nodes the curve is a polynomial of the states on both sides, and so is its error.
 
         Parameters
         ----------
         time : (T,) array
+            Times [s], increasing.
         lags : int
+            Largest number of places in ``time`` between an instant and an earlier one.
 
         Returns
         -------
         (lags + 1, T, 3, 3) array
-            ``[l, i]`` is the covariance of the three errors at ``time[i]`` with those at ``time[i - l]``; zero where
-            there is no such time.
+            Covariance ``[l, i]`` of the three errors at ``time[i]`` with those at ``time[i - l]``, zero where there
+            is no such time.
         """
         left, weights = self._interpolation(time)
-        # the states that a time draws on: those of the nodes left and right of it
+        # the curve at a time depends on the states of the nodes left and right of it
         states = left[:, None] * self.order + np.arange(2 * self.order)
         size, count = self.states.size, len(time)
         result = np.zeros((lags + 1, count, 3, 3))
@@ -130,14 +133,14 @@ class SmoothedJoint:
         return result
 
     def _interpolation(self, time: Floats) -> tuple[Integers, Floats]:
-        """Left node of each time, and weights (T, 3, 2 order) of both nodes' states on the curve's derivatives."""
+        """Return the node left of each time, and the weights (T, 3, 2 order) of both nodes' states."""
         left = np.clip(np.searchsorted(self.nodes, time, side="right") - 1, 0, len(self.nodes) - 2)
         length = np.diff(self.nodes)[left]
         s = (time - self.nodes[left]) / length
         powers, order = np.arange(2 * self.order), np.arange(self.order)
 
         def derivatives(at: Floats, which: Integers) -> Floats:
-            """Return derivatives of the monomials, (T, which, powers)."""
+            """Return the derivatives of the monomials, shape (T, which, powers)."""
             factor = np.array([[math.perm(int(j), int(r)) for j in powers] for r in which], dtype=float)
             return factor * at[:, None, None] ** np.maximum(powers[None, :] - which[:, None], 0)
 
@@ -148,7 +151,7 @@ class SmoothedJoint:
         return left, curve
 
     def standard_deviation(self, time: Floats) -> Floats:
-        """Return the standard deviation of position, velocity and acceleration, shape (3, T)."""
+        """Return the standard deviations of position, velocity and acceleration at the times (T,), shape (3, T)."""
         return np.sqrt(np.diagonal(self.lag_covariance(time, 0)[0], axis1=1, axis2=2)).T
 
 
@@ -158,9 +161,9 @@ def smooth(samples: list[JointSamples], start: float | None = None) -> SmoothedJ
     Parameters
     ----------
     samples : list of JointSamples
-        At least one series of positions or velocities.
+        Series of samples, at least one of them of positions or velocities.
     start : float, optional
-        Exact position at time 0, for a joint known by its speed only.
+        Exact position at time 0 of a joint that is recorded by its speed only.
     """
     nodes, scale = _nodes(np.concatenate([series.time for series in samples]))
     best = None
@@ -226,10 +229,10 @@ def _fit(samples: list[JointSamples], nodes: Floats, scale: float, start: float 
     )
 
 
-def _nodes(own: Floats) -> tuple[Floats, float]:
-    own = np.unique(own)
-    scale = float(np.median(np.diff(own)))
-    return own[np.concatenate([[True], np.diff(own) > SNAP * scale])], scale
+def _nodes(times: Floats) -> tuple[Floats, float]:
+    times = np.unique(times)
+    scale = float(np.median(np.diff(times)))
+    return times[np.concatenate([[True], np.diff(times) > SNAP * scale])], scale
 
 
 def _nearest(nodes: Floats, time: Floats) -> Integers:
@@ -242,7 +245,7 @@ def _scaled(series: JointSamples, nodes: Floats, scale: float) -> tuple[int, Int
 
 
 class _Problem:
-    """Banded normal equations of the smoothing problem in scaled time."""
+    """Normal equations of the smoothing problem in scaled time, which are banded."""
 
     def __init__(
         self, nodes: Floats, series: list[tuple[int, Integers, Floats]], start: float | None, order: int
@@ -277,12 +280,12 @@ class _Problem:
         return float(np.sqrt(np.mean(rough**2))) / 10.0 + 1e-12
 
     def noise_guess(self, index: int) -> float:
-        """Return a first guess of the noise of one series from its highest differences."""
+        """Return a first guess of the noise of one series from its fourth differences."""
         rough = np.diff(self.series[index][2], n=4)
         return float(np.sqrt(np.mean(rough**2) / 70.0)) / 3.0
 
     def solve(self, intensity: float, sigmas: list[float]) -> tuple[float, Floats, Floats, float]:
-        """Return log marginal likelihood, states (n, order), the banded factor, and chi2 of the samples."""
+        """Return the log marginal likelihood, the states (n, order), the banded factor and chi-square."""
         order, weight = self.order, intensity**-2
         diagonal = weight * self.diagonal
         diagonal[0] += np.diag(self.initial)

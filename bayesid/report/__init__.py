@@ -1,9 +1,10 @@
-"""Reports as PDF."""
+"""Reports as PDF: a document, its words, its tables and its figures, and one file per report."""
 
 from bayesid.report.check_report import check_report
 from bayesid.report.design_report import design_report
 from bayesid.report.diagnosis_report import diagnosis_report
 from bayesid.report.document import Document
+from bayesid.report.identifiability_report import identifiability_report
 from bayesid.report.identification_report import identification_report
 from bayesid.report.numbers import format_quantity
 from bayesid.report.prediction_report import prediction_report
@@ -15,6 +16,7 @@ __all__ = [
     "design_report",
     "diagnosis_report",
     "format_quantity",
+    "identifiability_report",
     "identification_report",
     "prediction_report",
     "simulation_report",

@@ -1,4 +1,4 @@
-"""The report of a check: what was read, before anything is identified."""
+"""The report of a check: the recordings as they were read, before anything is identified."""
 
 from __future__ import annotations
 
@@ -7,32 +7,38 @@ from pathlib import Path
 
 import numpy as np
 
+from bayesid._io.words import counted
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.recording_check import RecordingCheck
+from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.report import figures
 from bayesid.report.document import Document
+from bayesid.report.numbers import format_fixed, format_number, format_unit
 
 __all__ = ["check_report"]
 
 CURVE_POINTS = 600
+"""Number of points of a curve over time."""
 
 
 def check_report(posterior: Posterior, checks: Sequence[RecordingCheck], title: str, file: Path) -> None:
-    """Write the report of a check as PDF.
+    """Write the report of a check as PDF, whole or not at all.
 
     Parameters
     ----------
     posterior : Posterior
     checks : sequence of RecordingCheck
-        One per recording.
+        Check of each recording.
     title : str
+        Title of the study.
     file : path
     """
     document = Document(title, "Check of the study and its recordings")
     document.section("Summary")
     document.paragraph(
-        f"{len(checks)} recordings, {posterior.samples} scalar samples, {posterior.size} unknowns. The integration "
-        f"step is {posterior.step:g} s. Nothing was identified; simulated values are those of the robot as given."
+        f"The study has {counted(len(checks), 'recording')} with {posterior.samples} scalar samples, and "
+        f"{counted(posterior.size, 'unknown')}. The integration step is {posterior.step:g} s. Nothing was identified: "
+        "simulated values are those of the robot as given."
     )
     remarks = [f"{check.name}: {warning}" for check in checks for warning in check.warnings]
     document.items(remarks or ["Nothing conspicuous."])
@@ -43,8 +49,14 @@ def check_report(posterior: Posterior, checks: Sequence[RecordingCheck], title: 
         document.figure(
             figures.robot_pose(robot, posterior.manoeuvres[0].motion, poses), "The robot during the first recording."
         )
+    fits = sensor_fits(posterior, posterior.starting_point())
     for index, check in enumerate(checks):
         _add_recording(document, posterior, index, check)
+        document.figure(
+            figures.measured_against_simulated(fits[index]),
+            "Readings as measured, and as simulated with the robot as given; beneath, the residual in σ. It is large "
+            "until the unknown bodies are identified.",
+        )
     document.write(file)
 
 
@@ -52,8 +64,11 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
     document.section(f"Recording {check.name}")
     document.table(
         ["channel", "samples", "interval [s]", "longest gap [s]"],
-        [[c.name, str(c.samples), f"{c.interval:.4g}", f"{c.longest_gap:.4g}"] for c in check.channels],
-        "What was recorded.",
+        [
+            [c.name, str(c.samples), format_number(c.interval, 4), format_number(c.longest_gap, 4)]
+            for c in check.channels
+        ],
+        "Channels of the recording.",
         ["left", "right", "right", "right"],
     )
     document.table(
@@ -61,15 +76,17 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
         [
             [
                 sensor.kind.value,
-                sensor.kind.unit,
-                _triple(sensor.sigma),
-                "not evaluated" if sensor.measured_sigma is None else _triple(sensor.measured_sigma),
-                "not evaluated" if sensor.delay is None else f"{sensor.delay[0]:.3f} ± {sensor.delay[1]:.3f}",
+                format_unit(sensor.kind.unit),
+                _by_axis(sensor.sigma),
+                "not evaluated" if sensor.measured_sigma is None else _by_axis(sensor.measured_sigma),
+                "not evaluated"
+                if sensor.delay is None
+                else " ± ".join(format_fixed(value, 3) for value in sensor.delay),
             ]
             for sensor in check.sensors
         ],
-        "Noise and clocks. The noise is that of third differences where the signal hardly changes; the delay is fitted "
-        "against the robot as given and shifts with its errors.",
+        "Noise and clocks. The noise is estimated from third differences where the signal hardly changes; the delay is "
+        "fitted against the robot as given and shifts with its errors.",
         ["left", "left", "right", "right", "right"],
     )
     if check.joints:
@@ -86,28 +103,23 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
             [
                 [
                     joint.name,
-                    f"{joint.lowest:.3f} to {joint.highest:.3f} {joint.unit}",
-                    f"{joint.speed:.3g} {joint.unit}/s",
-                    f"{joint.sigma:.2g}" + ("" if joint.declared else " (estimated)"),
-                    f"{joint.chi2_per_sample:.2f}",
-                    f"{joint.velocity_sd:.2g}",
-                    f"{joint.acceleration_sd:.2g}",
+                    f"{format_fixed(joint.lowest, 3)} to {format_fixed(joint.highest, 3)} {joint.unit}",
+                    f"{format_number(joint.speed)} {joint.unit}/s",
+                    format_number(joint.sigma, 2) + ("" if joint.declared else " (estimated)"),
+                    format_fixed(joint.chi2_per_sample, 2),
+                    format_number(joint.velocity_sd, 2),
+                    format_number(joint.acceleration_sd, 2),
                 ]
                 for joint in check.joints
             ],
-            "Joint motion after smoothing; the last columns are what the smoothing leaves uncertain "
+            "Joint motion after smoothing; the last two columns are the standard deviations that the smoothing leaves "
             "[joint unit per s, per s²].",
             ["left"] + ["right"] * 6,
         )
         manoeuvre = posterior.manoeuvres[index]
         time = np.linspace(manoeuvre.recording.time[0], manoeuvre.recording.time[-1], CURVE_POINTS)
         document.figure(figures.manoeuvre(manoeuvre.motion, posterior.model.robot, time), "Motion of the joints.")
-    document.figure(
-        figures.measured_against_simulated(posterior, posterior.starting_point(), index),
-        "Measured, and simulated with the robot as given; beneath, the residual in σ. It is large until the unknown "
-        "bodies are identified.",
-    )
 
 
-def _triple(values: Sequence[float] | np.ndarray) -> str:
-    return ", ".join(f"{value:.2g}" for value in values)
+def _by_axis(values: Sequence[float] | np.ndarray) -> str:
+    return ", ".join(format_number(float(value), 2) for value in values)

@@ -8,26 +8,37 @@ from pathlib import Path
 import numpy as np
 
 from bayesid.design import Design
-from bayesid.report import design_tables as tables
 from bayesid.report import figures
-from bayesid.report.design_text import MEANING, assumption_sentences, reference_design, summary
 from bayesid.report.document import Document
+from bayesid.report.sentences.design_sentences import MEANING, assumption_sentences, reference_design, summary
+from bayesid.report.tables import design_tables as tables
 
 __all__ = ["design_report"]
 
 POSES = 5
-"""Instants at which the robot is drawn."""
+"""Number of instants at which the robot is drawn."""
+
+PAIRS = (
+    ("mass", "com.x"),
+    ("com.x", "com.y"),
+    ("com.y", "com.z"),
+    ("inertia.xx", "inertia.yy"),
+    ("inertia.yy", "inertia.zz"),
+    ("inertia.xy", "inertia.xz"),
+)
+"""Pairs of a body's quantities whose ellipses are drawn."""
 
 
 def design_report(designs: Sequence[Design], best: Design, title: str, file: Path) -> None:
-    """Write the report of designs of one problem as PDF, all or nothing.
+    """Write the report of designs of one problem as PDF, whole or not at all.
 
     Parameters
     ----------
     designs : sequence of Design
     best : Design
-        One of them.
+        Best of the designs.
     title : str
+        Title of the study.
     file : path
     """
     document = Document(title, "Design of manoeuvres")
@@ -37,9 +48,9 @@ def design_report(designs: Sequence[Design], best: Design, title: str, file: Pat
     _add_uncertainty(document, designs)
     document.section("Criteria")
     document.items(
-        [f"{design.name}. {MEANING.get(design.criterion, 'A criterion of your own.')}" for design in designs]
+        [f"{design.name}. {MEANING.get(design.criterion, 'A criterion that the user defined.')}" for design in designs]
     )
-    document.section("What was assumed")
+    document.section("Assumptions")
     document.items(assumption_sentences(best))
     document.write(file)
 
@@ -71,8 +82,8 @@ def _add_limits(document: Document, designs: Sequence[Design], best: Design) -> 
         ["quantity", "unit", "limit", "largest", "used", "state"],
         tables.limit_rows(best),
         f"Limits of {best.name} and the largest value along it, at the prior's centre. A joint's range is counted from "
-        "its middle; rest is the joints' speed at both ends; a quiet band's value is the part of the power of the "
-        "base's motion within it.",
+        "its middle; rest is the joints' speed at both ends; the value of a quiet band is the share of the power of "
+        "the base's motion within it.",
         ["left", "left", "right", "right", "right", "left"],
     )
     if rows := tables.risk_rows(designs):
@@ -114,8 +125,9 @@ def _add_manoeuvres(document: Document, designs: Sequence[Design], best: Design)
 def _add_uncertainty(document: Document, designs: Sequence[Design]) -> None:
     document.section("Predicted uncertainty")
     for body in designs[0].problem.plan.model.bodies:
+        pairs = [(f"{body.name}.{first}", f"{body.name}.{second}") for first, second in PAIRS]
         document.figure(
-            figures.covariance_ellipses(designs, tables.pairs(body.name), tables.parameter_units(designs[0])),
+            figures.covariance_ellipses(designs, pairs, tables.parameter_units(designs[0])),
             f"Predicted 95 % ellipses of pairs of parameters of {body.name}, about the prior's centre. A much wider "
-            "ellipse may leave its panel.",
+            "ellipse may extend beyond its panel.",
         )

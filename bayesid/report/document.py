@@ -1,4 +1,4 @@
-"""A PDF document built piece by piece and set with Typst, with no other programs and only the fonts Typst brings.
+"""A PDF document, built piece by piece and set by Typst with the fonts that Typst brings.
 
 Text that callers give is never read as markup: it reaches Typst as string literals.
 """
@@ -20,16 +20,19 @@ from matplotlib.lines import Line2D
 
 from bayesid._io.errors import InputError
 
-__all__ = ["Document"]
+__all__ = ["Document", "Rows"]
+
+Rows = list[list[str]]
+"""Cells of a table, row by row."""
 
 MANY_POINTS = 4000
-"""Points of a line or a scatter plot above which it is drawn as pixels inside the vector figure."""
+"""Number of points above which a line or a scatter plot is drawn as pixels inside the vector figure."""
 
 RESOLUTION = 250
-"""Of what is drawn as pixels [dots per inch]."""
+"""Resolution of what is drawn as pixels [dots per inch]."""
 
 LONG_WORD = 14
-"""Characters from which on a word in a table may break at its punctuation."""
+"""Number of characters from which on a word in a table may break at its punctuation."""
 
 _TEMPLATE = """\
 #set page(paper: "a4", margin: (x: 20mm, top: 20mm, bottom: 22mm), numbering: "1 / 1")
@@ -64,7 +67,7 @@ class Document:
     ----------
     title, subtitle : str
     date : str, optional
-        Printed under the title. Left out, the document does not depend on when it was written.
+        Date printed under the title. Where it is left out, the document does not depend on when it was written.
     """
 
     def __init__(self, title: str, subtitle: str = "", date: str | None = None) -> None:
@@ -89,7 +92,7 @@ class Document:
             self._parts.append(f"#list({', '.join(literal(text) for text in texts)})\n")
 
     def formula(self, typst_math: str) -> None:
-        """Add a displayed formula in Typst's notation, which is not escaped."""
+        """Add a displayed formula in Typst's notation, which is the only text that is read as markup."""
         self._parts.append(f"$ {typst_math} $\n")
 
     def table(
@@ -99,15 +102,17 @@ class Document:
         caption: str | None = None,
         align: Sequence[str] | None = None,
     ) -> None:
-        """Add a table, which may run over pages; it is numbered if it has a caption.
+        """Add a table, which may run over several pages and is numbered if it has a caption.
 
         Parameters
         ----------
         header : sequence of str
-            One title per column.
+            Title of each column.
         rows : sequence of sequence of str
+            Cells, as many in each row as there are columns.
+        caption : str, optional
         align : sequence of str, optional
-            ``left``, ``center`` or ``right`` per column; left where left out.
+            Alignment of each column, ``left``, ``center`` or ``right``; by default all are ``left``.
         """
         align = ["left"] * len(header) if align is None else list(align)
         _check_table(header, rows, align)
@@ -126,8 +131,9 @@ class Document:
         Parameters
         ----------
         fig : matplotlib.figure.Figure
+        caption : str
         width : str
-            In percent of the text's width.
+            Width in percent of the text's width, such as ``80%``.
         """
         if not re.fullmatch(r"\d+(\.\d+)?%", width):
             raise InputError(f"width {width!r} is not a percentage", remedy='Give the width of a figure as "80%"')
@@ -136,7 +142,7 @@ class Document:
         self._parts.append(f"#figure(image({name}, width: {width}), kind: image, caption: {literal(caption)})\n")
 
     def write(self, path: str | Path) -> None:
-        """Set the document and write it as PDF, all or nothing."""
+        """Set the document and write it as PDF, whole or not at all."""
         target = Path(path)
         with tempfile.TemporaryDirectory() as folder:
             source = Path(folder) / "main.typ"
@@ -157,7 +163,7 @@ def literal(text: str) -> str:
 
 
 def _cell(text: str) -> str:
-    """Literal of a table's cell, whose long words may break after their punctuation."""
+    """Return the literal of a table's cell, whose long words may break after their punctuation."""
     words = (
         re.sub(r"([._/:\-])(?=\w)", "\\1\u200b", word) if len(word) >= LONG_WORD else word for word in text.split(" ")
     )

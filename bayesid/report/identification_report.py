@@ -1,4 +1,4 @@
-"""The report of an identification, for a reader who does not see the code."""
+"""The report of an identification, written for a reader who does not see the code."""
 
 from __future__ import annotations
 
@@ -9,40 +9,42 @@ import numpy as np
 
 from bayesid.inference.identification import Identification
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.residual_series import Residuals
+from bayesid.inference.sensor_fit import sensor_fits, torque_fits
 from bayesid.report import figures
-from bayesid.report import identification_text as text
-from bayesid.report import report_tables as tables
-from bayesid.report.assumptions import model_sentences
 from bayesid.report.document import Document
 from bayesid.report.figures.figure_style import WIDTH
-from bayesid.report.sensor_fit import sensor_fits, torque_fits
+from bayesid.report.sentences import identification_sentences as sentences
+from bayesid.report.sentences.model_assumptions import model_sentences
+from bayesid.report.tables import identification_tables as tables
 
 __all__ = ["add_identification", "add_joints", "identification_report"]
 
 POSES = 4
-"""Instants at which the robot is drawn."""
+"""Number of instants at which the robot is drawn."""
 
 CURVE_POINTS = 600
+"""Number of points of a curve over time."""
 
 LARGEST_CORRELATIONS = 30
-"""Quantities that one picture of correlations can show."""
+"""Largest number of quantities in the figure of correlations."""
 
 
 def identification_report(
     result: Identification, title: str, assumptions: Sequence[str], file: str | Path, date: str | None = None
 ) -> None:
-    """Write the report of an identification as PDF, all or nothing.
+    """Write the report of an identification as PDF, whole or not at all.
 
     Parameters
     ----------
     result : Identification
     title : str
-        Of the study.
+        Title of the study.
     assumptions : sequence of str
-        What the user assumed beyond what the model says of itself.
+        Assumptions of the user beyond those of the model.
     file : path
     date : str, optional
-        Printed under the title; left out, equal results give equal files.
+        Date printed under the title. Where it is left out, equal results give equal files.
     """
     document = Document(title, "Identification of inertial parameters", date)
     add_identification(document, result, assumptions)
@@ -50,7 +52,7 @@ def identification_report(
 
 
 def add_identification(document: Document, result: Identification, assumptions: Sequence[str]) -> None:
-    """Add all sections of an identification to a document."""
+    """Add all sections on an identification to a document."""
     _add_result(document, result)
     _add_robot(document, result)
     _add_fit(document, result)
@@ -61,17 +63,17 @@ def add_identification(document: Document, result: Identification, assumptions: 
 
 def _add_result(document: Document, result: Identification) -> None:
     document.section("Result")
-    document.paragraph(text.summary(result))
-    document.paragraph(text.verdict(result))
+    document.paragraph(sentences.summary(result))
+    document.paragraph(sentences.verdict(result))
     document.table(
         ["quantity", "unit", "prior centre", "posterior mean ± sd", "sd / |mean|", "learnt"],
         tables.parameter_rows(result),
-        "Identified bodies, in the axes of the link; inertias are about the body's own centre of mass. Learnt is by "
-        "how much the data narrowed the prior (half the central 68 %); where by less than 10 %, it says prior only.",
+        "Identified bodies, in the axes of the link; inertias are about the body's centre of mass. Learnt is the share "
+        "by which the data narrowed the prior (half the central 68 %); prior only stands for less than 10 %.",
         ["left", "left", "right", "right", "right", "right"],
     )
     if rows := tables.effect_rows(result):
-        header = ["parameter", "unit", "prior mean ± sd", "posterior mean ± sd", "|mean| / sd"]
+        header = ["parameter", "unit", "prior, central 68 %", "posterior mean ± sd", "|mean| / sd"]
         caption = "Parameters of the effects in the model."
         document.table(header, rows, caption, ["left", "left", "right", "right", "right"])
     if rows := tables.start_rows(result):
@@ -103,44 +105,47 @@ def _add_robot(document: Document, result: Identification) -> None:
 
 def _add_fit(document: Document, result: Identification) -> None:
     posterior, z = result.posterior, result.optimum.z
+    fits = sensor_fits(posterior, z)
     document.section("Measured against simulated")
     document.paragraph(
-        "Residuals are in units of their noise σ: the sensor's own and, through the dynamics, that of the encoders. "
+        "Residuals are in units of their noise σ: that of the sensor and, through the dynamics, that of the encoders. "
         "They are taken at the mode and freed of their correlation, so that a right model leaves independent values "
         "of standard deviation one; the grey band is ± 2 σ."
     )
     document.table(
         ["recording", "sensor", "samples", "chi-square per sample", "largest residual"],
-        tables.misfit_rows(posterior, sensor_fits(posterior, z)),
-        "Misfit by recording and sensor. Noise alone gives one, within the stated ± in two cases of three.",
+        tables.misfit_rows(posterior, fits),
+        "Misfit by recording and sensor. Noise alone gives one, in two cases of three within the ± stated.",
         ["left", "left", "right", "right", "right"],
     )
-    for index, manoeuvre in enumerate(posterior.manoeuvres):
+    for manoeuvre, sensors in zip(posterior.manoeuvres, fits, strict=True):
         document.figure(
-            figures.measured_against_simulated(posterior, z, index),
+            figures.measured_against_simulated(sensors),
             f"Measured and simulated in {manoeuvre.recording.name}, sensor axes; beneath, the residual in σ.",
         )
     _add_torques(document, result)
     document.figure(
-        figures.residual_spectrum(posterior, z),
+        figures.residual_statistics(Residuals.at(posterior, z)),
         "Residuals of all recordings. Left: mean power by frequency, one for noise alone. Right: distribution, with "
         "the standard normal one.",
     )
 
 
 def _add_torques(document: Document, result: Identification) -> None:
-    posterior, fits = result.posterior, torque_fits(result.posterior, result.optimum.z)
+    posterior = result.posterior
     if posterior.model.torque is None:
         return
+    fits = torque_fits(posterior, result.optimum.z)
     document.table(
         ["recording", "joint", "noise per sample", "samples used", "chi-square per sample", "largest residual"],
         tables.torque_rows(posterior, fits),
-        "Joint torques. Where a joint with dry friction stands nearly still, its torque says nothing and is left out.",
+        "Joint torques. The torque of a joint with dry friction that stands nearly still carries no information and is "
+        "left out.",
         ["left", "left", "right", "right", "right", "right"],
     )
-    for manoeuvre, own in zip(posterior.manoeuvres, fits, strict=True):
+    for manoeuvre, joints in zip(posterior.manoeuvres, fits, strict=True):
         document.figure(
-            figures.torques_over_time(own), f"Measured and simulated joint torques in {manoeuvre.recording.name}."
+            figures.torques_over_time(joints), f"Measured and simulated joint torques in {manoeuvre.recording.name}."
         )
 
 
@@ -148,7 +153,7 @@ def _add_uncertainty(document: Document, result: Identification) -> None:
     document.section("Uncertainty")
     document.figure(
         figures.prior_to_posterior(result),
-        "How much the data narrowed what was known before. At one (10⁰) the data said nothing.",
+        "Width of the posterior over that of the prior. At one (10⁰) the data said nothing.",
     )
     for name, body in result.bodies.items():
         document.figure(
@@ -167,7 +172,7 @@ def _add_uncertainty(document: Document, result: Identification) -> None:
 
 def _add_computation(document: Document, result: Identification) -> None:
     document.section("Computation")
-    document.items(text.agreement_sentences(result))
+    document.items(sentences.agreement_sentences(result))
     document.figure(
         figures.convergence(result),
         "The coordinates in which the ensembles agree least. Left: mean of the draws so far, about the mean of all, "
@@ -177,18 +182,18 @@ def _add_computation(document: Document, result: Identification) -> None:
 
 
 def _add_assumptions(document: Document, result: Identification, assumptions: Sequence[str]) -> None:
-    document.section("What was assumed")
+    document.section("Assumptions")
     document.items([*assumptions, *model_sentences(result.posterior, result.integration_error)])
     add_joints(document, result.posterior)
 
 
 def add_joints(document: Document, posterior: Posterior) -> None:
-    """Add the table of the joints' smoothing, where their motion was measured."""
+    """Add the table of the joints' smoothing; nothing where their motion is prescribed."""
     if rows := tables.joint_rows(posterior):
         document.table(
             ["joint", "noise per sample", "order", "chi-square per sample"],
             rows,
-            "Smoothing of the joints: noise of the samples, the derivative of the position that is taken for white "
-            "noise, and the misfit of the samples to the spline, below one as far as the spline follows their noise. "
-            "Orders and misfits are those of each recording in turn.",
+            "Smoothing of the joints: noise of the samples, order of the derivative of the position that is modelled "
+            "as white noise, and misfit of the samples to the spline, which is below one as far as the spline follows "
+            "their noise. Orders and misfits are those of each recording in turn.",
         )

@@ -1,16 +1,33 @@
-"""Numbers as a reader wants them: an uncertainty to two significant digits, powers of ten written out."""
+"""Numbers as reports print them: rounded to their uncertainty, with true minus signs and raised powers of ten."""
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 
-__all__ = ["format_number", "format_quantity", "format_unit"]
+__all__ = [
+    "format_fixed",
+    "format_number",
+    "format_p_value",
+    "format_percent",
+    "format_quantity",
+    "format_range",
+    "format_signed",
+    "format_unit",
+    "format_vector",
+]
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 LARGEST, SMALLEST = 6, -3
-"""Powers of ten from which on, and down to which, a number is written with its power of ten."""
+"""Exponents from which on, and down to which, a number is written with its power of ten."""
+
+SMALLEST_P = 1e-12
+"""P-value below which only the bound is printed."""
+
+NEARLY_ALL = 0.995
+"""Ratio from which on a percentage has three digits, because two would round it to 100 %."""
 
 
 def format_quantity(mean: float, sd: float) -> str:
@@ -19,12 +36,12 @@ def format_quantity(mean: float, sd: float) -> str:
     Parameters
     ----------
     mean, sd : float
-        In the same unit. A standard deviation of zero stands for an exact value.
+        Value and standard deviation in the same unit. A standard deviation of zero stands for an exact value.
 
     Returns
     -------
     str
-        Such as ``640.00 ± 0.50`` or ``(1.230 ± 0.012) × 10⁻⁵``; ``not finite`` where either is not.
+        Text such as ``640.00 ± 0.50`` or ``(1.230 ± 0.012) × 10⁻⁵``, or ``not finite`` where either number is not.
     """
     if not (math.isfinite(mean) and math.isfinite(sd)):
         return "not finite"
@@ -34,9 +51,9 @@ def format_quantity(mean: float, sd: float) -> str:
     power = max(_power(mean), _power(rounded)) if mean else _power(rounded)
     decimals = 1 - _power(rounded)
     if SMALLEST < power < LARGEST and not (power < 0 and decimals > 6):
-        return f"{_fixed(mean, decimals)} ± {_fixed(rounded, decimals)}"
+        return f"{format_fixed(mean, decimals)} ± {format_fixed(rounded, decimals)}"
     places, unit = decimals + power, 10.0**power
-    return f"({_fixed(mean / unit, places)} ± {_fixed(rounded / unit, places)}) × 10{_raise(power)}"
+    return f"({format_fixed(mean / unit, places)} ± {format_fixed(rounded / unit, places)}) × 10{_raise(power)}"
 
 
 def format_number(value: float, digits: int = 3) -> str:
@@ -53,18 +70,48 @@ def format_number(value: float, digits: int = 3) -> str:
     return f"{_minus(mantissa)} × 10{_raise(power)}"
 
 
+def format_fixed(value: float, decimals: int) -> str:
+    """Return a number to so many decimals, rounded to tens and hundreds where they are negative; zero has no sign."""
+    text = f"{round(value, decimals):.{max(decimals, 0)}f}"
+    return _minus(text if float(text) else text.lstrip("-"))
+
+
+def format_signed(value: float, decimals: int = 1) -> str:
+    """Return a number to so many decimals with its sign, plus or minus."""
+    return _minus(f"{value:+.{decimals}f}")
+
+
+def format_percent(ratio: float, digits: int | None = None) -> str:
+    """Return a ratio in percent to so many significant digits; where left out, to two, or three from 99.5 % on."""
+    if digits is None:
+        digits = 2 if ratio < NEARLY_ALL else 3
+    return f"{format_number(100.0 * ratio, digits)} %"
+
+
+def format_p_value(value: float) -> str:
+    """Return a p-value to two digits, or the bound that it stays below."""
+    return "< 10⁻¹²" if value < SMALLEST_P else format_number(value, 2)
+
+
+def format_range(values: Iterable[float], digits: int = 3) -> str:
+    """Return the smallest and the largest of some values as ``low to high``, or one number where they print alike."""
+    known = list(values)
+    low, high = format_number(min(known), digits), format_number(max(known), digits)
+    return low if low == high else f"{low} to {high}"
+
+
+def format_vector(values: Iterable[float], digits: int = 3) -> str:
+    """Return a vector as ``(x, y, z)``."""
+    return f"({', '.join(format_number(float(value), digits) for value in values)})"
+
+
 def format_unit(unit: str) -> str:
-    """Raise the exponents of a unit: ``kg m2`` becomes ``kg m²``; a pure number has none."""
-    return "" if unit == "1" else re.sub(r"(?<=[A-Za-z])-?\d+", lambda found: _raise(int(found[0])), unit)
+    """Return a unit with raised exponents, ``kg m²`` for ``kg m2``; a pure number, ``1``, has none."""
+    return "" if unit == "1" else re.sub(r"(?<=[A-Za-z])-?\d+", lambda match: _raise(int(match[0])), unit)
 
 
 def _power(value: float) -> int:
     return math.floor(math.log10(abs(value))) if value else 0
-
-
-def _fixed(value: float, decimals: int) -> str:
-    text = f"{round(value, decimals):.{max(decimals, 0)}f}"
-    return _minus(text if float(text) else text.lstrip("-"))
 
 
 def _minus(text: str) -> str:

@@ -9,26 +9,30 @@ import numpy as np
 
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import integration_error_at
+from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.recording import Recording
 from bayesid.report import figures
-from bayesid.report.assumptions import model_sentences
 from bayesid.report.document import Document
+from bayesid.report.numbers import format_number, format_unit
+from bayesid.report.sentences.model_assumptions import model_sentences
 
 __all__ = ["simulation_report"]
 
 CURVE_POINTS = 600
+"""Number of points of a curve over time."""
 
 
 def simulation_report(posterior: Posterior, recordings: Sequence[Recording], title: str, file: Path) -> None:
-    """Write the report of simulated recordings as PDF.
+    """Write the report of simulated recordings as PDF, whole or not at all.
 
     Parameters
     ----------
     posterior : Posterior
-        Whose manoeuvres were simulated at its initial point.
+        Posterior whose manoeuvres were simulated at its initial point.
     recordings : sequence of Recording
-        As simulated.
+        Simulated recordings.
     title : str
+        Title of the study.
     file : path
     """
     document = Document(title, "Simulation")
@@ -39,9 +43,8 @@ def simulation_report(posterior: Posterior, recordings: Sequence[Recording], tit
             if sensor.kind.mounted:
                 _, values = recording.vector(sensor.kind.value)
                 largest = np.abs(values).max(axis=0)
-                rows.append(
-                    [recording.name, sensor.kind.value, sensor.kind.unit, *(f"{value:.4g}" for value in largest)]
-                )
+                readings = [format_number(float(value), 4) for value in largest]
+                rows.append([recording.name, sensor.kind.value, format_unit(sensor.kind.unit), *readings])
     document.table(
         ["recording", "sensor", "unit", "x", "y", "z"],
         rows,
@@ -49,6 +52,7 @@ def simulation_report(posterior: Posterior, recordings: Sequence[Recording], tit
         ["left", "left", "left", "right", "right", "right"],
     )
     z = posterior.starting_point()
+    fits = sensor_fits(posterior, z)
     for index, recording in enumerate(recordings):
         manoeuvre = posterior.manoeuvres[index]
         document.section(f"Recording {recording.name}")
@@ -56,9 +60,10 @@ def simulation_report(posterior: Posterior, recordings: Sequence[Recording], tit
             time = np.linspace(recording.time[0], recording.time[-1], CURVE_POINTS)
             document.figure(figures.manoeuvre(manoeuvre.motion, posterior.model.robot, time), "Motion of the joints.")
         document.figure(
-            figures.measured_against_simulated(posterior, z, index),
-            "Simulated with the robot as given, beside what the study's recording holds; beneath, the residual in σ.",
+            figures.measured_against_simulated(fits[index]),
+            "Readings as simulated with the robot as given, beside those of the study's recording; beneath, the "
+            "residual in σ.",
         )
-    document.section("What was assumed")
+    document.section("Assumptions")
     document.items(model_sentences(posterior, integration_error_at(posterior, z)))
     document.write(file)

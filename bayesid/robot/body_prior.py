@@ -1,4 +1,4 @@
-"""Prior of one body's inertial parameters, in log-Cholesky coordinates about its centre; and draws from it."""
+"""Prior of one body's inertial parameters in log-Cholesky coordinates about its centre, and draws from it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["BodyPrior", "Mixing", "check_mixing", "coordinates_of", "draw_inerti
 
 
 Mixing = tuple[tuple[float, ...], ...]
-"""Rows of a lower-triangular factor of the joint prior covariance; a tuple, so that models compare and hash."""
+"""Rows of a lower-triangular factor of the joint prior covariance, as tuples so that models compare and hash."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +26,15 @@ class BodyPrior:
     Parameters
     ----------
     name : str
-        Link or load.
+        Name of the link or load.
     centre : InertialParameters
+        Body at which all coordinates are zero.
     spread : float
         Standard deviation of each log-Cholesky coordinate relative to the centre's pseudo-inertia. The mass is then
-        log-normal with twice that relative width. Where a model has a joint prior (`Model.mixing`), that counts, and
-        this is its root mean square.
+        log-normal with twice that relative width. Where a model has a joint prior (`Model.mixing`), the joint prior
+        applies, and the spread is its root mean square.
     nuisance : bool
-        Whether the body is marginalised only because it is not known exactly.
+        Whether the body is marginalised and not reported, because it is only known approximately.
     """
 
     name: str
@@ -67,7 +68,7 @@ def check_mixing(mixing: Mixing, bodies: int) -> None:
 
 
 def coordinates_of(body: BodyPrior, inertial: InertialParameters) -> Floats:
-    """Standard-normal coordinates of a body under its own prior, shape (10,)."""
+    """Return the coordinates of a body that are standard-normal under its prior, shape (10,)."""
     return relative_coordinates(body.centre, inertial) / body.spread
 
 

@@ -1,8 +1,9 @@
 """Kinematic tables: the composite body's moments of mass as linear functions of every link's inertial parameters.
 
-With ``T`` a link's pose in the base and ``J`` its pseudo-inertia, ``P = sum T J T'``, ``S = sum T J dT'`` and
-``Q = sum T J d2T'`` hold everything the dynamics needs. Each is linear in the ten parameters of each link, so a
-recording is reduced once to coefficient tables, and a simulation costs one rigid body however many links there are.
+With ``T`` the pose of a link in the base and ``J`` its pseudo-inertia, ``P = sum T J T'``, ``S = sum T J dT'`` and
+``Q = sum T J d2T'`` hold all that the dynamics needs. Each is linear in the ten parameters of each link, so that a
+recording is reduced once to tables of coefficients, and a simulation costs as much as one rigid body, however many
+links there are.
 """
 
 from __future__ import annotations
@@ -30,15 +31,16 @@ ENTRIES = {
     "spin": slice(22, 25),  # angular momentum relative to the base, about its origin
     "spin_rate": slice(25, 28),
 }
-"""Columns of a table row."""
+"""Columns of each moment of mass in a row of a table."""
 
 WIDTH = 28
+"""Number of columns of a table."""
 
 _UPPER = ((0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2))
 
 
 def link_table(robot: Robot, name: str, motion: Kinematics) -> Floats:
-    """Coefficients of one link's ten parameters, shape (T, 28, 10)."""
+    """Return the coefficients of one link's ten parameters at T instants of a motion, shape (T, 28, 10)."""
     link = robot.link(name)
     pose, rate, acceleration = (change @ link.placement for change in joint_motion(motion, link.joint))
     table = _moments(pose, rate, acceleration, BASIS)
@@ -47,7 +49,7 @@ def link_table(robot: Robot, name: str, motion: Kinematics) -> Floats:
 
 
 def _moments(pose: Floats, rate: Floats, acceleration: Floats, bodies: Floats) -> Floats:
-    """Table rows of pseudo-inertias (p, 4, 4) moving with a pose, shape (T, p, 28), in the order of `ENTRIES`."""
+    """Return the rows of pseudo-inertias (p, 4, 4) that move with a pose, in the order of `ENTRIES`, (T, p, 28)."""
     left = pose[:, None] @ bodies
     xp = namespace(left)
     composite, flow, surge = (left @ xp.swapaxes(other, 1, 2)[:, None] for other in (pose, rate, acceleration))
@@ -72,7 +74,7 @@ def _moments(pose: Floats, rate: Floats, acceleration: Floats, bodies: Floats) -
 
 
 def composite_rows(robot: Robot, motion: Kinematics, leave_out: Container[str] = ()) -> Floats:
-    """Table rows of all links with mass but the named ones, summed, shape (T, 28)."""
+    """Return the sum of the rows of all links with mass except those left out, shape (T, 28)."""
     carried: dict[int, Floats] = {}
     for name, link in robot.links.items():
         if name not in leave_out and link.inertial.mass > 0.0:

@@ -1,4 +1,4 @@
-"""Frames of the robot whose motion is limited or predicted."""
+"""The end-effector: a frame of the robot whose motion is limited or predicted."""
 
 from __future__ import annotations
 
@@ -13,7 +13,17 @@ __all__ = ["Tip"]
 
 @dataclass(frozen=True)
 class Tip:
-    """A frame of the URDF: the joint that carries it and its pose (4, 4) in that joint's axes."""
+    """End-effector of the robot, which is a frame of its URDF.
+
+    Parameters
+    ----------
+    name : str
+        Name of the frame.
+    joint : int
+        Index into `Robot.joints` of the joint that carries the frame; -1 for the base.
+    placement : (4, 4) array
+        Pose of the frame in that joint's axes.
+    """
 
     name: str
     joint: int
@@ -21,7 +31,13 @@ class Tip:
 
     @classmethod
     def of(cls, robot: Robot, name: str | None = None) -> Tip:
-        """Return a frame by name; where left out, the last link's."""
+        """Return the frame of a name, by default the last frame of the last link.
+
+        Raises
+        ------
+        InputError
+            If the robot has no frame of that name.
+        """
         frames = {frame.name: frame for frame in robot.model.frames if frame.parentJoint > 0}
         if name is None:
             name = max(frames.values(), key=lambda frame: frame.parentJoint).name if robot.joints else robot.base

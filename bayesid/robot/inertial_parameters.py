@@ -1,4 +1,4 @@
-"""Inertial parameters of one rigid body, and coordinates in which every value is a physical body.
+"""Inertial parameters of one rigid body, and log-Cholesky coordinates, in which every value is a physical body.
 
 A body is physical when its 4x4 pseudo-inertia ``[[Sigma, h], [h', m]]`` is positive definite, with ``Sigma`` the second
 moment of mass about the link's origin (Wensing, Kim and Slotine, RA-L 2018). The log-Cholesky coordinates are those of
@@ -37,7 +37,7 @@ LOG_CHOLESKY = ("alpha", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3"
 """Names of the log-Cholesky coordinates (Rucker & Wensing 2022)."""
 
 PARAMETERS = 10
-"""Inertial parameters of a rigid body."""
+"""Number of inertial parameters of a rigid body."""
 
 
 def _basis() -> Floats:
@@ -56,6 +56,7 @@ def _basis() -> Floats:
 
 
 BASIS = _basis()
+"""Matrices, shape (10, 4, 4), whose combination with the ten parameters is the pseudo-inertia."""
 BASIS.setflags(write=False)
 
 
@@ -66,7 +67,7 @@ class InertialParameters:
     Parameters
     ----------
     mass : float
-        [kg]
+        Mass [kg].
     com : (3,) array_like
         Centre of mass [m].
     inertia : (3, 3) array_like
@@ -129,7 +130,7 @@ class InertialParameters:
 
     @property
     def vector(self) -> Floats:
-        """Ten parameters, linear in the dynamics, in Pinocchio's order (`from_vector`)."""
+        """Ten parameters in which the dynamics is linear, in Pinocchio's order (`from_vector`)."""
         c = self.com
         tensor = self.inertia + self.mass * (c @ c * np.eye(3) - np.outer(c, c))
         return np.array([self.mass, *(self.mass * c), *tensor[np.tril_indices(3)]])
@@ -141,17 +142,17 @@ class InertialParameters:
 
     @property
     def is_extended(self) -> bool:
-        """Whether the mass fills a volume, as log-Cholesky coordinates need (a rod or a point does not)."""
+        """Whether the mass fills a volume, as log-Cholesky coordinates require; that of a rod or a point does not."""
         return self.mass > 0.0 and bool(np.linalg.eigvalsh(self.pseudo_inertia / self.mass)[0] > 1e-12)
 
 
 def log_cholesky_factor(coordinates: Array) -> Array:
-    """Upper-triangular factor U(theta) of ``J = U U'``; theta = 0 gives the identity.
+    """Return the upper-triangular factor U(theta) of ``J = U U'``, which is the identity for theta = 0.
 
     Parameters
     ----------
     coordinates : (10,) array
-        ``alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3``.
+        Coordinates in the order of `LOG_CHOLESKY`.
 
     Returns
     -------
@@ -169,25 +170,25 @@ def log_cholesky_factor(coordinates: Array) -> Array:
 
 
 def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array:
-    """Ten linear parameters of the body with given log-Cholesky coordinates relative to a centre, shape (10,)."""
+    """Return the ten linear parameters of the body with log-Cholesky coordinates (10,) about a centre, shape (10,)."""
     return vector_from_factor(jnp.asarray(upper_cholesky(centre.pseudo_inertia)), coordinates)
 
 
 @jax.jit  # traced once for all bodies
 def vector_from_factor(centre: Array, coordinates: Array) -> Array:
-    """Return `log_cholesky_vector` for a centre given by the factor (4, 4) of its pseudo-inertia (`upper_cholesky`)."""
+    """Return `log_cholesky_vector` about a centre whose pseudo-inertia has the factor (4, 4) of `upper_cholesky`."""
     factor = centre @ log_cholesky_factor(coordinates)
     return parameters_from_pseudo_inertia(factor @ factor.T)
 
 
 def upper_cholesky(pseudo_inertia: Floats) -> Floats:
-    """Upper-triangular U with ``U U' = pseudo_inertia``, shape (4, 4)."""
+    """Return the upper-triangular U with ``U U' = pseudo_inertia``, shape (4, 4)."""
     flipped = np.linalg.cholesky(pseudo_inertia[::-1, ::-1])
     return flipped[::-1, ::-1]
 
 
 def parameters_from_pseudo_inertia(pseudo_inertia: Array) -> Array:
-    """Ten linear parameters (`InertialParameters.vector`) of a pseudo-inertia, shape (4, 4) -> (10,)."""
+    """Return the ten linear parameters (`InertialParameters.vector`) of a pseudo-inertia, (4, 4) -> (10,)."""
     sigma = pseudo_inertia[:3, :3]
     tensor = jnp.trace(sigma) * jnp.eye(3) - sigma
     lower = jnp.stack([tensor[0, 0], tensor[1, 0], tensor[1, 1], tensor[2, 0], tensor[2, 1], tensor[2, 2]])
@@ -195,9 +196,16 @@ def parameters_from_pseudo_inertia(pseudo_inertia: Array) -> Array:
 
 
 def mass_com_inertia(vectors: A) -> A:
-    """Mass, centre of mass and inertia about it (xx, yy, zz, xy, xz, yz) of linear parameters, (..., 10) -> (..., 10).
+    """Return mass, centre of mass and inertia about it (xx, yy, zz, xy, xz, yz) of linear parameters.
 
-    Of NumPy arrays as of JAX's.
+    Parameters
+    ----------
+    vectors : (..., 10) array
+        Linear parameters (`InertialParameters.vector`), of NumPy or of JAX.
+
+    Returns
+    -------
+    (..., 10) array
     """
     xp = namespace(vectors)
     mass, first = vectors[..., :1], vectors[..., 1:4]

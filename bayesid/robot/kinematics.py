@@ -1,4 +1,4 @@
-"""Motion of the joint frames relative to the base: poses with two derivatives, by Pinocchio or traced by JAX."""
+"""Motion of the joint frames relative to the base: poses with two derivatives, by Pinocchio or in JAX."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class Kinematics(NamedTuple):
 
 
 def kinematics(robot: Robot, state: JointState) -> Kinematics:
-    """Return the motion of the joint frames: by Pinocchio, or for traced arrays of JAX by `traced_kinematics`."""
+    """Return the motion of the joint frames: by Pinocchio, or of arrays of JAX by `traced_kinematics`."""
     return _kinematics(robot, state) if isinstance(state.position, np.ndarray) else traced_kinematics(robot, state)
 
 
 def _kinematics(robot: Robot, state: JointState) -> Kinematics:
-    """Run Pinocchio's second-order forward kinematics with the base at rest."""
+    """Return the motion of the joint frames by Pinocchio's second-order forward kinematics, with the base at rest."""
     model, data = robot.model, robot.model.createData()
     count, joints = state.position.shape
     pose = np.tile(np.eye(4), (count, joints, 1, 1))
@@ -44,15 +44,15 @@ def _kinematics(robot: Robot, state: JointState) -> Kinematics:
             placement = data.oMi[joint + 2]
             pose[row, joint, :3, :3], pose[row, joint, :3, 3] = placement.rotation, placement.translation
             motion[0, row, joint], motion[1, row, joint] = data.v[joint + 2].vector, data.a[joint + 2].vector
-    twist, twist_rate = _hat(motion)  # in the joint's own axes
+    twist, twist_rate = _hat(motion)  # in the axes of the joint itself
     return Kinematics(pose, pose @ twist, pose @ (twist_rate + twist @ twist))
 
 
 def traced_kinematics(robot: Robot, state: JointState) -> Kinematics:
-    """Do the same by products of exponentials in JAX, for derivatives in the motion's parameters.
+    """Return the motion of the joint frames by products of exponentials in JAX, which can be differentiated.
 
-    Each joint's pose is its parent's, times a constant placement, times the exponential of its axis (Lynch & Park 2017,
-    section 4.1); the derivatives follow by the product rule.
+    The pose of each joint is that of its parent, times a constant placement, times the exponential of its axis (Lynch &
+    Park 2017, section 4.1); the derivatives follow by the product rule.
     """
     frames: list[tuple[Array, ...]] = []
     still = jnp.zeros((len(state.position), 4, 4))
@@ -82,7 +82,7 @@ def traced_kinematics(robot: Robot, state: JointState) -> Kinematics:
 
 
 def configuration(robot: Robot, position: Floats) -> Floats:
-    """Return Pinocchio's configuration for joint positions with the base at the origin."""
+    """Return Pinocchio's configuration of joint positions (joints,) with the base at the origin."""
     q = pin.neutral(robot.model)
     for index, value in enumerate(position):
         joint = robot.model.joints[index + 2]
@@ -94,7 +94,7 @@ def configuration(robot: Robot, position: Floats) -> Floats:
 
 
 def joint_motion(motion: Kinematics, joint: int) -> tuple[Floats, Floats, Floats]:
-    """Pose of a joint's frame and its two derivatives, each (T, 4, 4); of the base's where ``joint`` is negative."""
+    """Return the pose of a joint's frame with two derivatives, each (T, 4, 4); a negative index stands for the base."""
     if joint < 0:
         still = np.zeros((len(motion.pose), 4, 4))
         return still + np.eye(4), still, still
@@ -102,15 +102,15 @@ def joint_motion(motion: Kinematics, joint: int) -> tuple[Floats, Floats, Floats
 
 
 def joint_twist(robot: Robot, joint: int) -> Floats:
-    """Velocity of a joint's frame at unit speed of the joint, linear part first, in the joint's own axes, (6,)."""
+    """Return the velocity of a joint's frame at unit speed of the joint, linear part first, in its axes, shape (6,)."""
     model = robot.model.joints[joint + 2]
-    own = model.createData()
-    model.calc(own, pin.neutral(robot.model), np.zeros(robot.model.nv))
-    return np.asarray(own.S).ravel()
+    data = model.createData()
+    model.calc(data, pin.neutral(robot.model), np.zeros(robot.model.nv))
+    return np.asarray(data.S).ravel()
 
 
 def _hat(twist: Floats) -> Floats:
-    """4x4 matrix of spatial velocities, linear part first."""
+    """Return the 4x4 matrices of spatial velocities (..., 6), linear part first."""
     matrix = np.zeros((*twist.shape[:-1], 4, 4))
     x, y, z = np.moveaxis(twist[..., 3:], -1, 0)
     matrix[..., 0, 1], matrix[..., 0, 2] = -z, y

@@ -1,7 +1,8 @@
-"""One body relative to the centre of its prior: log-Cholesky coordinates, and coordinates linear in the parameters.
+"""Coordinates of one body relative to the centre of its prior: log-Cholesky, and linear in the parameters.
 
-With ``U0`` the factor of the centre's pseudo-inertia, a body has ``J = U0 U(theta) U(theta)' U0'``; ``theta`` (10,) are
-its log-Cholesky coordinates; the ten entries of ``U U' - 1`` (upper triangle) are linear in its parameters.
+With ``U0`` the factor of the centre's pseudo-inertia, the pseudo-inertia of a body is ``U0 U(theta) U(theta)' U0'``.
+Its log-Cholesky coordinates are ``theta`` (10,); the ten entries of ``U U' - 1`` (upper triangle) are linear in its
+parameters.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ _ROW, _COLUMN = np.triu_indices(4)
 
 
 def relative(theta: Array) -> Array:
-    """Entries of the relative pseudo-inertia, less the identity, shape (10,)."""
+    """Return the entries of the relative pseudo-inertia less the identity, shape (10,)."""
     factor = log_cholesky_factor(theta)
     return ((factor @ factor.T) - jnp.eye(4))[_ROW, _COLUMN]
 
 
 def absolute(entries: Array) -> Array:
-    """Inverse of `relative`; not a number where no physical body has these entries."""
+    """Return the log-Cholesky coordinates of entries (10,), not a number where no physical body has them."""
     upper = jnp.zeros((4, 4)).at[_ROW, _COLUMN].set(entries)
     matrix = jnp.eye(4) + upper + upper.T - jnp.diag(jnp.diag(upper))
     u = _upper_factor(matrix)
@@ -36,9 +37,9 @@ def absolute(entries: Array) -> Array:
 
 
 def _upper_factor(matrix: Array) -> Array:
-    """Upper-triangular U with ``U U' = matrix`` (4, 4), not a number where there is none.
+    """Return the upper-triangular U with ``U U' = matrix`` (4, 4), not a number where there is none.
 
-    Written out: thousands of factorisations of this size in one call to LAPACK can block the processor's threads.
+    The factorisation is written out, because thousands of this size in one call to LAPACK can block the threads.
     """
     u = [[jnp.zeros(()) for _ in range(4)] for _ in range(4)]
     for k in (3, 2, 1, 0):
@@ -49,7 +50,7 @@ def _upper_factor(matrix: Array) -> Array:
 
 
 def log_volume(theta: Array) -> Array:
-    """Logarithm of the determinant of d relative / d theta."""
+    """Return the logarithm of the determinant of d relative / d theta."""
     # |d(U U')/dU| = 2^4 prod u_ii^i for upper-triangular U, times |dU/dtheta| = u_11 u_22 u_33 u_44 u_44^6
     alpha, d = theta[0], theta[1:4]
     logs = jnp.concatenate([alpha + d, alpha[None]])
@@ -66,16 +67,17 @@ def _slope() -> Floats:
 
 
 SLOPE = _slope()
+"""Derivative of `relative` at the centre, shape (10, 10)."""
 SLOPE.setflags(write=False)
 
 
 def relative_coordinates(centre: InertialParameters, inertial: InertialParameters) -> Floats:
-    """Log-Cholesky coordinates of a body relative to a centre, shape (10,)."""
+    """Return the log-Cholesky coordinates of a body relative to a centre, shape (10,)."""
     return log_cholesky_coordinates(centre.pseudo_inertia, inertial.pseudo_inertia[None])[0]
 
 
 def log_cholesky_coordinates(centre: Floats, bodies: Floats) -> Floats:
-    """Log-Cholesky coordinates of many pseudo-inertias (n, 4, 4) relative to one (4, 4), shape (n, 10)."""
+    """Return the log-Cholesky coordinates of pseudo-inertias (n, 4, 4) relative to one (4, 4), shape (n, 10)."""
     factors = np.linalg.cholesky(bodies[:, ::-1, ::-1])[:, ::-1, ::-1]
     shape = np.linalg.solve(upper_cholesky(centre), factors)
     alpha = np.log(shape[:, 3, 3])

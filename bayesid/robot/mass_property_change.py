@@ -1,4 +1,4 @@
-"""A stated change of a body between two studies: fuel burnt, a part released or taken on board."""
+"""A change of a body between two studies that the user states: fuel burnt, a part released or taken on board."""
 
 from __future__ import annotations
 
@@ -21,15 +21,20 @@ class BodyChange:
     Parameters
     ----------
     body : str
-        The link or load that changes.
+        Name of the link or load that changes.
     mass : float
-        [kg], negative if removed; not zero.
+        Mass that is added, negative if it is removed, and not zero [kg].
     com : (3,) array_like
-        Where the centre of mass of what is added or removed is, in the axes of the body [m].
+        Centre of mass of the part that is added or removed, in the axes of the body [m].
     inertia : (3, 3) array_like, optional
-        Its inertia about its own centre of mass [kg m2]; a point mass where left out.
+        Inertia of the part about its centre of mass, by default that of a point mass [kg m2].
     mass_sigma : float
-        Standard deviation of the mass [kg]; the inertia varies in proportion.
+        Standard deviation of the mass; the inertia varies in proportion [kg].
+
+    Raises
+    ------
+    InputError
+        If the mass is zero, or no rigid body has these parameters.
     """
 
     body: str
@@ -45,6 +50,6 @@ class BodyChange:
 
     @property
     def vector(self) -> Floats:
-        """Ten linear parameters of what is added, negative if removed, shape (10,)."""
+        """Ten linear parameters of the part that is added, negative if it is removed, shape (10,)."""
         inertia = np.zeros((3, 3)) if self.inertia is None else np.asarray(self.inertia, dtype=float)
         return np.sign(self.mass) * InertialParameters(abs(self.mass), self.com, inertia).vector

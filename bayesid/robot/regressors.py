@@ -1,8 +1,8 @@
-"""Equations of motion as numbers times inertial parameters.
+"""Regressors: the equations of motion as matrices times inertial parameters.
 
 Every regressor multiplies the ten parameters of each body (`InertialParameters.vector`) and is built on the tables of
-`bayesid.robot.composite_tables`. NumPy arrays give NumPy arrays; where any is JAX's, so is the result. Vectors are in
-base axes, moments of force and of momentum about the base origin.
+`bayesid.robot.composite_tables`. Arrays of NumPy give arrays of NumPy; if any argument is an array of JAX, so is the
+result. Vectors are in base axes; moments of force and of momentum are about the base origin.
 """
 
 from __future__ import annotations
@@ -31,22 +31,23 @@ A = TypeVar("A", Floats, Array)
 
 
 def balance_regressor(tables: A, rate: A, rate_change: A, acceleration: A) -> A:
-    """Regressor of the base's force balance, the paper's (19): force and torque about the base origin, base axes.
+    """Return the regressor of the base's force balance, the paper's (19): force and torque about the base origin.
 
     Parameters
     ----------
     tables : (T, 28, p) array
-        Of the bodies, see `bayesid.robot.composite_tables`.
+        Tables of the bodies (`bayesid.robot.composite_tables`).
     rate, rate_change : (T, 3) arrays
         Angular velocity of the base and its derivative, base axes [rad/s, rad/s2].
     acceleration : (T, 3) array
-        Of the base origin, non-gravitational, base axes [m/s2].
+        Specific force at the base origin, base axes [m/s2].
 
     Returns
     -------
     (T, 6, p) array
-        What multiplies the p inertial parameters to give the wrench that moves the bodies so [N, N m]; summed over all
-        bodies of the robot it is the external wrench. The gravity gradient is left out (`gradient_regressor`).
+        Matrices that give, times the p inertial parameters, the wrench that moves the bodies in this way [N, N m];
+        summed over all bodies of the robot it is the external wrench. The gravity gradient has a separate regressor
+        (`gradient_regressor`).
     """
     xp = namespace(tables, rate, rate_change, acceleration)
     entry = _entries(tables)
@@ -71,21 +72,22 @@ def balance_regressor(tables: A, rate: A, rate_change: A, acceleration: A) -> A:
 
 
 def momentum_regressor(tables: A, rate: A, velocity: A) -> A:
-    """Regressor of linear momentum, and of angular momentum about the base origin, base axes.
+    """Return the regressor of linear momentum, and of angular momentum about the base origin, base axes.
 
     Parameters
     ----------
     tables : (T, 28, p) array
-        Of the bodies, see `bayesid.robot.composite_tables`.
+        Tables of the bodies (`bayesid.robot.composite_tables`).
     rate : (T, 3) array
         Angular velocity of the base, base axes [rad/s].
     velocity : (T, 3) array
-        Of the base origin in inertial space, base axes [m/s]; zero gives the momentum in a frame that moves with it.
+        Velocity of the base origin in inertial space, base axes [m/s]; zero gives the momentum in a frame that moves
+        with the base origin.
 
     Returns
     -------
     (T, 6, p) array
-        What multiplies the p inertial parameters to give the momenta [N s, N m s].
+        Matrices that give, times the p inertial parameters, the momenta [N s, N m s].
     """
     xp = namespace(tables, rate, velocity)
     entry = _entries(tables)
@@ -96,19 +98,19 @@ def momentum_regressor(tables: A, rate: A, velocity: A) -> A:
 
 
 def gradient_regressor(tables: A, zenith: A, gradient: float) -> A:
-    """Regressor of the gravity gradient on all bodies, the paper's (14) and (16), expanded about the base origin.
+    """Return the regressor of the gravity gradient, the paper's (14) and (16), expanded about the base origin.
 
-    With it the balance reads ``(balance_regressor - gradient_regressor) p = other external wrenches``, where the
-    acceleration is the base origin's non-gravitational one: both sides are linear in the same parameters.
+    The balance then reads ``(balance_regressor - gradient_regressor) p = other external wrenches``, in which the
+    acceleration is the specific force at the base origin: both sides are linear in the same parameters.
 
     Parameters
     ----------
     tables : (T, 28, p) array
-        Of the bodies, see `bayesid.robot.composite_tables`.
+        Tables of the bodies (`bayesid.robot.composite_tables`).
     zenith : (T, 3) array
         Unit vector from the Earth's centre, base axes.
     gradient : float
-        mu / R^3 [1/s2].
+        Gravity gradient mu / R^3 [1/s2].
 
     Returns
     -------
@@ -126,25 +128,25 @@ def gradient_regressor(tables: A, zenith: A, gradient: float) -> A:
 def torque_regressor(
     robot: Robot, bodies: Sequence[str], motion: Kinematics, rate: A, rate_change: A, acceleration: A
 ) -> A:
-    """Regressor of the full equations of motion, the paper's (23): wrench on the base, then the joints' torques.
+    """Return the regressor of the full equations of motion, the paper's (23): wrench on the base, then joint torques.
 
-    A joint's torque is the virtual power, per unit of its speed, of the wrenches that move the bodies it carries.
+    The torque of a joint is the virtual power, per unit of its speed, of the wrenches that move the bodies it carries.
 
     Parameters
     ----------
     robot : Robot
     bodies : sequence of str
-        Links and loads whose parameters the columns are, ten each.
+        Links and loads, each of which has ten columns.
     motion : Kinematics
-        Of the joints at T instants (`bayesid.robot.kinematics.kinematics`).
+        Motion of the joint frames at T instants (`bayesid.robot.kinematics.kinematics`).
     rate, rate_change, acceleration : (T, 3) arrays
-        Of the base, as for `balance_regressor`. A fixed base has no rates, and minus gravity for an acceleration.
+        Motion of the base, as for `balance_regressor`. A fixed base has no rates, and minus gravity as acceleration.
 
     Returns
     -------
     (T, 6 + joints, 10 bodies) array
-        What multiplies the parameters to give the external force and torque on the base [N, N m] and the joint torques,
-        or forces of prismatic joints [N m, N]; friction and the rotors of the drives are left out.
+        Matrices that give, times the parameters, the external force and torque on the base [N, N m], and the torques of
+        the joints [N m] or the forces of prismatic joints [N]. Friction and the rotors of the drives are left out.
     """
     tables = [link_table(robot, name, motion) for name in bodies]
     xp = namespace(motion.pose, rate, rate_change, acceleration)
@@ -155,7 +157,7 @@ def torque_regressor(
 
 
 def joint_axes(robot: Robot, motion: Kinematics) -> Floats:
-    """Return the twist, at the base origin in base axes, of what each joint carries at unit speed, (T, joints, 6)."""
+    """Return the twist at the base origin of the links that each joint carries at unit speed, (T, joints, 6)."""
     xp = namespace(motion.pose)
     axes = []
     for index in range(len(robot.joints)):
@@ -167,7 +169,7 @@ def joint_axes(robot: Robot, motion: Kinematics) -> Floats:
 
 
 def carried_bodies(robot: Robot, bodies: Sequence[str]) -> Floats:
-    """Return whether (1 or 0) a joint carries a body, shape (joints, bodies)."""
+    """Return 1 where a joint carries a body and 0 elsewhere, shape (joints, bodies)."""
     carried = np.zeros((len(robot.joints), len(bodies)))
     for column, name in enumerate(bodies):
         joint = robot.link(name).joint
@@ -178,20 +180,20 @@ def carried_bodies(robot: Robot, bodies: Sequence[str]) -> Floats:
 
 
 def _entries(tables: A) -> dict[str, A]:
-    """Entries of tables (T, 28, p), each (T, p, width)."""
+    """Return the moments of mass in tables (T, 28, p), each of shape (T, p, width)."""
     xp = namespace(tables)
     rows = xp.swapaxes(tables, 1, 2)
     return {name: rows[..., columns] for name, columns in ENTRIES.items()}
 
 
 def _rows(upper: A, lower: A) -> A:
-    """Regressor (T, 6, p) of two vectors (T, p, 3)."""
+    """Return the regressor (T, 6, p) of two vectors (T, p, 3)."""
     xp = namespace(upper, lower)
     return cast("A", xp.swapaxes(xp.concatenate([upper, lower], axis=-1), 1, 2))
 
 
 def _stretched(second: A, vector: A) -> A:
-    """Second moments xx, yy, zz, xy, xz, yz (..., 6) times vectors (..., 3)."""
+    """Return second moments xx, yy, zz, xy, xz, yz (..., 6) times vectors (..., 3)."""
     xp = namespace(second, vector)
     xx, yy, zz, xy, xz, yz = xp.moveaxis(second, -1, 0)
     x, y, z = xp.moveaxis(vector, -1, 0)
@@ -199,5 +201,5 @@ def _stretched(second: A, vector: A) -> A:
 
 
 def _turned(second: A, vector: A) -> A:
-    """Inertia tensors of second moments (..., 6) times vectors (..., 3)."""
+    """Return the inertia tensors of second moments (..., 6) times vectors (..., 3)."""
     return second[..., :3].sum(axis=-1, keepdims=True) * vector - _stretched(second, vector)

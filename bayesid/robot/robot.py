@@ -20,11 +20,12 @@ from bayesid.robot.inertial_parameters import InertialParameters
 __all__ = ["Joint", "Link", "Load", "Robot"]
 
 MOVING = ("revolute", "continuous", "prismatic")
+"""Joint types of a URDF that move."""
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A moving joint with its limits, in rad or m and their rates."""
+    """A moving joint with its limits of position [rad, m] and of speed [rad/s, m/s]."""
 
     name: str
     kind: str
@@ -40,7 +41,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid body: its inertial parameters in its own axes, and where those axes are.
+    """A rigid body: its inertial parameters in the link's axes, and the placement of these axes.
 
     Parameters
     ----------
@@ -75,12 +76,12 @@ class Robot:
     ----------
     name : str
     links : mapping of str to Link
-        Every body that may have mass, loads included; the base first.
+        Bodies that may have mass, loads included, with the base first.
     joints : tuple of Joint
-        Moving joints, in Pinocchio's order.
+        Moving joints in Pinocchio's order.
     model : pinocchio.Model
-        Kinematic tree with a free-flyer base and no gravity. Its inertias are those of the URDF: the links' own
-        parameters are in `links`.
+        Kinematic tree with a free-flyer base and no gravity. Its inertias are those of the URDF; the present parameters
+        are those in `links`.
     """
 
     name: str
@@ -107,7 +108,7 @@ class Robot:
 
     @classmethod
     def shipped(cls, name: str) -> Robot:
-        """Return a robot that comes with the package: ``"ets7"`` or ``"planar"``."""
+        """Return a robot of the package by its name, ``"ets7"`` or ``"planar"``."""
         folder = files("bayesid.robot") / "models"
         known = sorted(Path(str(item)).stem for item in folder.iterdir() if str(item).endswith(".urdf"))
         if name not in known:
@@ -168,7 +169,7 @@ class Robot:
         Raises
         ------
         InputError
-            If there is none of that name.
+            If the robot has no link or load of that name.
         """
         if name not in self.links:
             raise InputError(
@@ -206,9 +207,9 @@ class Robot:
         return names.index(name)
 
     def to_urdf(self) -> str:
-        """Return the URDF with the present inertial parameters; every simulator can load it.
+        """Return the URDF with the present inertial parameters, which every simulator can load.
 
-        Loads become links on fixed joints. Products of the link frames are kept; inertial frames get the link's axes.
+        Loads become links on fixed joints, and inertial frames take the axes of their links.
         """
         root = ET.fromstring(self.urdf)
         for name, link in self.links.items():
@@ -224,7 +225,7 @@ class Robot:
         return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
     def write_urdf(self, file: str | Path) -> None:
-        """Write `to_urdf` to a file."""
+        """Write the URDF with the present inertial parameters to a file."""
         Path(file).write_text(self.to_urdf(), encoding="utf-8")
 
     def _carrier(self, load: str) -> str:
@@ -270,14 +271,14 @@ def _read_inertial(element: ET.Element | None) -> InertialParameters:
     if mass is None or tensor is None:
         raise InputError("<inertial> lacks its <mass> or <inertia>", remedy="Give both, or leave <inertial> out")
     entry = {key: float(tensor.get(key, "0")) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
-    own = np.array(
+    about_com = np.array(
         [
             [entry["ixx"], entry["ixy"], entry["ixz"]],
             [entry["ixy"], entry["iyy"], entry["iyz"]],
             [entry["ixz"], entry["iyz"], entry["izz"]],
         ]
     )
-    return InertialParameters(float(mass.get("value", "nan")), position, rotation @ own @ rotation.T)
+    return InertialParameters(float(mass.get("value", "nan")), position, rotation @ about_com @ rotation.T)
 
 
 def _write_inertial(link: ET.Element, inertial: InertialParameters) -> None:
@@ -309,7 +310,7 @@ def _check_joints(root: ET.Element, file: Path | None) -> None:
                 "mimic joints are not supported",
                 file=file,
                 place=f"joint {name}",
-                remedy="Make it a joint of its own and record it",
+                remedy="Make it an independent joint and record it",
             )
 
 

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from bayesid.diagnosis import Status
 from bayesid.report import Document, format_quantity
-from bayesid.report.diagnosis_tables import hypothesis_rows
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number, format_unit
+from bayesid.report.tables.diagnosis_tables import hypothesis_rows
 from studies.common.ets7 import RADIUS, RAMPS
 from studies.ets7_drift.analysis import CAUSES, Case, Result
 from studies.ets7_drift.world import (

@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid.diagnosis import Diagnosis
+from bayesid.diagnosis.cause_amplitudes import amplitudes_of
 from bayesid.report import Document, format_quantity
-from bayesid.report.diagnosis_tables import amplitudes_of, hypothesis_rows
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number, format_unit
+from bayesid.report.tables.diagnosis_tables import hypothesis_rows
 from studies.throws_drag.analysis import SPREAD, Comparison, Study, Wheel
 
 __all__ = ["held_out_figure", "wheel_figure", "write_report"]

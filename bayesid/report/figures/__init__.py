@@ -1,19 +1,13 @@
-"""Figures of reports. Every function returns a new matplotlib Figure; none touches pyplot."""
+"""Figures of the reports; every function returns a new matplotlib Figure, and none touches pyplot."""
 
-from bayesid.report.figures.agreement_figures import measured_against_simulated, residual_spectrum
+from bayesid.report.figures.agreement_figures import measured_against_simulated, torques_over_time
 from bayesid.report.figures.design_figures import base_motion, covariance_ellipses, joints_within_limits, tip_motion
-from bayesid.report.figures.diagnosis_figures import (
-    candidate_strengths,
-    residual_histories,
-    residual_spectra,
-    wrench_histories,
-    wrench_spectrum,
-)
+from bayesid.report.figures.diagnosis_figures import candidate_strengths, wrench_histories, wrench_spectrum
 from bayesid.report.figures.identifiability_figures import direction_widths, displacements
 from bayesid.report.figures.prediction_figures import final_positions, trajectory_bands
+from bayesid.report.figures.residual_figures import residual_histories, residual_spectra, residual_statistics
 from bayesid.report.figures.robot_figures import manoeuvre, robot_pose
 from bayesid.report.figures.sampler_figures import convergence
-from bayesid.report.figures.torque_figures import torques_over_time
 from bayesid.report.figures.uncertainty_figures import corner, correlations, prior_to_posterior
 
 __all__ = [
@@ -32,7 +26,7 @@ __all__ = [
     "prior_to_posterior",
     "residual_histories",
     "residual_spectra",
-    "residual_spectrum",
+    "residual_statistics",
     "robot_pose",
     "tip_motion",
     "torques_over_time",

@@ -1,4 +1,4 @@
-"""Designed manoeuvres: joints within their limits, tip, base, and what each would tell of the parameters."""
+"""Designed manoeuvres: joints within their limits, motion of tip and base, and the covariances they predict."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
 from bayesid.design import Design
-from bayesid.report.figures.figure_style import curve_style, decimal_scale, styled, wide_figure
+from bayesid.report.figures.figure_style import curve_style, decimal_scale, ellipse_outline, styled, wide_figure
 from bayesid.report.numbers import format_number, format_unit
 from bayesid.robot.robot import Joint
 
 __all__ = ["base_motion", "covariance_ellipses", "joints_within_limits", "tip_motion"]
 
 LIMIT: Any = {"color": "#B00020", "linewidth": 0.9, "linestyle": (0, (4, 2))}
-"""How limits are drawn."""
+"""Look of limits."""
 
 ELLIPSE = 2.4477
 """Half-width, in standard deviations, of an ellipse that holds 95 %."""
 
 WIDEST = 6.0
-"""Half-width of an ellipse's axes, in those of the middle one of all designs."""
+"""Largest half-width of a panel, in half-widths of the middle ellipse of all designs."""
 
 
 @styled
 def joints_within_limits(design: Design) -> Figure:
-    """Draw positions and speeds of the joints, one row for each unit, with the limits that lie near them."""
+    """Draw positions and speeds of the joints, one row for each unit, with the limits that lie near the curves."""
     trajectory, joints = design.trajectory, design.problem.plan.model.robot.joints
     general = design.problem.limits.joint_speed
     units = sorted({joint.unit for joint in joints}, reverse=True)
@@ -54,7 +54,7 @@ def joints_within_limits(design: Design) -> Figure:
 
 @styled
 def tip_motion(designs: Mapping[str, Design]) -> Figure:
-    """Draw speed and turning rate of the tip with their limits."""
+    """Draw speed and turning rate of the tip, with their limits."""
     figure = wide_figure(2.2)
     panels = figure.subplots(1, 2)
     limits = next(iter(designs.values())).problem.limits
@@ -77,7 +77,7 @@ def tip_motion(designs: Mapping[str, Design]) -> Figure:
 
 @styled
 def base_motion(designs: Mapping[str, Design]) -> Figure:
-    """Draw rate, displacement and attitude of the base, one column for each design: the paper's figure 4."""
+    """Draw rate, displacement and attitude of the base as the paper's figure 4 does, one column for each design."""
     figure = wide_figure(4.6)
     panels = figure.subplots(3, len(designs), squeeze=False, sharex=True, sharey="row")
     for column, (label, design) in enumerate(designs.items()):
@@ -110,25 +110,21 @@ def covariance_ellipses(
     ----------
     designs : sequence of Design
     pairs : sequence of (str, str)
-        Names of the quantities across and up.
+        Names of the quantities along and up.
     units : mapping of str to str
-        By name.
+        Unit of each quantity.
     """
     rows = -(-len(pairs) // 3)
     figure = wide_figure(0.4 + 2.05 * rows)
     panels = figure.subplots(rows, 3, squeeze=False)
     for axes in panels.flat[len(pairs) :]:
         axes.set_visible(False)
-    angle = np.linspace(0.0, 2.0 * np.pi, 181)
-    circle = ELLIPSE * np.stack([np.cos(angle), np.sin(angle)])
     for number, (axes, pair) in enumerate(zip(panels.flat, pairs, strict=False)):
         widths, outlines = [], []
         for design in designs:
             chosen = [design.predicted.names.index(name) for name in pair]
             covariance = design.predicted.covariance[np.ix_(chosen, chosen)]
-            values, vectors = np.linalg.eigh(covariance)
-            outline = (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle
-            outlines.append(outline)
+            outlines.append(ellipse_outline(covariance, ELLIPSE))
             widths.append(ELLIPSE * np.sqrt(np.diag(covariance)))
         half = 1.1 * np.minimum(np.max(widths, axis=0), WIDEST * np.median(widths, axis=0))
         scales = [decimal_scale(half[0]), decimal_scale(half[1])]
@@ -152,7 +148,7 @@ def _bounds(joint: Joint, speed: bool, general: float | None) -> list[float]:
 
 
 def _draw_limits(axes: Axes, values: Floats, bounds: set[float], unit: str) -> None:
-    """Draw the limits near the curves, and name those that would squeeze them."""
+    """Draw the limits near the curves, and name in the title those too far away to be drawn."""
     low, high = float(values.min()), float(values.max())
     span = 0.5 * max(high - low, 1e-9)
     finite = sorted(bound for bound in bounds if np.isfinite(bound))

@@ -1,141 +1,28 @@
-"""What a diagnosis saw: residuals before and after, candidates, and the reconstructed disturbance."""
+"""Strengths of the candidates of a diagnosis, and the reconstructed disturbance over time and by frequency."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-from scipy import stats
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Candidate, Frame, Unexplained
 from bayesid.diagnosis.disturbing_wrench import WAVES
-from bayesid.report.figures.agreement_figures import SENSOR_TITLES
-from bayesid.report.figures.figure_style import COLOURS, curve_style, decimal_scale, styled, wide_figure
-from bayesid.report.residual_series import Residuals
+from bayesid.report.figures.figure_style import (
+    COLOURS,
+    curve_style,
+    decimal_scale,
+    shared_legend,
+    styled,
+    wide_figure,
+)
 
-__all__ = ["candidate_strengths", "residual_histories", "residual_spectra", "wrench_histories", "wrench_spectrum"]
-
-PARTS = 40
-"""Windows that a recording is cut into for the running mean."""
-
-BINS = 40
-
-BEFORE, AFTER = COLOURS[1], COLOURS[0]
+__all__ = ["candidate_strengths", "torque_amplitudes", "wrench_histories", "wrench_spectrum"]
 
 FEW = 7
-"""Recordings that one figure can hold."""
-
-
-@styled
-def residual_histories(sides: Sequence[Residuals], index: int) -> Figure:
-    """Draw the whitened residual of one recording over time, per sensor axis: before, and after if there is one.
-
-    Parameters
-    ----------
-    sides : sequence of Residuals
-        Before, and after where something is named.
-    index : int
-        Of the recording.
-    """
-    kinds = sides[0].kinds
-    figure = wide_figure(0.45 + 1.2 * len(kinds))
-    panels = figure.subplots(len(kinds), 3, squeeze=False, sharex=True)
-    for slot, kind in enumerate(kinds):
-        columns = sides[0].posterior.model.channels.of(kind)
-        for axis in range(3):
-            axes, reach = panels[slot, axis], 4.5
-            axes.axhspan(-2.0, 2.0, color="#e8e8e8", linewidth=0.0)
-            for side, colour, label in zip(sides, (BEFORE, AFTER), ("before", "after"), strict=False):
-                time, value = side.channel(index, columns.start + axis)
-                axes.plot(time, value, ".", color=colour, markersize=1.2, alpha=0.5)
-                axes.plot(*_running_mean(time, value), color=colour, linewidth=1.0, label=_label(sides, label))
-                reach = max(reach, 1.1 * float(np.abs(value).max(initial=0.0)))
-            axes.set_ylim(-reach, reach)
-            axes.set_title(f"{SENSOR_TITLES[kind.value]} {'xyz'[axis]}")
-            axes.locator_params(axis="both", nbins=4)
-        panels[slot, 0].set_ylabel("residual [σ]")
-    for axes in panels[-1]:
-        axes.set_xlabel("time [s]")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=2)
-    return figure
-
-
-def _label(sides: Sequence[Residuals], label: str) -> str:
-    return f"{label}: samples and their running mean" if len(sides) > 1 else "samples and their running mean"
-
-
-def _running_mean(time: Floats, value: Floats) -> tuple[Floats, Floats]:
-    width = max(1, len(value) // PARTS)
-    if len(value) < 2 * width:
-        return time, value
-    window = np.full(width, 1.0 / width)
-    return np.convolve(time, window, "valid"), np.convolve(value, window, "valid")
-
-
-@styled
-def residual_spectra(sides: Sequence[Residuals]) -> Figure:
-    """Draw the periodogram of the whitened residual by sensor axis, recordings pooled; noise alone has level one."""
-    kinds = sides[0].kinds
-    figure = wide_figure(0.5 + 1.45 * len(kinds))
-    panels = figure.subplots(len(kinds), 3, squeeze=False)
-    for slot, kind in enumerate(kinds):
-        columns = sides[0].posterior.model.channels.of(kind)
-        for axis in range(3):
-            axes = panels[slot, axis]
-            _draw_spectra(axes, sides, columns.start + axis)
-            axes.set_title(f"{SENSOR_TITLES[kind.value]} {'xyz'[axis]}")
-            axes.set_xlabel("frequency [Hz]")
-        panels[slot, 0].set_ylabel("power [σ² per bin]")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3)
-    return figure
-
-
-def _draw_spectra(axes: Axes, sides: Sequence[Residuals], channel: int) -> None:
-    for side, colour, label in zip(sides, (BEFORE, AFTER), ("before", "after"), strict=False):
-        frequency, power = (np.concatenate(parts) for parts in zip(*_periodograms(side, channel), strict=True))
-        if len(frequency) == 0:
-            continue
-        bins = max(4, min(BINS, len(frequency) // 5))
-        edges = np.linspace(0.0, frequency.max() * (1.0 + 1e-9), bins + 1)
-        number = np.histogram(frequency, edges)[0]
-        full = number > 0
-        mean = np.histogram(frequency, edges, weights=power)[0][full] / number[full]
-        centre = (0.5 * (edges[1:] + edges[:-1]))[full]
-        name = label if len(sides) > 1 else "residual"
-        axes.plot(centre, mean, color=colour, marker=".", markersize=3, linewidth=0.8, label=name)
-        if side is sides[0]:
-            band = stats.gamma.ppf([[0.025], [0.975]], number[full]) / number[full]
-            axes.fill_between(
-                centre, *band, color="#e8e8e8", linewidth=0.0, zorder=0, label="95 % of bins, were it only noise"
-            )
-    axes.axhline(1.0, color="black", linewidth=0.6)
-    axes.set_yscale("log")
-    low, high = axes.get_ylim()
-    axes.set_ylim(max(min(low, 0.2), 1e-3), max(high, 5.0))
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 3.0) if high < 100.0 else (1.0,), numticks=8))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.locator_params(axis="x", nbins=4)
-
-
-def _periodograms(side: Residuals, channel: int) -> list[tuple[Floats, Floats]]:
-    """Frequencies between zero and Nyquist [Hz] and power there, by recording."""
-    found: list[tuple[Floats, Floats]] = [(np.zeros(0), np.zeros(0))]
-    for index in range(side.recordings):
-        time, value = side.channel(index, channel)
-        if len(value) < 8:
-            continue
-        power = np.abs(np.fft.rfft(value)) ** 2 / len(value)
-        frequency = np.fft.rfftfreq(len(value), float(np.median(np.diff(time))))
-        inside = slice(1, (len(value) + 1) // 2)
-        found.append((np.asarray(frequency[inside], dtype=float), np.asarray(power[inside], dtype=float)))
-    return found
+"""Largest number of recordings in one figure."""
 
 
 @styled
@@ -146,7 +33,7 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
     ----------
     rows : sequence of Candidate
     named : sequence of str
-        The verdict's causes.
+        Causes that the verdict names.
     alarm : float
         Family-wise p-value below which a candidate is significant.
     """
@@ -160,9 +47,9 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
     ]
     strength = np.array([row.signal_to_noise for row in rows])
     for kind, colour in kinds.items():
-        own = [index for index, item in enumerate(state) if item == kind]
-        if own:
-            axes.barh(place[own], strength[own], color=colour, height=0.7, label=kind)
+        chosen = [index for index, item in enumerate(state) if item == kind]
+        if chosen:
+            axes.barh(place[chosen], strength[chosen], color=colour, height=0.7, label=kind)
     for y, value in zip(place, strength, strict=True):
         axes.annotate(f"{value:.1f}", (value, y), (2, 0), textcoords="offset points", va="center", fontsize=6)
     axes.set_yticks(place, [row.name for row in rows])
@@ -176,7 +63,7 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
 
 @styled
 def wrench_histories(wrench: Unexplained, frame: Frame) -> Figure:
-    """Draw a reconstructed torque and force over time in one frame; with ± 1 sd in base axes."""
+    """Draw a reconstructed torque and force over time in the axes of one frame, with ± 1 sd in base axes."""
     figure = wide_figure(3.6)
     panels = figure.subplots(2, 3, squeeze=False, sharex=True)
     families = (
@@ -199,14 +86,13 @@ def wrench_histories(wrench: Unexplained, frame: Frame) -> Figure:
             axes.locator_params(axis="both", nbins=4)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    shared_legend(figure, panels[0, 0], columns=4)
     return figure
 
 
 @styled
 def wrench_spectrum(wrench: Unexplained) -> Figure:
-    """Draw the amplitude spectrum of the reconstructed torque, base axes, by recording."""
+    """Draw the amplitude of the reconstructed torque by frequency, in base axes, one curve per recording."""
     figure = wide_figure(1.9)
     panels = figure.subplots(1, 3, squeeze=False)
     series = [torque_amplitudes(wrench, index) for index in range(len(wrench.names[:FEW]))]
@@ -221,13 +107,12 @@ def wrench_spectrum(wrench: Unexplained) -> Figure:
         axes.set_xlabel("frequency [Hz]")
         axes.locator_params(axis="both", nbins=4)
     panels[0, 0].set_ylabel("amplitude")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    shared_legend(figure, panels[0, 0], columns=4)
     return figure
 
 
 def torque_amplitudes(wrench: Unexplained, index: int) -> tuple[Floats, Floats]:
-    """Frequencies [Hz] and amplitudes [N m] of one recording's torque about its mean, up to where it is resolved."""
+    """Return frequencies [Hz], as far as resolved, and amplitudes [N m] of one recording's torque about its mean."""
     time, torque = wrench.time[index], wrench.torque[Frame.BASE][index]
     uniform = np.linspace(time[0], time[-1], len(time))
     even = np.stack([np.interp(uniform, time, column) for column in torque.T], axis=1)

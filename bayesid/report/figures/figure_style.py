@@ -1,24 +1,57 @@
-"""One look for all figures: the page's width, small sans-serif letters, a palette that the colour-blind can read."""
+"""The look that all figures share: page width, small sans-serif letters, a palette for the colour-blind, legends."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, ParamSpec, TypeVar
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-__all__ = ["COLOURS", "DASHES", "WIDTH", "curve_style", "decimal_scale", "styled", "wide_figure"]
+from bayesid._math.arrays import Floats
+from bayesid.simulation.sensors import Kind
+
+__all__ = [
+    "BAND",
+    "COLOURS",
+    "DASHES",
+    "FILL",
+    "WIDTH",
+    "axis_title",
+    "curve_style",
+    "decimal_scale",
+    "ellipse_outline",
+    "residual_limits",
+    "sensor_panels",
+    "sensor_title",
+    "shared_legend",
+    "styled",
+    "wide_figure",
+]
 
 WIDTH = 6.7
-"""Width of the text on an A4 page [in]; figures are set in their true size."""
+"""Width of the text on an A4 page [in]; figures are printed in their true size."""
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito, Color Universal Design (2008)."""
+"""Colours of curves, by Okabe and Ito, Color Universal Design (2008)."""
 
 DASHES = ("-", "--", ":", "-.")
+"""Dashes of curves, one after the other when the colours are used up."""
+
+FILL = "#9fcbe6"
+"""Colour of histograms and marginal densities."""
+
+BAND: Any = {"color": "#e8e8e8", "linewidth": 0.0}
+"""Look of the grey band in which noise alone would stay."""
+
+LEAST_REACH = 4.5
+"""Smallest half-height of a panel of residuals [σ]."""
+
+_TITLES = {Kind.RATE: "angular rate", Kind.ACCEL: "acceleration", Kind.ATTITUDE: "rotation"}
+"""Quantity that a sensor measures, where figures call it otherwise than files do."""
 
 _SETTINGS: Any = {
     "font.family": "DejaVu Sans",
@@ -50,13 +83,13 @@ T = TypeVar("T")
 
 
 def styled(draw: Callable[P, T]) -> Callable[P, T]:
-    """Decorate a function that draws, so that it draws in this look."""
+    """Decorate a function that draws, so that it draws in the shared look."""
     decorated: Callable[P, T] = mpl.rc_context(_SETTINGS)(draw)
     return decorated
 
 
 def wide_figure(height: float) -> Figure:
-    """Return an empty figure of the page's width; its height is in inches."""
+    """Return an empty figure of the page's width and a height in inches."""
     return Figure(figsize=(WIDTH, height), layout="constrained")
 
 
@@ -66,9 +99,51 @@ def curve_style(index: int) -> dict[str, Any]:
 
 
 def decimal_scale(values: ArrayLike) -> tuple[float, str]:
-    """Return the power of a thousand to divide values by, and how to write it before their unit."""
+    """Return the power of a thousand to divide values by, and its text before their unit."""
     largest = float(np.nanmax(np.abs(np.asarray(values, dtype=float)), initial=0.0))
     if not np.isfinite(largest) or largest == 0.0 or 0.1 <= largest < 1000.0:
         return 1.0, ""
     power = 3 * int(np.floor(np.log10(largest) / 3.0))
     return 10.0**power, f"$10^{{{power}}}$ "
+
+
+def sensor_title(kind: Kind) -> str:
+    """Return the quantity that a sensor measures, as figures call it."""
+    return _TITLES.get(kind, kind.value)
+
+
+def axis_title(kind: Kind, axis: int) -> str:
+    """Return the title of the panel of one axis of a sensor, such as ``angular rate x``."""
+    return f"{sensor_title(kind)} {kind.axes[axis]}"
+
+
+def sensor_panels(figure: Figure, kinds: Sequence[Kind], sharex: bool = False) -> Any:
+    """Return panels (sensors, axes) with a row for each sensor; those without an axis are hidden."""
+    columns = max(kind.size for kind in kinds)
+    panels = figure.subplots(len(kinds), columns, squeeze=False, sharex=sharex)
+    for row, kind in zip(panels, kinds, strict=True):
+        for axes in row[kind.size :]:
+            axes.set_visible(False)
+    return panels
+
+
+def residual_limits(axes: Axes, residual: Floats) -> None:
+    """Make a panel symmetric about zero and high enough for all residuals; those that are not a number are ignored."""
+    reach = max(LEAST_REACH, 1.1 * float(np.nanmax(np.abs(residual), initial=0.0)))
+    axes.set_ylim(-reach, reach)
+
+
+def shared_legend(
+    figure: Figure, axes: Axes, columns: int, place: str = "outside upper center", markerscale: float = 1.0
+) -> None:
+    """Put the legend of one panel outside all panels, for all of them."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc=place, ncols=columns, markerscale=markerscale)
+
+
+def ellipse_outline(covariance: Floats, reach: float) -> Floats:
+    """Return the outline (2, n) of a (2, 2) covariance about the origin, ``reach`` standard deviations out."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 181)
+    values, vectors = np.linalg.eigh(covariance)
+    circle = np.stack([np.cos(angle), np.sin(angle)])
+    return np.asarray(reach * (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle)

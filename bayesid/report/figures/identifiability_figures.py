@@ -1,4 +1,4 @@
-"""Directions of the parameter space: how much of the prior is left in each, and what they move."""
+"""Directions of the parameter space: the share of the prior's width left in each, and the parameters they move."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 __all__ = ["direction_widths", "displacements"]
 
 WORST, MOST_ROWS = 12, 44
-"""Directions and parameters in the map of displacements, at most."""
+"""Largest numbers of directions and of parameters in the map of displacements."""
 
 VISIBLE = 0.1
-"""Displacement, in prior sd, from which on a parameter counts as moved."""
+"""Displacement over the largest of its direction from which on a parameter counts as moved."""
 
 LOOK = {
     ContractionVerdict.CONTRACTED: COLOURS[2],
     ContractionVerdict.WEAKLY: COLOURS[4],
     ContractionVerdict.NOT: COLOURS[1],
 }
+"""Colour of each verdict."""
 
 
 @styled
@@ -55,7 +56,7 @@ def displacements(directions: Sequence[Direction], prior_sd: Floats) -> Figure:
     """Draw the displacements of the worst known directions in units of the prior's widths, parameters down."""
     shown = directions[:WORST]
     moved = np.stack([item.displacement / prior_sd for item in shown], axis=1)
-    # relative to the largest of each direction: well known ones would be white
+    # each direction is divided by its largest displacement: otherwise the well-known ones would be white
     largest = np.abs(moved).max(axis=0)
     strength = (np.abs(moved) / largest).max(axis=1)
     rows = np.sort(np.argsort(-strength)[:MOST_ROWS])

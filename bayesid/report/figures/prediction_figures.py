@@ -1,4 +1,4 @@
-"""Predicted courses of base and end-effector, and where the final position may be."""
+"""Predicted trajectories of base and end-effector, and the distribution of the final position."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from matplotlib.figure import Figure
 from bayesid._math.arrays import Floats
 from bayesid.design.pose_region import REACH, Pose, Region
 from bayesid.design.pose_trajectory import PoseTrajectory
-from bayesid.report.figures.figure_style import curve_style, styled, wide_figure
+from bayesid.report.figures.figure_style import curve_style, ellipse_outline, styled, wide_figure
 
 __all__ = ["final_positions", "trajectory_bands"]
 
 PLANES = ((0, 1), (0, 2), (1, 2))
+"""Axes along and up of each panel."""
 
 
 @styled
 def trajectory_bands(trajectory: PoseTrajectory) -> Figure:
-    """Draw the mean course of one body, and beside it the width of its uncertainty, ± 2 sd about the mean."""
+    """Draw the mean trajectory of one body with a band of ± 2 sd, and twice the standard deviation beside it."""
     poses = [trajectory.pose(index) for index in range(len(trajectory.time))]
     figure = wide_figure(3.2)
     panels = figure.subplots(2, 2, sharex=True)
@@ -50,14 +51,15 @@ def trajectory_bands(trajectory: PoseTrajectory) -> Figure:
 
 @styled
 def final_positions(poses: Mapping[str, Pose], truth: Floats | None = None) -> Figure:
-    """Draw draws of the final position in three planes, with the shadow of the 95 % ellipsoid.
+    """Draw samples of the final position in three planes, with the projection of the 95 % ellipsoid.
 
     Parameters
     ----------
     poses : mapping of str to Pose
-        By what they are called in the legend.
+        Poses by their names in the legend.
     truth : (3,) array, optional
-        Where it really was [m]; the offset is then from there, and from the first pose's mean otherwise.
+        True position [m], from which offsets are counted; where it is left out, they are counted from the first
+        pose's mean.
     """
     figure = wide_figure(2.4)
     panels = figure.subplots(1, 3)
@@ -81,12 +83,9 @@ def final_positions(poses: Mapping[str, Pose], truth: Floats | None = None) -> F
 
 
 def _shadow(axes: Axes, draws: Floats, region: Region, plane: tuple[int, int], name: str | None, number: int) -> None:
-    """Draw points and the projection of the ellipsoid onto a plane."""
+    """Draw the samples and the projection of the ellipsoid onto a plane."""
     style = curve_style(number)
     covariance = region.covariance[np.ix_(plane, plane)]
-    values, vectors = np.linalg.eigh(covariance)
-    angle = np.linspace(0.0, 2.0 * np.pi, 181)
-    circle = np.stack([np.cos(angle), np.sin(angle)])
-    outline = REACH * (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle + region.mean[list(plane)][:, None]
+    outline = ellipse_outline(covariance, REACH) + region.mean[list(plane)][:, None]
     axes.plot(draws[:, 0], draws[:, 1], ".", color=style["color"], markersize=1.5, alpha=0.35, markeredgewidth=0.0)
     axes.plot(outline[0], outline[1], label=name, **style)

@@ -1,4 +1,4 @@
-"""The robot and its manoeuvre."""
+"""The robot in its poses, and the motion of its joints."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Motion
-from bayesid.report.figures.figure_style import curve_style, styled, wide_figure
+from bayesid.report.figures.figure_style import curve_style, shared_legend, styled, wide_figure
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
@@ -19,7 +19,7 @@ __all__ = ["equivalent_box", "manoeuvre", "robot_pose"]
 
 
 VIEWS = (("seen along −z", 0, 1), ("seen along y", 0, 2), ("seen along −x", 1, 2))
-"""Title, horizontal and vertical axis of each projection."""
+"""Title, axis along and axis up of each projection."""
 
 
 @styled
@@ -29,7 +29,7 @@ def manoeuvre(motion: Motion, robot: Robot, time: Floats) -> Figure:
     Parameters
     ----------
     time : (T,) array
-        [s]
+        Times [s]
     """
     state = motion.evaluate(np.asarray(time, dtype=float))
     units = sorted({joint.unit for joint in robot.joints}, reverse=True) or ["rad"]
@@ -54,12 +54,12 @@ def manoeuvre(motion: Motion, robot: Robot, time: Floats) -> Figure:
 
 @styled
 def robot_pose(robot: Robot, motion: Motion, times: Floats) -> Figure:
-    """Draw the robot as sticks in three projections of the base frame, darker the later.
+    """Draw the robot as sticks in three projections of the base frame, later instants darker.
 
     Parameters
     ----------
     times : (T,) array
-        [s]
+        Instants at which the robot is drawn [s].
     """
     times = np.atleast_1d(np.asarray(times, dtype=float))
     poses = kinematics(robot, motion.evaluate(times)).pose
@@ -89,13 +89,12 @@ def robot_pose(robot: Robot, motion: Motion, times: Floats) -> Figure:
         axes.set_aspect("equal")
         axes.locator_params(axis="both", nbins=5)
     _symbols(panels[0])
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4)
+    shared_legend(figure, panels[0], columns=4, place="outside lower center")
     return figure
 
 
 def equivalent_box(body: InertialParameters) -> Floats:
-    """Corners, shape (8, 3), of the homogeneous box with the body's mass, centre of mass and inertia."""
+    """Return the corners, shape (8, 3), of the homogeneous box with the body's mass, centre of mass and inertia."""
     moment = 0.5 * np.trace(body.inertia) * np.eye(3) - body.inertia
     variances, axes = np.linalg.eigh(moment / body.mass)
     half = np.sqrt(3.0 * np.maximum(variances, 0.0))
@@ -104,7 +103,7 @@ def equivalent_box(body: InertialParameters) -> Floats:
 
 
 def _sticks(robot: Robot, pose: Floats) -> list[Floats]:
-    """One polyline per moving joint, from its parent to itself, and one on to the end of every last link."""
+    """Return one stick to each moving joint from its parent, and one on to the centre of mass of every last link."""
     parents = [robot.model.parents[index + 2] - 2 for index in range(len(robot.joints))]
     origin = [pose[index, :3, 3] for index in range(len(robot.joints))]
     sticks = [
@@ -134,7 +133,7 @@ def _draw_box(axes: Axes, box: Floats, plane: tuple[int, int]) -> None:
 
 
 def _symbols(axes: Axes) -> None:
-    """Name the symbols in the legend."""
+    """Add the symbols to the legend."""
     axes.plot([], [], "s", color="#cfe3f1", markeredgecolor="#0072B2", label="base, as a homogeneous box")
     axes.plot([], [], "+", color="#0072B2", label="origin of the base frame")
     axes.plot([], [], "X", color="#666666", label="centre of mass of the whole")

@@ -1,4 +1,4 @@
-"""Whether the sampler's ensembles agree."""
+"""Agreement of the sampler's ensembles: running means and ranks."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from scipy.stats import rankdata
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.identification import Identification
-from bayesid.report.figures.figure_style import COLOURS, DASHES, styled, wide_figure
+from bayesid.report.figures.figure_style import BAND, curve_style, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_number
 
 __all__ = ["convergence"]
 
 
 SHOWN = 3
-"""Coordinates drawn: those in which the ensembles agree least."""
+"""Number of coordinates drawn, those in which the ensembles agree least."""
 
 RANK_BINS = 20
+"""Number of bins of the histograms of ranks."""
 
 
 @styled
@@ -47,8 +48,7 @@ def convergence(result: Identification) -> Figure:
         f"accepted {100.0 * chains.acceptance:.0f} % of proposals, {chains.effective_samples:.0f} effective samples"
     )
     figure.suptitle(text, fontsize=7.5)
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(handles))
+    shared_legend(figure, panels[0, 0], columns=len(chains.z) + 1, place="outside lower center")
     return figure
 
 
@@ -59,17 +59,9 @@ def _draw_running_means(axes: Axes, draws: Floats, walkers: int, autocorrelation
     scale = float(draws.std()) or 1.0
     step = np.arange(1, steps + 1)
     error = np.sqrt(np.maximum(autocorrelation, 1.0) / (step * walkers))
-    axes.fill_between(step, -2.0 * error, 2.0 * error, color="#e8e8e8", linewidth=0.0, label="95 % expected")
+    axes.fill_between(step, -2.0 * error, 2.0 * error, **BAND, label="95 % expected")
     for number, values in enumerate((running - draws.mean()) / scale):
-        style = DASHES[number // len(COLOURS) % len(DASHES)]
-        axes.plot(
-            step,
-            values,
-            color=COLOURS[number % len(COLOURS)],
-            linestyle=style,
-            linewidth=0.8,
-            label=f"ensemble {number + 1}",
-        )
+        axes.plot(step, values, linewidth=0.8, label=f"ensemble {number + 1}", **curve_style(number))
     reach = 4.0 * float(error[min(len(error) - 1, max(1, len(error) // 20))])
     axes.set_ylim(-reach, reach)
     axes.set_xlim(1, max(steps, 2))
@@ -80,7 +72,7 @@ def _draw_ranks(axes: Axes, draws: Floats) -> None:
     edges = np.linspace(0.0, 1.0, RANK_BINS + 1)
     for number, values in enumerate(rank):
         density = np.histogram(values, edges, density=True)[0]
-        axes.stairs(density, edges, color=COLOURS[number % len(COLOURS)], linewidth=0.8)
+        axes.stairs(density, edges, color=curve_style(number)["color"], linewidth=0.8)
     axes.axhline(1.0, color="black", linewidth=0.6)
     axes.set_ylim(0.0, 2.0)
     axes.set_xlim(0.0, 1.0)

@@ -1,4 +1,4 @@
-"""What is known of the parameters: joint distributions, correlations, and how much the data narrowed the prior."""
+"""Uncertainty of the parameters: joint distributions, correlations, and the posterior's width over the prior's."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, bodies_of, reported_effect
 from bayesid.inference.contraction import half_range
 from bayesid.inference.identification import Identification
-from bayesid.report.figures.figure_style import COLOURS, WIDTH, styled, wide_figure
-from bayesid.report.numbers import format_number, format_quantity, format_unit
+from bayesid.report.figures.figure_style import COLOURS, FILL, WIDTH, styled, wide_figure
+from bayesid.report.numbers import format_fixed, format_number, format_quantity, format_unit
 
 __all__ = ["corner", "correlations", "prior_to_posterior", "widths"]
 
 
 REACH = 3.5
-"""Half width of a corner plot's axes, in posterior standard deviations."""
+"""Half-width of a corner plot's axes in posterior standard deviations."""
 
 CELLS = 35
-"""Cells of a corner plot's histograms along one axis."""
+"""Number of cells of a corner plot's histograms along one axis."""
 
 PRIOR_DRAWS = 4000
+"""Number of draws from the prior."""
 
 
 @styled
 def corner(body: BodyDraws) -> Figure:
-    """Draw the joint distributions of one body's ten quantities, about their means in posterior standard deviations.
+    """Draw the joint distributions of one body's ten quantities about their means, in posterior standard deviations.
 
     The contours hold 50 % and 90 % of the draws.
     """
@@ -60,7 +61,7 @@ def corner(body: BodyDraws) -> Figure:
 def _draw_marginal(axes: Axes, values: Floats) -> None:
     density, edges = np.histogram(values, bins=CELLS, range=(-REACH, REACH), density=True)
     centres = 0.5 * (edges[1:] + edges[:-1])
-    axes.fill_between(centres, gaussian_filter1d(density, 0.8), color="#9fcbe6", linewidth=0.0)
+    axes.fill_between(centres, gaussian_filter1d(density, 0.8), color=FILL, linewidth=0.0)
     axes.set_ylim(0.0, None)
 
 
@@ -114,16 +115,10 @@ def correlations(names: Sequence[str], covariance: ArrayLike) -> Figure:
     if count <= 24:
         for row in range(count):
             for column in range(count):
-                value = float(np.round(values[row, column], 2)) + 0.0
-                colour = "white" if abs(value) > 0.6 else "black"
+                value = float(values[row, column])
+                colour = "white" if abs(round(value, 2)) > 0.6 else "black"
                 axes.text(
-                    column,
-                    row,
-                    f"{value:.2f}".replace("-", "−"),
-                    ha="center",
-                    va="center",
-                    color=colour,
-                    fontsize=size - 1.0,
+                    column, row, format_fixed(value, 2), ha="center", va="center", color=colour, fontsize=size - 1.0
                 )
     figure.colorbar(image, ax=axes, label="correlation", shrink=0.8, aspect=30)
     return figure
@@ -136,7 +131,7 @@ def prior_to_posterior(result: Identification, seed: int = 0) -> Figure:
     Parameters
     ----------
     seed : int
-        Of the draws from the prior.
+        Seed of the draws from the prior.
     """
     prior, posterior = widths(result, seed)
     names = list(posterior)
@@ -160,7 +155,7 @@ def prior_to_posterior(result: Identification, seed: int = 0) -> Figure:
 
 
 def widths(result: Identification, seed: int = 0) -> tuple[dict[str, float], dict[str, float]]:
-    """Half the central 68 % range of every reported quantity, in the prior and in the posterior."""
+    """Return half the central 68 % range of every reported quantity, in the prior and in the posterior."""
     z = np.random.default_rng(seed).normal(size=(PRIOR_DRAWS, result.posterior.size))
     values = result.posterior.unknowns.values_of(z)
     prior = _half_ranges(bodies_of(result.posterior, z))

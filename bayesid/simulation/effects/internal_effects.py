@@ -69,7 +69,7 @@ class WheelMomentum(Effect):
 class _Vibration(Effect):
     """Something on a spring inside the base: what such effects share."""
 
-    separated_by = "It swings on: excite it with one quick motion, then record with the arm at rest."
+    separated_by = "It goes on swinging: excite it with one quick motion, then record with the arm at rest."
     frequency: float = FREQUENCY
 
     @property

@@ -1,16 +1,18 @@
-"""Sentences of a design report: the outcome, what each criterion asks for, what was assumed."""
+"""Sentences of a design report: the outcome, the meaning of each criterion, and the assumptions."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from bayesid._io.words import counted, joined, ordinal
 from bayesid.design import Design
-from bayesid.report.assumptions import planning_sentences, span
-from bayesid.report.numbers import format_number, format_unit
+from bayesid.report.numbers import format_number, format_range, format_unit
+from bayesid.report.sentences.model_assumptions import planning_sentences
 
 __all__ = ["MEANING", "assumption_sentences", "design_sentences", "reference_design", "summary"]
 
 REFERENCE = "paper-26"
+"""Name of the design that the others are compared with."""
 
 MEANING: Mapping[str, str] = {
     "paper-26": "The paper's (26) as printed, of the largest excursions y1, y2, y3 of the base's position and of its "
@@ -28,22 +30,23 @@ MEANING: Mapping[str, str] = {
     "separation": "The largest signal-to-noise ratio by which the rival effects can be told apart, with everything "
     "else unknown.",
 }
-"""One sentence or so on each criterion."""
+"""Meaning of each criterion, by its name."""
 
 
 def reference_design(designs: Sequence[Design]) -> Design:
-    """Return the design that others are compared with: that by (26), or the first where there is none."""
+    """Return the design that the others are compared with: the one by (26), or the first where there is none."""
     return next((design for design in designs if design.name == REFERENCE), designs[0])
 
 
 def summary(designs: Sequence[Design], best: Design) -> str:
-    """Return which manoeuvre is best and what it buys."""
+    """Return which manoeuvre is best and by how much it narrows the posterior."""
     reference, family = reference_design(designs), best.problem.plan.family
-    names = " and ".join(body.name for body in best.problem.plan.model.bodies)
+    names = joined(body.name for body in best.problem.plan.model.bodies)
     text = (
-        f"{len(designs)} manoeuvre{'' if len(designs) == 1 else 's'} of {family.duration:g} s for the robot "
-        f"{best.problem.plan.model.robot.name}, of the family {family.name} with {family.size} parameters, were "
-        f"designed to identify {names}. The smallest posterior is that of {best.name}"
+        f"{counted(len(designs), 'manoeuvre')} of {family.duration:g} s for the robot "
+        f"{best.problem.plan.model.robot.name}, of the family {family.name} with {family.size} parameters, "
+        f"{'was' if len(designs) == 1 else 'were'} designed to identify {names}. "
+        f"The smallest posterior is that of {best.name}"
     )
     if best is reference:
         return f"{text}. {_verdict(best)}"
@@ -56,7 +59,7 @@ def summary(designs: Sequence[Design], best: Design) -> str:
 
 
 def design_sentences(designs: Sequence[Design], best: Design) -> list[str]:
-    """Return one sentence per design for the terminal, and the best."""
+    """Return one sentence on each design and one on the best, for the terminal."""
     reference = reference_design(designs)
     scale = reference.predicted.geometric_mean
     lines = [
@@ -68,25 +71,25 @@ def design_sentences(designs: Sequence[Design], best: Design) -> list[str]:
 
 
 def assumption_sentences(best: Design) -> list[str]:
-    """Return what the design supposes."""
+    """Return what the design assumes."""
     problem = best.problem
     plan = problem.plan
     sensors = [
-        f"Sensor {sensor.kind.value}: white noise of {span(list(sensor.noise.sigma(plan.interval)))} "
+        f"Sensor {sensor.kind.value}: white noise of {format_range(sensor.noise.sigma(plan.interval))} "
         f"{format_unit(sensor.kind.unit)} per sample and axis."
         for sensor in plan.model.sensors
     ]
     return [
         "The search compares manoeuvres by the white noise of the sensors alone; the predicted standard deviations and "
         "covariances below include the noise of the encoders and filters, and every other unknown is marginalised.",
-        "PredictedReadings hold to first order about the prior's centre (Laplace), and include the prior.",
+        "Predictions hold to first order about the prior's centre (Laplace), and include the prior.",
         f"Sampling every {plan.interval:g} s; the search integrates with steps of {format_number(plan.step)} s and "
-        f"simulates every {_ordinal(plan.thinning)} sample. Limits are looked at every half step in the search, and "
-        "eight times more finely at its end.",
+        f"simulates every {f'{ordinal(plan.thinning)} ' if plan.thinning > 1 else ''}sample. Limits are evaluated "
+        "every half step in the search, and eight times more finely at its end.",
         f"Tip speed and tip rate are those of {plan.tip.name}, each the larger of the one relative to the base and the "
         "one relative to inertial space.",
-        "The risk is taken over draws of the prior of the bodies, the base starting at rest: the initial rate, which "
-        "the manoeuvre does not cause, is left out.",
+        "The risk is evaluated over draws from the prior of the bodies with the base starting at rest: the initial "
+        "rate, which the manoeuvre does not cause, is left out.",
         *sensors,
         *planning_sentences(plan),
     ]
@@ -96,13 +99,9 @@ def _verdict(best: Design) -> str:
     if best.go:
         return "It keeps every limit, with 99 % probability also under the present uncertainty of the robot."
     broken = ", ".join(
-        f"{risk.name} ({format_number(risk.quantile)} {risk.unit})" for risk in best.risks if not risk.go
+        f"{risk.name} ({format_number(risk.quantile)} {format_unit(risk.unit)})" for risk in best.risks if not risk.go
     )
     return (
         "It keeps every limit for the robot as given, but under the present uncertainty not with 99 % probability: "
-        f"{broken}. It is no go until the robot is known better or the limits leave more room."
+        f"{broken}. It is a no go until the robot is known better or the limits leave more room."
     )
-
-
-def _ordinal(number: int) -> str:
-    return {1: "single", 2: "second", 3: "third"}.get(number, f"{number}th")

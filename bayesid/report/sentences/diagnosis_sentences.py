@@ -1,32 +1,37 @@
-"""Sentences of a diagnosis' report: verdict, causes, gain, how it was made."""
+"""Sentences of a diagnosis: the verdict, its causes, what they gain, and how the verdict was reached."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, Status, Unexplained
 from bayesid.diagnosis.amplitude_scale import SCALES
+from bayesid.diagnosis.cause_amplitudes import amplitudes_of
 from bayesid.diagnosis.noise_faults import SUMMARIES
+from bayesid.diagnosis.rival_causes import differing
 from bayesid.diagnosis.test_suite import FALSE_ALARM
 from bayesid.diagnosis.verdict import RIVALRY
-from bayesid.report.diagnosis_advice import advice, differing
-from bayesid.report.diagnosis_tables import amplitude_text, amplitudes_of, format_p, largest_shift, signed
-from bayesid.report.numbers import format_number
+from bayesid.report.numbers import format_fixed, format_number, format_p_value, format_signed
+from bayesid.report.sentences.amplitude_words import amplitude_text
+from bayesid.report.sentences.next_experiment import advice
 
 __all__ = [
     "advice_sentences",
+    "alarm_sentence",
     "cause_sentences",
+    "diagnosis_sentences",
     "gain_sentence",
-    "made_sentences",
-    "rest_sentence",
+    "method_sentences",
     "verdict_sentence",
     "wrench_sentence",
 ]
 
 AT_MOST = 6
-"""Quantities of one cause that a sentence holds."""
+"""Largest number of quantities of one cause in a sentence."""
 
 RELEASED = "The base was already turning when the recordings began, although the study takes it to be at rest."
+"""Summary of the cause that the initial rate is not zero."""
 
 FIXED = {
     Frame.BASE: "It keeps its direction in base axes: its source is on board.",
@@ -34,10 +39,22 @@ FIXED = {
     "flight.",
     Frame.INERTIAL: "It keeps its direction in inertial space: its source lies outside the orbit, as the Sun does.",
 }
+"""Where the source of a disturbance is, by the axes in which it keeps its direction."""
+
+
+def diagnosis_sentences(result: Diagnosis) -> Iterator[str]:
+    """Return the verdict, its causes, its rivals and its gain, for the terminal."""
+    yield verdict_sentence(result)
+    yield from cause_sentences(result)
+    for rival in result.verdict.rivals:
+        yield f"Rival: {' + '.join(rival.labels)}."
+    yield gain_sentence(result)
+    if result.verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
+        yield wrench_sentence(result.unexplained)
 
 
 def verdict_sentence(result: Diagnosis) -> str:
-    """Say what the verdict is and what it means."""
+    """Return the verdict and what it means."""
     causes = joined(result.verdict.causes)
     one = len(result.verdict.causes) == 1
     return {
@@ -52,26 +69,31 @@ def verdict_sentence(result: Diagnosis) -> str:
     }[result.verdict.status]
 
 
-def rest_sentence(result: Diagnosis) -> str:
-    """Say what the tests find before and after."""
+def alarm_sentence(result: Diagnosis) -> str:
+    """Return the most significant test before, and after where causes are named."""
     before, after = result.before.outcome, result.after.outcome
     first = (
         f"Of {len(before.log_p)} tests of what the present simulation leaves, the most significant is "
-        f"that for {before.worst} (p {_p(before.p_value)}, all tests counted)"
+        f"that for {before.worst} (p {_relation(before.p_value)}, all tests counted)"
     )
     if not result.verdict.causes:
         return f"{first}; an alarm is raised below {FALSE_ALARM:g}."
     return (
         f"{first}. With the named cause{'s' if len(result.verdict.causes) > 1 else ''} it is that for {after.worst} "
-        f"(p {_p(after.p_value)}); an alarm is raised below {FALSE_ALARM:g}."
+        f"(p {_relation(after.p_value)}); an alarm is raised below {FALSE_ALARM:g}."
     )
 
 
+def _relation(p_value: float) -> str:
+    text = format_p_value(p_value)
+    return text if text.startswith("<") else f"= {text}"
+
+
 def cause_sentences(result: Diagnosis) -> Iterator[str]:
-    """Describe every named cause: what it is, how large, and under which other names it goes."""
+    """Return what each named cause is, how large it is, and by which other names it goes."""
     best = result.verdict.best
     for label in result.verdict.causes:
-        parts = [f"{label}. {_summary(result, label)}"]
+        parts = [f"{label}. {_summary(best, label)}"]
         amplitude = amplitudes_of(best, label)
         if amplitude:
             rest = "; all are in the table of the named causes" if len(amplitude) > AT_MOST else ""
@@ -81,14 +103,8 @@ def cause_sentences(result: Diagnosis) -> Iterator[str]:
         yield " ".join(parts)
 
 
-def _p(value: float) -> str:
-    text = format_p(value)
-    return text if text.startswith("<") else f"= {text}"
-
-
-def _summary(result: Diagnosis, label: str) -> str:
-    best = result.verdict.best
-    for effect in best.fit.effects:
+def _summary(hypothesis: Hypothesis, label: str) -> str:
+    for effect in hypothesis.fit.effects:
         if effect.label == label:
             return effect.summary
     if label == "initial-rate":
@@ -97,7 +113,7 @@ def _summary(result: Diagnosis, label: str) -> str:
 
 
 def gain_sentence(result: Diagnosis) -> str:
-    """Say in one sentence what the extension gains; of the present model, how it stands where nothing is named."""
+    """Return what the named causes gain, or how the present model fits where none is named."""
     before, after = result.gain.before, result.gain.after
     if not result.verdict.causes:
         return (
@@ -109,61 +125,55 @@ def gain_sentence(result: Diagnosis) -> str:
         change = float(after.held_out.sum() - before.held_out.sum())
         verb = "rises" if change >= 0.0 else "falls"
         parts.append(f"the log score of recordings predicted from the others {verb} by {format_number(abs(change), 4)}")
-    if shift := largest_shift(before.bodies.names, result.gain.shift):
+    if shifts := dict(zip(before.bodies.names, result.gain.shift.tolist(), strict=True)):
+        name = max(shifts, key=lambda key: abs(shifts[key]))
         parts.append(
-            f"the inertial parameter that moves most is {shift[0]}, by {signed(shift[1])} of the standard deviations "
-            "that would have been believed without it"
+            f"the inertial parameter that moves most is {name}, by {format_signed(shifts[name])} of the standard "
+            "deviations that would have been believed without it"
         )
     text = f"{', '.join(parts[:-1])}, and {parts[-1]}" if len(parts) > 1 else parts[0]
     return f"What it gains: {text}."
 
 
 def wrench_sentence(wrench: Unexplained) -> str:
-    """Say how strong a reconstructed disturbance is and in which axes it keeps its direction."""
+    """Return how strong a reconstructed disturbance is, and in which axes it keeps its direction."""
     if wrench.signal_to_noise == 0.0:
         return "A free torque and force on the base would explain no more than noise does."
     where = FIXED[wrench.fixed_in] if wrench.fixed_in else "In which axes it keeps its direction is not decided."
-    strength = f"{wrench.signal_to_noise:.1f}"
+    strength = format_fixed(wrench.signal_to_noise, 1)
     return f"As a free torque and force on the base it has a signal-to-noise ratio of {strength}. {where}"
 
 
 def advice_sentences(result: Diagnosis, rivals: Sequence[Hypothesis]) -> Iterator[str]:
-    """Say what to fly next for each cause in which the best and its rivals differ."""
+    """Return the manoeuvre that would bring out each cause in which the best hypothesis and its rivals differ."""
     if not rivals:
         return
     leader = result.verdict.best if result.verdict.best.labels else rivals[0]
-    names: list[str] = []
-    for rival in rivals:
-        mine, theirs = differing(leader, rival)
-        names += [name for name in (*mine, *theirs) if name not in names]
-    for name in names:
+    names = [name for rival in rivals for side in differing(leader, rival) for name in side]
+    for name in dict.fromkeys(names):
         yield f"{name}: {advice(name)}"
 
 
-def made_sentences(result: Diagnosis) -> Iterator[str]:
-    """Say how the verdict was reached."""
+def method_sentences(result: Diagnosis) -> Iterator[str]:
+    """Return how the verdict was reached."""
     search = result.search
     yield (
         f"An alarm is raised where the smallest p-value of the whole family of {len(search.base.outcome.log_p)} tests "
         f"is one that noise alone gives in less than {100.0 * FALSE_ALARM:g} % of cases. The family holds every "
         "candidate, smooth disturbing torques and forces, vibrations, the residual of each channel, and the sensors' "
-        "noise. How small the smallest p-value comes out by chance was simulated, with all dependence between tests."
+        "noise. The distribution of the smallest p-value under noise alone was simulated, with all dependence between "
+        "the tests."
     )
     yield (
-        f"{len(search.candidates)} causes of the catalogue could exist here: {', '.join(search.candidates)}. Others "
+        f"{len(search.candidates)} causes of the catalogue are possible here: {', '.join(search.candidates)}. Others "
         "were not considered."
     )
     yield (
         "Causes are tried one at a time, then the best in pairs, then in threes. The smallest set that leaves nothing "
         "but noise is named; sets of one size are ranked by their evidence, from the Laplace approximation. Rivals "
         f"are within {RIVALRY:g} of the best in the logarithm of the Bayes factor. The scale of a cause's amplitudes "
-        f"of one unit is unknown: the priors shown, or one of {len(SCALES) - 1} down to {SCALES[-1]:g} of them, all "
-        "equally probable."
+        f"of one unit is unknown: it is that of the priors shown, or one of {len(SCALES) - 1} smaller scales down to "
+        f"{SCALES[-1]:g} of it, all equally probable."
     )
-    yield "Faults of noise are blamed only where no physical cause explains what is left."
+    yield "Faults of the noise are named only where no physical cause explains the residual."
     yield f"Seed of all random numbers: {search.seed}."
-
-
-def joined(names: tuple[str, ...] | list[str]) -> str:
-    """Join names with commas and an 'and'."""
-    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else "".join(names)

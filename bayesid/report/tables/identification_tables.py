@@ -10,22 +10,29 @@ from bayesid.inference.body_quantities import BODY_QUANTITIES, reported_effect
 from bayesid.inference.contraction import Contraction, ContractionVerdict
 from bayesid.inference.identification import Identification
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.sensor_fit import SensorFit, TorqueFit
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.smoothing import SmoothedJoint
-from bayesid.report.numbers import format_number, format_quantity, format_unit
-from bayesid.report.sensor_fit import SensorFit, TorqueFit
+from bayesid.report.document import Rows
+from bayesid.report.numbers import (
+    format_fixed,
+    format_number,
+    format_percent,
+    format_quantity,
+    format_range,
+    format_unit,
+)
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.simulation.effects import Effect
 
-__all__ = ["effect_rows", "joint_rows", "misfit_rows", "parameter_rows", "start_rows"]
+__all__ = ["effect_rows", "joint_rows", "misfit_rows", "parameter_rows", "prior_range", "start_rows", "torque_rows"]
 
-Rows = list[list[str]]
-
-FAMILIES = ("position", "velocity", "acceleration")
+FAMILIES = {"position": "", "velocity": "/s", "acceleration": "/s²"}
+"""Families of joint channels, with what follows the unit of the joint's position."""
 
 
 def parameter_rows(result: Identification) -> Rows:
-    """Quantity, unit, prior centre, posterior, relative sd, shrinkage of the prior of every identified body."""
+    """Return quantity, unit, prior centre, posterior, relative sd and shrinkage for every identified body."""
     rows = []
     for prior in result.posterior.model.bodies:
         body, centre = result.bodies[prior.name], mass_com_inertia(prior.centre.vector)
@@ -45,7 +52,7 @@ def parameter_rows(result: Identification) -> Rows:
 
 
 def effect_rows(result: Identification) -> Rows:
-    """Quantity, unit, prior (central 68 %), posterior and distance from zero of every effect that has parameters."""
+    """Return quantity, unit, central 68 % of the prior, posterior and distance from zero of effects with parameters."""
     rows = []
     for effect in result.posterior.model.effects:
         if not effect.parameters:
@@ -65,7 +72,7 @@ def effect_rows(result: Identification) -> Rows:
                         format_unit(unit),
                         f"{format_number(prior[0][index])} to {format_number(prior[1][index])}",
                         format_quantity(mean, sd),
-                        f"{abs(mean) / sd:.1f} sd" if sd > 0.0 else "",
+                        f"{format_fixed(abs(mean) / sd, 1)} sd" if sd > 0.0 else "",
                     ]
                 )
     return rows
@@ -80,7 +87,7 @@ def prior_range(effect: Effect) -> tuple[Floats, Floats]:
 
 
 def start_rows(result: Identification) -> Rows:
-    """Return initial rate and attitude of each recording, where unknown."""
+    """Return recording, unknown, unit, prior, and posterior per axis for unknown initial rates and attitudes."""
     posterior = result.posterior
     values = posterior.unknowns.values_of(result.chains.flat)
     rows = []
@@ -89,32 +96,32 @@ def start_rows(result: Identification) -> Rows:
         unknown.append(("initial rotation", "rad", values.tilt, posterior.unknowns.tilt_sigma[index]))
         for label, unit, draws, sigma in unknown:
             if sigma > 0.0:
-                own = np.asarray(draws)[:, index]
+                drawn = np.asarray(draws)[:, index]
                 texts = [
-                    format_quantity(float(m), float(s))
-                    for m, s in zip(own.mean(axis=0), own.std(axis=0, ddof=1), strict=True)
+                    format_quantity(float(mean), float(sd))
+                    for mean, sd in zip(drawn.mean(axis=0), drawn.std(axis=0, ddof=1), strict=True)
                 ]
                 rows.append([manoeuvre.recording.name, label, unit, f"0 ± {format_number(sigma)}", *texts])
     return rows
 
 
 def misfit_rows(posterior: Posterior, fits: list[list[SensorFit]]) -> Rows:
-    """Return recording, sensor, scalar samples, chi2 per sample and largest residual."""
+    """Return recording, sensor, number of scalar samples, chi-square per sample and largest residual."""
     return [
         [
             manoeuvre.recording.name,
             fit.kind.value,
             str(fit.samples),
-            f"{fit.chi2 / max(fit.samples, 1):.3f} ± {np.sqrt(2.0 / max(fit.samples, 1)):.3f}",
-            f"{np.nanmax(np.abs(fit.residual), initial=0.0):.1f} σ",
+            _chi2_per_sample(fit.chi2, max(fit.samples, 1)),
+            _largest(fit.residual),
         ]
-        for manoeuvre, own in zip(posterior.manoeuvres, fits, strict=True)
-        for fit in own
+        for manoeuvre, sensors in zip(posterior.manoeuvres, fits, strict=True)
+        for fit in sensors
     ]
 
 
 def torque_rows(posterior: Posterior, fits: list[list[TorqueFit]]) -> Rows:
-    """Return recording, joint, noise, samples used, chi2 per sample and largest residual."""
+    """Return recording, joint, noise, number of samples used, chi-square per sample and largest residual."""
     sigmas = () if posterior.model.torque is None else posterior.model.torque.sigma
     return [
         [
@@ -122,19 +129,30 @@ def torque_rows(posterior: Posterior, fits: list[list[TorqueFit]]) -> Rows:
             fit.joint,
             f"{format_number(sigma, 2)} {fit.unit}",
             f"{len(fit.residual)} of {len(fit.time)}",
-            f"{(fit.residual**2).mean():.3f} ± {np.sqrt(2.0 / len(fit.residual)):.3f}" if len(fit.residual) else "none",
-            f"{np.max(np.abs(fit.residual), initial=0.0):.1f} σ",
+            _chi2_per_sample(float(fit.residual @ fit.residual), len(fit.residual)) if len(fit.residual) else "none",
+            _largest(fit.residual),
         ]
-        for manoeuvre, own in zip(posterior.manoeuvres, fits, strict=True)
-        for fit, sigma in zip(own, sigmas, strict=True)
+        for manoeuvre, joints in zip(posterior.manoeuvres, fits, strict=True)
+        for fit, sigma in zip(joints, sigmas, strict=True)
     ]
 
 
+def _chi2_per_sample(chi2: float, samples: int) -> str:
+    """Return chi-square per sample ± the standard deviation that noise alone gives it."""
+    return f"{format_fixed(chi2 / samples, 3)} ± {format_fixed(float(np.sqrt(2.0 / samples)), 3)}"
+
+
+def _largest(residual: Floats) -> str:
+    return f"{format_fixed(float(np.nanmax(np.abs(residual), initial=0.0)), 1)} σ"
+
+
 def joint_rows(posterior: Posterior) -> Rows:
-    """Joint, noise of its channels, order of its smoothing and misfit, the last two one value per recording."""
-    joints = posterior.model.robot.joints
+    """Return joint, noise of its channels, order of its smoothing and misfit, the last two for each recording in turn.
+
+    The rows are empty where the motion of the joints is prescribed.
+    """
     rows = []
-    for index, joint in enumerate(joints):
+    for index, joint in enumerate(posterior.model.robot.joints):
         fits: list[SmoothedJoint] = []
         noise: dict[str, list[float]] = {}
         for manoeuvre in posterior.manoeuvres:
@@ -145,29 +163,28 @@ def joint_rows(posterior: Posterior) -> Rows:
                     noise.setdefault(family, []).append(sigma)
                 fits.append(fit)
         if fits:
-            texts = [
-                f"{family} {_span(values)} {joint.unit}{('', '/s', '/s²')[FAMILIES.index(family)]}"
-                for family, values in noise.items()
-            ]
-            orders = ", ".join(str(fit.order) for fit in fits)
-            misfits = ", ".join(f"{fit.chi2 / max(fit.samples, 1):.2f}" for fit in fits)
-            rows.append([joint.name, "; ".join(texts), orders, misfits])
+            rows.append(
+                [
+                    joint.name,
+                    "; ".join(
+                        f"{family} {format_range(values, 2)} {joint.unit}{FAMILIES[family]}"
+                        for family, values in noise.items()
+                    ),
+                    ", ".join(str(fit.order) for fit in fits),
+                    ", ".join(format_fixed(fit.chi2 / max(fit.samples, 1), 2) for fit in fits),
+                ]
+            )
     return rows
-
-
-def _span(values: list[float]) -> str:
-    low, high = format_number(min(values), 2), format_number(max(values), 2)
-    return low if low == high else f"{low} to {high}"
 
 
 def _shrinkage(contraction: Contraction) -> str:
     if contraction.verdict is ContractionVerdict.NOT:
         return "prior only"
-    text = f"{format_number(100.0 * contraction.shrinkage, 3)} %"
+    text = format_percent(contraction.shrinkage, 3)
     return text if contraction.verdict is ContractionVerdict.CONTRACTED else f"{text} (weakly)"
 
 
 def _relative(mean: float, sd: float) -> str:
     if mean == 0.0 or sd > abs(mean):
         return "> 100 %"
-    return f"{format_number(100.0 * sd / abs(mean), 2)} %"
+    return format_percent(sd / abs(mean), 2)

@@ -1,4 +1,4 @@
-"""Sentences on what a model supposes: priors, links, sensors, effects, orbit, joint motion, integration."""
+"""Sentences on what a model assumes of priors, links, sensors, effects, orbit, joint motion and integration."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ import numpy as np
 from bayesid.design import Plan
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
-from bayesid.report.numbers import format_number, format_unit
-from bayesid.report.sensor_fit import sensor_sigma
+from bayesid.report.numbers import format_number, format_percent, format_range, format_unit, format_vector
+from bayesid.robot.inertial_parameters import PARAMETERS
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Filter, Kind, Sensor
 
-__all__ = ["model_sentences", "planning_sentences", "span"]
+__all__ = ["model_sentences", "planning_sentences"]
 
 
 def model_sentences(posterior: Posterior, integration_error: float) -> list[str]:
-    """Return what the model and the declared noise suppose.
+    """Return what the model and the declared noise assume.
 
     Parameters
     ----------
     posterior : Posterior
     integration_error : float
-        Largest, in standard deviations of a sample.
+        Largest error of the integration in standard deviations of a sample.
     """
     model = posterior.model
     return [
@@ -41,7 +41,7 @@ def model_sentences(posterior: Posterior, integration_error: float) -> list[str]
 
 
 def planning_sentences(planned: Posterior | Plan) -> list[str]:
-    """Return what a prediction supposes of the robot and of what acts on it; it has no sensors."""
+    """Return what a prediction, which has no sensors, assumes of the robot and of what acts on it."""
     model = planned.model
     tilt = max(planned.unknowns.tilt_sigma)
     attitude = f"uncertain by {format_number(tilt)} rad per axis" if tilt > 0.0 else "known exactly"
@@ -68,7 +68,7 @@ def _prior_sentences(posterior: Posterior) -> list[str]:
 
 
 def _body_sentences(model: Model) -> list[str]:
-    return _carried_sentences(model) or [
+    return _joint_prior_sentences(model) or [
         f"Prior of {body.name}: the log-Cholesky coordinates of its pseudo-inertia are normal about the given values, "
         f"with a relative width of {format_number(body.spread)}, so that every value is a physical body. The "
         f"logarithm of the mass has a standard deviation of {format_number(2.0 * body.spread)}."
@@ -76,14 +76,14 @@ def _body_sentences(model: Model) -> list[str]:
     ]
 
 
-def _carried_sentences(model: Model) -> list[str]:
-    """Describe a joint prior; empty where bodies are independent."""
+def _joint_prior_sentences(model: Model) -> list[str]:
+    """Describe a joint prior of the bodies; nothing where they are independent."""
     if model.mixing is None:
         return []
     # theta_1 is half the logarithm of the mass
-    widths = np.linalg.norm(np.array(model.mixing)[::10], axis=1)
+    widths = np.linalg.norm(np.array(model.mixing)[::PARAMETERS], axis=1)
     masses = ", ".join(
-        f"{prior.name} {format_number(prior.centre.mass, 5)} kg ± {format_number(200.0 * float(width), 2)} %"
+        f"{prior.name} {format_number(prior.centre.mass, 5)} kg ± {format_percent(2.0 * float(width), 2)}"
         for prior, width in zip(model.priors, widths, strict=True)
         if not prior.nuisance
     )
@@ -98,7 +98,7 @@ def _link_sentence(model: Model) -> str:
     nuisance = [prior for prior in model.priors if prior.nuisance]
     if not nuisance:
         return "All other links are known exactly: masses, centres of mass, inertias and geometry as given."
-    width = span([prior.spread for prior in nuisance])
+    width = format_range(prior.spread for prior in nuisance)
     names = ", ".join(prior.name for prior in nuisance)
     return (
         f"The inertial parameters of {names} are uncertain by a relative width of {width}, which the result accounts "
@@ -107,11 +107,12 @@ def _link_sentence(model: Model) -> str:
 
 
 def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:
-    width = span(sensor_sigma(posterior, sensor).ravel().tolist())
+    width = format_range(
+        float(sigma) for index in range(len(posterior.manoeuvres)) for sigma in posterior.data.sigma(index, sensor.kind)
+    )
     parts = [f"Sensor {sensor.kind.value}: white noise of {width} {format_unit(sensor.kind.unit)} per sample and axis"]
     if sensor.kind is Kind.ACCEL:
-        position = ", ".join(format_number(float(value)) for value in np.asarray(sensor.position, dtype=float))
-        parts.append(f"mounted at ({position}) m in the base frame")
+        parts.append(f"mounted at {format_vector(np.asarray(sensor.position, dtype=float))} m in the base frame")
     if not np.allclose(sensor.rotation, np.eye(3)):
         parts.append("turned against the base axes as declared")
     if sensor.filter.low_pass is not None:
@@ -126,10 +127,10 @@ def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:
 def _torque_sentences(model: Model) -> list[str]:
     if model.torque is None:
         return []
-    width = span(list(model.torque.sigma))
+    width = format_range(model.torque.sigma)
     return [
         f"Joint torques of {', '.join(model.torque.joints)}: white noise of {width} N m (N of prismatic joints) per "
-        "sample, read at the motor's side. A joint's friction acts only as far as an effect of the model says."
+        "sample, measured at the motor's side. A joint's friction acts only as far as an effect of the model says."
     ]
 
 
@@ -161,9 +162,3 @@ def _motion_sentence(posterior: Posterior) -> str:
         "The motion of the joints is a smoothing spline through the samples of the encoders (last table); its "
         f"uncertainty is carried into the noise of the sensors, {reach}."
     )
-
-
-def span(values: list[float]) -> str:
-    """Return smallest and largest of some values, or the one value."""
-    low, high = format_number(min(values)), format_number(max(values))
-    return low if low == high else f"{low} to {high}"

@@ -1,30 +1,29 @@
-"""Sentences on what can be identified."""
+"""Sentences of an identifiability report: structure, learnt and unlearnt directions, advice and method."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bayesid.identifiability.advice import WORST, Advice
+from bayesid._io.words import abridged
+from bayesid.identifiability.advice import WORST
 from bayesid.identifiability.base_parameters import BaseParameters
 from bayesid.identifiability.normality import NORMAL, Method
 from bayesid.identifiability.parameter_table import ParameterRow
 from bayesid.identifiability.practical_identifiability import Practical
-from bayesid.identifiability.unidentifiable import listed
 from bayesid.inference.contraction import CONTRACTED, PRIOR_ONLY, ContractionVerdict
-from bayesid.report.numbers import format_number, format_unit
+from bayesid.report.numbers import format_percent
 
 __all__ = [
     "advice_sentences",
     "confidence_sentences",
     "method_sentences",
     "practical_sentences",
-    "share",
     "structure_sentence",
 ]
 
 
 def structure_sentence(structure: BaseParameters) -> str:
-    """Return how many parameters the robot has, and how many can be told at all."""
+    """Return the number of standard parameters of the robot, and that of the base parameters they combine to."""
     return (
         f"Of {len(structure.standard)} standard inertial parameters of the robot, motion and torques depend on "
         f"{len(structure.independent)} combinations, the base parameters."
@@ -32,7 +31,7 @@ def structure_sentence(structure: BaseParameters) -> str:
 
 
 def practical_sentences(result: Practical) -> list[str]:
-    """Return what the study tells, and what it does not."""
+    """Return which parameters and directions the study tells of, and which it does not."""
     count = {verdict: sum(item.verdict is verdict for item in result.parameters) for verdict in ContractionVerdict}
     total = len(result.parameters)
     fully, weakly, not_at_all = (count[verdict] for verdict in ContractionVerdict)
@@ -40,7 +39,7 @@ def practical_sentences(result: Practical) -> list[str]:
         f"Of {total} parameters of the bodies to identify {fully} are learnt, {weakly} weakly, {not_at_all} not."
     ]
     if names := [item.name for item in result.parameters if item.verdict is ContractionVerdict.NOT]:
-        sentences.append(f"Not learnt, so that the posterior is the prior: {listed(names)}.")
+        sentences.append(f"Not learnt, so that the posterior is the prior: {abridged(names)}.")
     directions = sum(item.verdict is ContractionVerdict.NOT for item in result.directions)
     if directions:
         plural = "direction is" if directions == 1 else "directions are"
@@ -48,22 +47,22 @@ def practical_sentences(result: Practical) -> list[str]:
     sentences.append(f"The worst known direction: {result.words[0]}.")
     worst = min(result.parameters, key=lambda item: item.shrinkage)
     sentences.append(
-        f"The worst known parameter: {worst.name}, {share(1.0 - worst.shrinkage)} of the prior's width is left"
+        f"The worst known parameter: {worst.name}, {format_percent(1.0 - worst.shrinkage)} of the prior's width is left"
         f"{_confused(worst)}."
     )
     return sentences
 
 
 def advice_sentences(result: Practical) -> list[str]:
-    """Return what would help most."""
+    """Return which candidates narrow the worst direction most."""
     usable = [item for item in result.advice if not item.reason]
     worst = result.directions[0]
     now = worst.sd / worst.prior_sd
     if not usable or usable[0].directions[0] > 0.95 * now:
         return ["None of the candidates narrows the worst direction by more than 5 %."]
     best = [item for item in usable if item.directions[0] <= 0.95 * now][:WORST]
-    texts = "; ".join(f"{share(item.directions[0])} with {item.text}" for item in best)
-    return [f"Of the worst direction {share(now)} of the prior's width is left. It would be {texts}."]
+    texts = "; ".join(f"{format_percent(item.directions[0])} with {item.text}" for item in best)
+    return [f"Of the worst direction {format_percent(now)} of the prior's width is left. It would be {texts}."]
 
 
 def confidence_sentences(result: Practical) -> list[str]:
@@ -86,18 +85,17 @@ def confidence_sentences(result: Practical) -> list[str]:
         ]
     profiled = sum(item.profile is not None for item in result.parameters)
     return [
-        f"The posterior of {listed(skewed)} is not normal: a quantile is off by more than {NORMAL:g} sd ({how}). "
+        f"The posterior of {abridged(skewed)} is not normal: a quantile is off by more than {NORMAL:g} sd ({how}). "
         f"{profiled} of {len(skewed)} were profiled, the least normal first."
     ]
 
 
 def method_sentences(result: Practical) -> list[str]:
-    """Return how to read the figures."""
+    """Return how to read the figures and tables."""
     return [
         "Prior and posterior are compared in the normal approximation about the fit (for a prediction, about the "
-        "prior's centre): C = D (J'J)⁻¹ D' and C₀ = D D', with J the derivative of whitened residuals and prior and "
-        "D that of the parameters. Initial rates, effects and links that are known to a few percent "
-        "are marginalised.",
+        "prior's centre): C = D (J'J)⁻¹ D' and C₀ = D D', with J the derivative of whitened residuals and prior and D "
+        "that of the parameters. Initial rates, effects and links that are known to a few percent are marginalised.",
         f"A parameter or direction is learnt if the data narrow the prior by at least {100 * CONTRACTED:.0f} %, and "
         f"not learnt if by less than {100 * PRIOR_ONLY:.0f} %.",
         "Learning counts what the data carry over: a mass tied by the data to others is known as well as the priors of "
@@ -112,24 +110,11 @@ def method_sentences(result: Practical) -> list[str]:
     ]
 
 
-def share(ratio: float) -> str:
-    """Return a ratio in percent."""
-    return f"{format_number(100.0 * ratio, 2 if ratio < 0.995 else 3)} %"
-
-
-def advice_row(item: Advice, unit: str) -> list[str]:
-    """Return text, what is left of the worst directions, sd of the worst parameter and the information."""
-    if item.reason:
-        return [item.text, f"not evaluated: {item.reason}", "", "", "", ""]
-    ratios = [share(ratio) for ratio in item.directions] + [""] * (WORST - len(item.directions))
-    return [item.text, *ratios, f"{format_number(item.sd, 2)} {format_unit(unit)}", f"{item.information:.1f}"]
-
-
 def _confused(item: ParameterRow) -> str:
     if not item.correlated_with:
         return ""
     alone = 1.0 - item.conditional_sd / item.prior_sd
-    names = listed([name for name, _ in item.correlated_with])
+    names = abridged([name for name, _ in item.correlated_with])
     if np.isfinite(alone) and alone > item.shrinkage + PRIOR_ONLY:
-        return f", as it is confused with {names}; were these known, {share(1.0 - alone)} would be"
+        return f", as it is confused with {names}; were these known, {format_percent(1.0 - alone)} would be"
     return f"; it is correlated with {names}"

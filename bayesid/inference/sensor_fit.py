@@ -1,4 +1,4 @@
-"""What each sensor read and what the model says that it should have read, ready to be drawn."""
+"""Readings of each sensor beside those that the model predicts, with the whitened residuals."""
 
 from __future__ import annotations
 
@@ -9,21 +9,23 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import predicted_readings
-from bayesid.simulation.sensors import Kind, Sensor
+from bayesid.simulation.sensors import Kind
 
-__all__ = ["SensorFit", "TorqueFit", "sensor_fits", "sensor_sigma", "torque_fits"]
+__all__ = ["SensorFit", "TorqueFit", "sensor_fits", "torque_fits"]
 
 
 @dataclass(frozen=True)
 class SensorFit:
-    """One sensor in one recording.
+    """Readings of one sensor in one recording, measured and predicted.
 
     Attributes
     ----------
-    time, measured, predicted : (n,), (n, 3), (n, 3) array
-        In sensor axes; an attitude as its rotation vector from the first sample, base axes.
-    residual_time, residual : (m,), (m, 3) array
-        Whitened: independent and of unit variance if the model is right; NaN where an axis has no sample.
+    time, measured, predicted : (n,), (n, k), (n, k) array
+        Times [s] and readings as they are drawn (`Kind.shown`), in sensor axes. An attitude is the rotation vector from
+        the first sample, in base axes.
+    residual_time, residual : (m,), (m, k) array
+        Times [s] and whitened residuals, which are independent and of unit variance if the model is right; NaN where
+        an axis has no sample.
     """
 
     kind: Kind
@@ -35,7 +37,7 @@ class SensorFit:
 
     @property
     def chi2(self) -> float:
-        """Square sum of the whitened residuals."""
+        """Sum of squares of the whitened residuals."""
         return float(np.nansum(self.residual**2))
 
     @property
@@ -45,7 +47,7 @@ class SensorFit:
 
 
 def sensor_fits(posterior: Posterior, z: Floats) -> list[list[SensorFit]]:
-    """Compare measured and simulated at ``z``: one list per recording, one entry per sensor."""
+    """Return measured and predicted readings at coordinates ``z`` (n,): a list per recording, an entry per sensor."""
     predictions, residuals = predicted_readings(posterior, z), posterior.residuals(z)
     result = []
     for index, (predicted, whitening) in enumerate(zip(predictions, posterior.whitenings, strict=True)):
@@ -56,16 +58,25 @@ def sensor_fits(posterior: Posterior, z: Floats) -> list[list[SensorFit]]:
             time, measured = posterior.data.measured(index, sensor.kind)
             simulated = predicted.channels[sensor.kind][np.searchsorted(grid, time)]
             measured, simulated = (sensor.kind.shown(values, measured[0]) for values in (measured, simulated))
-            own = whitened[:, posterior.model.channels.of(sensor.kind)]
-            kept = np.isfinite(own).any(axis=1)
-            fits.append(SensorFit(sensor.kind, time, measured, simulated, grid[whitening.rows][kept], own[kept]))
+            residual = whitened[:, posterior.model.channels.of(sensor.kind)]
+            kept = np.isfinite(residual).any(axis=1)
+            fits.append(SensorFit(sensor.kind, time, measured, simulated, grid[whitening.rows][kept], residual[kept]))
         result.append(fits)
     return result
 
 
 @dataclass(frozen=True)
 class TorqueFit:
-    """One joint's torque sensor in one recording: (n,) arrays, and the (m,) whitened residuals of the samples used."""
+    """Torque of one joint in one recording, measured and predicted.
+
+    Attributes
+    ----------
+    joint, unit : str
+    time, measured, predicted : (n,) array
+        Times [s] and torques [N m], or forces [N] of a prismatic joint.
+    residual_time, residual : (m,) array
+        Times [s] and whitened residuals of the samples that the likelihood uses.
+    """
 
     joint: str
     unit: str
@@ -77,7 +88,7 @@ class TorqueFit:
 
 
 def torque_fits(posterior: Posterior, z: Floats) -> list[list[TorqueFit]]:
-    """Compare measured and simulated joint torques at ``z``: one list per recording, one entry per joint."""
+    """Return measured and predicted torques at the coordinates ``z`` (n,): a list per recording, an entry per joint."""
     sensor, robot = posterior.model.torque, posterior.model.robot
     if sensor is None:
         return [[] for _ in posterior.manoeuvres]
@@ -90,14 +101,9 @@ def torque_fits(posterior: Posterior, z: Floats) -> list[list[TorqueFit]]:
         fits = []
         for column, joint in enumerate(sensor.joints):
             used = whitening.outputs[:, first + column]
-            own = residuals[index, : len(used), first + column][used]
+            residual = residuals[index, : len(used), first + column][used]
             unit = "N" if robot.joints[robot.joint_index(joint)].kind == "prismatic" else "N m"
             rows = grid[whitening.rows][used]
-            fits.append(TorqueFit(joint, unit, time, measured[:, column], simulated[:, column], rows, own))
+            fits.append(TorqueFit(joint, unit, time, measured[:, column], simulated[:, column], rows, residual))
         result.append(fits)
     return result
-
-
-def sensor_sigma(posterior: Posterior, sensor: Sensor) -> Floats:
-    """Noise of a sensor per recording and axis, shape (R, 3)."""
-    return np.stack([posterior.data.sigma(index, sensor.kind) for index in range(len(posterior.manoeuvres))])

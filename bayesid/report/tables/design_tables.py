@@ -6,42 +6,31 @@ from collections.abc import Sequence
 
 from bayesid.design import Design
 from bayesid.inference.body_quantities import BODY_QUANTITIES
-from bayesid.report.design_text import reference_design
-from bayesid.report.numbers import format_number, format_unit
+from bayesid.report.document import Rows
+from bayesid.report.numbers import format_fixed, format_number, format_unit
+from bayesid.report.sentences.design_sentences import reference_design
 
-__all__ = ["design_rows", "limit_rows", "pairs", "parameter_units", "risk_rows", "sd_rows"]
-
-Rows = list[list[str]]
-
-PAIRS = (
-    ("mass", "com.x"),
-    ("com.x", "com.y"),
-    ("com.y", "com.z"),
-    ("inertia.xx", "inertia.yy"),
-    ("inertia.yy", "inertia.zz"),
-    ("inertia.xy", "inertia.xz"),
-)
-"""Quantities of a body that are drawn together."""
+__all__ = ["design_rows", "limit_rows", "parameter_units", "risk_rows", "sd_rows"]
 
 
 def design_rows(designs: Sequence[Design]) -> Rows:
-    """Return name, log-determinant, geometric mean relative to the reference, worst direction, evaluations, go."""
+    """Return name, log-determinant, geometric mean over the reference's, worst direction, evaluations, go or no go."""
     reference = reference_design(designs).predicted
     return [
         [
             design.name,
-            f"{design.predicted.log_det:.2f}".replace("-", "−"),
-            f"{design.predicted.geometric_mean / reference.geometric_mean:.3f}",
+            format_fixed(design.predicted.log_det, 2),
+            format_fixed(design.predicted.geometric_mean / reference.geometric_mean, 3),
             format_number(design.predicted.worst),
             str(design.found.evaluations),
-            "go" if design.go else "no go",
+            _go(design.go),
         ]
         for design in designs
     ]
 
 
 def sd_rows(designs: Sequence[Design]) -> Rows:
-    """Return quantity, unit, prior centre and predicted standard deviation by every design."""
+    """Return quantity, unit, prior centre, and the standard deviation that each design predicts."""
     units = parameter_units(designs[0])
     return [
         [
@@ -55,14 +44,14 @@ def sd_rows(designs: Sequence[Design]) -> Rows:
 
 
 def limit_rows(design: Design) -> Rows:
-    """Return limit, bound, largest, unit, part used."""
+    """Return limited quantity, unit, limit, largest value, its share of the limit, and whether the limit is active."""
     return [
         [
             item.name,
             format_unit(item.unit),
             format_number(item.limit, 4),
             format_number(item.largest, 4),
-            f"{100.0 * item.largest / item.limit:.0f} %",
+            f"{format_fixed(100.0 * item.largest / item.limit, 0)} %",
             "active" if item.active else "",
         ]
         for item in design.reached
@@ -70,7 +59,7 @@ def limit_rows(design: Design) -> Rows:
 
 
 def risk_rows(designs: Sequence[Design]) -> Rows:
-    """Return design, limit, bound, 99 % quantile and go or no go."""
+    """Return design, limited quantity, unit, limit, 99 % quantile, and go or no go."""
     return [
         [
             design.name,
@@ -78,7 +67,7 @@ def risk_rows(designs: Sequence[Design]) -> Rows:
             format_unit(risk.unit),
             format_number(risk.limit, 4),
             format_number(risk.quantile, 4),
-            "go" if risk.go else "no go",
+            _go(risk.go),
         ]
         for design in designs
         for risk in design.risks
@@ -91,6 +80,5 @@ def parameter_units(design: Design) -> dict[str, str]:
     return {f"{body.name}.{key}": unit for body in bodies for key, unit in BODY_QUANTITIES.items()}
 
 
-def pairs(body: str) -> list[tuple[str, str]]:
-    """Return names of the quantities of a body that are drawn together."""
-    return [(f"{body}.{first}", f"{body}.{second}") for first, second in PAIRS]
+def _go(go: bool) -> str:
+    return "go" if go else "no go"

@@ -1,0 +1,32 @@
+"""Words in sentences: lists of names, and nouns that agree with their number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+__all__ = ["abridged", "counted", "joined", "ordinal"]
+
+NAMED = 8
+"""Number of texts that an abridged list names by default."""
+
+
+def joined(texts: Iterable[str]) -> str:
+    """Return texts as a list in a sentence: ``a``, ``a and b``, ``a, b and c``."""
+    *first, last = [*texts] or [""]
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def abridged(texts: Sequence[str], most: int = NAMED, separator: str = ", ") -> str:
+    """Return a list of texts that names the first few and counts the rest: ``a, b and 3 more``."""
+    more = len(texts) - most
+    return separator.join(texts[:most]) + (f" and {more} more" if more > 0 else "")
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, which takes an s unless the number is one: ``1 recording``, ``3 recordings``."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def ordinal(number: int) -> str:
+    """Return the position that a number from one on counts: ``first``, ``second``, ``third``, ``4th``."""
+    return {1: "first", 2: "second", 3: "third"}.get(number, f"{number}th")

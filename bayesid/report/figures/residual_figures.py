@@ -1,0 +1,170 @@
+"""Whitened residuals over time, by frequency and as a distribution."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+from scipy import stats
+
+from bayesid._math.arrays import Floats
+from bayesid.inference.residual_series import Residuals, ResidualSpectrum
+from bayesid.report.figures.figure_style import (
+    BAND,
+    COLOURS,
+    FILL,
+    axis_title,
+    residual_limits,
+    sensor_panels,
+    sensor_title,
+    shared_legend,
+    styled,
+    wide_figure,
+)
+
+__all__ = ["residual_histories", "residual_spectra", "residual_statistics"]
+
+PARTS = 40
+"""Number of windows that a recording is cut into for the running mean."""
+
+SIDES = (("before", COLOURS[1]), ("after", COLOURS[0]))
+"""Names and colours of the residuals of the present model and of the extended one."""
+
+NOISE_BAND = "95 % of bins, were it only noise"
+"""Legend of the band that holds the bins of a spectrum if the residuals are noise alone."""
+
+
+@styled
+def residual_histories(sides: Sequence[Residuals], recording: int) -> Figure:
+    """Draw the residuals of one recording over time, one panel per sensor axis.
+
+    Parameters
+    ----------
+    sides : sequence of Residuals
+        Residuals before, and after where causes are named.
+    recording : int
+        Index of the recording.
+    """
+    kinds = sides[0].kinds
+    figure = wide_figure(0.45 + 1.2 * len(kinds))
+    panels = sensor_panels(figure, kinds, sharex=True)
+    for sensor, kind in enumerate(kinds):
+        for axis in range(kind.size):
+            axes = panels[sensor, axis]
+            axes.axhspan(-2.0, 2.0, **BAND)
+            drawn = []
+            for side, (name, colour) in zip(sides, SIDES, strict=False):
+                time, value = side.series(recording, kind, axis)
+                label = "samples and their running mean"
+                axes.plot(time, value, ".", color=colour, markersize=1.2, alpha=0.5)
+                axes.plot(
+                    *_running_mean(time, value),
+                    color=colour,
+                    linewidth=1.0,
+                    label=f"{name}: {label}" if len(sides) > 1 else label,
+                )
+                drawn.append(value)
+            residual_limits(axes, np.concatenate(drawn))
+            axes.set_title(axis_title(kind, axis))
+            axes.locator_params(axis="both", nbins=4)
+        panels[sensor, 0].set_ylabel("residual [σ]")
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    shared_legend(figure, panels[0, 0], columns=2)
+    return figure
+
+
+def _running_mean(time: Floats, value: Floats) -> tuple[Floats, Floats]:
+    width = max(1, len(value) // PARTS)
+    if len(value) < 2 * width:
+        return time, value
+    window = np.full(width, 1.0 / width)
+    return np.convolve(time, window, "valid"), np.convolve(value, window, "valid")
+
+
+@styled
+def residual_spectra(sides: Sequence[Residuals]) -> Figure:
+    """Draw the spectra of the residuals, one panel per sensor axis; noise alone has level one.
+
+    Parameters
+    ----------
+    sides : sequence of Residuals
+        Residuals before, and after where causes are named.
+    """
+    kinds = sides[0].kinds
+    figure = wide_figure(0.5 + 1.45 * len(kinds))
+    panels = sensor_panels(figure, kinds)
+    for sensor, kind in enumerate(kinds):
+        for axis in range(kind.size):
+            axes = panels[sensor, axis]
+            curves = [
+                (name if len(sides) > 1 else "residual", colour, side.spectrum(kind, axis))
+                for side, (name, colour) in zip(sides, SIDES, strict=False)
+            ]
+            _draw_spectra(axes, curves)
+            axes.set_title(axis_title(kind, axis))
+            axes.set_xlabel("frequency [Hz]")
+            axes.locator_params(axis="x", nbins=4)
+        panels[sensor, 0].set_ylabel("power [σ² per bin]")
+    shared_legend(figure, panels[0, 0], columns=3)
+    return figure
+
+
+@styled
+def residual_statistics(residuals: Residuals) -> Figure:
+    """Draw the spectrum of each sensor axis and the distribution of each sensor's residuals, one row per sensor.
+
+    If the model is right, the spectra are flat at one and the distributions are standard normal.
+    """
+    kinds = residuals.kinds
+    figure = wide_figure(0.5 + 1.9 * len(kinds))
+    panels = figure.subplots(len(kinds), 2, squeeze=False, gridspec_kw={"width_ratios": [1.7, 1.0]})
+    for sensor, kind in enumerate(kinds):
+        curves = [
+            (f"axis {kind.axes[axis]}", COLOURS[axis], residuals.spectrum(kind, axis)) for axis in range(kind.size)
+        ]
+        _draw_spectra(panels[sensor, 0], curves)
+        panels[sensor, 0].set_ylabel(f"{sensor_title(kind)}\npower [σ² per bin]")
+        _draw_distribution(panels[sensor, 1], residuals.pooled(kind))
+    panels[-1, 0].set_xlabel("frequency [Hz]")
+    panels[-1, 1].set_xlabel("residual [σ]")
+    shared_legend(figure, panels[0, 0], columns=4, place="outside upper left")
+    return figure
+
+
+def _draw_spectra(axes: Axes, curves: Sequence[tuple[str, str, ResidualSpectrum]]) -> None:
+    """Draw named spectra, and the band that holds 95 % of the bins of the first if it is noise alone."""
+    for name, colour, spectrum in curves:
+        axes.plot(spectrum.frequency, spectrum.power, color=colour, marker=".", markersize=3, linewidth=0.8, label=name)
+    frequency, _, ordinates = curves[0][2]
+    if len(frequency):
+        band = stats.gamma.ppf([[0.025], [0.975]], ordinates) / ordinates
+        axes.fill_between(frequency, *band, **BAND, zorder=0, label=NOISE_BAND)
+    axes.axhline(1.0, color="black", linewidth=0.6)
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    axes.set_ylim(max(min(low, 0.2), 1e-3), max(high, 5.0))
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 3.0) if high < 100.0 else (1.0,), numticks=8))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_minor_locator(NullLocator())
+
+
+def _draw_distribution(axes: Axes, residual: Floats) -> None:
+    reach = max(4.0, 1.05 * float(np.abs(residual).max(initial=0.0)))
+    bins = np.linspace(-reach, reach, 41)
+    axes.hist(residual, bins=bins.tolist(), density=True, color=FILL, edgecolor="white", linewidth=0.3)
+    grid = np.linspace(-reach, reach, 401)
+    axes.plot(grid, stats.norm.pdf(grid), color="black", linewidth=0.8)
+    axes.set_ylabel("density [1/σ]")
+    axes.text(
+        0.98,
+        0.96,
+        f"mean {residual.mean():.3f}\nsd {residual.std():.3f}\n{len(residual)} samples",
+        transform=axes.transAxes,
+        ha="right",
+        va="top",
+        fontsize=6,
+    )

@@ -1,0 +1,1 @@
+"""Sentences of the reports and of the terminal, one module per report or subject."""

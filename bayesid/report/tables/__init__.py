@@ -1,0 +1,1 @@
+"""Rows of the reports' tables, one module per report."""

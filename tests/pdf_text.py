@@ -1,0 +1,37 @@
+"""Text of a PDF, for tests of what a reader sees."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from pypdf import PdfReader
+
+FOOTER = re.compile(r"\s*\d+\s*/\s*\d+\s*$")
+BREAKABLE = re.compile("[\\s\u00ad\u200b-]+")
+
+
+@dataclass(frozen=True)
+class PdfText:
+    """Text of a PDF by page, without page numbers; sentences are looked up whatever the breaks of lines and pages.
+
+    Typst breaks lines at spaces and hyphens and may hyphenate, so spaces and hyphens do not count in a comparison.
+    """
+
+    pages: tuple[str, ...]
+
+    @classmethod
+    def read(cls, file: Path) -> PdfText:
+        return cls(tuple(FOOTER.sub("", page.extract_text()) for page in PdfReader(file).pages))
+
+    def __contains__(self, text: str) -> bool:
+        return _bare(text) in _bare("".join(self.pages))
+
+    def row(self, *cells: str) -> bool:
+        """Whether these cells of a table stand beside each other."""
+        return "".join(cells) in self
+
+
+def _bare(text: str) -> str:
+    return BREAKABLE.sub("", text)
