@@ -15,9 +15,10 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, namespace
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.composite_tables import composite_rows, link_table
-from bayesid.robot.inertial_parameters import LOG_CHOLESKY, mass_com_inertia, upper_cholesky, vector_from_factor
+from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import configuration, kinematics
+from bayesid.robot.log_cholesky import LOG_CHOLESKY, upper_cholesky, vector_from_factor
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect, Parameter, Prior, Quantity, register
 from bayesid.simulation.effects.placed import OnJoint, Placed
