@@ -14,6 +14,7 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import complete_folder, write_json
+from bayesid._io.progress import Progress
 from bayesid.app.demonstration import copy_demonstration
 from bayesid.app.schema import Study
 from bayesid.app.study_to_design import ASSUMED, assumed_encoders, encoders, fingerprint, load_problem
@@ -24,7 +25,6 @@ from bayesid.diagnosis import Diagnosis, diagnose, identify_extended
 from bayesid.identifiability.unidentifiable import unidentifiable_sentences
 from bayesid.inference import Identification
 from bayesid.inference import identify as identify_posterior
-from bayesid.inference.ensemble import Progress
 from bayesid.inference.identified_robot import write_identified
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_file import write_netcdf
@@ -47,8 +47,6 @@ from bayesid.report.diagnosis_report import diagnosis_sentences
 
 __all__ = ["run_check", "run_demo", "run_design", "run_diagnose", "run_identify", "run_predict", "run_simulate"]
 
-Show = Callable[[float, str], None]
-
 
 def run_check(file: Path, output: Path) -> Iterator[str]:
     """Write check.json and report.pdf of a study."""
@@ -66,7 +64,7 @@ def run_check(file: Path, output: Path) -> Iterator[str]:
     yield f"Wrote {output / 'report.pdf'}."
 
 
-def run_identify(file: Path, output: Path, *, seed: int, effective_samples: float, progress: Show) -> Iterator[str]:
+def run_identify(file: Path, output: Path, *, seed: int, effective_samples: float, progress: Progress) -> Iterator[str]:
     """Write identification.json, posterior.nc, the identified robot and report.pdf of a study."""
     study, posterior = _read(file)
     if not posterior.size:
@@ -85,7 +83,7 @@ def run_diagnose(
     seed: int,
     effective_samples: float,
     sample: bool,
-    progress: Show,
+    progress: Progress,
     keep: Callable[[Diagnosis], None] | None = None,
 ) -> Iterator[str]:
     """Write diagnosis.json, unexplained.csv, posterior.nc of the extended model and report.pdf of a study.
@@ -146,7 +144,7 @@ def run_simulate(file: Path, output: Path, *, seed: int, noise: bool) -> Iterato
 
 
 def run_predict(
-    file: Path, output: Path, *, posterior: Path | None, seed: int, draws: int, progress: Show
+    file: Path, output: Path, *, posterior: Path | None, seed: int, draws: int, progress: Progress
 ) -> Iterator[str]:
     """Write prediction.json and report.pdf of the planned manoeuvres of a study.
 
@@ -175,7 +173,9 @@ def run_predict(
     yield f"Wrote {output / 'report.pdf'}."
 
 
-def run_design(file: Path, output: Path, *, seed: int, starts: int, iterations: int, progress: Show) -> Iterator[str]:
+def run_design(
+    file: Path, output: Path, *, seed: int, starts: int, iterations: int, progress: Progress
+) -> Iterator[str]:
     """Write design.json, a recording of the joints of every designed manoeuvre, and report.pdf of a study."""
     study = Study.load(file)
     problem = load_problem(study)
@@ -206,7 +206,7 @@ def run_design(file: Path, output: Path, *, seed: int, starts: int, iterations: 
     yield f"Wrote {output / 'report.pdf'}."
 
 
-def run_demo(output: Path, *, seed: int, effective_samples: float, progress: Show) -> Iterator[str]:
+def run_demo(output: Path, *, seed: int, effective_samples: float, progress: Progress) -> Iterator[str]:
     """Diagnose the shipped recordings, say what was hidden in them, and write the report."""
     answer = copy_demonstration(output / "study")
     yield f"Recordings of an independent simulator, with something hidden in them: {output / 'study'}."
@@ -233,15 +233,11 @@ def _read(file: Path) -> tuple[Study, Posterior]:
     return study, posterior
 
 
-def _identify(posterior: Posterior, output: Path, seed: int, wanted: float, show: Show) -> Identification:
+def _identify(posterior: Posterior, output: Path, seed: int, wanted: float, show: Progress) -> Identification:
     output.mkdir(parents=True, exist_ok=True)
     show(0.0, "fitting")
 
-    def report(state: Progress) -> None:
-        done = max(state.effective_samples / state.wanted if state.r_hat < 1.05 else 0.0, state.steps / state.limit)
-        show(done, f"step {state.steps}, {state.effective_samples:.0f} effective samples, R-hat {state.r_hat:.3f}")
-
-    return identify_posterior(posterior, seed, effective_samples=wanted, file=output / "samples.h5", progress=report)
+    return identify_posterior(posterior, seed, effective_samples=wanted, file=output / "samples.h5", progress=show)
 
 
 def _write_identification(result: Identification, title: str, output: Path, seed: int) -> None:

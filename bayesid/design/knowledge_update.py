@@ -11,6 +11,7 @@ import arviz as az
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._io.files import complete_file
 from bayesid._math.arrays import Floats
 from bayesid.design.design_problem import Known
 from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, quantity
@@ -96,9 +97,8 @@ class Laplace:
         data = az.from_dict(
             posterior={"inertial": values}, dims={"inertial": ["body", "parameter"]}, coords={"body": names}
         )
-        part = file.with_name(file.name + ".part")
-        data.to_netcdf(str(part))
-        part.replace(file)
+        with complete_file(file) as part:
+            data.to_netcdf(str(part))
         return {"method": "laplace", "chi2": optimum.chi2, "samples": posterior.samples, "disagreements": []}
 
 

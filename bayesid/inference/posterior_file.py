@@ -8,6 +8,7 @@ from typing import Any
 import arviz as az
 import numpy as np
 
+from bayesid._io.files import complete_file
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of, reported_effect
 from bayesid.inference.identification import Identification
@@ -65,9 +66,8 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
 
 def write_netcdf(result: Identification, file: Path, rng: np.random.Generator) -> None:
     """Write `to_arviz` to a NetCDF file, all or nothing."""
-    part = file.with_name(file.name + ".part")
-    to_arviz(result, rng).to_netcdf(str(part))
-    part.replace(file)
+    with complete_file(file) as part:
+        to_arviz(result, rng).to_netcdf(str(part))
 
 
 def _thin(draws: Floats, count: int) -> Floats:
