@@ -197,9 +197,9 @@ HEAVY = ("jax", "pinocchio", "arviz", "scipy", "matplotlib", "emcee", "h5py", "p
 WITH_STUDY = ("check", "design", "diagnose", "identifiability", "identify", "loop", "predict", "simulate")
 
 
-def imported(code: str) -> list[str]:
-    """Return which heavy packages a fresh interpreter holds after running code."""
-    ending = f"\nimport sys\nprint('LOADED', *[name for name in {HEAVY!r} if name in sys.modules])"
+def imported(code: str, packages: tuple[str, ...] = HEAVY) -> list[str]:
+    """Return which of some packages a fresh interpreter holds after running code."""
+    ending = f"\nimport sys\nprint('LOADED', *[name for name in {packages!r} if name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code + ending], capture_output=True, text=True, check=True)
     return done.stdout.splitlines()[-1].split()[1:]
 
@@ -240,6 +240,7 @@ for call in {calls!r}:
     assert ("Error: " in result.output) == wrong, (call, result.output)
 """
     assert imported(code) == []
+
     assert not (tmp_path / "out").exists()
 
 
