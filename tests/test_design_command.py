@@ -21,7 +21,7 @@ from bayesid.design import Store
 from bayesid.design.extended_posture import extended_posture
 from bayesid.design.trajectory_search import _Run
 from bayesid.recording.recording import Recording
-from bayesid.report import design_report as report
+from bayesid.report.document import Document
 from bayesid.robot.end_effector import Tip
 from bayesid.robot.robot import Robot
 from studies.common.ets7 import extended_wrist
@@ -85,7 +85,7 @@ def made(shared_problem, tmp_path_factory: pytest.TempPathFactory):
     """A design that was interrupted in its third search and taken up again; what the report was told."""
     folder, patch, told = tmp_path_factory.mktemp("design"), pytest.MonkeyPatch(), []
     file, kept = write(folder), []
-    minimise, write_report = _Run.minimise, report.Document.write
+    minimise, write_report = _Run.minimise, Document.write
 
     def stop(self) -> None:
         if len(kept) == 2:
@@ -100,9 +100,7 @@ def made(shared_problem, tmp_path_factory: pytest.TempPathFactory):
     assert "goes on" in text
     assert [item.name for item in (folder / "out").iterdir()] == ["search.json"]
     with patch.context() as watched:
-        watched.setattr(
-            report.Document, "write", lambda self, path: (told.extend(self._parts), write_report(self, path))
-        )
+        watched.setattr(Document, "write", lambda self, path: (told.extend(self._parts), write_report(self, path)))
         status, text = run("design", file, "--output", folder / "out", *EFFORT)
     assert status == 0, text
     return folder, text, "".join(told)
