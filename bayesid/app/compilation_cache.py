@@ -9,10 +9,10 @@ from pathlib import Path
 __all__ = ["keep_compiled"]
 
 SETTINGS = {
-    "jax_persistent_cache_min_compile_time_secs": 0.05,
+    "jax_persistent_cache_min_compile_time_secs": 0.0,
     "jax_persistent_cache_min_entry_size_bytes": -1,
 }
-"""What is worth keeping, in the options of JAX."""
+"""What is kept, in the options of JAX: everything, as reading a small function costs less than compiling it."""
 
 FOLDER = "jax_compilation_cache_dir"
 """The option of JAX that names the folder."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-import arviz as az
 import numpy as np
 
 from bayesid._io.errors import InputError
@@ -88,6 +87,8 @@ class Laplace:
 
     def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
         """Write draws of the bodies alone."""
+        import arviz as az  # here, as it takes a second that commands without samples save
+
         starts, normal = np.random.SeedSequence(seed).spawn(2)
         refined, optimum = maximise(posterior, np.random.default_rng(starts))
         noise = np.random.default_rng(normal).normal(size=(self.draws, posterior.size))

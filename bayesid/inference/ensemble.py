@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import arviz as az
 import emcee
 import h5py
 import numpy as np
@@ -217,6 +216,8 @@ class _KeyedBackend(emcee.backends.HDFBackend):
 
 
 def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
+    import arviz as az  # here, as it takes a second that commands without samples save
+
     steps = min(int(sampler.iteration) for sampler in samplers)
     chains = [sampler.get_chain()[:steps] for sampler in samplers]
     densities = [sampler.get_log_prob()[:steps] for sampler in samplers]

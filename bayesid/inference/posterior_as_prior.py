@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import arviz as az
 import jax.numpy as jnp
 import numpy as np
 
@@ -63,6 +62,8 @@ class InertialDraws:
         InputError
             If the file is absent or holds none.
         """
+        import arviz as az  # here, as it takes a second that commands without samples save
+
         remedy = "Name the posterior.nc that bayesid identify wrote"
         if not file.is_file():
             raise InputError("there is no such file", file=file, remedy=remedy)
