@@ -18,6 +18,8 @@ import warnings
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    __version__: str
+
     from bayesid._io.errors import InputError
     from bayesid.app.schema import Study
     from bayesid.app.study_to_model import load_manoeuvres, load_model, load_posterior
@@ -99,7 +101,11 @@ warnings.filterwarnings("ignore", message="\\s*ArviZ is undergoing", category=Fu
 
 
 def __getattr__(name: str) -> object:
-    """Load a public name."""
+    """Load a public name, or read the version from the package's metadata."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("bayesid")
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)

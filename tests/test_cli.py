@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import re
+import subprocess
+import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import arviz as az
@@ -11,6 +15,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import bayesid
+from bayesid import app as app_room
 from bayesid.app.command_line import app
 from bayesid.report.numbers import format_fixed, format_number, format_quantity
 from studies.truth.mujoco import Manoeuvres, TruthModel, write_study
@@ -211,6 +217,98 @@ def test_bad_input_gives_one_clear_error_and_nothing_half_written(kind: str, stu
     assert not output.exists() or not list(output.iterdir())
 
 
+HEAVY = ("jax", "pinocchio", "arviz", "scipy", "matplotlib", "emcee", "h5py", "pandas", "pyarrow", "typst")
+"""Packages that take seconds to import; help and errors in a study file do without."""
+
+WITH_STUDY = ("check", "design", "diagnose", "identifiability", "identify", "loop", "predict", "simulate")
+
+
+def imported(code: str, packages: tuple[str, ...] = HEAVY) -> list[str]:
+    """Return which of some packages a fresh interpreter holds after running code."""
+    ending = f"\nimport sys\nprint('LOADED', *[name for name in {packages!r} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code + ending], capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()[-1].split()[1:]
+
+
+def test_the_heavy_packages_exist_and_are_seen():
+    assert all(importlib.util.find_spec(name) for name in HEAVY)
+    assert imported("import scipy") == ["scipy"]
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import bayesid",
+        "import bayesid; bayesid.Study, bayesid.InputError, bayesid.InertialParameters, bayesid.White",
+        "import bayesid.app.command_line",
+    ],
+)
+def test_importing_is_light(code: str):
+    assert imported(code) == []
+
+
+def test_help_version_and_errors_in_a_study_are_light(tmp_path: Path):
+    bad = {"key.toml": "[robot]\nurdff = 'x'\n", "type.toml": SHORT.replace("1e-5", "'small'"), "syntax.toml": "[robot"}
+    for name, text in bad.items():
+        (tmp_path / name).write_text(text)
+    calls = [[], ["--help"], ["--version"], *([name, "--help"] for name in (*WITH_STUDY, "demo"))]
+    for name in (*bad, "absent.toml"):
+        calls += [[command, str(tmp_path / name), "--output", str(tmp_path / "out")] for command in WITH_STUDY]
+    code = f"""
+from typer.testing import CliRunner
+import bayesid
+from bayesid import app as app_room
+from bayesid.app.command_line import app
+for call in {calls!r}:
+    result = CliRunner().invoke(app, call)
+    wrong = any(".toml" in word for word in call)
+    assert result.exit_code == (2 if wrong or not call else 0), (call, result.output)
+    assert ("Error: " in result.output) == wrong, (call, result.output)
+"""
+    assert imported(code) == []
+
+    assert not (tmp_path / "out").exists()
+
+
+SHORT = """
+[robot]
+urdf = "robot.urdf"
+[sensors.rate]
+sigma = 1e-5
+[unknowns]
+bodies = []
+"""
+
+
+def test_the_version_is_that_of_the_package():
+    status, text = run("--version")
+    assert status == 0
+    assert text == f"bayesid {version('bayesid')} "
+    assert bayesid.__version__ == version("bayesid")
+
+
+def test_every_command_is_one_file_and_shows_its_first_sentence():
+    files = sorted(
+        file.name.removesuffix("_command.py") for file in Path(app_room.__file__).parent.glob("*_command.py")
+    )
+    assert files == sorted((*WITH_STUDY, "demo"))
+    for name in files:
+        status, text = run(name, "--help")
+        assert status == 0
+        sentence = importlib.import_module(f"bayesid.app.{name}_command").run.__doc__
+        assert re.sub(r"\s+", " ", sentence)[:40] in text
+        assert "progress" not in text
+
+
+def test_an_output_that_is_a_file_is_an_error(study: Path, tmp_path: Path):
+    (tmp_path / "out").write_text("")
+    for command in ("check", "identify"):
+        status, text = run(command, study, "--output", tmp_path / "out")
+        assert status == 2, text
+        assert "cannot create the folder" in text
+        assert text.count("Error:") == 1
+
+
 def test_a_missing_study_is_an_error(tmp_path: Path) -> None:
     status, text = run("check", tmp_path / "none.toml", "--output", tmp_path / "out")
     assert status == 2
@@ -251,7 +349,7 @@ class SteadyTorque(Effect):
     summary = "Something pushes steadily."
     parameters = tuple(Parameter(axis, "N m", 1e-3) for axis in "xyz")
 
-    def wrench(self, values, moment, inner):
+    def wrench(self, values, instant, inner):
         """Return the torque."""
         return Wrench(jnp.zeros(3), values)
 '''

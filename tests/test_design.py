@@ -33,8 +33,9 @@ from bayesid.design.plan import PlannedOutcome, Trajectory
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.composite_tables import link_table
-from bayesid.robot.inertial_parameters import InertialParameters, log_cholesky_vector, mass_com_inertia
+from bayesid.robot.inertial_parameters import InertialParameters, mass_com_inertia
 from bayesid.robot.kinematics import configuration, kinematics
+from bayesid.robot.log_cholesky import log_cholesky_vector
 from bayesid.robot.regressors import balance_regressor
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import Effect, Parameter

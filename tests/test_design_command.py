@@ -13,9 +13,10 @@ from scipy.interpolate import make_interp_spline
 from test_cli import run
 
 from bayesid._io.errors import InputError
-from bayesid.app import commands
+from bayesid.app import study_to_design
 from bayesid.app.schema import Study
-from bayesid.app.study_to_design import encoders, load_problem
+from bayesid.app.study_to_design import load_problem
+from bayesid.app.study_to_encoders import assume_missing, encoder_noise
 from bayesid.design import Store
 from bayesid.design.extended_posture import extended_posture
 from bayesid.design.trajectory_search import _Run
@@ -76,7 +77,7 @@ def shared_problem():
         return problems[text]
 
     with patch.context() as changed:
-        changed.setattr(commands, "load_problem", load)
+        changed.setattr(study_to_design, "load_problem", load)
         yield
 
 
@@ -241,7 +242,7 @@ def test_rivals_extend_the_model_and_ask_for_separation(tmp_path: Path):
     assert [effect.label for effect in problem.plan.model.effects] == ["rate-bias", "rate-scale"]
     assert problem.criteria[-1].rivals == ("rate-bias", "rate-scale")
     assert [criterion.name for criterion in problem.criteria[:2]] == ["paper-26", "condition-number"]
-    assert encoders(study, problem.plan.model.robot)[0] == {"joint1": 1e-6, "joint2": 1e-6}
+    assert assume_missing(encoder_noise(study, problem.plan.model.robot))[0][0] == {"joint1": 1e-6, "joint2": 1e-6}
     assert len(problem.plan.samples) <= 121
 
 

@@ -7,13 +7,8 @@ import pinocchio as pin
 import pytest
 
 from bayesid._io.errors import InputError
-from bayesid.robot.inertial_parameters import (
-    BASIS,
-    InertialParameters,
-    log_cholesky_factor,
-    parameters_from_pseudo_inertia,
-    upper_cholesky,
-)
+from bayesid.robot.inertial_parameters import BASIS, InertialParameters, parameters_from_pseudo_inertia
+from bayesid.robot.log_cholesky import log_cholesky_factor, upper_cholesky
 
 SEEDS = range(5)
 

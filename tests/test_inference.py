@@ -159,9 +159,9 @@ def test_a_run_that_does_not_converge_says_so():
 
 
 def interrupt_between_blocks(stub, file):
-    def stop(progress):
-        if progress.steps >= BLOCK:
-            raise KeyboardInterrupt
+    def stop(fraction, text):
+        assert text.startswith(f"step {BLOCK},")
+        raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         drawn(stub, file=file, progress=stop)
@@ -219,7 +219,7 @@ def test_another_runs_file_is_refused(change, tmp_path):
     stub = LinearGaussian(seed=1 if change == "data" else 0)
     if change == "names":
         stub.unknowns = SimpleNamespace(names=("a", "b", "c", "d"))
-    with pytest.raises(InputError, match=r"chain\.h5: holds the samples of another run"):
+    with pytest.raises(InputError, match=r"chain\.h5: it belongs to another run: data, model or seed differ"):
         drawn(stub, seed=4 if change == "seed" else 3, file=file)
 
 

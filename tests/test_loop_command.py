@@ -10,9 +10,11 @@ import pytest
 from conftest import PLANAR
 from test_cli import run
 
-from bayesid.app.loop_command import load_spacecraft, problem_of
-from bayesid.app.schema import Study
+from bayesid.app.schema import DesignSection, Study
+from bayesid.app.study_to_design import load_loop_problem
+from bayesid.app.user_spacecraft import load_spacecraft
 from bayesid.design import Loop
+from bayesid.design.excitation_loop import flown, start_of
 from bayesid.design.loop_history import History
 from bayesid.recording.recording import Recording
 
@@ -42,6 +44,19 @@ def execute(plan):
 """
 
 
+DATACLASS = """
+from __future__ import annotations
+from dataclasses import dataclass
+
+@dataclass
+class Spacecraft:
+    speed: float = 1.0
+
+    def execute(self, plan):
+        return plan
+"""
+
+
 @pytest.fixture
 def study(tmp_path: Path) -> Path:
     file = tmp_path / "study.toml"
@@ -50,11 +65,92 @@ def study(tmp_path: Path) -> Path:
 
 
 def test_the_design_section_becomes_a_problem(study: Path):
-    problem = problem_of(Study.load(study))
+    problem = load_loop_problem(Study.load(study))
     assert problem.plan.family.duration == 10.0
     assert problem.plan.family.moving == (1,)
     assert problem.limits.base_rotation == 0.15
     assert problem.plan.tip.name == "tip"
+
+
+DESIGN = {
+    "duration": ("duration = 20.0", lambda p: p.plan.family.duration, 20.0),
+    "interval": ("duration = 10.0\ninterval = 0.25", lambda p: p.plan.interval, 0.25),
+    "tip_frame": ("duration = 10.0\ntip_frame = 'link1'", lambda p: p.plan.tip.name, "link1"),
+    "joints": ("duration = 10.0\njoints = ['joint2', 'joint1']", lambda p: p.plan.family.moving, (1, 0)),
+    "start": ("duration = 10.0\nstart = {joint1 = 0.4}", lambda p: start_of(p.plan).tolist(), [0.4, 0.0]),
+    "parameterisation": ("duration = 10.0\nparameterisation = 'fourier'", lambda p: p.plan.family.name, "fourier"),
+    "functions": ("duration = 10.0\nfunctions = 3", lambda p: p.plan.family.size, 6),
+    "criteria": (
+        "duration = 10.0\ncriteria = ['e-optimal', 'a-optimal']",
+        lambda p: names_of(p.criteria),
+        ["e-optimal"],
+    ),
+    "rivals": (
+        "duration = 10.0\nrivals = ['rate-bias', 'rate-scale']",
+        lambda p: [effect.label for effect in p.plan.model.effects],
+        ["rate-bias", "rate-scale"],
+    ),
+    "attitude": ("duration = 10.0\nattitude = [1, 0, 0, 0]", lambda p: p.plan.attitude.tolist(), [1.0, 0.0, 0.0, 0.0]),
+    "attitude_sigma": ("duration = 10.0\nattitude_sigma = 0.01", lambda p: p.plan.attitude_sigma, 0.01),
+    "argument_of_latitude": ("duration = 10.0\nargument_of_latitude = 1.5", lambda p: p.plan.argument_of_latitude, 1.5),
+    "limits": ("duration = 10.0\nlimits = {joint_speed = 0.2}", lambda p: p.limits.joint_speed, 0.2),
+}
+
+
+def names_of(criteria) -> list[str]:
+    return [criterion.name for criterion in criteria]
+
+
+@pytest.mark.parametrize("key", DESIGN)
+def test_every_key_of_the_design_section_reaches_the_loop(study: Path, key: str):
+    text, reached, value = DESIGN[key]
+    before = STUDY[: STUDY.index("[design]")]
+    study.write_text(f"{before}[design]\n{text}\n")
+    assert reached(load_loop_problem(Study.load(study))) == value
+    study.write_text(f"{before}[design]\nduration = 10.0\n")
+    assert reached(load_loop_problem(Study.load(study))) != value
+
+
+def test_no_key_of_the_design_section_is_left_out():
+    assert set(DESIGN) == set(DesignSection.model_fields)
+
+
+@pytest.mark.parametrize("key", ["duration", "start", "functions", "criteria", "attitude", "limits"])
+def test_a_loop_is_told_from_another_by_its_design(study: Path, key: str):
+    before = STUDY[: STUDY.index("[design]")]
+    keys = []
+    for text in ("duration = 10.0", DESIGN[key][0]):
+        study.write_text(f"{before}[design]\n{text}\n")
+        keys.append(Loop(load_loop_problem(Study.load(study)), {0: 1e-6})._key())
+    assert keys[0] != keys[1]
+
+
+def test_the_loop_plans_by_the_smallest_volume_from_where_the_first_recording_starts(study: Path):
+    recording = """
+[[recordings]]
+file = "absent.csv"
+attitude = [0.0, 1.0, 0.0, 0.0]
+argument_of_latitude = 0.3
+"""
+    study.write_text(STUDY + recording)
+    problem = load_loop_problem(Study.load(study))
+    assert names_of(problem.criteria) == ["d-optimal"]
+    assert problem.plan.attitude.tolist() == [0.0, 1.0, 0.0, 0.0]
+    assert problem.plan.argument_of_latitude == 0.3
+    study.write_text(STUDY.replace("[design]", "[design]\nattitude = [0, 0, 1, 0]") + recording)
+    problem = load_loop_problem(Study.load(study))
+    assert problem.plan.attitude.tolist() == [0.0, 0.0, 1.0, 0.0]
+    assert problem.plan.argument_of_latitude == 0.0
+
+
+def test_joints_recorded_by_speed_start_where_the_plan_does(study: Path):
+    study.write_text(STUDY.replace("[design]", "[design]\nstart = {joint1 = 0.4}"))
+    plan = load_loop_problem(Study.load(study)).plan
+    time = np.arange(0.0, 10.1, 0.5)
+    speeds = Recording("step-1", None, time, {f"velocity.joint{k}": 0.0 * time for k in (1, 2)})
+    position = flown(plan, speeds, {1: 1e-5}).motion.evaluate(time).position
+    np.testing.assert_allclose(position[0], [0.4, 0.0], atol=1e-9)
+    np.testing.assert_allclose(position, np.tile([0.4, 0.0], (len(time), 1)), atol=0.01)  # a smoother of noisy speeds
 
 
 def test_without_a_spacecraft_the_plan_is_written_and_the_command_waits(study, tmp_path, monkeypatch):
@@ -89,6 +185,8 @@ def test_a_users_file_executes(tmp_path: Path):
     assert load_spacecraft(file).execute(plan) is plan
     file.write_text("class Spacecraft:\n    def execute(self, plan):\n        return plan\n")
     assert load_spacecraft(file).execute(plan) is plan
+    file.write_text(DATACLASS)
+    assert load_spacecraft(file).execute(plan) is plan
 
 
 @pytest.mark.parametrize(
@@ -119,5 +217,5 @@ def test_an_unknown_joint_is_an_error(study: Path, tmp_path: Path):
     study.write_text(STUDY.replace('joints = ["joint2"]', 'joints = ["elbow"]'))
     status, text = run("loop", study, "--output", tmp_path / "out")
     assert status == 2
-    assert "no moving joint named 'elbow'" in text
+    assert "no moving joint 'elbow'" in text
     assert "joint1, joint2" in text

@@ -1,1 +1,1 @@
-"""Errors that a user meets, and files that are complete or absent."""
+"""Errors that a user meets, files that are complete or absent, results kept under a key, and progress."""

@@ -1,8 +1,9 @@
-"""Files of results: written to a temporary folder and moved when complete, so that nothing is left half-written."""
+"""Files of results, complete or absent: written beside their place and then moved there."""
 
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -14,23 +15,52 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 
-__all__ = ["complete_folder", "write_json"]
+__all__ = ["complete_file", "complete_folder", "create_folder", "write_json", "write_text"]
 
 
-def write_json(file: Path, content: dict[str, Any]) -> None:
+@contextmanager
+def complete_file(file: str | Path) -> Iterator[Path]:
+    """Yield a path to write to; what was written takes the place of the file, unless the block fails."""
+    target = Path(file)
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        yield part
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_text(file: str | Path, text: str) -> None:
+    """Write text as UTF-8."""
+    with complete_file(file) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+def write_json(file: str | Path, content: dict[str, Any]) -> None:
     """Write JSON, arrays as lists."""
-    file.write_text(json.dumps(content, indent=1, default=lambda value: np.asarray(value).tolist()), encoding="utf-8")
+    write_text(file, json.dumps(content, indent=1, default=lambda value: np.asarray(value).tolist()))
+
+
+def create_folder(folder: Path) -> None:
+    """Create a folder for results, unless there is one.
+
+    Raises
+    ------
+    InputError
+        If it cannot be created.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"cannot create the folder: {error.strerror}", file=folder, remedy="Choose another output"
+        ) from None
 
 
 @contextmanager
 def complete_folder(output: Path) -> Iterator[Path]:
     """Yield a folder whose files appear in the output together, or not at all."""
-    try:
-        output.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"cannot create the folder: {error.strerror}", file=output, remedy="Choose another output"
-        ) from None
+    create_folder(output)
     with tempfile.TemporaryDirectory(dir=output, prefix=".part-") as name:
         yield Path(name)
         for item in sorted(Path(name).iterdir()):

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
-
-import jax
 
 __all__ = ["keep_compiled"]
 
+SETTINGS = {
+    "jax_persistent_cache_min_compile_time_secs": 0.0,
+    "jax_persistent_cache_min_entry_size_bytes": -1,
+}
+"""What is kept, in the options of JAX: everything, as reading a small function costs less than compiling it."""
+
+FOLDER = "jax_compilation_cache_dir"
+"""The option of JAX that names the folder."""
+
 
 def keep_compiled(folder: Path | None = None) -> None:
-    """Keep compiled functions in a folder; by default the user's cache, or what ``BAYESID_CACHE`` names.
+    """Keep compiled functions in a folder; by default what ``BAYESID_CACHE`` names, or else the user's cache.
 
-    An empty ``BAYESID_CACHE`` keeps nothing.
+    An empty ``BAYESID_CACHE`` keeps nothing, and a folder that JAX was given before stays. JAX need not be imported.
     """
     named = os.environ.get("BAYESID_CACHE")
-    if folder is None and named == "":
+    if folder is None and (named == "" or (named is None and _given())):
         return
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     chosen = folder or (Path(named) if named else home / "bayesid")
@@ -24,6 +32,15 @@ def keep_compiled(folder: Path | None = None) -> None:
         chosen.mkdir(parents=True, exist_ok=True)
     except OSError:  # a read-only home costs time, nothing else
         return
-    jax.config.update("jax_compilation_cache_dir", str(chosen))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.05)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", -1)
+    for option, value in {FOLDER: str(chosen), **SETTINGS}.items():
+        if "jax" in sys.modules:
+            sys.modules["jax"].config.update(option, value)
+        else:
+            os.environ[option.upper()] = str(value)
+
+
+def _given() -> object:
+    """Return the folder that JAX uses already, if any."""
+    if "jax" in sys.modules:
+        return getattr(sys.modules["jax"].config, FOLDER)
+    return os.environ.get(FOLDER.upper())

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bayesid._io.files import create_folder, write_text
 from bayesid.inference.simulated_recordings import simulate_manoeuvre
 from bayesid.recording.joint_motion import Excitation
 from bayesid.robot.body_prior import BodyPrior
@@ -72,7 +73,7 @@ def copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
     dict
         What is hidden in its recordings: effect -> key -> true value, in SI units.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    create_folder(folder)
     shipped = files("bayesid.app") / "demonstration_data"
     answer: dict[str, dict[str, float]] = {}
     for item in shipped.iterdir():
@@ -80,7 +81,7 @@ def copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
         if item.name == "hidden.json":
             answer = json.loads(text)
         else:
-            (folder / item.name).write_text(text, encoding="utf-8")
+            write_text(folder / item.name, text)
     return answer
 
 
@@ -102,7 +103,7 @@ def write_demo(folder: Path, seed: int) -> InertialParameters:
         orbit=Orbit(RADIUS),
         effects=(GravityGradient(),),
     )
-    folder.mkdir(parents=True, exist_ok=True)
+    create_folder(folder)
     sections = []
     for number, (offset, amplitude) in enumerate(MANOEUVRES, start=1):
         motion = Excitation(np.array(offset), np.array(amplitude), 2.0 * np.pi / 30.0, periods=2, ramp=30.0)
@@ -124,5 +125,5 @@ def write_demo(folder: Path, seed: int) -> InertialParameters:
         encoder=ENCODER_SIGMA,
         recordings="".join(sections),
     )
-    (folder / "study.toml").write_text(text, encoding="utf-8")
+    write_text(folder / "study.toml", text)
     return truth

@@ -1,34 +1,46 @@
-"""What ``bayesid identifiability`` does, apart from the terminal: what can be known, and what a study tells."""
+"""``bayesid identifiability``: what can be known of a robot, and what a study tells of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any
 
-from bayesid._io.files import complete_folder, write_json
-from bayesid.app.schema import Study
-from bayesid.app.study_to_linearisation import missing_part, prepare
-from bayesid.app.study_to_model import load_robot
-from bayesid.identifiability.base_parameters import BaseParameters, base_parameters
-from bayesid.identifiability.practical_identifiability import practical
-from bayesid.report import identifiability_report
-from bayesid.report.sentences.identifiability_sentences import advice_sentences, practical_sentences, structure_sentence
+import typer
 
-__all__ = ["run_identifiability"]
+from bayesid._io.progress import Progress
+from bayesid.app.options import Output, Seed, StudyFile
+
+if TYPE_CHECKING:
+    from bayesid.identifiability import BaseParameters
+
+__all__ = ["run"]
 
 
-def run_identifiability(
-    file: Path,
-    output: Path,
-    *,
-    seed: int,
-    effective_samples: float,
-    profiles: int,
-    progress: Callable[[float, str], None],
+def run(
+    file: StudyFile,
+    output: Output,
+    progress: Progress,
+    seed: Seed = 0,
+    samples: Annotated[float, typer.Option(help="Effective samples wanted where emcee is needed.")] = 500.0,
+    profiles: Annotated[int, typer.Option(min=0, help="Parameters that are profiled at most.")] = 6,
 ) -> Iterator[str]:
-    """Write identifiability.json and report.pdf of a study; without recordings only of its robot."""
+    """Say what robot, manoeuvres and sensors can tell of the bodies, and what would tell more: identifiability.json."""
+    from bayesid.app.schema import Study
+
     study = Study.load(file)
+
+    from bayesid._io.files import complete_folder, write_json
+    from bayesid.app.study_to_linearisation import missing_part, prepare
+    from bayesid.app.study_to_model import load_robot
+    from bayesid.identifiability import base_parameters
+    from bayesid.identifiability.practical_identifiability import practical
+    from bayesid.report import identifiability_report
+    from bayesid.report.sentences.identifiability_sentences import (
+        advice_sentences,
+        practical_sentences,
+        structure_sentence,
+    )
+
     structure = base_parameters(load_robot(study))
     yield structure_sentence(structure)
     content = _structure_dict(structure)
@@ -44,7 +56,7 @@ def run_identifiability(
             linearisation_point.optimum,
             linearisation_point.basis,
             seed,
-            effective_samples=effective_samples,
+            effective_samples=samples,
             profiles=profiles,
             progress=progress,
         )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,7 +14,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.app.schema import DesignSection, Study
 from bayesid.app.schema.validation_messages import suggest
-from bayesid.app.study_to_model import encoder_noise, load_model
+from bayesid.app.study_to_model import load_model
 from bayesid.design.criteria import (
     AOptimal,
     ConditionNumber,
@@ -30,20 +30,19 @@ from bayesid.design.design_problem import Problem
 from bayesid.design.extended_posture import extended_posture
 from bayesid.design.motion_limits import Limits
 from bayesid.design.plan import Plan
-from bayesid.design.predicted_posterior import Encoder
 from bayesid.design.trajectories import BSplines, Fourier, PaperExcitation, TrajectoryFamily
 from bayesid.robot.end_effector import Tip
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import create
 from bayesid.simulation.model import Model
 
-__all__ = ["ASSUMED", "assumed_encoders", "encoders", "fingerprint", "load_problem"]
+__all__ = ["defining_files", "load_loop_problem", "load_problem"]
 
 SAMPLES = 120
-"""Of a manoeuvre that are simulated, at most, each standing for as many as it takes."""
+"""Largest number of samples of a manoeuvre that are simulated, each standing for as many as it takes."""
 
 LONGEST_STEP, STEPS = 2.0, 60
-"""Of the integration: longest step [s] and fewest steps of a manoeuvre."""
+"""Longest step of the integration [s], and fewest steps of a manoeuvre."""
 
 FUNCTIONS = 8
 """Free functions of every joint where a study does not say."""
@@ -57,11 +56,10 @@ CRITERIA: tuple[Criterion, ...] = (
     EOptimal(),
     InformationGain(),
 )
-"""All that need nothing but the plan."""
+"""Criteria that need nothing but the plan."""
 
-
-ASSUMED = 1e-6
-"""Noise of an encoder of which the study says nothing, and no data tell [rad or m]."""
+BASE_AT_START = ("attitude", "attitude_sigma", "argument_of_latitude")
+"""Keys that ``[design]`` shares with a recording."""
 
 
 def load_problem(study: Study) -> Problem:
@@ -96,26 +94,30 @@ def load_problem(study: Study) -> Problem:
         raise error.within(file=study.file) from None
 
 
-def encoders(study: Study, robot: Robot) -> Encoder:
-    """Return the noise of the joints' recorded positions, `ASSUMED` where the study does not give it."""
-    noise = encoder_noise(study, robot)
-    positions = {joint: ASSUMED if sigma is None else sigma for joint, sigma in noise[0].items()}
-    return {**noise, 0: positions}
+def load_loop_problem(study: Study) -> Problem:
+    """Return the design problem for the loop, which plans by one criterion: the first that is named, or D-optimal.
+
+    Where ``[design]`` does not say how the base starts, it starts as in the first of the ``[[recordings]]``, whose file
+    is not read.
+
+    Raises
+    ------
+    InputError
+        Naming file, place, value and remedy.
+    """
+    section = study.design or DesignSection()
+    named = section.criteria or (DOptimal.name,)
+    update: dict[str, Any] = {"criteria": named[:1]}
+    if study.recordings and not section.model_fields_set.intersection(BASE_AT_START):
+        first = study.recordings[0]
+        update |= {key: getattr(first, key) for key in BASE_AT_START}
+        update["argument_of_latitude"] = first.argument_of_latitude or 0.0
+    return load_problem(study.model_copy(update={"design": section.model_copy(update=update)}))
 
 
-def assumed_encoders(study: Study, robot: Robot) -> list[str]:
-    """Return the joints whose encoders' noise had to be assumed."""
-    return [joint for joint, sigma in encoder_noise(study, robot)[0].items() if sigma is None]
-
-
-def fingerprint(study: Study) -> str:
-    """Return a hash of all files that define the problem of a study."""
-    files = [study.file, study.robot.urdf, study.unknowns.posterior, *study.model.plugins]
-    content = hashlib.sha256()
-    for file in files:
-        part = b"" if file is None else Path(file).read_bytes()
-        content.update(hashlib.sha256(part).digest())
-    return content.hexdigest()
+def defining_files(study: Study) -> list[Path | None]:
+    """Return all files that define the problem of a study, None for those it does not name."""
+    return [study.file, study.robot.urdf, study.unknowns.posterior, *study.model.plugins]
 
 
 def _with_rivals(model: Model, section: DesignSection) -> Model:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesid.app.schema import Study
-from bayesid.app.study_to_design import ASSUMED, assumed_encoders, encoders
+from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.design.predicted_posterior import planned_posterior
 from bayesid.identifiability.hypothetical_experiment import blanked, has
@@ -72,7 +72,7 @@ def prepare(study: Study, seed: int) -> LinearisationPoint:
 def _predicted(
     study: Study, model: Model, manoeuvres: Sequence[Manoeuvre], lacking: Sequence[str]
 ) -> LinearisationPoint:
-    robot, noise = model.robot, encoders(study, model.robot)
+    robot, (noise, assumed) = model.robot, assume_missing(encoder_noise(study, model.robot))
     planned = []
     for section, manoeuvre in zip(study.recordings, manoeuvres, strict=True):
         refuse_impossible_joints(manoeuvre.recording, robot)
@@ -87,8 +87,8 @@ def _predicted(
         "is taken as planned. The sensors are supposed to read what the prior's centre predicts, with the declared "
         "noise."
     )
-    if guessed := assumed_encoders(study, robot):
-        statement += f" The study gives no encoder noise of {', '.join(guessed)}: {ASSUMED:g} rad or m is assumed."
+    if assumed:
+        statement += f" The study gives no encoder noise of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
     return LinearisationPoint(Basis.PREDICTION, statement, posterior, fit(posterior, centre))
 
 

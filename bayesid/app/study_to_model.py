@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import copy
-import importlib.util
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid.app.schema import RecordingSection, Study
+from bayesid.app.study_to_encoders import encoder_noise
+from bayesid.app.user_files import run_user_file
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -24,7 +24,7 @@ from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Filter, Kind, Sensor
 
-__all__ = ["encoder_noise", "load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
+__all__ = ["load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
 
 
 CHANGE_SEED = 0
@@ -89,7 +89,7 @@ def _carried(study: Study, robot: Robot) -> JointPrior | None:
 def load_model(study: Study) -> Model:
     """Build the model of a study."""
     for plugin in study.model.plugins:
-        _import(Path(plugin))
+        run_user_file(Path(plugin), "model.plugins", "Correct the path of the plugin")
     robot, carried = _load_robot(study)
     try:
         priors, mixing = _priors(study, robot, carried)
@@ -136,15 +136,6 @@ def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Man
         attitude_sigma=section.attitude_sigma,
         argument_of_latitude=section.argument_of_latitude or 0.0,
     )
-
-
-def encoder_noise(study: Study, robot: Robot) -> dict[int, dict[str, float | None]]:
-    """Return the noise of position (0), velocity (1), acceleration (2) by joint; None where it is to be estimated."""
-    families: tuple[Literal["position", "velocity", "acceleration"], ...] = ("position", "velocity", "acceleration")
-    return {
-        derivative: {joint.name: study.sensors.encoder.sigma_of(family, joint.name) for joint in robot.joints}
-        for derivative, family in enumerate(families)
-    }
 
 
 def _orbit(study: Study) -> Orbit | None:
@@ -226,19 +217,3 @@ def _rate_sigma(study: Study) -> float:
     if study.model.initial_rate == "zero":
         return 0.0
     return study.model.initial_rate_sigma or RATE_SIGMA
-
-
-def _import(file: Path) -> None:
-    """Run a user's file, which registers the effects it defines."""
-    if not file.is_file():
-        raise InputError("no such file", file=file, place="model.plugins", remedy="Correct the path of the plugin")
-    spec = importlib.util.spec_from_file_location(f"bayesid_plugin_{file.stem}", file)
-    if spec is None or spec.loader is None:
-        raise InputError("not a Python file", file=file, place="model.plugins", remedy="Name a .py file")
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise InputError(
-            f"the plugin fails: {type(error).__name__}: {error}", file=file, remedy="Correct the file"
-        ) from error

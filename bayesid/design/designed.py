@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress, part_of, silent
 from bayesid._math.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem, Reached
@@ -16,7 +17,7 @@ from bayesid.design.plan import Trajectory
 from bayesid.design.predicted_posterior import Encoder, Predicted, planned_manoeuvre, planned_posterior, predict
 from bayesid.design.search_store import Store
 from bayesid.design.trajectories import ParameterisedMotion
-from bayesid.design.trajectory_search import Found, Search, Show, optimise
+from bayesid.design.trajectory_search import Found, Search, optimise
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.model import Manoeuvre
 
@@ -165,7 +166,7 @@ def design(
     search: Search = Search(),  # noqa: B008  (immutable)
     *,
     store: Store | None = None,
-    progress: Show = lambda fraction, text: None,
+    progress: Progress = silent,
 ) -> list[Design]:
     """Design a manoeuvre by every criterion of a problem.
 
@@ -199,7 +200,7 @@ def design(
                 search,
                 known=own.known,
                 keep=own.keep,
-                progress=_part(progress, index, 2 * count),
+                progress=part_of(progress, index / (2 * count), (index + 1) / (2 * count)),
             )
         )
     polished = []
@@ -213,7 +214,7 @@ def design(
                 np.random.default_rng(seeds[count + index]),
                 search,
                 store,
-                _part(progress, count + index, 2 * count),
+                part_of(progress, (count + index) / (2 * count), (count + index + 1) / (2 * count)),
             )
         )
     rng = np.random.default_rng(seeds[-1])
@@ -284,7 +285,7 @@ def _crossed(
     rng: np.random.Generator,
     search: Search,
     store: Store,
-    progress: Show,
+    progress: Progress,
 ) -> Found:
     """Search once more from the best of what all criteria found, and return the better result."""
     points = problem.points(criterion, rng)
@@ -305,7 +306,3 @@ def _crossed(
     costs = (again.cost, *found[index].costs)
     evaluations = again.evaluations + found[index].evaluations
     return Found(again.parameters, again.cost, costs, evaluations)
-
-
-def _part(progress: Show, index: int, count: int) -> Show:
-    return lambda fraction, text: progress((index + fraction) / count, text)

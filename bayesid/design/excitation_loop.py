@@ -7,7 +7,6 @@ of the folder: a loop that was killed goes on to the very same result.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress, silent
+from bayesid._io.store import content_key
+from bayesid._math.arrays import Floats
 from bayesid.design.design_problem import Problem
 from bayesid.design.designed import sample_times
 from bayesid.design.go_no_go import plan_to_go
@@ -32,7 +34,7 @@ from bayesid.design.plan import Plan
 from bayesid.design.predicted_posterior import Encoder
 from bayesid.design.search_store import Store
 from bayesid.design.simulated_spacecraft import Spacecraft, plan_recording
-from bayesid.design.trajectory_search import Search, Show
+from bayesid.design.trajectory_search import Search
 from bayesid.inference.body_quantities import BodyDraws
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
@@ -87,7 +89,7 @@ class Loop:
     search: Search = Search(starts=2, iterations=60)  # noqa: RUF009  (immutable)
     identifier: Identifier = Sampled()  # noqa: RUF009  (immutable)
 
-    def run(self, spacecraft: Spacecraft, folder: Path, progress: Show = lambda fraction, text: None) -> History:
+    def run(self, spacecraft: Spacecraft, folder: Path, progress: Progress = silent) -> History:
         """Go on until the wanted precision, the limit of steps, a no-go, or `NotFlown`.
 
         Parameters
@@ -127,7 +129,7 @@ class Loop:
         history.close("at-most")
         return history
 
-    def _plan(self, history: History, number: int, problem: Problem, progress: Show) -> bool:
+    def _plan(self, history: History, number: int, problem: Problem, progress: Progress) -> bool:
         """Plan a step unless that is done; return whether it may be flown."""
         entry = history.entry(number, "plan")
         if entry is not None:
@@ -153,8 +155,7 @@ class Loop:
             "attempts": [attempt.to_dict() for attempt in attempts],
         }
         history.record(number, "plan", content)
-        if store.file is not None:
-            store.file.unlink(missing_ok=True)
+        store.remove()
         return best.go
 
     def _execute(self, history: History, number: int, spacecraft: Spacecraft) -> None:
@@ -196,7 +197,7 @@ class Loop:
         """Return what tells this loop from others; how long it goes on is not part of it."""
         plan, limits = self.problem.plan, self.problem.applied
         model = plan.model
-        parts = (
+        return content_key(
             model.robot.to_urdf(),
             [(prior.name, prior.spread, prior.nuisance, prior.centre.vector.tolist()) for prior in model.priors],
             (
@@ -207,17 +208,18 @@ class Loop:
                 model.rate_sigma,
             ),
             (plan.family.name, plan.family.names, plan.family.duration, plan.interval, plan.tip.name),
+            start_of(plan),
             (plan.attitude.tolist(), plan.attitude_sigma, plan.argument_of_latitude, plan.step, plan.thinning),
             [(limit.name, limit.bound) for limit in limits],
             (self.problem.criteria[0], self.seed, self.search, self.identifier, dict(self.encoder)),
         )
-        return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
 def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
     """Return a recording as a manoeuvre, its joints smoothed.
 
-    The attitude at the start is that of the plan unless the recording has one.
+    The attitude at the start is that of the plan unless the recording has one; so are the positions of joints that are
+    recorded by speed alone.
     """
     attitude, sigma = plan.attitude, plan.attitude_sigma
     if "attitude.x" in recording.channels:
@@ -232,5 +234,12 @@ def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
         star = plan.model.sensor(Kind.ATTITUDE)
         if star is not None:
             sigma = max(sigma, LOOSE * float(np.max(star.noise.sigma(plan.interval))))
-    motion = MeasuredMotion.from_recording(recording, plan.model.robot, sigma=encoder)
+    names = [joint.name for joint in plan.model.robot.joints]
+    start = dict(zip(names, start_of(plan).tolist(), strict=True))
+    motion = MeasuredMotion.from_recording(recording, plan.model.robot, sigma=encoder, start=start)
     return Manoeuvre(recording, motion, attitude, attitude_sigma=sigma, argument_of_latitude=plan.argument_of_latitude)
+
+
+def start_of(plan: Plan) -> Floats:
+    """Positions of all joints at the start of a plan's manoeuvres, shape (joints,) [rad or m]."""
+    return plan.family.motion(plan.family.centre).evaluate(np.zeros(1)).position[0]

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from bayesid._io.progress import Progress, silent
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem, Reached
 from bayesid.design.designed import Risk, risks
 from bayesid.design.motion_limits import Limits
 from bayesid.design.search_store import Store
-from bayesid.design.trajectory_search import Found, Search, Show, optimise
+from bayesid.design.trajectory_search import Found, Search, optimise
 
 __all__ = ["Attempt", "plan_to_go"]
 
@@ -75,7 +76,7 @@ def plan_to_go(
     seed: np.random.SeedSequence,
     search: Search,
     store: Store,
-    progress: Show = lambda fraction, text: None,
+    progress: Progress = silent,
 ) -> list[Attempt]:
     """Design, and design anew under limits tightened by the ratio of limit to quantile until all hold.
 

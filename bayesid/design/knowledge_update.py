@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-import arviz as az
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._io.files import complete_file
 from bayesid._math.arrays import Floats
 from bayesid.design.design_problem import Known
 from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, quantity
@@ -87,6 +87,8 @@ class Laplace:
 
     def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
         """Write draws of the bodies alone."""
+        import arviz as az  # here, as it takes a second that commands without samples save
+
         starts, normal = np.random.SeedSequence(seed).spawn(2)
         refined, optimum = maximise(posterior, np.random.default_rng(starts))
         noise = np.random.default_rng(normal).normal(size=(self.draws, posterior.size))
@@ -96,9 +98,8 @@ class Laplace:
         data = az.from_dict(
             posterior={"inertial": values}, dims={"inertial": ["body", "parameter"]}, coords={"body": names}
         )
-        part = file.with_name(file.name + ".part")
-        data.to_netcdf(str(part))
-        part.replace(file)
+        with complete_file(file) as part:
+            data.to_netcdf(str(part))
         return {"method": "laplace", "chi2": optimum.chi2, "samples": posterior.samples, "disagreements": []}
 
 

@@ -6,14 +6,13 @@ not done is forgotten. All else the folder holds are recordings, which nobody bu
 
 from __future__ import annotations
 
-import hashlib
-import json
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from bayesid._io.errors import InputError
+from bayesid._io.files import create_folder
+from bayesid._io.store import JsonStore, file_key
 
 __all__ = ["History"]
 
@@ -28,7 +27,7 @@ class History:
     ----------
     folder : Path
     key : str
-        Identifies robot, sensors, prior, limits and seed.
+        The SHA-256 of robot, sensors, prior, manoeuvre, limits, search and seed.
     status : str
         ``running``, ``waiting`` (for a recording), ``reached``, ``at-most`` or ``no-go``.
     steps : list of dict
@@ -49,23 +48,9 @@ class History:
         InputError
             If it belongs to another loop, or a recording or plan was changed after it was used.
         """
-        folder.mkdir(parents=True, exist_ok=True)
-        file = folder / "loop.json"
-        if not file.is_file():
-            return cls(folder, key)
-        try:
-            content = json.loads(file.read_text(encoding="utf-8"))
-            found, steps = content["key"], content["steps"]
-        except (ValueError, KeyError, TypeError) as error:
-            raise InputError(f"unreadable: {error}", file=file, remedy="Delete it or choose another folder") from error
-        if found != key:
-            raise InputError(
-                "it belongs to another loop: robot, sensors, prior, limits, search or seed differ",
-                file=file,
-                remedy="Choose another output folder",
-            )
+        create_folder(folder)
         history = cls(folder, key)
-        history._take(steps)
+        history._take(history._store.read("steps") or [])
         return history
 
     def path(self, number: int, stage: str) -> Path:
@@ -90,14 +75,16 @@ class History:
 
     def write(self) -> None:
         """Write ``loop.json``, all or nothing."""
-        content = {"key": self.key, "status": self.status, "steps": self.steps}
-        part = self.folder / ".loop.json.part"
-        part.write_text(json.dumps(content, indent=1), encoding="utf-8")
-        os.replace(part, self.folder / "loop.json")
+        self._store.write(status=self.status, steps=self.steps)
+
+    @property
+    def _store(self) -> JsonStore:
+        content = "robot, sensors, prior, manoeuvre, limits, search or seed"
+        return JsonStore(self.folder / "loop.json", self.key, "loop", content)
 
     def _mark(self, number: int, stage: str) -> dict[str, str]:
         file = self.path(number, stage)
-        return {"file": file.name, "sha256": hashlib.sha256(file.read_bytes()).hexdigest()}
+        return {"file": file.name, "sha256": file_key(file)}
 
     def _take(self, steps: list[dict[str, Any]]) -> None:
         """Keep the entries of stages that are done."""

@@ -10,13 +10,13 @@ import numpy as np
 from scipy.optimize import minimize
 
 from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem
 
 __all__ = ["Found", "Search", "optimise"]
 
-Show = Callable[[float, str], None]
 
 FILLED = 0.8
 """Part of the tightest limit that random starts use."""
@@ -75,7 +75,7 @@ def optimise(
     first: Floats | None = None,
     known: Callable[[int], tuple[Floats, float, int] | None] = lambda start: None,
     keep: Callable[[int, Floats, float, int], None] = lambda start, parameters, cost, evaluations: None,
-    progress: Show = lambda fraction, text: None,
+    progress: Progress = silent,
 ) -> Found:
     """Minimise a criterion within the limits.
 
@@ -135,7 +135,7 @@ class _Run:
         points: list[Floats],
         number: int,
         search: Search,
-        progress: Show,
+        progress: Progress,
         begin: Floats,
     ) -> None:
         self.problem, self.criterion, self.points = problem, criterion, points

@@ -6,7 +6,7 @@ gate is the calibrated test of what a fit leaves (`TestSuite`); evidence ranks w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import product
@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.fit_starts import starts_of
 from bayesid.diagnosis.noise_faults import NoiseFault, noise_fault, refined
@@ -108,8 +109,7 @@ class CauseSearch:
         Coordinates held at zero (`Engine`).
     candidates : sequence of Effect
     seed : int
-    progress : callable, optional
-        Told a fraction and a sentence.
+    progress : Progress, optional
     """
 
     def __init__(
@@ -118,11 +118,11 @@ class CauseSearch:
         frozen: Sequence[int],
         candidates: Sequence[Effect],
         seed: int,
-        progress: Callable[[float, str], None] | None = None,
+        progress: Progress = silent,
     ) -> None:
         self.candidates = {effect.label: effect for effect in candidates}
         self.seed = seed
-        self._tell = progress or (lambda fraction, text: None)
+        self._tell = progress
         self._batteries: dict[tuple[str, ...], TestSuite] = {}
         self._done: dict[frozenset[str], Hypothesis] = {}
         engine = Engine(posterior, frozen)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidate_effects import candidates
 from bayesid.diagnosis.candidate_table import Candidate, candidate_table
@@ -19,7 +20,6 @@ from bayesid.diagnosis.gain import Gain, measure_gain
 from bayesid.diagnosis.verdict import Status, Verdict, judge
 from bayesid.inference import Identification, identify
 from bayesid.inference.body_quantities import quantity
-from bayesid.inference.ensemble import Progress
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model
@@ -116,7 +116,7 @@ def diagnose(
     *,
     effects: Sequence[Effect] | None = None,
     knows_latitude: bool = True,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
 ) -> Diagnosis:
     """Show what a model gets wrong about recordings, and name the cause. Joint torques are not used.
 
@@ -130,8 +130,7 @@ def diagnose(
         Candidates; by default all of the catalogue that could exist (`candidates`).
     knows_latitude : bool
         Whether the manoeuvres' arguments of latitude are known.
-    progress : callable, optional
-        Told a fraction and a sentence.
+    progress : Progress, optional
     """
     model = model.without_torque  # whose friction no catalogue of causes holds
     with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
@@ -144,9 +143,8 @@ def _diagnose(
     seed: int,
     effects: Sequence[Effect] | None,
     knows_latitude: bool,
-    progress: Callable[[float, str], None] | None,
+    progress: Progress,
 ) -> Diagnosis:
-    tell = progress or (lambda fraction, text: None)
     at_rest = model.rate_sigma == 0.0
     posterior = Posterior.of(replace(model, rate_sigma=RATE_SIGMA, speed_errors=True) if at_rest else model, manoeuvres)
     rates = posterior.unknowns.layout.all_rates
@@ -154,10 +152,10 @@ def _diagnose(
     catalogue = candidates(model, knows_latitude=knows_latitude) if effects is None else list(effects)
     search = CauseSearch(posterior, frozen, catalogue, seed, progress)
     verdict = judge(search)
-    tell(0.8, "measuring the gain")
+    progress(0.8, "measuring the gain")
     best = verdict.best if verdict.causes else search.base
     gain = measure_gain(search.base, best)
-    tell(0.9, "reconstructing the disturbance")
+    progress(0.9, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
     unexplained = unexplained_wrench(best, open_question) if verdict.causes or open_question else verdict.disturbance
     return Diagnosis(search, verdict, candidate_table(search), gain, unexplained)
@@ -187,7 +185,7 @@ def identify_extended(
     seed: int,
     *,
     effective_samples: float = 4000.0,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Progress = silent,
 ) -> Identification:
     """Sample the extended model."""
     return identify(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.special import logsumexp
 
+from bayesid._io.files import write_text
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.cause_search import Hypothesis
 from bayesid.diagnosis.omnibus_tests import FORCE, TORQUE
@@ -76,7 +77,7 @@ class Unexplained:
             blocks = [part[frame][r] for frame in Frame for part in (self.torque, self.force)]
             table = np.concatenate([self.time[r][:, None], *blocks, self.torque_sd[r], self.force_sd[r]], axis=1)
             lines += [",".join([name, *(f"{value:.6g}" for value in row)]) for row in table]
-        file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        write_text(file, "\n".join(lines) + "\n")
 
 
 def unexplained_wrench(hypothesis: Hypothesis, name_frame: bool = True) -> Unexplained:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress
 from bayesid.identifiability.added_information import AddedMeasurement, NotEvaluated
 from bayesid.identifiability.directions import Direction
 from bayesid.identifiability.hypothetical_experiment import InformationPredictor
@@ -70,7 +71,7 @@ def advise(
     candidates: Sequence[AddedMeasurement],
     worst: Sequence[Direction],
     now: Knowledge,
-    progress: Callable[[float, str], None],
+    progress: Progress,
 ) -> list[Advice]:
     """Evaluate candidates at the point of the predictor, the most telling of the worst direction first.
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
+from bayesid._io.progress import Progress
 from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference.body_quantities import bodies_of
-from bayesid.inference.ensemble import Progress, sample
+from bayesid.inference.ensemble import sample
 from bayesid.inference.importance import choose_parameterisation, weighted_draws
 from bayesid.inference.mode import Optimum
 from bayesid.inference.posterior import Posterior
@@ -77,7 +77,7 @@ def draw(
     optimum: Optimum,
     seed: np.random.SeedSequence,
     effective_samples: float,
-    progress: Callable[[float, str], None],
+    progress: Progress,
 ) -> Draws:
     """Draw from a posterior: by importance sampling, or by emcee where that may not be trusted and can be afforded."""
     weigh, walk = seed.spawn(2)
@@ -88,12 +88,8 @@ def draw(
         values = _quantities(posterior, weighted.z)
         return Draws(Method.IMPORTANCE, values, weighted.weights, weighted.trusted, weighted.pareto_k)
 
-    def report(state: Progress) -> None:
-        found = state.effective_samples / state.wanted if state.r_hat < 1.05 else 0.0
-        progress(min(max(found, state.steps / state.limit), 1.0), f"sampling, step {state.steps}")
-
     chains = sample(
-        parameterisation, optimum, walk, effective_samples=effective_samples, max_steps=STEPS, progress=report
+        parameterisation, optimum, walk, effective_samples=effective_samples, max_steps=STEPS, progress=progress
     )
     values = _quantities(posterior, chains.flat)
     weights = np.full(len(values), 1.0 / len(values))

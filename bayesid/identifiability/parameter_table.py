@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import jax
 import numpy as np
 
+from bayesid._io.progress import Progress
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.identifiability.normality import NORMAL, Draws, shape_errors
 from bayesid.identifiability.profile_interval import Profile, Target, profile
@@ -21,8 +21,6 @@ __all__ = ["ParameterRow", "profiled", "quantity_of", "tabulate"]
 
 CORRELATED = 0.9
 """Correlation from which on a quantity is named as one that another is confused with."""
-
-Show = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,7 @@ def profiled(
     draws: Draws,
     knowledge: Knowledge,
     most: int,
-    progress: Show,
+    progress: Progress,
 ) -> list[ParameterRow]:
     """Profile the least normal quantities; where draws do not tell, the worst known of which something was learnt."""
     errors = shape_errors(draws, knowledge)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
 import numpy as np
 
+from bayesid._io.progress import Progress, part_of, silent
 from bayesid.identifiability.added_information import candidates
 from bayesid.identifiability.advice import Advice, advise
 from bayesid.identifiability.direction_words import describe
@@ -21,8 +21,6 @@ from bayesid.inference.mode import Optimum
 from bayesid.inference.posterior import Posterior
 
 __all__ = ["Basis", "Practical", "covers_all", "practical"]
-
-Show = Callable[[float, str], None]
 
 
 class Basis(Enum):
@@ -100,7 +98,7 @@ def practical(
     *,
     effective_samples: float = 500.0,
     profiles: int = 6,
-    progress: Show = lambda _fraction, _text: None,
+    progress: Progress = silent,
 ) -> Practical:
     """Say what a posterior knows of its bodies, and what would tell more.
 
@@ -120,11 +118,11 @@ def practical(
     found = tuple(directions(knowledge))
     whole = covers_all(posterior)
     words = tuple(describe(item, knowledge.values, knowledge.prior_sd, whole) for item in found)
-    draws = draw(posterior, optimum, np.random.SeedSequence(seed), effective_samples, _part(progress, 0.1, 0.4))
+    draws = draw(posterior, optimum, np.random.SeedSequence(seed), effective_samples, part_of(progress, 0.1, 0.4))
     parameters = tabulate(knowledge, draws)
-    parameters = profiled(posterior, optimum, parameters, draws, knowledge, profiles, _part(progress, 0.4, 0.6))
+    parameters = profiled(posterior, optimum, parameters, draws, knowledge, profiles, part_of(progress, 0.4, 0.6))
     predictor = InformationPredictor(posterior.model, posterior.manoeuvres, optimum.z, posterior.step)
-    advice = advise(predictor, candidates(posterior.model), found, knowledge, _part(progress, 0.6, 1.0))
+    advice = advise(predictor, candidates(posterior.model), found, knowledge, part_of(progress, 0.6, 1.0))
     return Practical(basis, posterior, optimum, knowledge, found, words, tuple(parameters), draws, tuple(advice))
 
 
@@ -132,7 +130,3 @@ def covers_all(posterior: Posterior) -> bool:
     """Whether every body of the robot that has mass is to be identified."""
     named = {body.name for body in posterior.model.bodies}
     return {name for name, link in posterior.model.robot.links.items() if link.inertial.mass > 0.0} <= named
-
-
-def _part(progress: Show, start: float, end: float) -> Show:
-    return lambda fraction, text: progress(start + (end - start) * fraction, text)

@@ -6,27 +6,27 @@ steps where the posterior is nearly normal, and emcee's differential evolution, 
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import arviz as az
 import emcee
+import h5py
 import numpy as np
 from emcee.autocorr import integrated_time
 from emcee.moves import DEMove, DESnookerMove
 from emcee.moves.red_blue import RedBlueMove
 
 from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress, silent
+from bayesid._io.store import content_key, refuse_other
 from bayesid._math.arrays import Floats
 from bayesid.inference.mode import Optimum
 from bayesid.inference.parameterisation import Parameterisation
-from bayesid.inference.posterior import BATCH, Posterior
+from bayesid.inference.posterior import BATCH
 from bayesid.inference.proposal import StudentT
 
-__all__ = ["Chains", "LaplaceMove", "Progress", "sample"]
+__all__ = ["Chains", "LaplaceMove", "sample"]
 
 
 ENSEMBLES = 4
@@ -37,6 +37,10 @@ LENGTHS = 50.0
 """Steps demanded, in autocorrelation times, as emcee advises."""
 
 R_HAT = 1.01
+"""Largest potential scale reduction of a converged sampler."""
+
+NEARLY = 1.05
+"""Potential scale reduction below which effective samples are counted as progress."""
 
 
 class LaplaceMove(RedBlueMove):
@@ -52,19 +56,6 @@ class LaplaceMove(RedBlueMove):
         """Return proposals and the log ratio of backward to forward densities."""
         new = self.proposal.draw(len(sample), random)
         return new, self.proposal.log_density(sample) - self.proposal.log_density(new)
-
-
-@dataclass(frozen=True)
-class Progress:
-    """State of a running sampler, handed to a callback after every block of steps."""
-
-    steps: int
-    limit: int
-    evaluations: int
-    effective_samples: float
-    wanted: float
-    r_hat: float
-    acceptance: float
 
 
 @dataclass(frozen=True)
@@ -120,7 +111,7 @@ def sample(
     effective_samples: float = 4000.0,
     max_steps: int = 5000,
     file: Path | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Progress = silent,
 ) -> Chains:
     """Sample the posterior until it has converged.
 
@@ -136,7 +127,7 @@ def sample(
         Per ensemble; reaching it leaves ``converged`` false.
     file : path, optional
         HDF5 file that keeps every step. If it holds part of the same run, sampling goes on from there.
-    progress : callable, optional
+    progress : Progress, optional
         Called after every block of steps.
     """
     posterior = parameterisation.posterior
@@ -144,10 +135,12 @@ def sample(
     moves = [(LaplaceMove(proposal), 0.6), (DEMove(), 0.3), (DESnookerMove(), 0.1)]
     walkers = _walkers(posterior.size)
     sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-    mark = _fingerprint(posterior, optimum, sequence)
+    # the optimum follows from data and model
+    mode = np.round(optimum.z, 6) + 0.0
+    key = content_key(posterior.unknowns.names, sequence.entropy, sequence.spawn_key, mode)
     samplers = []
     for number, child in enumerate(sequence.spawn(ENSEMBLES)):
-        backend = _backend(file, number, mark)
+        backend = _backend(file, number, key)
         state = np.random.RandomState(child.generate_state(8))
         fresh = not backend.initialized or backend.iteration == 0
         sampler = emcee.EnsembleSampler(
@@ -160,8 +153,7 @@ def sample(
         steps = min(int(sampler.iteration) for sampler, _ in samplers)
         if steps and (steps % BLOCK == 0 or steps >= max_steps):
             chains = _summary(parameterisation, [sampler for sampler, _ in samplers], effective_samples)
-            if progress is not None:
-                progress(_progress(chains, max_steps, effective_samples))
+            _tell(progress, chains, max_steps, effective_samples)
             if chains.converged or steps >= max_steps:
                 return chains
         # after an interruption ensembles stand at different steps; all go on to the end of the block
@@ -172,16 +164,11 @@ def sample(
             samplers[number] = (sampler, None)
 
 
-def _progress(chains: Chains, limit: int, wanted: float) -> Progress:
-    return Progress(
-        steps=chains.steps,
-        limit=limit,
-        evaluations=chains.evaluations,
-        effective_samples=chains.effective_samples,
-        wanted=wanted,
-        r_hat=chains.r_hat,
-        acceptance=chains.acceptance,
-    )
+def _tell(progress: Progress, chains: Chains, limit: int, wanted: float) -> None:
+    """Tell how far the ensembles are: towards the wanted samples or, while they disagree, towards the last step."""
+    sampled = chains.effective_samples / wanted if chains.r_hat < NEARLY else 0.0
+    text = f"step {chains.steps}, {chains.effective_samples:.0f} effective samples, R-hat {chains.r_hat:.3f}"
+    progress(min(max(sampled, chains.steps / limit), 1.0), text)
 
 
 def _walkers(size: int) -> int:
@@ -200,42 +187,37 @@ def _start(
     return finite[:walkers]
 
 
-def _backend(file: Path | None, number: int, mark: str) -> emcee.backends.Backend:
+def _backend(file: Path | None, number: int, key: str) -> emcee.backends.Backend:
+    """Return where an ensemble keeps its steps; samples of another key are refused."""
     if file is None:
         return emcee.backends.Backend()
-    backend = emcee.backends.HDFBackend(str(file), name=f"ensemble-{number}")
-    if backend.initialized:
-        with backend.open() as opened:
-            found = opened[f"ensemble-{number}"].attrs.get("run", "")
-        if found != mark:
-            raise InputError(
-                "holds the samples of another run (other data, model or seed)",
-                file=file,
-                remedy="Delete it or choose another output folder",
-            )
-    return _Marked(backend, mark)
+    name = f"ensemble-{number}"
+    if file.is_file():
+        try:
+            with h5py.File(file, "r") as opened:
+                found = opened[name].attrs.get("key", "") if name in opened else key
+        except OSError as error:
+            raise InputError(f"unreadable samples: {error}", file=file, remedy="Delete the file") from error
+        refuse_other(found, key, file, "run", "data, model or seed")
+    return _KeyedBackend(file, name, key)
 
 
-class _Marked(emcee.backends.HDFBackend):
-    """HDF5 backend that writes down which run its samples belong to."""
+class _KeyedBackend(emcee.backends.HDFBackend):
+    """HDF5 backend that writes down the key of what its samples depend on."""
 
-    def __init__(self, backend: emcee.backends.HDFBackend, mark: str) -> None:
-        super().__init__(backend.filename, name=backend.name)
-        self.mark = mark
+    def __init__(self, file: Path, name: str, key: str) -> None:
+        super().__init__(str(file), name=name)
+        self.key = key
 
     def reset(self, nwalkers: int, ndim: int) -> None:
         super().reset(nwalkers, ndim)
         with self.open("a") as opened:
-            opened[self.name].attrs["run"] = self.mark
-
-
-def _fingerprint(posterior: Posterior, optimum: Optimum, sequence: np.random.SeedSequence) -> str:
-    digest = hashlib.sha256(repr((posterior.unknowns.names, sequence.entropy, sequence.spawn_key)).encode())
-    digest.update(np.round(optimum.z, 6).tobytes())
-    return digest.hexdigest()[:16]
+            opened[self.name].attrs["key"] = self.key
 
 
 def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
+    import arviz as az  # here, as it takes a second that commands without samples save
+
     steps = min(int(sampler.iteration) for sampler in samplers)
     chains = [sampler.get_chain()[:steps] for sampler in samplers]
     densities = [sampler.get_log_prob()[:steps] for sampler in samplers]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from bayesid._io.files import write_json
+from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import (
     BODY_QUANTITIES,
@@ -22,7 +22,7 @@ from bayesid.inference.body_quantities import (
     reported_effect,
 )
 from bayesid.inference.contraction import Contraction, compare
-from bayesid.inference.ensemble import Chains, Progress, sample
+from bayesid.inference.ensemble import Chains, sample
 from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise
 from bayesid.inference.posterior import Posterior
@@ -157,10 +157,7 @@ class Identification:
 
     def write_json(self, file: Path) -> None:
         """Write `to_dict`, all or nothing."""
-        text = json.dumps(self.to_dict(), indent=1)
-        part = file.with_suffix(".part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(file)
+        write_json(file, self.to_dict())
 
     def _effects_dict(self) -> dict[str, Any]:
         result: dict[str, Any] = {}
@@ -190,7 +187,7 @@ def identify(
     effective_samples: float = 4000.0,
     max_steps: int = 5000,
     file: Path | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Progress = silent,
 ) -> Identification:
     """Identify the unknowns of a posterior.
 

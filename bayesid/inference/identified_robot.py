@@ -7,12 +7,12 @@ linear in these parameters: the mean lies on the straight ridge that the data le
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bayesid._io.files import write_json
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, body_dict
 from bayesid.inference.identification import Identification
@@ -50,7 +50,7 @@ def uncertainty(result: Identification) -> dict[str, Any]:
 def write_identified(result: Identification, folder: Path) -> None:
     """Write ``identified.urdf`` and, beside it, ``identified-uncertainty.json``."""
     identified_robot(result).write_urdf(folder / "identified.urdf")
-    (folder / "identified-uncertainty.json").write_text(json.dumps(uncertainty(result), indent=1), encoding="utf-8")
+    write_json(folder / "identified-uncertainty.json", uncertainty(result))
 
 
 def _draws(result: Identification) -> dict[str, Floats]:

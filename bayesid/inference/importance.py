@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import arviz as az
 import numpy as np
 
 from bayesid._math.arrays import Floats
@@ -103,6 +102,8 @@ def weighted_draws(
     parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator, draws: int = 4000
 ) -> WeightedDraws:
     """Draw from the Student-t about the mode and weigh by the posterior."""
+    import arviz as az  # here, as it takes a second that commands without samples save
+
     proposal = parameterisation.proposal(optimum)
     y = proposal.draw(draws, rng)
     log_weights = parameterisation.log_density(y) - proposal.log_density(y)

@@ -15,8 +15,8 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Traceable
-from bayesid.robot.inertial_parameters import PARAMETERS, vector_from_factor
-from bayesid.robot.log_cholesky import absolute, log_volume, relative
+from bayesid.robot.inertial_parameters import PARAMETERS
+from bayesid.robot.log_cholesky import absolute, log_volume, relative, vector_from_factor
 from bayesid.simulation.effects.effect_parameters import Prior
 from bayesid.simulation.simulator import Values
 

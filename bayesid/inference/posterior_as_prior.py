@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import arviz as az
 import jax.numpy as jnp
 import numpy as np
 
@@ -19,8 +18,8 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.inference.identification import Identification
 from bayesid.robot.body_prior import BodyPrior, Mixing
-from bayesid.robot.inertial_parameters import BASIS, InertialParameters, log_cholesky_vector
-from bayesid.robot.log_cholesky import log_cholesky_coordinates
+from bayesid.robot.inertial_parameters import BASIS, InertialParameters
+from bayesid.robot.log_cholesky import log_cholesky_coordinates, log_cholesky_vector
 from bayesid.robot.mass_property_change import BodyChange
 
 __all__ = ["BodyChange", "InertialDraws", "JointPrior", "joint_prior"]
@@ -63,6 +62,8 @@ class InertialDraws:
         InputError
             If the file is absent or holds none.
         """
+        import arviz as az  # here, as it takes a second that commands without samples save
+
         remedy = "Name the posterior.nc that bayesid identify wrote"
         if not file.is_file():
             raise InputError("there is no such file", file=file, remedy=remedy)

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import arviz as az
 import numpy as np
 
+from bayesid._io.files import complete_file
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of, reported_effect
 from bayesid.inference.identification import Identification
 from bayesid.inference.predicted_readings import noisy, predicted_readings
 from bayesid.simulation.sensors import Kind
+
+if TYPE_CHECKING:
+    import arviz as az
 
 __all__ = ["to_arviz", "write_netcdf"]
 
@@ -34,6 +37,8 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
     of all bodies, those only marginalised included; ``z``, the coordinates with a standard-normal prior),
     ``log_likelihood`` per recording, ``posterior_predictive`` with sensor noise, and ``observed_data``.
     """
+    import arviz as az  # here, as it takes a second that commands without samples save
+
     z = _thin(result.chains.z, STORED)
     few = z[:, :: max(1, z.shape[1] // PREDICTED)][:, :PREDICTED]
     posterior, dims, units = _posterior_group(result, z)
@@ -65,9 +70,8 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
 
 def write_netcdf(result: Identification, file: Path, rng: np.random.Generator) -> None:
     """Write `to_arviz` to a NetCDF file, all or nothing."""
-    part = file.with_name(file.name + ".part")
-    to_arviz(result, rng).to_netcdf(str(part))
-    part.replace(file)
+    with complete_file(file) as part:
+        to_arviz(result, rng).to_netcdf(str(part))
 
 
 def _thin(draws: Floats, count: int) -> Floats:

@@ -20,8 +20,8 @@ from jax import Array
 from bayesid._math.arrays import Floats
 from bayesid.inference.layout import EffectLayout, Layout, PriorNumbers
 from bayesid.robot.body_prior import BodyPrior, Mixing, coordinates_of
-from bayesid.robot.inertial_parameters import LOG_CHOLESKY, PARAMETERS, InertialParameters, upper_cholesky
-from bayesid.robot.log_cholesky import SLOPE
+from bayesid.robot.inertial_parameters import PARAMETERS, InertialParameters
+from bayesid.robot.log_cholesky import LOG_CHOLESKY, SLOPE, upper_cholesky
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.simulator import Values
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import csv
 import difflib
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
 from bayesid._io.errors import InputError
+from bayesid._io.files import complete_file
 from bayesid._math.arrays import Floats
 
 __all__ = ["JOINT_FAMILIES", "VECTOR_FAMILIES", "Recording", "declare_family"]
@@ -132,12 +132,8 @@ class Recording:
             raise InputError(f"a recording cannot be a {file.suffix!r} file", file=file, remedy=_FORMATS)
         if not file.parent.is_dir():
             raise InputError(f"there is no folder {file.parent}", file=file, remedy="Create it first")
-        temporary = file.with_name(f".{file.name}.{os.getpid()}.part")
-        try:
-            writer(temporary, {"time": self.time, **self.channels})
-            temporary.replace(file)
-        finally:
-            temporary.unlink(missing_ok=True)
+        with complete_file(file) as part:
+            writer(part, {"time": self.time, **self.channels})
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -6,7 +6,6 @@ Text that callers give is never read as markup: it reaches Typst as string liter
 from __future__ import annotations
 
 import io
-import os
 import re
 import tempfile
 from collections.abc import Sequence
@@ -19,6 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from bayesid._io.errors import InputError
+from bayesid._io.files import complete_file
 
 __all__ = ["Document", "Rows"]
 
@@ -142,17 +142,15 @@ class Document:
         self._parts.append(f"#figure(image({name}, width: {width}), kind: image, caption: {literal(caption)})\n")
 
     def write(self, path: str | Path) -> None:
-        """Set the document and write it as PDF, whole or not at all."""
-        target = Path(path)
+        """Set the document and write it as PDF, all or nothing."""
         with tempfile.TemporaryDirectory() as folder:
             source = Path(folder) / "main.typ"
             source.write_text("".join(self._parts), encoding="utf-8")
             for number, content in enumerate(self._figures, start=1):
                 (Path(folder) / f"figure-{number}.svg").write_bytes(content)
             pdf = typst.compile(str(source), root=folder, format="pdf")
-        part = target.with_name(target.name + ".part")
-        part.write_bytes(pdf)
-        os.replace(part, target)
+        with complete_file(path) as part:
+            part.write_bytes(pdf)
 
 
 def literal(text: str) -> str:

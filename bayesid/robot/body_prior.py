@@ -9,8 +9,8 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.robot.inertial_parameters import InertialParameters, log_cholesky_vector
-from bayesid.robot.log_cholesky import relative_coordinates
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.log_cholesky import log_cholesky_vector, relative_coordinates
 
 __all__ = ["BodyPrior", "Mixing", "check_mixing", "coordinates_of", "draw_inertial"]
 

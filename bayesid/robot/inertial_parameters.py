@@ -1,40 +1,27 @@
-"""Inertial parameters of one rigid body, and log-Cholesky coordinates, in which every value is a physical body.
+"""Inertial parameters of one rigid body.
 
 A body is physical when its 4x4 pseudo-inertia ``[[Sigma, h], [h', m]]`` is positive definite, with ``Sigma`` the second
-moment of mass about the link's origin (Wensing, Kim and Slotine, RA-L 2018). The log-Cholesky coordinates are those of
-Rucker and Wensing (RA-L 2022) in Pinocchio's order: ``alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3``.
+moment of mass about the link's origin (Wensing, Kim and Slotine, RA-L 2018). Coordinates in which every value is a
+physical body are in `bayesid.robot.log_cholesky`. Study files are checked with this module, which imports no JAX.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 from numpy.typing import ArrayLike
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, namespace
 
-__all__ = [
-    "BASIS",
-    "LOG_CHOLESKY",
-    "InertialParameters",
-    "log_cholesky_factor",
-    "log_cholesky_vector",
-    "mass_com_inertia",
-    "parameters_from_pseudo_inertia",
-    "upper_cholesky",
-    "vector_from_factor",
-]
+if TYPE_CHECKING:
+    from jax import Array
 
-A = TypeVar("A", Floats, Array)
+__all__ = ["BASIS", "PARAMETERS", "InertialParameters", "mass_com_inertia", "parameters_from_pseudo_inertia"]
 
-LOG_CHOLESKY = ("alpha", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3")
-"""Names of the log-Cholesky coordinates (Rucker & Wensing 2022)."""
+A = TypeVar("A", Floats, "Array")
 
 PARAMETERS = 10
 """Number of inertial parameters of a rigid body."""
@@ -146,53 +133,13 @@ class InertialParameters:
         return self.mass > 0.0 and bool(np.linalg.eigvalsh(self.pseudo_inertia / self.mass)[0] > 1e-12)
 
 
-def log_cholesky_factor(coordinates: Array) -> Array:
-    """Return the upper-triangular factor U(theta) of ``J = U U'``, which is the identity for theta = 0.
-
-    Parameters
-    ----------
-    coordinates : (10,) array
-        Coordinates in the order of `LOG_CHOLESKY`.
-
-    Returns
-    -------
-    (4, 4) array
-    """
-    alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3 = coordinates
-    zero, one = jnp.zeros_like(alpha), jnp.ones_like(alpha)
-    rows = [
-        [jnp.exp(d1), s12, s13, t1],
-        [zero, jnp.exp(d2), s23, t2],
-        [zero, zero, jnp.exp(d3), t3],
-        [zero, zero, zero, one],
-    ]
-    return jnp.exp(alpha) * jnp.stack([jnp.stack(row) for row in rows])
-
-
-def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array:
-    """Return the ten linear parameters of the body with log-Cholesky coordinates (10,) about a centre, shape (10,)."""
-    return vector_from_factor(jnp.asarray(upper_cholesky(centre.pseudo_inertia)), coordinates)
-
-
-@jax.jit  # traced once for all bodies
-def vector_from_factor(centre: Array, coordinates: Array) -> Array:
-    """Return `log_cholesky_vector` about a centre whose pseudo-inertia has the factor (4, 4) of `upper_cholesky`."""
-    factor = centre @ log_cholesky_factor(coordinates)
-    return parameters_from_pseudo_inertia(factor @ factor.T)
-
-
-def upper_cholesky(pseudo_inertia: Floats) -> Floats:
-    """Return the upper-triangular U with ``U U' = pseudo_inertia``, shape (4, 4)."""
-    flipped = np.linalg.cholesky(pseudo_inertia[::-1, ::-1])
-    return flipped[::-1, ::-1]
-
-
-def parameters_from_pseudo_inertia(pseudo_inertia: Array) -> Array:
-    """Return the ten linear parameters (`InertialParameters.vector`) of a pseudo-inertia, (4, 4) -> (10,)."""
+def parameters_from_pseudo_inertia(pseudo_inertia: A) -> A:
+    """Ten linear parameters (`InertialParameters.vector`) of a pseudo-inertia of NumPy or JAX, (4, 4) -> (10,)."""
+    xp = namespace(pseudo_inertia)
     sigma = pseudo_inertia[:3, :3]
-    tensor = jnp.trace(sigma) * jnp.eye(3) - sigma
-    lower = jnp.stack([tensor[0, 0], tensor[1, 0], tensor[1, 1], tensor[2, 0], tensor[2, 1], tensor[2, 2]])
-    return jnp.concatenate([pseudo_inertia[3, 3][None], pseudo_inertia[:3, 3], lower])
+    tensor = xp.trace(sigma) * xp.eye(3) - sigma
+    lower = xp.stack([tensor[0, 0], tensor[1, 0], tensor[1, 1], tensor[2, 0], tensor[2, 1], tensor[2, 2]])
+    return cast("A", xp.concatenate([pseudo_inertia[3:, 3], pseudo_inertia[:3, 3], lower]))
 
 
 def mass_com_inertia(vectors: A) -> A:

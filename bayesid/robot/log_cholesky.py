@@ -1,22 +1,80 @@
 """Coordinates of one body relative to the centre of its prior: log-Cholesky, and linear in the parameters.
 
-With ``U0`` the factor of the centre's pseudo-inertia, the pseudo-inertia of a body is ``U0 U(theta) U(theta)' U0'``.
-Its log-Cholesky coordinates are ``theta`` (10,); the ten entries of ``U U' - 1`` (upper triangle) are linear in its
-parameters.
+With ``U0`` the factor of the centre's pseudo-inertia, a body has ``J = U0 U(theta) U(theta)' U0'``; ``theta`` (10,) are
+its log-Cholesky coordinates, of which every value is a physical body; the ten entries of ``U U' - 1`` (upper triangle)
+are linear in its parameters. The coordinates are those of Rucker and Wensing (RA-L 2022) in Pinocchio's order:
+``alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3``.
 """
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
-from bayesid.robot.inertial_parameters import InertialParameters, log_cholesky_factor, upper_cholesky
+from bayesid.robot.inertial_parameters import InertialParameters, parameters_from_pseudo_inertia
 
-__all__ = ["SLOPE", "absolute", "log_cholesky_coordinates", "log_volume", "relative", "relative_coordinates"]
+__all__ = [
+    "LOG_CHOLESKY",
+    "SLOPE",
+    "absolute",
+    "log_cholesky_coordinates",
+    "log_cholesky_factor",
+    "log_cholesky_vector",
+    "log_volume",
+    "relative",
+    "relative_coordinates",
+    "upper_cholesky",
+    "vector_from_factor",
+]
+
+LOG_CHOLESKY = ("alpha", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3")
+"""Names of the log-Cholesky coordinates (Rucker & Wensing 2022)."""
 
 _ROW, _COLUMN = np.triu_indices(4)
+
+
+def log_cholesky_factor(coordinates: Array) -> Array:
+    """Upper-triangular factor U(theta) of ``J = U U'``; theta = 0 gives the identity.
+
+    Parameters
+    ----------
+    coordinates : (10,) array
+        ``alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3``.
+
+    Returns
+    -------
+    (4, 4) array
+    """
+    alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3 = coordinates
+    zero, one = jnp.zeros_like(alpha), jnp.ones_like(alpha)
+    rows = [
+        [jnp.exp(d1), s12, s13, t1],
+        [zero, jnp.exp(d2), s23, t2],
+        [zero, zero, jnp.exp(d3), t3],
+        [zero, zero, zero, one],
+    ]
+    return jnp.exp(alpha) * jnp.stack([jnp.stack(row) for row in rows])
+
+
+def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array:
+    """Ten linear parameters of the body with given log-Cholesky coordinates relative to a centre, shape (10,)."""
+    return vector_from_factor(jnp.asarray(upper_cholesky(centre.pseudo_inertia)), coordinates)
+
+
+@jax.jit  # traced once for all bodies
+def vector_from_factor(centre: Array, coordinates: Array) -> Array:
+    """Return `log_cholesky_vector` for a centre given by the factor (4, 4) of its pseudo-inertia (`upper_cholesky`)."""
+    factor = centre @ log_cholesky_factor(coordinates)
+    return parameters_from_pseudo_inertia(factor @ factor.T)
+
+
+def upper_cholesky(pseudo_inertia: Floats) -> Floats:
+    """Upper-triangular U with ``U U' = pseudo_inertia``, shape (4, 4)."""
+    flipped = np.linalg.cholesky(pseudo_inertia[::-1, ::-1])
+    return flipped[::-1, ::-1]
 
 
 def relative(theta: Array) -> Array:

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from bayesid._io.errors import InputError
+from bayesid._io.files import write_text
 from bayesid._math.arrays import Floats
 from bayesid.robot.body_prior import draw_inertial
 from bayesid.robot.inertial_parameters import InertialParameters
@@ -225,8 +226,8 @@ class Robot:
         return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
     def write_urdf(self, file: str | Path) -> None:
-        """Write the URDF with the present inertial parameters to a file."""
-        Path(file).write_text(self.to_urdf(), encoding="utf-8")
+        """Write the URDF with the present inertial parameters to a file, whole or not at all."""
+        write_text(file, self.to_urdf())
 
     def _carrier(self, load: str) -> str:
         link = self.links[load]

@@ -255,6 +255,6 @@ class Sensor:
     @property
     def rotation(self) -> Floats:
         """Rotation matrix, sensor to base axes."""
-        from scipy.spatial.transform import Rotation
+        from scipy.spatial.transform import Rotation  # study files, which name a noise, are checked without SciPy
 
         return Rotation.from_quat(np.asarray(self.mounting, dtype=float)).as_matrix()

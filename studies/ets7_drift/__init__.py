@@ -6,8 +6,9 @@ simulation starts without the three. ``python -m studies.ets7_drift --full`` wri
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
+from bayesid._io.progress import Progress, silent
 from studies.common.command import Command
 from studies.ets7_drift.analysis import CAUSES, Case, Result, analyse
 from studies.ets7_drift.report import write_report
@@ -26,7 +27,7 @@ def run(
     recordings: int | None = None,
     duration: float = DURATION,
     names: Sequence[str] | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
 ) -> Result:
     """Run the study.
 

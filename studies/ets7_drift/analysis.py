@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from bayesid import Kind, Model, Posterior, Sensor, White
+from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis import Diagnosis, Hypothesis, diagnose
 from bayesid.diagnosis.cause_amplitudes import amplitudes_of
 from bayesid.inference.predicted_readings import predicted_readings
@@ -107,7 +108,7 @@ def analyse(
     world: World,
     spread: float,
     seed: int,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
     *,
     names: Sequence[str] | None = None,
     compared: bool = True,

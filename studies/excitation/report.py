@@ -11,7 +11,7 @@ from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, curve_style, styled, wide_figure
 from bayesid.report.numbers import format_number
-from bayesid.robot.inertial_parameters import LOG_CHOLESKY
+from bayesid.robot.log_cholesky import LOG_CHOLESKY
 from studies.excitation import Result
 from studies.excitation.contest import Contest
 from studies.excitation.realised import Realised

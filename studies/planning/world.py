@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from bayesid import BodyPrior, Excitation, InertialParameters, Kind, Manoeuvre, Model, Orbit, Sensor, White
 from bayesid.recording.joint_motion import Motion
-from bayesid.robot.inertial_parameters import log_cholesky_factor, parameters_from_pseudo_inertia, upper_cholesky
+from bayesid.robot.inertial_parameters import parameters_from_pseudo_inertia
 from bayesid.robot.joint_state import JointState
+from bayesid.robot.log_cholesky import log_cholesky_factor, upper_cholesky
 from bayesid.simulation.effects import GravityGradient
 from studies.base_body import paper
 from studies.common import flight

@@ -5,10 +5,11 @@ Data as in `studies.throws`; ``python -m studies.throws_drag --full`` writes ``r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from bayesid._io.progress import Progress, silent
 from studies.common.command import Command
 from studies.throws.data import DEFAULT_FOLDER, read_truth
 from studies.throws_drag.analysis import Comparison, Study, Wheel, compare, find_wheel, study_body
@@ -47,7 +48,7 @@ def run(
     seed: int = 1,
     names: Sequence[str] | None = None,
     reverse: bool = True,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
 ) -> Result:
     """Run the study.
 

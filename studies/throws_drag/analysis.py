@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import BodyPrior, Manoeuvre, MeasuredMotion, Model, Posterior, Recording
+from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, candidates, diagnose
 from bayesid.diagnosis.diagnosis_run import extended_posterior, extended_start
 from bayesid.inference.mode import fit
@@ -24,7 +25,6 @@ from studies.throws.start import guess
 __all__ = ["Comparison", "HeldOut", "Study", "Wheel", "compare", "find_wheel", "predict", "study_body"]
 
 Floats = NDArray[np.floating]
-Progress = Callable[[float, str], None]
 
 SPREAD = 0.1
 """Relative width of the prior about the regression on the training throws."""
@@ -121,7 +121,7 @@ def study_body(
     testing: int,
     seed: int,
     names: Sequence[str] | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Study:
     """Diagnose the first throws of a body and predict the next ones."""
     recordings = read_throws(folder, body, Timing(), training + testing)
@@ -207,7 +207,7 @@ def find_wheel(
     count: int,
     seed: int,
     names: Sequence[str] | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Wheel:
     """Take the wheel from model and recordings, and have it found."""
     recordings = read_throws(folder, body, Timing(), count)

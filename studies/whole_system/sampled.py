@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from bayesid import Identification, Manoeuvre, Posterior, Robot, identify
-from bayesid.inference.ensemble import Progress
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.whole_system.setting import COULOMB, VISCOUS, bodies, model_of
 
@@ -58,10 +57,8 @@ def sampled(
     """Identify all bodies; ``rate`` is the true initial rate of the base, base axes [rad/s]."""
     posterior = Posterior.of(model_of(drawings, torques=torques), [manoeuvre])
 
-    def tell(state: Progress) -> None:
-        progress(
-            f"{title}: step {state.steps}, {state.effective_samples:.0f} effective samples, R-hat {state.r_hat:.4f}"
-        )
+    def tell(fraction: float, text: str) -> None:
+        progress(f"{title}: {text}")
 
     result = identify(posterior, seed, effective_samples=effective_samples, progress=tell)
     z = true_point(posterior, truth, rate)

@@ -2,7 +2,8 @@
 
 A study is data only: typed, immutable, checked when it is loaded. SI units, radians, quaternions x, y, z, w. Each class
 is a table of the file and each of its fields a key, so that an unknown key is an error. Tables within (joint to number)
-are plain mappings and not to be changed.
+are plain mappings and not to be changed. The schema imports nothing that takes long, not even NumPy before a body needs
+it, so that an error in the file is told at once.
 """
 
 from bayesid.app.schema.design_section import DesignLimits, DesignSection

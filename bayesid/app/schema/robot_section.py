@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
@@ -23,7 +23,9 @@ from bayesid.app.schema.value_types import (
     list_of,
     no_more_than,
 )
-from bayesid.robot.inertial_parameters import InertialParameters
+
+if TYPE_CHECKING:
+    from bayesid.robot.inertial_parameters import InertialParameters
 
 LOWEST_ORBIT = 6.3e6
 """Radii below this are inside the Earth [m]."""
@@ -57,6 +59,8 @@ class BodySection(Section):
     @property
     def parameters(self) -> InertialParameters:
         """The same as `InertialParameters`, whose triangle inequality and the like have been checked."""
+        from bayesid.robot.inertial_parameters import InertialParameters
+
         xx, yy, zz, xy, xz, yz = self.inertia
         return InertialParameters(self.mass, self.com, [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 

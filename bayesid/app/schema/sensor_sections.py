@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BaseModel, model_validator
 
@@ -21,7 +21,9 @@ from bayesid.app.schema.value_types import (
     no_less_than,
     no_more_than,
 )
-from bayesid.simulation.sensors import ARCSEC, AngleRandomWalk, Noise, NoiseDensity, StarTracker, White
+
+if TYPE_CHECKING:
+    from bayesid.simulation.sensors import Noise
 
 
 def _exactly_one(section: BaseModel, keys: Sequence[str]) -> None:
@@ -72,6 +74,8 @@ class RateSensor(Section):
     @property
     def noise(self) -> Noise:
         """Noise of the recorded samples, before any filter."""
+        from bayesid.simulation.sensors import AngleRandomWalk, StarTracker, White
+
         if self.sigma is not None:
             return White(self.sigma)
         if self.angle_random_walk is not None:
@@ -118,6 +122,8 @@ class AccelSensor(Section):
     @property
     def noise(self) -> Noise:
         """Noise of the recorded samples, before any filter."""
+        from bayesid.simulation.sensors import NoiseDensity, White
+
         return White(self.sigma) if self.sigma is not None else NoiseDensity(self.noise_density or math.nan)
 
 
@@ -149,6 +155,8 @@ class AttitudeSensor(Section):
     @property
     def noise(self) -> Noise:
         """Noise of the recorded samples, before any filter."""
+        from bayesid.simulation.sensors import ARCSEC, White
+
         return White(self.sigma if self.sigma is not None else (self.arcsec or math.nan) * ARCSEC)
 
 

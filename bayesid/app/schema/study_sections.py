@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -28,7 +28,9 @@ from bayesid.app.schema.value_types import (
     list_of,
     no_more_than,
 )
-from bayesid.robot.mass_property_change import BodyChange
+
+if TYPE_CHECKING:
+    from bayesid.robot.mass_property_change import BodyChange
 
 
 def check_extended(body: BodySection, place: str) -> None:
@@ -96,6 +98,8 @@ class ChangeSection(Section):
     @property
     def change(self) -> BodyChange:
         """The same as `BodyChange`, which has checked it."""
+        from bayesid.robot.mass_property_change import BodyChange
+
         xx, yy, zz, xy, xz, yz = self.inertia
         tensor = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
         return BodyChange(self.body, self.mass, self.com, tensor, self.mass_sigma)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import (
     AfterValidator,
     AllowInfNan,
@@ -29,11 +28,18 @@ UNIT_TOLERANCE = 1e-3
 """How far the norm of a unit vector or quaternion may be from one before it is taken for an error."""
 
 
+def _numbers(value: Any) -> Iterable[float]:
+    """Return the numbers in one number, a list of them or a table of them."""
+    if isinstance(value, Mapping):
+        return value.values()
+    return value if isinstance(value, (list, tuple)) else (value,)
+
+
 def no_more_than(limit: float, remedy: str) -> AfterValidator:
     """Reject magnitudes that only a wrong unit explains."""
 
     def check(value: Any) -> Any:
-        largest = max(np.abs(list(value.values()) if isinstance(value, Mapping) else value).flat, default=0.0)
+        largest = max(map(abs, _numbers(value)), default=0.0)
         if largest > limit:
             raise InputError(f"{largest:g} is implausibly large, over {limit:g}", remedy=remedy)
         return value

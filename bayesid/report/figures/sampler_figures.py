@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import arviz as az
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.stats import rankdata
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.identification import Identification
@@ -29,6 +27,8 @@ def convergence(result: Identification) -> Figure:
 
     Ensembles that sample the same distribution have running means that meet at zero and ranks spread evenly.
     """
+    import arviz as az  # here, as it takes a second that reports without samples save
+
     chains = result.chains
     r_hat = np.array([float(az.rhat(chains.z[:, :, k])) for k in range(chains.z.shape[2])])
     worst = np.argsort(r_hat)[::-1][:SHOWN]
@@ -68,6 +68,8 @@ def _draw_running_means(axes: Axes, draws: Floats, walkers: int, autocorrelation
 
 
 def _draw_ranks(axes: Axes, draws: Floats) -> None:
+    from scipy.stats import rankdata
+
     rank = (rankdata(draws.ravel()) - 0.5).reshape(draws.shape) / draws.size
     edges = np.linspace(0.0, 1.0, RANK_BINS + 1)
     for number, values in enumerate(rank):

@@ -12,8 +12,9 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.composite_tables import link_table
-from bayesid.robot.inertial_parameters import LOG_CHOLESKY, mass_com_inertia, upper_cholesky, vector_from_factor
+from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.robot.kinematics import kinematics
+from bayesid.robot.log_cholesky import LOG_CHOLESKY, upper_cholesky, vector_from_factor
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Quantity

@@ -1,0 +1,48 @@
+"""``bayesid check``: what a study and its recordings hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from bayesid.app.options import Output, StudyFile
+
+if TYPE_CHECKING:
+    from bayesid.inference.recording_check import RecordingCheck
+
+__all__ = ["run"]
+
+
+def run(file: StudyFile, output: Output) -> Iterator[str]:
+    """Validate a study and its recordings and say what was read, before anyone waits for a sampler."""
+    from bayesid.app.schema import Study
+
+    study = Study.load(file)
+
+    from bayesid._io.files import complete_folder, write_json
+    from bayesid.app.study_to_model import load_posterior
+    from bayesid.inference.recording_check import check_recording, refuse_wrong_units
+    from bayesid.report import check_report
+
+    posterior = load_posterior(study)
+    refuse_wrong_units(posterior)
+    count = len(posterior.manoeuvres)
+    yield f"{study.title}: {count} recordings, {posterior.samples} samples, {posterior.size} unknowns."
+    checks = [check_recording(posterior, index) for index in range(count)]
+    with complete_folder(output) as folder:
+        write_json(
+            folder / "check.json", {"title": study.title, "recordings": [_check_dict(check) for check in checks]}
+        )
+        check_report(posterior, checks, study.title, folder / "report.pdf")
+    for check in checks:
+        yield f"{check.name}: {check.duration:.4g} s. " + (" ".join(check.warnings) or "Nothing conspicuous.")
+    yield f"Wrote {output / 'report.pdf'}."
+
+
+def _check_dict(check: RecordingCheck) -> dict[str, Any]:
+    content = asdict(check)
+    for sensor in content["sensors"]:
+        sensor["kind"] = sensor["kind"].value
+    content["warnings"] = list(check.warnings)
+    return content

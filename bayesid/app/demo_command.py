@@ -1,0 +1,31 @@
+"""``bayesid demo``: shipped recordings with a hidden cause, diagnosed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from bayesid._io.progress import Progress
+from bayesid.app.options import Output, Samples, Seed
+
+if TYPE_CHECKING:
+    from bayesid.diagnosis import Diagnosis
+
+__all__ = ["run"]
+
+
+def run(output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4000.0) -> Iterator[str]:
+    """Diagnose shipped recordings with a hidden cause, say what was hidden and write the report; needs no file."""
+    from bayesid.app.demonstration import copy_demonstration
+    from bayesid.app.diagnose_command import diagnose_study
+    from bayesid.app.schema import Study
+
+    answer = copy_demonstration(output / "study")
+    yield f"Recordings of an independent simulator, with something hidden in them: {output / 'study'}."
+    result: list[Diagnosis] = []
+    study = Study.load(output / "study" / "study.toml")
+    yield from diagnose_study(study, output, seed, samples, progress, result.append)
+    named = result[0].verdict.causes
+    for cause, values in answer.items():
+        parts = ", ".join(f"{key} {value:.4g}" for key, value in values.items())
+        yield f"Hidden was {cause}: {parts}. {'It was found.' if cause in named else 'It was not found.'}"

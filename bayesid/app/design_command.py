@@ -1,0 +1,63 @@
+"""``bayesid design``: manoeuvres by several criteria, within limits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+import typer
+
+from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress
+from bayesid.app.options import Output, Seed, StudyFile
+
+__all__ = ["run"]
+
+
+def run(
+    file: StudyFile,
+    output: Output,
+    progress: Progress,
+    seed: Seed = 0,
+    starts: Annotated[int, typer.Option(min=1, help="Random starts of the search, for every criterion.")] = 2,
+    iterations: Annotated[int, typer.Option(min=1, help="Iterations of the optimiser from each start.")] = 60,
+) -> Iterator[str]:
+    """Design manoeuvres by several criteria, within limits: design.json, a CSV file for each, and report.pdf."""
+    from bayesid.app.schema import Study
+
+    study = Study.load(file)
+
+    from bayesid._io.files import complete_folder, write_json
+    from bayesid._io.store import content_key
+    from bayesid.app.study_to_design import defining_files, load_problem
+    from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
+    from bayesid.design import Search, Store, best_design, design
+    from bayesid.recording.recording import Recording
+    from bayesid.report import design_report
+    from bayesid.report.sentences.design_sentences import design_sentences
+
+    problem = load_problem(study)
+    noise, assumed = assume_missing(encoder_noise(study, problem.plan.model.robot))
+    yield (
+        f"{study.title}: {len(problem.criteria)} criteria, {problem.plan.family.size} parameters of "
+        f"{problem.plan.family.name}, {problem.plan.family.duration:g} s."
+    )
+    if assumed:
+        yield f"The study gives no sensors.encoder.sigma of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
+    progress(0.0, "compiling")
+    store = Store.open(output / "search.json", content_key(*defining_files(study), seed, starts, iterations))
+    try:
+        designs = design(problem, seed, noise, Search(starts, iterations), store=store, progress=progress)
+        best = best_design(designs)
+    except InputError as error:
+        raise error.within(file=file) from None
+    with complete_folder(output) as folder:
+        content = {"title": study.title, "seed": seed, "manoeuvres": [item.to_dict() for item in designs]}
+        write_json(folder / "design.json", {**content, "best": best.name})
+        for item in designs:
+            joints = {key: values for key, values in item.manoeuvre.recording.channels.items() if "position." in key}
+            Recording(item.name, None, item.manoeuvre.recording.time, joints).write(folder / f"{item.name}.csv")
+        design_report(designs, best, study.title, folder / "report.pdf")
+    store.remove()
+    yield from design_sentences(designs, best)
+    yield f"Wrote {output / 'report.pdf'}."

@@ -1,0 +1,80 @@
+"""``bayesid diagnose``: what the simulation gets wrong, its cause, and what the extended model gains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bayesid._io.progress import Progress, silent
+from bayesid.app.options import Output, Samples, Seed, StudyFile
+
+if TYPE_CHECKING:
+    from bayesid.app.schema import Study
+    from bayesid.diagnosis import Diagnosis
+
+__all__ = ["diagnose_study", "run"]
+
+
+def run(
+    file: StudyFile,
+    output: Output,
+    progress: Progress,
+    seed: Seed = 0,
+    samples: Samples = 4000.0,
+    sample: Annotated[bool, typer.Option(help="Sample the extended model with emcee at the end.")] = True,
+) -> Iterator[str]:
+    """Show what the simulation gets wrong, name the cause, extend the model by it and measure the gain."""
+    from bayesid.app.schema import Study
+
+    yield from diagnose_study(Study.load(file), output, seed, samples if sample else None, progress)
+
+
+def diagnose_study(
+    study: Study,
+    output: Path,
+    seed: int,
+    effective_samples: float | None,
+    progress: Progress = silent,
+    keep: Callable[[Diagnosis], object] = lambda result: None,
+) -> Iterator[str]:
+    """Write diagnosis.json, unexplained.csv, posterior.nc of the extended model and report.pdf of a study.
+
+    Parameters
+    ----------
+    effective_samples : float or None
+        Samples wanted of the extended model, which is not sampled where this is None.
+    keep : callable
+        Handed the result.
+    """
+    import numpy as np
+
+    from bayesid._io.files import complete_folder, write_json
+    from bayesid.app.study_to_model import load_manoeuvres, load_model
+    from bayesid.diagnosis import diagnose, identify_extended
+    from bayesid.inference.posterior import Posterior
+    from bayesid.inference.posterior_file import write_netcdf
+    from bayesid.inference.recording_check import refuse_wrong_units
+    from bayesid.report import diagnosis_report
+    from bayesid.report.sentences.diagnosis_sentences import diagnosis_sentences
+
+    model = load_model(study)
+    manoeuvres = load_manoeuvres(study, model.robot)
+    refuse_wrong_units(Posterior.of(model, manoeuvres))
+    knows = all(section.argument_of_latitude is not None for section in study.recordings)
+    result = diagnose(model, manoeuvres, seed, knows_latitude=knows, progress=progress)
+    keep(result)
+    yield from diagnosis_sentences(result)
+    identification = None
+    if effective_samples is not None and result.posterior.size:
+        progress(0.9, "sampling the extended model")
+        identification = identify_extended(result, seed, effective_samples=effective_samples)
+    with complete_folder(output) as folder:
+        write_json(folder / "diagnosis.json", result.to_dict(identification))
+        result.unexplained.write(folder / "unexplained.csv")
+        if identification is not None:
+            write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
+        diagnosis_report(result, identification, study.title, folder / "report.pdf")
+    yield f"Wrote {output / 'report.pdf'}."

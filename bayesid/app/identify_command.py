@@ -1,0 +1,63 @@
+"""``bayesid identify``: the unknown bodies of a study, sampled by emcee."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress
+from bayesid.app.options import Output, Samples, Seed, StudyFile
+
+if TYPE_CHECKING:
+    from bayesid.inference import Identification
+
+__all__ = ["run"]
+
+
+def run(
+    file: StudyFile, output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4000.0
+) -> Iterator[str]:
+    """Identify the unknown bodies: identification.json, posterior.nc and report.pdf."""
+    from bayesid.app.schema import Study
+
+    study = Study.load(file)
+
+    import numpy as np
+
+    from bayesid._io.files import complete_folder, create_folder
+    from bayesid.app.study_to_model import load_posterior
+    from bayesid.inference import identify
+    from bayesid.inference.identified_robot import write_identified
+    from bayesid.inference.posterior_file import write_netcdf
+    from bayesid.inference.recording_check import refuse_wrong_units
+    from bayesid.report import identification_report
+
+    posterior = load_posterior(study)
+    refuse_wrong_units(posterior)
+    if not posterior.size:
+        raise InputError("nothing is unknown", file=file, place="unknowns.bodies", remedy="Name a body to identify")
+    yield f"{study.title}: {posterior.samples} samples, {posterior.size} unknowns, step {posterior.step:g} s."
+    create_folder(output)
+    progress(0.0, "fitting")
+    kept = output / "samples.h5"
+    result = identify(posterior, seed, effective_samples=samples, file=kept, progress=progress)
+    with complete_folder(output) as folder:
+        result.write_json(folder / "identification.json")
+        write_netcdf(result, folder / "posterior.nc", np.random.default_rng(seed))
+        if result.posterior.model.priors:
+            write_identified(result, folder)
+        identification_report(result, study.title, [], folder / "report.pdf")
+    kept.unlink(missing_ok=True)
+    yield from _summary(result)
+    yield f"Wrote {output / 'report.pdf'}."
+
+
+def _summary(result: Identification) -> Iterator[str]:
+    from bayesid.identifiability.unidentifiable import unidentifiable_sentences
+
+    yield f"chi-square {result.optimum.chi2:.0f} over {result.posterior.samples} samples."
+    for name, body in result.bodies.items():
+        yield f"{name}: mass {body.mean[0]:.6g} +- {body.sd[0]:.2g} kg"
+    yield from unidentifiable_sentences(result)
+    yield from result.disagreements

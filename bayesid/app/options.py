@@ -1,0 +1,15 @@
+"""Arguments and options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["Output", "Samples", "Seed", "StudyFile"]
+
+StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")]
+Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; it is created.")]
+Seed = Annotated[int, typer.Option(help="Every random number follows from it.")]
+Samples = Annotated[float, typer.Option("--samples", help="Effective samples wanted.")]

@@ -1,0 +1,62 @@
+"""``bayesid simulate``: what a study's sensors would read at the given values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+import typer
+
+from bayesid.app.options import Output, Seed, StudyFile
+
+__all__ = ["run"]
+
+
+def run(
+    file: StudyFile,
+    output: Output,
+    seed: Seed = 0,
+    noise: Annotated[bool, typer.Option(help="Add the declared noise of the sensors.")] = True,
+) -> Iterator[str]:
+    """Simulate the sensors of a study's recordings at the given values: recordings, simulation.json and report.pdf."""
+    from bayesid.app.schema import Study
+
+    study = Study.load(file)
+
+    import numpy as np
+
+    from bayesid._io.files import complete_folder, write_json
+    from bayesid.app.study_to_model import load_posterior
+    from bayesid.inference.predicted_readings import integration_error_at
+    from bayesid.inference.recording_check import refuse_wrong_units
+    from bayesid.inference.simulated_recordings import simulate_recordings
+    from bayesid.report import simulation_report
+
+    posterior = load_posterior(study)
+    refuse_wrong_units(posterior)
+    recordings = simulate_recordings(posterior, np.random.default_rng(seed) if noise else None)
+    error = integration_error_at(posterior, posterior.starting_point())
+    with complete_folder(output) as folder:
+        for recording in recordings:
+            recording.write(folder / f"{recording.name}.csv")
+        content = {
+            "recordings": [
+                {
+                    "file": f"{recording.name}.csv",
+                    "largest": {
+                        kind.value: [
+                            float(np.nanmax(np.abs(recording.channels[f"{kind.value}.{axis}"]))) for axis in "xyz"
+                        ]
+                        for kind in (sensor.kind for sensor in posterior.model.sensors)
+                        if kind.mounted
+                    },
+                }
+                for recording in recordings
+            ],
+            "noise": noise,
+            "integration": {"step": posterior.step, "error_in_sigma": error},
+        }
+        write_json(folder / "simulation.json", content)
+        simulation_report(posterior, recordings, study.title, folder / "report.pdf")
+    yield f"Simulated {len(recordings)} recordings; integration step {posterior.step:g} s, error {error:.2g} sigma."
+    yield f"Wrote {output / 'report.pdf'}."

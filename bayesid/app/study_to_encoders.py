@@ -1,0 +1,34 @@
+"""The noise of the joints' encoders, as a study states it."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from bayesid.app.schema import Study
+from bayesid.robot.robot import Robot
+
+__all__ = ["ASSUMED", "JointNoise", "assume_missing", "encoder_noise"]
+
+ASSUMED = 1e-6
+"""Noise of an encoder of which the study says nothing, and no data tell [rad or m]."""
+
+JointNoise = dict[int, dict[str, float | None]]
+"""Noise of position (0), velocity (1), acceleration (2) by joint; None where it is to be estimated from the data."""
+
+
+def encoder_noise(study: Study, robot: Robot) -> JointNoise:
+    """Return the noise per sample of all joints of a robot."""
+    families: tuple[Literal["position", "velocity", "acceleration"], ...] = ("position", "velocity", "acceleration")
+    return {
+        derivative: {joint.name: study.sensors.encoder.sigma_of(family, joint.name) for joint in robot.joints}
+        for derivative, family in enumerate(families)
+    }
+
+
+def assume_missing(noise: JointNoise) -> tuple[JointNoise, list[str]]:
+    """Return the noise with `ASSUMED` for positions of which the study says nothing, and the joints this concerns.
+
+    Planned motion has no samples from which the noise could be estimated.
+    """
+    positions = {joint: ASSUMED if sigma is None else sigma for joint, sigma in noise[0].items()}
+    return {**noise, 0: {**positions}}, [joint for joint, sigma in noise[0].items() if sigma is None]
