@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from bayesid._math.arrays import Traceable
 from bayesid._math.rotation import tilted
 from bayesid.simulation.channels import Channels
 from bayesid.simulation.dynamics import Grid, Samples, Start, simulate, trace
@@ -43,16 +44,16 @@ class ModelConstants(NamedTuple):
     constants of every effect.
     """
 
-    rotation: Array
-    point: Array
+    rotation: Traceable
+    point: Traceable
     effects: tuple[Any, ...]
 
     @classmethod
     def of(cls, model: Model) -> ModelConstants:
         """Collect the constants of a model."""
         return cls(
-            rotation=jnp.asarray(np.stack([sensor.rotation for sensor in model.sensors])),
-            point=jnp.asarray(np.stack([np.asarray(sensor.position, dtype=float) for sensor in model.sensors])),
+            rotation=np.stack([sensor.rotation for sensor in model.sensors]),
+            point=np.stack([np.asarray(sensor.position, dtype=float) for sensor in model.sensors]),
             effects=tuple(effect.constants for effect in model.effects),
         )
 

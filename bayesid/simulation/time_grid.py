@@ -130,7 +130,7 @@ def _instants(
     environment = Environment(
         time, *state, wheel_momentum=momentum, wheel_torque=torque, wrench=np.zeros((len(time), 6))
     )
-    xp = namespace(known)
+    xp = namespace(known, *(table for _, table in tables))
     coefficients = xp.concatenate([np.zeros((len(time), WIDTH, 0)), *(table for _, table in tables)], axis=2)
     beyond = no_joints(len(time), len(owners))
     if torques and robot.joints:
