@@ -32,11 +32,8 @@ COMPILED = "BAYESID_TEST_COMPILED"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption(
-        "--catalogue",
-        action="store_true",
-        help="hide every cause of the catalogue, and run slow studies (half an hour)",
-    )
+    parser.addoption("--slow", action="store_true", help="run only the tests that are otherwise left out")
+    parser.addoption("--catalogue", action="store_true", help="run all tests, and hide every cause of the catalogue")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -47,11 +44,19 @@ def pytest_configure(config: pytest.Config) -> None:
     keep_compiled(Path(os.environ[COMPILED]))
 
 
-@pytest.fixture(scope="session")  # so that it skips before costly fixtures of modules are made
-def slow(request: pytest.FixtureRequest) -> None:
-    """Leave a test to ``pytest --catalogue``."""
-    if not request.config.getoption("--catalogue"):
-        pytest.skip("takes long; run with --catalogue")
+@pytest.fixture(scope="session")
+def slow() -> None:
+    """Leave a test to ``pytest --slow``."""
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Deselect the slow tests, or with ``--slow`` all others."""
+    if config.getoption("--catalogue"):
+        return
+    wanted = bool(config.getoption("--slow"))
+    left_out = [item for item in items if ("slow" in getattr(item, "fixturenames", ())) != wanted]
+    config.hook.pytest_deselected(items=left_out)
+    items[:] = [item for item in items if item not in left_out]
 
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -179,7 +179,7 @@ class Steady(Effect):
     parameters = (Parameter("z", "rad/s", 1e-3),)
 
     def read(self, values, readings):
-        return readings._replace(rate=readings.rate + jnp.array([0.0, 0.0, 1.0]) * values[0])
+        return readings.replace(rate=readings.rate + jnp.array([0.0, 0.0, 1.0]) * values[0])
 
 
 class Growing(Steady):
@@ -188,7 +188,7 @@ class Growing(Steady):
     name = "growing"
 
     def read(self, values, readings):
-        return readings._replace(rate=readings.rate + readings.time[:, None] * jnp.array([0.0, 0.0, 1.0]) * values[0])
+        return readings.replace(rate=readings.rate + readings.time[:, None] * jnp.array([0.0, 0.0, 1.0]) * values[0])
 
 
 def test_separation_is_lambda_times_one_minus_rho_squared() -> None:

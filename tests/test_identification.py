@@ -57,13 +57,13 @@ CASES = {
 
 
 LONG = ("ets7", "known thrust")
-"""Cases left to ``--catalogue``."""
+"""Cases left to ``--slow``."""
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "name" in metafunc.fixturenames:
-        every = metafunc.config.getoption("--catalogue")
-        metafunc.parametrize("name", [name for name in CASES if every or name not in LONG])
+        slow = pytest.mark.usefixtures("slow")
+        metafunc.parametrize("name", [pytest.param(name, marks=slow if name in LONG else ()) for name in CASES])
 
 
 def test_truth_lies_inside_the_posterior_and_noise_is_all_that_is_left(name: str, tmp_path: Path) -> None:

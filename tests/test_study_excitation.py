@@ -1,4 +1,4 @@
-"""The study of the excitation: what it predicts is realised; the whole of it, small, with ``pytest --catalogue``."""
+"""The study of the excitation: what it predicts is realised; the whole of it, small, with ``pytest --slow``."""
 
 from __future__ import annotations
 

@@ -15,9 +15,7 @@ NAMES = ("rate-scale",)
 
 
 @pytest.fixture(scope="module")
-def result(request):
-    if not request.config.getoption("--catalogue"):
-        pytest.skip("takes minutes: pytest --catalogue")
+def result(slow):
     if not PRESENT:
         reason = f"the measured throws are not at {DEFAULT_FOLDER}"
         (pytest.fail if os.environ.get("CI") else pytest.skip)(reason)
