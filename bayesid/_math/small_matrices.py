@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 from jax import Array
 
-__all__ = ["cross", "inverse", "solve_small", "symmetric", "trace_less"]
+__all__ = ["cross", "inverse", "inverse_small", "solve_small", "symmetric", "trace_less"]
 
 
 def solve_small(matrix: Array, right: Array) -> Array:
@@ -19,18 +19,27 @@ def solve_small(matrix: Array, right: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
+    """Return the cross product of two vectors, shape (3,)."""
     return jnp.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def symmetric(six: Array) -> Array:
+    """Return the symmetric matrix of its entries xx, yy, zz, xy, xz, yz, shape (3, 3)."""
     xx, yy, zz, xy, xz, yz = six
     return jnp.stack([jnp.stack([xx, xy, xz]), jnp.stack([xy, yy, yz]), jnp.stack([xz, yz, zz])])
 
 
 def trace_less(second: Array) -> Array:
+    """Return trace(M) 1 - M: the inertia that goes with a second moment of mass M, shape (3, 3)."""
     return jnp.trace(second) * jnp.eye(3) - second
 
 
 def inverse(m: Array) -> Array:
+    """Return the inverse of a symmetric matrix, shape (3, 3)."""
     a, b, c = cross(m[1], m[2]), cross(m[2], m[0]), cross(m[0], m[1])
     return jnp.stack([a, b, c], axis=1) / (m[0] @ a)
+
+
+def inverse_small(matrix: Array) -> Array:
+    """Return the inverse of a small positive-definite matrix of any size, column by column."""
+    return jnp.stack([solve_small(matrix, unit) for unit in jnp.eye(len(matrix))], axis=1)

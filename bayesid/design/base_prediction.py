@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from bayesid._io.errors import InputError
@@ -20,9 +19,10 @@ from bayesid.design.pose_trajectory import PoseTrajectory
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.perturbed_posterior import trace
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.recorded_samples import first_rate
 from bayesid.inference.simulated_recordings import blank_channels
 from bayesid.recording.recording import Recording
-from bayesid.robot.kinematics import configuration
+from bayesid.robot.end_effector import Tip
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor, White
@@ -101,7 +101,7 @@ class BasePredictor:
             self.posterior = with_manoeuvres(like.posterior, [planned])
         self.rate = _first_rate(model, manoeuvre.recording)
         self.time = planned.recording.time
-        self._tip = _poses(model.robot, self.tip_frame, manoeuvre.motion.evaluate(self.time).position)
+        self._tip = Tip.of(model.robot, self.tip_frame).motion(model.robot, manoeuvre.motion.evaluate(self.time))[0]
 
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
         """Draw from the prior; the initial rate is the known one, shape (count, size)."""
@@ -189,25 +189,10 @@ def _planned(recording: Recording) -> Recording:
 
 
 def _first_rate(model: Model, recording: Recording) -> Floats:
-    sensor = next((sensor for sensor in model.sensors if sensor.kind is Kind.RATE), None)
+    sensor = model.sensor(Kind.RATE)
     if model.rate_sigma == 0.0 or sensor is None or "rate.x" not in recording.channels:
         return np.zeros(3)
-    return np.asarray(sensor.rotation @ recording.vector("rate")[1][:3].mean(axis=0))
-
-
-def _poses(robot: Robot, frame: str, position: Floats) -> Floats:
-    """Return the pose of a frame in the base at joint positions (T, joints), shape (T, 4, 4)."""
-    if not robot.model.existFrame(frame):
-        known = [item.name for item in robot.model.frames if item.type == pin.FrameType.BODY]
-        raise InputError(
-            f"the robot has no frame {frame!r}", place="design.tip_frame", remedy=f"Choose one of {', '.join(known)}"
-        )
-    data, index = robot.model.createData(), robot.model.getFrameId(frame)
-    poses = []
-    for row in position:
-        pin.framesForwardKinematics(robot.model, data, configuration(robot, row))
-        poses.append(data.oMf[index].homogeneous)
-    return np.stack(poses)
+    return first_rate(sensor, recording.vector("rate")[1])
 
 
 def _quaternions(turn: Floats) -> Floats:

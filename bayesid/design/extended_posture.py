@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from bayesid._math.arrays import Floats
 from bayesid.robot.end_effector import Tip
 from bayesid.robot.joint_state import JointState
-from bayesid.robot.kinematics import joint_motion, kinematics
+from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 
 __all__ = ["extended_posture"]
@@ -53,8 +53,9 @@ def extended_posture(robot: Robot, start: Sequence[float] | Floats, free: Sequen
 
     def shortness(x: Floats) -> float:
         q = posture(x)[None]
-        poses = kinematics(robot, JointState(q, 0.0 * q, 0.0 * q))
-        end = joint_motion(poses, tip.joint)[0][0] @ tip.placement
+        state = JointState(q, 0.0 * q, 0.0 * q)
+        poses = kinematics(robot, state)
+        end = tip.motion(robot, state)[0][0]
         away = x - start[between]
         return -float(np.linalg.norm(end[:3, 3] - poses.pose[0, last, :3, 3])) + PULL * float(away @ away)
 

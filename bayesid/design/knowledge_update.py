@@ -10,7 +10,6 @@ from typing import Any, Protocol
 import numpy as np
 
 from bayesid._io.errors import InputError
-from bayesid._io.files import complete_file
 from bayesid._math.arrays import Floats
 from bayesid.design.design_problem import Known
 from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, quantity
@@ -18,7 +17,7 @@ from bayesid.inference.identification import Identification, identify
 from bayesid.inference.mode import maximise
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, joint_prior
-from bayesid.inference.posterior_file import write_netcdf
+from bayesid.inference.posterior_file import write_draws, write_netcdf
 from bayesid.inference.unknowns import Unknowns
 from bayesid.robot.inertial_parameters import BASIS, mass_com_inertia
 from bayesid.robot.log_cholesky import log_cholesky_coordinates
@@ -87,19 +86,13 @@ class Laplace:
 
     def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
         """Write draws of the bodies alone."""
-        import arviz as az  # here, as it takes a second that commands without samples save
-
         starts, normal = np.random.SeedSequence(seed).spawn(2)
         refined, optimum = maximise(posterior, np.random.default_rng(starts))
         noise = np.random.default_rng(normal).normal(size=(self.draws, posterior.size))
         z = optimum.z + noise @ np.linalg.cholesky(optimum.covariance).T
         names = [prior.name for prior in posterior.model.priors]
         values = np.asarray(refined.unknowns.values_of(z).inertial).reshape(1, self.draws, len(names), 10)
-        data = az.from_dict(
-            posterior={"inertial": values}, dims={"inertial": ["body", "parameter"]}, coords={"body": names}
-        )
-        with complete_file(file) as part:
-            data.to_netcdf(str(part))
+        write_draws(names, values, file)
         return {"method": "laplace", "chi2": optimum.chi2, "samples": posterior.samples, "disagreements": []}
 
 

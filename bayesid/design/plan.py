@@ -16,7 +16,6 @@ from bayesid._math.arrays import Floats
 from bayesid.design.trajectories import TrajectoryFamily
 from bayesid.inference.unknowns import Unknowns
 from bayesid.robot.end_effector import Tip
-from bayesid.robot.kinematics import joint_motion, kinematics
 from bayesid.robot.regressors import balance_regressor
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.effects.effect import Instant, Readings
@@ -208,8 +207,7 @@ class Plan:
         times = np.linspace(0.0, self.family.duration, instant.rate.shape[0])
         motion = self.family.motion(parameters)
         state = motion.evaluate(times)
-        pose, flow, _ = joint_motion(kinematics(self.model.robot, state), self.tip.joint)
-        pose, flow = pose @ self.tip.placement, flow @ self.tip.placement
+        pose, flow = self.tip.motion(self.model.robot, state)
         turning = jnp.asarray(flow[:, :3, :3] @ jnp.swapaxes(pose[:, :3, :3], 1, 2))
         own_rate = jnp.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
         body = instant.body

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from bayesid._math.arrays import Floats
 from bayesid._math.runge_kutta import runge_kutta_step
-from bayesid._math.small_matrices import solve_small
+from bayesid._math.small_matrices import inverse_small
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect, Instant
 
@@ -154,16 +154,11 @@ def _oscillate(coupling: Array, load: Array, omega: Array, damping: Array, forci
     return one(coupling, load, omega, damping, forcing, compliance)
 
 
-def _inverse(mass: Array) -> Array:
-    """Inverse of a small positive-definite matrix, column by column."""
-    return jnp.stack([solve_small(mass, unit) for unit in jnp.eye(len(mass))], axis=1)
-
-
 def _run(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, compliance: Array) -> Array:
     count = len(omega)
     push = -forcing @ load.T
     mass = jnp.eye(count) - jnp.einsum("ia,tab,jb->tij", coupling, compliance, coupling)
-    soft = jax.vmap(_inverse)(mass)
+    soft = jax.vmap(inverse_small)(mass)
 
     def change(state: Array, push: Array, soft: Array) -> Array:
         amplitude, speed = state

@@ -16,6 +16,7 @@ from bayesid._io.files import write_json
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, body_dict
 from bayesid.inference.identification import Identification
+from bayesid.inference.posterior_as_prior import InertialDraws
 from bayesid.robot.inertial_parameters import InertialParameters, mass_com_inertia
 from bayesid.robot.robot import Robot
 
@@ -55,6 +56,5 @@ def write_identified(result: Identification, folder: Path) -> None:
 
 def _draws(result: Identification) -> dict[str, Floats]:
     """Linear parameters of every unknown body, shape (draws, 10)."""
-    flat = result.chains.flat
-    inertial = np.asarray(result.posterior.unknowns.values_of(flat).inertial).reshape(len(flat), -1, 10)
-    return {prior.name: inertial[:, index] for index, prior in enumerate(result.posterior.model.priors)}
+    draws = InertialDraws.of(result)
+    return {name: draws.values[:, index] for index, name in enumerate(draws.names)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from bayesid.simulation.sensors import Kind
 if TYPE_CHECKING:
     import arviz as az
 
-__all__ = ["to_arviz", "write_netcdf"]
+__all__ = ["to_arviz", "write_draws", "write_netcdf"]
 
 
 STORED = 1000
@@ -72,6 +73,19 @@ def write_netcdf(result: Identification, file: Path, rng: np.random.Generator) -
     """Write `to_arviz` to a NetCDF file, all or nothing."""
     with complete_file(file) as part:
         to_arviz(result, rng).to_netcdf(str(part))
+
+
+def write_draws(names: Sequence[str], values: Floats, file: Path) -> None:
+    """Write draws of the linear parameters of some bodies alone, (chains, draws, bodies, 10), all or nothing.
+
+    `InertialDraws` reads them as it reads the whole posterior.
+    """
+    import arviz as az  # here, as it takes a second that commands without samples save
+
+    dims, coords = {"inertial": ["body", "parameter"]}, {"body": list(names), "parameter": list(LINEAR)}
+    data = az.from_dict(posterior={"inertial": values}, dims=dims, coords=coords)
+    with complete_file(file) as part:
+        data.to_netcdf(str(part))
 
 
 def _thin(draws: Floats, count: int) -> Floats:

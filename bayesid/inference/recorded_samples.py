@@ -21,7 +21,7 @@ from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Filter, Kind, Sensor
 
-__all__ = ["RecordedSamples", "Series"]
+__all__ = ["RecordedSamples", "Series", "first_rate"]
 
 FEWEST = 4
 """Samples a sensor must have in a recording."""
@@ -103,7 +103,7 @@ class RecordedSamples:
         """Rate at the start, base axes, from the first samples; zero where no rate is measured."""
         for sensor in self.sensors:
             if sensor.kind == Kind.RATE:
-                return sensor.rotation @ self.series[Kind.RATE][1][:3].mean(axis=0)
+                return first_rate(sensor, self.series[Kind.RATE][1])
         return np.zeros(3)
 
     def sigma(self, kind: Kind) -> Floats:
@@ -137,6 +137,11 @@ class RecordedSamples:
         sensitivity = joint_sensitivity(robot, self.motion.evaluate(self.time), seen, self.sensors, torques)
         covariance = self.motion.lag_covariance(self.time, min(max(whitening.WINDOWS), len(self.time) - 1))
         return NoiseModel(self.time, channels, sensitivity, covariance)
+
+
+def first_rate(sensor: Sensor, values: Floats) -> Floats:
+    """Return the rate at the start, base axes, as the mean of a rate sensor's first three samples of (n, 3) values."""
+    return np.asarray(sensor.rotation @ values[:3].mean(axis=0))
 
 
 def _coloured(sensor: Sensor) -> list[tuple[float, float]]:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import joint_motion, kinematics
 from bayesid.robot.robot import Robot
 
 __all__ = ["Tip"]
@@ -52,3 +54,11 @@ class Tip:
             )
         frame = frames[name]
         return cls(name, frame.parentJoint - 2, frame.placement.homogeneous)
+
+    def motion(self, robot: Robot, state: JointState) -> tuple[Floats, Floats]:
+        """Return the pose of the frame in the base and its derivative, each (T, 4, 4), for joint states at T instants.
+
+        Arrays are NumPy's, or JAX's where the joint states are.
+        """
+        pose, rate, _ = joint_motion(kinematics(robot, state), self.joint)
+        return pose @ self.placement, rate @ self.placement

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, ClassVar
 import jax.numpy as jnp
 from jax import Array
 
+from bayesid._math.hermite import hermite
 from bayesid.simulation.effects.effect import Effect, Instant, Readings
 from bayesid.simulation.effects.effect_parameters import Parameter
 from bayesid.simulation.effects.register import register
@@ -266,4 +267,4 @@ def _interpolate(at: Array, time: Array, values: Array) -> Array:
     h = safe[index]
     s = (at - time[index])[:, None] / h
     a, b, p, q = values[index], values[index + 1], slopes[index] * h, slopes[index + 1] * h
-    return a + s * (p + s * (3.0 * (b - a) - 2.0 * p - q + s * (p + q - 2.0 * (b - a))))
+    return hermite(a, b, p, q, s)
