@@ -13,6 +13,7 @@ from jax import monitoring
 
 from bayesid.inference.importance import importance_sample
 from bayesid.inference.mode import maximise
+from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import predicted_readings
@@ -77,8 +78,13 @@ def test_another_noise_and_another_place_of_the_sensor_compile_nothing(compiled)
     rate, accel = compiled.model.sensors
     sensors = (replace(rate, noise=White(1.1e-5)), replace(accel, noise=White(1.1e-5), position=(0.3, 0.2, 0.1)))
     with counted() as seen:
-        exercised(Posterior.of(replace(compiled.model, sensors=sensors), compiled.manoeuvres, step=0.5))
+        other = Posterior.of(replace(compiled.model, sensors=sensors), compiled.manoeuvres, step=0.5)
+        z = np.zeros(other.size)
+        other.jacobian(z)
+        other.log_density(z)
+        predicted_readings(relinearised(other, z), z)
     assert seen == []
+    assert np.abs(other.residuals(z) - compiled.residuals(z)).max() > 0.1
 
 
 def test_another_recording_of_similar_length_compiles_nothing(compiled):
