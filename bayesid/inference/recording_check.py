@@ -11,9 +11,10 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, predicted_readings
+from bayesid.recording.channel_families import JOINT_FAMILIES
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_joints
-from bayesid.recording.recording import JOINT_FAMILIES, Recording
+from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor
