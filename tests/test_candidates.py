@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from bayesid.report.diagnosis_tables import candidate_rows, prior_texts
 from scipy import stats
 
 from bayesid.diagnosis import candidates
@@ -16,8 +17,7 @@ from bayesid.diagnosis.cause_search import CauseSearch
 from bayesid.diagnosis.detection_power import average_power, detection_power
 from bayesid.diagnosis.score_tests import DRAWS, Score
 from bayesid.inference.posterior import Posterior
-from bayesid.report.diagnosis_advice import advice
-from bayesid.report.diagnosis_tables import candidate_rows, prior_texts
+from bayesid.report.sentences.next_experiment import advice
 from bayesid.simulation.effects import AerodynamicDrag, Effect, Parameter, Wrench, create, known_effects, register
 from bayesid.simulation.effects.register import _REGISTER
 
@@ -53,7 +53,7 @@ def search(planar_case, restless) -> CauseSearch:
     """Two recordings in which nothing is hidden; the candidates are drag and the effect of this file."""
     model, manoeuvre = planar_case.posterior.model, planar_case.posterior.manoeuvres[0]
     again = replace(manoeuvre, recording=replace(manoeuvre.recording, name="again"))
-    posterior = Posterior(model, [manoeuvre, again], step=planar_case.posterior.step)
+    posterior = Posterior.of(model, [manoeuvre, again], step=planar_case.posterior.step)
     chosen = [effect for effect in candidates(model) if effect.label in ("aerodynamic-drag", restless)]
     assert [effect.label for effect in chosen] == ["aerodynamic-drag", restless]
     return CauseSearch(posterior, (), chosen, 0)
@@ -75,7 +75,7 @@ def test_an_effect_joins_the_catalogue_and_the_candidates_by_its_class_alone(res
 
 def test_it_joins_the_simulation(search):
     model, before = search.base.fit.posterior.model, search.base.fit.posterior
-    posterior = Posterior(model.extend(create("restless-torque")), before.manoeuvres, step=before.step)
+    posterior = Posterior.of(model.extend(create("restless-torque")), before.manoeuvres, step=before.step)
     assert posterior.unknowns.names[-6:] == tuple(f"restless-torque[{r}].{axis}" for r in range(2) for axis in "xyz")
     without = np.concatenate([search.base.fit.z, np.zeros(6)])
     change = posterior.residuals(without + np.eye(len(without))[-3]) - posterior.residuals(without)

@@ -16,12 +16,12 @@ from bayesid.robot.robot import Load, Robot
 from bayesid.simulation.effects import Effect, EncoderOffset, JointFlexibility, JointLatency
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Kind, Sensor, White
-from bayesid.simulation.simulator import Simulator, Values
+from bayesid.simulation.simulator import ModelConstants, Simulator, Values
 from bayesid.simulation.time_grid import build_grid, pad_grids
-from tests import hidden
-from tests import mujoco_truth as mj
+from studies.truth import mujoco as mj
+from studies.truth.urdf import link_body
 
-SERVICER = Path(__file__).parent / "robots" / "servicer3.urdf"
+SERVICER = Path(__file__).resolve().parents[1] / "studies" / "truth" / "robots" / "servicer3.urdf"
 POINT = (0.2, -0.1, 0.3)
 RATE0 = (0.004, -0.003, 0.002)
 TIMES = np.arange(0.0, 40.01, 0.5)
@@ -66,7 +66,7 @@ class Recorded(Motion):
 
 def truth(**options) -> np.ndarray:
     """Rate and acceleration that MuJoCo gives the robot with the heavy load, (T, 6)."""
-    carrying = mj.join(hidden.link_body(SERVICER, "link3"), mj.Body(HEAVY, COM, INERTIA))
+    carrying = mj.join(link_body(SERVICER, "link3"), mj.Body(HEAVY, COM, INERTIA))
     model = mj.TruthModel(SERVICER, accel_position=POINT, changed={"link3": carrying}, **options)
     run = model.run(formula, TIMES, rate0=RATE0, step=0.05)
     return np.concatenate([run.rate, run.accel], axis=1)
@@ -83,8 +83,9 @@ def simulated(
     grid = pad_grids([build_grid(carrier, ("target",), motion, TIMES, 0.25, effects=model.effects)])
     heavy = jnp.asarray(InertialParameters(HEAVY, COM, INERTIA).vector)
     present = tuple(jnp.asarray(values) for _ in model.effects)
-    unknown = Values(heavy, jnp.asarray([RATE0]), jnp.zeros((1, 3)), present)
-    readings = Simulator(model).readings(unknown, grid, jnp.asarray([[0.0, 0.0, 0.0, 1.0]]))
+    unknown = Values(heavy, jnp.asarray([RATE0]), jnp.zeros((1, 3)), jnp.zeros((1, 0)), present)
+    attitude = jnp.asarray([[0.0, 0.0, 0.0, 1.0]])
+    readings = Simulator.of(model).readings(ModelConstants.of(model), unknown, grid, attitude)[0]
     return np.concatenate([readings.rate[0], readings.accel[0]], axis=1)
 
 

@@ -18,12 +18,12 @@ from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import Effect, Parameter, Readings, Resonance, Wrench, known_effects
-from bayesid.simulation.effects.effect import Composite, Environment, Instant
+from bayesid.simulation.effects.instant import Composite, Environment, Instant
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Kind, Sensor, White
-from bayesid.simulation.simulator import Simulator, Values
+from bayesid.simulation.simulator import ModelConstants, Simulator, Values
 from bayesid.simulation.time_grid import build_grid, pad_grids
 
 ROBOT = Robot.from_urdf(Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf")
@@ -120,7 +120,8 @@ def readings() -> Readings:
     quaternion = rng.normal(size=(count, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1)[:, None]
     rate, accel = rng.normal(size=(2, count, 3))
-    return Readings(*map(jnp.asarray, (np.arange(count) * 0.5, rate, accel, quaternion, rng.normal(size=(count, 2)))))
+    channels = {"rate": rate, "accel": accel, "attitude": quaternion}
+    return jax.tree.map(jnp.asarray, Readings(np.arange(count) * 0.5, channels, rng.normal(size=(count, 2))))
 
 
 class Swing(Motion):
@@ -164,7 +165,7 @@ SHAPES: dict[str, Callable[[Effect], Any]] = {
     "specific_force": lambda _: (3,),
     "gravity_gradient_tensor": lambda _: (3, 3),
     "modes": lambda effect: tuple((effect.modes_count, *rest) for rest in ((), (), (3,), (3,), (3, 3))),
-    "read": lambda _: Readings((12,), (12, 3), (12, 3), (12, 4), (12, 2)),
+    "read": lambda _: Readings((12,), {"rate": (12, 3), "accel": (12, 3), "attitude": (12, 4)}, (12, 2)),
     "friction": lambda _: (6, 2),
     "loads": lambda effect: (columns(effect),),
     "body_loads": lambda effect: (11 * columns(effect),),
@@ -347,6 +348,14 @@ def check_needs_latitude(effect: Effect, hook: str) -> None:
     assert not type(effect).instances(Model(ROBOT, SENSORS, UNKNOWN, Orbit(7e6)))
 
 
+def check_constants(effect: Effect, hook: str) -> None:
+    """The effect with its constants put in anew does the same, and they are arguments of what is compiled."""
+    values = typical(effect)
+    assert all(constant is not None for constant in effect.constants)
+    again = jax.jit(lambda constants: effect.bound(constants).loads(values))(effect.constants)
+    np.testing.assert_allclose(again, effect.loads(values), rtol=1e-9, atol=1e-12)
+
+
 def check_count(effect: Effect, hook: str) -> None:
     hooks = {"states": "derivative", "modes_count": "modes"}
     assert getattr(effect, hook) > 0
@@ -361,6 +370,7 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "parameters": check_parameters,
     "needs_orbit": check_needs_orbit,
     "needs_latitude": check_needs_latitude,
+    "constant_names": check_constants,
     "states": check_count,
     "modes_count": check_count,
     "instances": check_places,
@@ -377,6 +387,9 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "table": check_table,
     "body_tables": check_body_tables,
 }
+FRAMEWORK = {"uses", "constants", "bound"}
+"""What the simulation asks of an effect and no effect overrides."""
+
 PER_RECORDING = {"per_recording"}
 """No shipped effect has values of its own for each recording; tests/test_candidates.py has one that does."""
 
@@ -398,7 +411,7 @@ def test_every_hook_keeps_its_contract(effect, hook):
 
 def test_no_hook_is_left_out():
     """Everything public on `Effect` has a check, and something to check it on; every shipped effect has a place."""
-    public = {name for name in vars(Effect) if not name.startswith("_")} - {"uses"} - PER_RECORDING
+    public = {name for name in vars(Effect) if not name.startswith("_")} - FRAMEWORK - PER_RECORDING
     assert public == CHECKS.keys()
     assert {hook for _, hook in PAIRS} == CHECKS.keys()
     assert {type(effect) for effect in EFFECTS} == {*KINDS, CreepingWheel}
@@ -462,14 +475,16 @@ class Flight:
         grids, attitude = pad_grids([grid]), jnp.asarray([[0.1, -0.2, 0.3, 0.9]])
         attitude /= jnp.linalg.norm(attitude)
         rate, tilt = jnp.asarray([[0.02, -0.03, 0.01]]), jnp.zeros((1, 3))
-        simulator = Simulator(model)
-        self._run = jax.jit(lambda effects: simulator.readings(Values(BODY, rate, tilt, effects), grids, attitude))
+        simulator, constants, speed = Simulator.of(model), ModelConstants.of(model), jnp.zeros((1, 0))
+        self._run = jax.jit(
+            lambda effects: simulator.readings(constants, Values(BODY, rate, tilt, speed, effects), grids, attitude)
+        )
 
     def __call__(self, **present: jnp.ndarray) -> dict[str, np.ndarray]:
         """Readings with the named effects at some values and the others absent."""
         values = tuple(present.get(effect.label, jnp.asarray(effect.absent)) for effect in self.model.effects)
-        found = self._run(values)._asdict()
-        return {key: np.asarray(found[key]) for key in ("rate", "accel", "attitude", "torque")}
+        found = self._run(values)[0]
+        return {key: np.asarray(value) for key, value in (*found.channels.items(), ("torque", found.torque))}
 
 
 SMALL = 0.03

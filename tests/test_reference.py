@@ -169,8 +169,8 @@ def test_stiff_appendage_is_part_of_the_base(tmp_path):
 
 
 @pytest.mark.parametrize(("eccentricity", "argument_of_latitude"), [(0.0, 0.0), (0.2, 2.5)])
-def test_orbit_obeys_newton(eccentricity, latitude):
-    orbit = mj.Orbit(7.5e6, eccentricity, argument_of_perigee=0.7, argument_of_latitude=latitude)
+def test_orbit_obeys_newton(eccentricity, argument_of_latitude):
+    orbit = mj.Orbit(7.5e6, eccentricity, argument_of_perigee=0.7, argument_of_latitude=argument_of_latitude)
 
     def position(time):
         up, gradient = orbit.zenith(time)

@@ -18,7 +18,7 @@ from bayesid.inference.unknowns import Unknowns
 from bayesid.robot.end_effector import Tip
 from bayesid.robot.regressors import balance_regressor
 from bayesid.simulation.dynamics import Grid
-from bayesid.simulation.effects.effect import Instant, Readings
+from bayesid.simulation.effects.instant import Instant, Readings
 from bayesid.simulation.model import Model
 from bayesid.simulation.simulator import ModelConstants, Simulator
 from bayesid.simulation.time_grid import build_grid

@@ -10,7 +10,8 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.omnibus_tests import MODAL, PAIRS
 from bayesid.diagnosis.perturbed_fit import Fit
-from bayesid.simulation.effects.effect import Effect, Resonance
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.instant import Resonance
 
 if TYPE_CHECKING:
     from bayesid.diagnosis.test_suite import TestSuite

@@ -21,8 +21,9 @@ from bayesid.diagnosis.hidden_vibration import Vibration
 from bayesid.inference.perturbed_posterior import Perturbation
 from bayesid.inference.posterior import Posterior
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
-from bayesid.simulation.effects.effect import Effect, Instant, Readings
+from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_key import EffectKey
+from bayesid.simulation.effects.instant import Instant, Readings
 from bayesid.simulation.sensors import Kind
 
 __all__ = [

@@ -19,7 +19,7 @@ from bayesid._math.arrays import Traceable
 from bayesid.inference import whitening
 from bayesid.inference.layout import Layout, PriorNumbers
 from bayesid.simulation.dynamics import Grid
-from bayesid.simulation.effects.effect import Instant, Readings
+from bayesid.simulation.effects.instant import Instant, Readings
 from bayesid.simulation.simulator import ModelConstants, Simulator
 
 __all__ = [

@@ -23,7 +23,8 @@ from bayesid._math.rotation import quaternion_rate, rotation
 from bayesid._math.runge_kutta import runge_kutta_step
 from bayesid._math.small_matrices import cross, inverse, solve_small, symmetric, trace_less
 from bayesid.robot.composite_tables import ENTRIES
-from bayesid.simulation.effects.effect import Composite, Effect, Environment, Instant, Modes, Wrench
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.instant import Composite, Environment, Instant, Modes, Wrench
 from bayesid.simulation.joint_torques import BaseMotion, Beyond, joint_torques
 
 __all__ = ["Grid", "Samples", "Start", "TimeTables", "UnitSpeed", "composite", "simulate", "trace"]

@@ -31,7 +31,7 @@ from bayesid.simulation.sensor_noise import (
 if TYPE_CHECKING:
     from jax import Array
 
-    from bayesid.simulation.effects.effect import Instant
+    from bayesid.simulation.effects.instant import Instant
 
 __all__ = [
     "ARCSEC",

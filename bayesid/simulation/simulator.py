@@ -14,8 +14,9 @@ from bayesid._math.arrays import Traceable
 from bayesid._math.rotation import tilted
 from bayesid.simulation.channels import Channels
 from bayesid.simulation.dynamics import Grid, Samples, Start, simulate, trace
-from bayesid.simulation.effects.effect import Effect, Instant, Readings
+from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_key import EffectKey
+from bayesid.simulation.effects.instant import Instant, Readings
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Sensed
 

@@ -6,7 +6,7 @@ files, and everything else that the package needs to know of an effect its class
 
 from bayesid.simulation.effects.arm_effects import LinkInertia, Payload
 from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointFlexibility, JointLatency
-from bayesid.simulation.effects.effect import Effect, Instant, Modes, Readings, Resonance, Wrench
+from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity
 from bayesid.simulation.effects.environment_effects import (
     AerodynamicDrag,
@@ -16,6 +16,7 @@ from bayesid.simulation.effects.environment_effects import (
     SolarPressure,
     ThrusterLeak,
 )
+from bayesid.simulation.effects.instant import Instant, Modes, Readings, Resonance, Wrench
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh, WheelMomentum
 from bayesid.simulation.effects.joint_friction import JointFriction, TorqueBias
 from bayesid.simulation.effects.register import create, known_effects, register

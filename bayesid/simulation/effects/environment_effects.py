@@ -10,8 +10,9 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
-from bayesid.simulation.effects.effect import Effect, Instant, Wrench
+from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior
+from bayesid.simulation.effects.instant import Instant, Wrench
 from bayesid.simulation.effects.register import register
 
 if TYPE_CHECKING:
@@ -84,7 +85,8 @@ class _Pressure(Effect):
         """Return the force and its products with the lever."""
         return jnp.concatenate([values[:1], values[0] * values[1:]])
 
-    def direction(self, instant: Instant) -> Array:
+    @staticmethod
+    def direction(instant: Instant) -> Array:
         """Return the force's direction in orbit axes."""
         raise NotImplementedError
 
@@ -104,7 +106,7 @@ class _LinearPressure(Effect):
     needs_orbit = True
 
     def __init__(self, pressure: _Pressure) -> None:
-        self.pressure = pressure
+        self.kind = type(pressure)
         force = pressure.parameters[0]
         self.parameters = (
             Parameter("force", "N", force.mean * force.sigma),
@@ -114,11 +116,11 @@ class _LinearPressure(Effect):
     @property
     def label(self) -> str:
         """Name of the pressure."""
-        return self.pressure.label
+        return self.kind.name
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the force and its torque about the base origin."""
-        unit = instant.to_base(self.pressure.direction(instant))
+        unit = instant.to_base(self.kind.direction(instant))
         return Wrench(values[0] * unit, jnp.cross(values[1:], unit))
 
 
@@ -140,7 +142,8 @@ class AerodynamicDrag(_Pressure):
     def __init__(self, force: float = 5.0e-3, spread: float = 1.5) -> None:
         super().__init__(force, spread)
 
-    def direction(self, instant: Instant) -> Array:
+    @staticmethod
+    def direction(instant: Instant) -> Array:
         """Return backwards along the orbit."""
         return -instant.environment.velocity
 
@@ -171,7 +174,8 @@ class SolarPressure(_Pressure):
     def __init__(self, force: float = 3.0e-4, spread: float = 2.0) -> None:
         super().__init__(force, spread)
 
-    def direction(self, instant: Instant) -> Array:
+    @staticmethod
+    def direction(instant: Instant) -> Array:
         """Return away from the Sun."""
         return -instant.environment.sun
 

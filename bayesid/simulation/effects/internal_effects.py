@@ -11,8 +11,9 @@ from jax import Array
 
 from bayesid._math.arrays import Floats
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects.effect import Effect, Instant, Modes, Resonance
+from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity, coordinates_of
+from bayesid.simulation.effects.instant import Instant, Modes, Resonance
 from bayesid.simulation.effects.register import register
 
 __all__ = ["FlexibleAppendage", "FuelSlosh", "WheelMomentum"]

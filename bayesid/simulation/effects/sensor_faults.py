@@ -13,8 +13,9 @@ import jax.numpy as jnp
 from jax import Array
 
 from bayesid._math.hermite import hermite
-from bayesid.simulation.effects.effect import Effect, Instant, Readings
+from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter
+from bayesid.simulation.effects.instant import Instant, Readings
 from bayesid.simulation.effects.register import register
 from bayesid.simulation.sensors import Kind
 
@@ -51,7 +52,7 @@ class SensorFault(Effect):
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
         """Return the effect where the sensor is declared."""
-        return super().instances(model) if any(sensor.kind is cls.sensor for sensor in model.sensors) else []
+        return super().instances(model) if model.sensor(cls.sensor) is not None else []
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         """Return what the faulty sensor reads, shape (T, 3), of the true reading."""
