@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from bayesid.report.diagnosis_tables import candidate_rows, prior_texts
+from bayesid.report.tables.diagnosis_tables import candidate_rows, prior_texts
 from scipy import stats
 
 from bayesid.diagnosis import candidates
