@@ -16,8 +16,6 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-import pyarrow as pa  # type: ignore[import-untyped]
-import pyarrow.parquet as pq  # type: ignore[import-untyped]
 from numpy.typing import ArrayLike
 
 from bayesid._io.errors import InputError
@@ -377,6 +375,9 @@ def _read_csv(file: Path) -> dict[str, Array]:
 
 
 def _read_parquet(file: Path) -> dict[str, Array]:
+    import pyarrow as pa  # type: ignore[import-untyped]  # here, as sensors import this module and CSV needs none
+    import pyarrow.parquet as pq  # type: ignore[import-untyped]
+
     try:
         # not pq.read_table, which fails obscurely on duplicate columns
         with pq.ParquetFile(file) as source:
@@ -431,4 +432,7 @@ def _write_csv(file: Path, columns: Mapping[str, Array]) -> None:
 
 
 def _write_parquet(file: Path, columns: Mapping[str, Array]) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
     pq.write_table(pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()}), file)
