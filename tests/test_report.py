@@ -207,8 +207,8 @@ def test_equivalent_box_has_the_body_s_inertia():
     body = Robot.shipped("ets7").link("base_link").inertial
     corners = equivalent_box(body) - body.com
     # a box of variance half^2 / 3 along each axis: its corners have three times the second moment of its volume
-    instant = body.mass * corners.T @ corners / 24.0
-    np.testing.assert_allclose(np.trace(instant) * np.eye(3) - instant, body.inertia, rtol=1e-9, atol=1e-9)
+    moment = body.mass * corners.T @ corners / 24.0
+    np.testing.assert_allclose(np.trace(moment) * np.eye(3) - moment, body.inertia, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -48,12 +48,12 @@ class Reading:
     unit: str
     fraction: float
     mass: float
-    instant: float
+    moment: float
 
     @property
     def manoeuvres(self) -> float:
         """How many manoeuvres would have to be averaged for an error of 2 % in all of them."""
-        return float(max(1.0, (max(self.mass, self.instant) / CLAIM) ** 2))
+        return float(max(1.0, (max(self.mass, self.moment) / CLAIM) ** 2))
 
 
 def read_sigmas(information: Information) -> list[Reading]:

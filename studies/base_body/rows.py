@@ -173,7 +173,7 @@ def reading_table(result: BaseBody) -> Table:
             format_unit(reading.unit),
             f"{format_number(100.0 * reading.fraction, 2)} %",
             _percent(reading.mass),
-            _percent(reading.instant),
+            _percent(reading.moment),
             f"{reading.manoeuvres:,.0f}".replace(",", " "),
         ]
         for reading in result.readings
@@ -186,7 +186,7 @@ def reading_sentences(result: BaseBody) -> list[str]:
     sentences, fitting = [], []
     for sigma in dict.fromkeys(reading.sigma for reading in result.readings):
         own = [reading for reading in result.readings if reading.sigma == sigma]
-        able = [reading.unit for reading in own if max(reading.mass, reading.instant) <= CLAIM]
+        able = [reading.unit for reading in own if max(reading.mass, reading.moment) <= CLAIM]
         buried = [format_unit(reading.unit) for reading in own if reading.fraction > 1.0]
         sentences.append(
             f"{sigma:g}: in {' or '.join(buried) or 'no unit'} it exceeds the whole signal. An error of 2 % from one "

@@ -131,8 +131,8 @@ def _geometry(document: Document, comparison: Comparison) -> None:
     for body in ("Empty", "A"):
         rigid, extended = (comparison.errors[name][body] for name in ("rigid", "extended"))
         rows += [
-            [body, instant, f"{one:+.2f}", f"{two:+.2f}"]
-            for instant, one, two in zip(("smallest", "middle", "largest"), rigid, extended, strict=True)
+            [body, moment, f"{one:+.2f}", f"{two:+.2f}"]
+            for moment, one, two in zip(("smallest", "middle", "largest"), rigid, extended, strict=True)
         ]
     document.table(
         ["body", "principal moment", "rigid [%]", "extended [%]"],
