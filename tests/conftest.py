@@ -37,6 +37,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "slow: left to ``pytest --slow``, as tests with the fixture of that name")
     if COMPILED not in os.environ:
         folder = tempfile.TemporaryDirectory()
         os.environ[COMPILED] = folder.name
@@ -49,12 +50,16 @@ def slow() -> None:
     """Leave a test to ``pytest --slow``."""
 
 
+def _is_slow(item: pytest.Item) -> bool:
+    return "slow" in getattr(item, "fixturenames", ()) or item.get_closest_marker("slow") is not None
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Deselect the slow tests, or with ``--slow`` all others."""
     if config.getoption("--catalogue"):
         return
     wanted = bool(config.getoption("--slow"))
-    left_out = [item for item in items if ("slow" in getattr(item, "fixturenames", ())) != wanted]
+    left_out = [item for item in items if _is_slow(item) != wanted]
     config.hook.pytest_deselected(items=left_out)
     items[:] = [item for item in items if item not in left_out]
 

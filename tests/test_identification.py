@@ -62,8 +62,9 @@ LONG = ("ets7", "known thrust")
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if "name" in metafunc.fixturenames:
-        slow = pytest.mark.usefixtures("slow")
-        metafunc.parametrize("name", [pytest.param(name, marks=slow if name in LONG else ()) for name in CASES])
+        metafunc.parametrize(
+            "name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in CASES]
+        )
 
 
 def test_truth_lies_inside_the_posterior_and_noise_is_all_that_is_left(name: str, tmp_path: Path) -> None:
