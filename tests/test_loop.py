@@ -45,7 +45,7 @@ ENCODER = {0: 1e-6}
 SENSORS = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(2e-5), position=(0.1, -0.15, 0.3)))
 TRUE = InertialParameters(61.2, [0.0525, -0.028, 0.0015], [[2.42, 0.047, 0.0], [0.047, 2.64, 0.0], [0.0, 0.0, 2.82]])
 """As the prior has it, which is so narrow that normal approximations do: at 5 % they lose a tenth of some widths."""
-LIMITS = Limits(joint_speed=0.5, base_rotation=0.045)
+LIMITS = Limits(joint_speed=0.5, base_rotation=0.03)
 
 
 def robot_of(base: InertialParameters) -> Robot:

@@ -179,7 +179,7 @@ def test_a_candidate_that_is_not_seen_has_a_limit():
         "refitted",
     ]
     assert faint[3] == "−2.0"
-    assert faint[4] == "x < 1.2 × 10⁻⁵, y < 1.6 × 10⁻⁶, z < 1.6 × 10⁻⁶ m/s²"
+    assert faint[4] == "x < 1.2 × 10⁻⁵, y < 2 × 10⁻⁶, z < 2 × 10⁻⁶ m/s²"
     assert faint[6] == "linear"
     assert noise[3:6] == ["", "", ""]
 
@@ -188,7 +188,7 @@ def test_candidates_out_of_reach_are_those_of_low_power():
     rows = [candidate(power=0.9), candidate(name="b", power=0.3), candidate(name="c", power=0.1), candidate(power=None)]
     assert [row.name for row in unseen_candidates(rows)] == ["c", "b"]
     assert tables.unseen_rows(unseen_candidates(rows)[:1]) == [
-        ["c", "0.10", "x < 1.2 × 10⁻⁵, y < 1.6 × 10⁻⁶, z < 1.6 × 10⁻⁶ m/s²"]
+        ["c", "0.10", "x < 1.2 × 10⁻⁵, y < 2 × 10⁻⁶, z < 2 × 10⁻⁶ m/s²"]
     ]
 
 
