@@ -275,7 +275,7 @@ def test_readings_are_drawn_with_their_residuals_beneath(attitude_posterior):
 def made_up_residuals(posterior: Posterior, make) -> Residuals:
     """Residuals that a function of the sample times gives on every axis."""
     values = np.zeros(posterior.residual_shape)
-    item, grid = posterior.whitenings[0], posterior.sample_times(0)
+    item, grid = posterior.whitenings[0], posterior.data.times(0)
     for channel in range(item.outputs.shape[1]):
         present = np.flatnonzero(item.outputs[:, channel])
         values[0, present, channel] = make(grid[item.rows[present]])
@@ -287,11 +287,11 @@ def test_the_spectrum_of_noise_is_flat_and_that_of_a_wave_has_a_peak(attitude_po
     noise = made_up_residuals(attitude_posterior, lambda time: rng.normal(size=len(time)))
     wave = made_up_residuals(attitude_posterior, lambda time: np.sin(2.0 * np.pi * 0.1 * time))
     for axis in range(3):
-        frequency, power, ordinates = noise.spectrum(0, axis)
+        frequency, power, ordinates = noise.spectrum(Kind.RATE, axis)
         assert np.average(power, weights=ordinates) == pytest.approx(1.0, abs=4.0 / np.sqrt(ordinates.sum()))
         # Parseval: the ordinates hold half the square sum, but for those at zero and at Nyquist
-        time, value = wave.series(0, 0, axis)
-        frequency, power, ordinates = wave.spectrum(0, axis)
+        time, value = wave.series(0, Kind.RATE, axis)
+        frequency, power, ordinates = wave.spectrum(Kind.RATE, axis)
         assert power @ ordinates == pytest.approx(0.5 * value @ value, rel=0.05)
         width = frequency[1] - frequency[0]
         assert abs(frequency[np.argmax(power)] - 0.1) < width
@@ -301,13 +301,13 @@ def test_the_spectrum_of_noise_is_flat_and_that_of_a_wave_has_a_peak(attitude_po
 def test_spectra_and_distributions_are_drawn_for_every_sensor(attitude_posterior):
     residuals = Residuals.at(attitude_posterior, np.zeros(attitude_posterior.size))
     panels = np.reshape(figures.residual_statistics(residuals).axes, (3, 2))
-    for sensor, (left, right) in enumerate(panels):
+    for kind, (left, right) in zip(residuals.kinds, panels, strict=True):
         for axis in range(3):
-            spectrum = residuals.spectrum(sensor, axis)
+            spectrum = residuals.spectrum(kind, axis)
             curve = next(line for line in left.lines if line.get_label() == f"axis {'xyz'[axis]}")
             np.testing.assert_array_equal(curve.get_xydata(), np.column_stack([spectrum.frequency, spectrum.power]))
         assert left.get_yscale() == "log"
-        pooled = residuals.pooled(sensor)
+        pooled = residuals.pooled(kind)
         assert right.texts[0].get_text() == (f"mean {pooled.mean():.3f}\nsd {pooled.std():.3f}\n{len(pooled)} samples")
         shares = [bar.get_height() * bar.get_width() for bar in right.patches]
         assert sum(shares) == pytest.approx(1.0)

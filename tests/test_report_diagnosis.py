@@ -22,7 +22,6 @@ from bayesid.diagnosis import (
 from bayesid.diagnosis.cause_amplitudes import CauseAmplitude, amplitudes_of
 from bayesid.diagnosis.rival_causes import improbable_rivals, signal_cosine
 from bayesid.diagnosis.wrench_correlations import torque_correlations
-from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_series import Residuals
 from bayesid.recording.recording import Recording
 from bayesid.report import diagnosis_report, figures
@@ -39,6 +38,7 @@ from bayesid.report.tables.identification_tables import joint_rows
 from bayesid.simulation.effects import known_effects
 from bayesid.simulation.effects.effect_parameters import Quantity
 from bayesid.simulation.model import Manoeuvre
+from bayesid.simulation.sensors import Kind
 from tests.pdf_text import PdfText
 
 BIAS = 4e-5
@@ -259,11 +259,11 @@ def test_the_spectrum_of_a_wave_is_its_amplitude():
 def test_residuals_are_those_of_the_fit(biased):
     side = residuals_of(biased.before)
     assert side.kinds
-    values = np.concatenate([side.pooled(sensor) for sensor in range(len(side.kinds))])
+    values = np.concatenate([side.pooled(kind) for kind in side.kinds])
     assert values @ values == pytest.approx(biased.before.fit.chi2)
-    for sensor in range(len(side.kinds)):
+    for kind in side.kinds:
         for axis in range(3):
-            time, value = side.series(0, sensor, axis)
+            time, value = side.series(0, kind, axis)
             assert len(time) == len(value) > 70
             assert np.diff(time).min() > 0.0
     again = Residuals.at(biased.before.fit.posterior, biased.before.fit.z)
@@ -276,19 +276,19 @@ def test_histories_and_spectra_draw_the_residuals_before_and_after(biased):
     assert len(histories.axes) == len(spectra.axes) == 6
     for place, (over_time, by_frequency) in enumerate(zip(histories.axes, spectra.axes, strict=True)):
         sensor, axis = divmod(place, 3)
-        title = f"{('angular rate', 'acceleration')[sensor]} {'xyz'[axis]}"
+        kind, title = sides[0].kinds[sensor], f"{('angular rate', 'acceleration')[sensor]} {'xyz'[axis]}"
         assert over_time.get_title() == by_frequency.get_title() == title
         samples = over_time.lines[::2]
         curves = {line.get_label(): line.get_xydata() for line in by_frequency.lines}
         for side, line, name in zip(sides, samples, ("before", "after"), strict=True):
-            np.testing.assert_array_equal(line.get_xydata(), np.column_stack(side.series(0, sensor, axis)))
-            np.testing.assert_array_equal(curves[name], np.column_stack(side.spectrum(sensor, axis)[:2]))
+            np.testing.assert_array_equal(line.get_xydata(), np.column_stack(side.series(0, kind, axis)))
+            np.testing.assert_array_equal(curves[name], np.column_stack(side.spectrum(kind, axis)[:2]))
         assert by_frequency.get_xlabel() == "frequency [Hz]"
     labels = histories.axes[0].get_legend_handles_labels()[1]
     assert labels == ["before: samples and their running mean", "after: samples and their running mean"]
     assert spectra.axes[0].get_legend_handles_labels()[1] == ["before", "after", NOISE_BAND]
     # the bias that was hidden stands in the lowest bins before, and is gone after
-    before, after = (side.spectrum(1, 0).power[0] for side in sides)
+    before, after = (side.spectrum(Kind.ACCEL, 0).power[0] for side in sides)
     assert before > 2.0 * after
 
 
@@ -451,7 +451,8 @@ def test_the_table_of_rivals_says_by_how_much_the_best_leads(biased):
 @pytest.fixture
 def printed(biased, clean, disturbance, tmp_path, monkeypatch):
     """Return a function that prints the report of a verdict and reads it."""
-    monkeypatch.setattr(Posterior, "integration_error", lambda self, z: 1e-3)
+    module = import_module("bayesid.report.diagnosis_report")
+    monkeypatch.setattr(module, "integration_error_at", lambda posterior, z: 1e-3)
 
     def read(status: Status) -> tuple[object, PdfText]:
         rivals = tuple(h for h in biased.search.tried if len(h.labels) == 1 and h.labels != biased.after.labels)[:2]
