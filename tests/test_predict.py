@@ -177,7 +177,7 @@ def test_a_plan_without_a_joint_or_a_frame_is_an_error(plan: Path, tmp_path: Pat
     plan.write_text(study.replace('"tip"', '"hand"'))
     status, text = run("predict", plan, "--output", tmp_path / "out")
     assert status == 2
-    assert "no frame 'hand'" in text
+    assert "no frame named 'hand'" in text
     assert "link2" in text
     plan.write_text(study)
     status, text = run("predict", plan, "--output", tmp_path / "out", "--posterior", tmp_path / "none.nc")
