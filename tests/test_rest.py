@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from bayesid.inference.mode import fit, maximise
 from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior
@@ -119,3 +121,22 @@ class _Exact:
 
     def evaluate(self, time):
         return self.motion.evaluate(time)
+
+
+def test_a_speed_error_is_the_momentum_of_that_joint(flights):
+    """Against Pinocchio's centroidal momentum: a joint believed too fast by d lets the base start at - I^-1 h(d)."""
+    posterior = posterior_of(flights[:1], np.random.default_rng(1), speed_errors=True, rate_sigma=0.0)
+    unknowns, motion = posterior.unknowns, posterior.manoeuvres[0].motion
+    robot = pin.buildModelFromUrdf(str(PLANAR), pin.JointModelFreeFlyer())
+    data, q = robot.createData(), pin.neutral(robot)
+    q[7:] = motion.evaluate(np.zeros(1)).position[0]
+    for joint in range(2):
+        z = np.zeros(unknowns.size)
+        z[unknowns.layout.all_speeds.start + joint] = 2.0
+        error = 2.0 * unknowns.speed_sigma[0][joint]
+        pin.ccrba(robot, data, q, np.zeros(8))
+        momentum = pin.computeCentroidalMomentum(robot, data, q, np.eye(8)[6 + joint] * error).angular
+        expected = -np.linalg.solve(data.Ig.inertia, momentum)
+        rate = predicted_readings(posterior, z)[0].rate[0] - predicted_readings(posterior, 0.0 * z)[0].rate[0]
+        assert np.abs(expected).max() > 1e-6
+        np.testing.assert_allclose(rate, expected, atol=1e-6 * np.abs(expected).max())
