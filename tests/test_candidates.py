@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from bayesid.report.tables.diagnosis_tables import candidate_rows, prior_texts
 from scipy import stats
 
 from bayesid.diagnosis import candidates
@@ -18,6 +17,7 @@ from bayesid.diagnosis.detection_power import average_power, detection_power
 from bayesid.diagnosis.score_tests import DRAWS, Score
 from bayesid.inference.posterior import Posterior
 from bayesid.report.sentences.next_experiment import advice
+from bayesid.report.tables.diagnosis_tables import candidate_rows, prior_texts
 from bayesid.simulation.effects import AerodynamicDrag, Effect, Parameter, Wrench, create, known_effects, register
 from bayesid.simulation.effects.register import _REGISTER
 
