@@ -110,8 +110,8 @@ class JointFlexibility(DisplacedMotion, OnJoint):
     ``frequency`` is that of everything beyond the joint swinging on the spring with the base held and all joints at
     zero, so that one frequency is one stiffness in all recordings. The deflection follows the torque through the joint
     as long as the motion is slow against that frequency: to second order in the ratio of frequencies here, which holds
-    above about 0.2 Hz. Deflection and what it displaces are computed with the robot's present bodies: those of unknown
-    ones must be near the truth there, within some tens of per cent.
+    above about 0.2 Hz. Deflection and what it displaces are computed with the bodies that the robot has, the centres of
+    the priors where they are unknown: a load far from its prior's centre is displaced wrongly.
     """
 
     name = "joint-flexibility"
@@ -157,7 +157,7 @@ class JointFlexibility(DisplacedMotion, OnJoint):
                 motions.append(kinematics(robot, JointState(*changed)))
         return Displaced(motions, np.kron(np.eye(3), [-0.5, 0.5]))
 
-    # a heavier body beyond the joint is displaced less: proportional to its parameters alone would be far too much
+    # a heavier body deflects the joint less where the base floats: changes in proportion to it would be far too large
     body_tables, body_loads = Effect.body_tables, Effect.body_loads
 
     def loads(self, values: Array) -> Array:
@@ -200,11 +200,8 @@ class _Deflection:
         ratio = np.zeros(len(knots))
         beyond = pin.crba(model, data, configuration(robot, np.zeros(len(robot.joints))))[6 + index, 6 + index]
         for row in range(len(knots)):
-            q, speed, acceleration = (
-                configuration(robot, state.position[row]),
-                state.velocity[row],
-                state.acceleration[row],
-            )
+            q = configuration(robot, state.position[row])
+            speed, acceleration = state.velocity[row], state.acceleration[row]
             mass = pin.crba(model, data, q)
             mass = np.triu(mass) + np.triu(mass, 1).T
             # the base floats, without momentum: it answers the joints' speed, and no wrench is left on it
