@@ -142,7 +142,7 @@ def test_emcee_samples_all_bodies_and_torques_bring_the_scale(compiled, tmp_path
     manoeuvre = flown(robot, tmp_path, rng)
     widths = {}
     for torque in (False, True):
-        posterior = compiled(torque).with_manoeuvres([manoeuvre])
+        posterior = with_manoeuvres(compiled(torque), [manoeuvre])
         result = identify(posterior, 1, effective_samples=400.0)
         assert result.chains.converged
         assert result.chains.r_hat < 1.02
