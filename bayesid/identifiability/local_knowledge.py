@@ -7,6 +7,7 @@ have the covariance ``(J'J)^-1``; quantities with the derivative ``D`` by ``z`` 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,7 +18,7 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.posterior import Posterior
 
-__all__ = ["Knowledge"]
+__all__ = ["Knowledge", "marginalised"]
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,11 @@ class Knowledge:
     def having(self, rows: Floats) -> Knowledge:
         """Return what is known with further whitened measurements of the coordinates, shape (k, N)."""
         return Knowledge(self.names, self.values, self.slope, np.concatenate([self.jacobian, rows]))
+
+    def fixing(self, coordinates: Sequence[int]) -> Knowledge:
+        """Return what would be known if some coordinates were known exactly, those left keeping their order."""
+        slope, jacobian = (np.delete(matrix, coordinates, axis=1) for matrix in (self.slope, self.jacobian))
+        return Knowledge(self.names, self.values, slope, jacobian)
 
     @cached_property
     def coordinates(self) -> Floats:
@@ -110,6 +116,25 @@ class Knowledge:
         """Inverse of R of J = QR: exact where some directions are known a million times better than others."""
         upper = _upper(self.jacobian)
         return np.asarray(sla.solve_triangular(upper, np.eye(len(upper))))
+
+
+def marginalised(jacobian: Floats, nuisance: Sequence[int]) -> Floats:
+    """Return the rows that are left for the other coordinates where some are marginalised.
+
+    Parameters
+    ----------
+    jacobian : (m, N) array
+        Jacobian of whitened measurements, with the prior of the nuisance coordinates among its rows.
+    nuisance : sequence of int
+        The n coordinates to marginalise.
+
+    Returns
+    -------
+    (N - n, N - n) array
+        Upper triangular; its Gram matrix is the Schur complement of the Fisher information.
+    """
+    others = np.delete(np.arange(jacobian.shape[1]), nuisance)
+    return _upper(jacobian[:, [*nuisance, *others]])[len(nuisance) :, len(nuisance) :]
 
 
 def _upper(matrix: Floats) -> Floats:

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from scipy.optimize import least_squares
 
 from bayesid._math.arrays import Floats
+from bayesid._math.least_squares import levenberg_marquardt
 
 __all__ = ["Profile", "Target", "profile"]
 
@@ -35,8 +35,7 @@ MOST = 24
 """Refits on each side."""
 
 TOLERANCE = 1e-8
-HUGE = 1e12
-"""Stands for residuals that are not finite, so that the step is refused."""
+"""Relative tolerance of a refit."""
 
 SHORTEST = 1e-3
 """Step, in standard deviations, below which a jump of the profile counts as one."""
@@ -126,14 +125,12 @@ class _Held:
         stiffness = STIFF / self.sd
 
         def held(z: Floats) -> Floats:
-            r = np.append(self.residual(z), stiffness * (self.target.value(z) - wanted))
-            return np.where(np.isfinite(r), r, HUGE)
+            return np.append(self.residual(z), stiffness * (self.target.value(z) - wanted))
 
         def slope(z: Floats) -> Floats:
             return np.vstack([self.jacobian(z), stiffness * self.target.gradient(z)])
 
-        options: Any = {"method": "lm", "x_scale": "jac", "ftol": TOLERANCE, "xtol": TOLERANCE, "gtol": TOLERANCE}
-        z = np.asarray(least_squares(held, start, slope, **options).x)
+        z = np.asarray(levenberg_marquardt(held, slope, start, TOLERANCE).x)
         value, loss = self.target.value(z), float((self.residual(z) ** 2).sum()) - self.best
         return _Point(value, float(np.sign(value - self.centre) * np.sqrt(max(loss, 0.0))), z)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from bayesid._math.arrays import Floats
+from bayesid._math.least_squares import levenberg_marquardt
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 
@@ -15,8 +15,7 @@ __all__ = ["Optimum", "fit", "maximise"]
 
 
 TOLERANCE = 1e-10
-HUGE = 1e12
-"""Stands for residuals that are not finite, so that the step is refused."""
+"""Relative tolerance of the search for the mode."""
 
 STARTS = 8
 """Random starts tried when the first optimum does not explain the data."""
@@ -59,14 +58,7 @@ class Optimum:
 
 def fit(posterior: Posterior, start: Floats) -> Optimum:
     """Run Levenberg-Marquardt from one point."""
-
-    def finite(z: Floats) -> Floats:
-        r = posterior.least_squares(z)
-        return np.where(np.isfinite(r), r, HUGE)
-
-    solution = least_squares(
-        finite, start, posterior.jacobian, method="lm", x_scale="jac", ftol=TOLERANCE, xtol=TOLERANCE, gtol=TOLERANCE
-    )
+    solution = levenberg_marquardt(posterior.least_squares, posterior.jacobian, start, TOLERANCE)
     jacobian = posterior.jacobian(solution.x)
     return Optimum(
         z=solution.x,

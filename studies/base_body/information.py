@@ -1,7 +1,7 @@
 """What sensors, priors and the knowledge of the arm make of the posterior's width: one Jacobian, many questions.
 
-With white noise the Fisher information is a sum over sensors, each divided by its variance. Computed once with
-everything unknown, it answers any sensor grade by rescaling, and any "if that were known" by striking out rows and
+With white noise every sensor's rows of the whitened Jacobian go with the inverse of its noise. Computed once with
+everything unknown, the Jacobian answers any sensor grade by rescaling, and any "if that were known" by leaving out
 columns.
 """
 
@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesid.identifiability.local_knowledge import Knowledge
+from bayesid.inference.body_quantities import linearise
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, predicted_readings
@@ -25,7 +27,6 @@ from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import ARCSEC, Kind, Sensor, White
 from studies.base_body import paper
 from studies.base_body.noise_free import ACCELEROMETER, STEP
-from studies.base_body.physical import physical_sd, physical_slope
 from studies.base_body.setting import blank
 from studies.common.ets7 import BASE, RADIUS, ets7
 
@@ -68,22 +69,22 @@ def wide_model() -> Model:
 
 @dataclass(frozen=True)
 class Information:
-    """Fisher information of one manoeuvre at the truth.
+    """What one manoeuvre tells of the base, linearised at the truth.
 
     Attributes
     ----------
     by_sensor : mapping of Kind to (n, n) array
-        With a noise of `UNIT` per sample.
-    slope : (10, n) array
-        Of the base's quantities.
+        Rows equivalent to the whitened Jacobian of each sensor with a noise of `UNIT` per sample.
+    prior : Knowledge
+        The base's quantities before the manoeuvre.
     names : tuple of str
-        Of the n unknowns.
+        Names of the n unknowns.
     truth : PredictedReadings
         What the sensors read.
     """
 
     by_sensor: Mapping[Kind, Floats]
-    slope: Floats
+    prior: Knowledge
     names: tuple[str, ...]
     truth: PredictedReadings
 
@@ -98,10 +99,12 @@ class Information:
         recording = simulate_recordings(simulator, z=z)[0]
         posterior = with_manoeuvres(simulator, [replace(planned, recording=recording)])
         jacobian = posterior.jacobian(z).reshape(-1, len(KINDS), 3, posterior.size)
-        blocks = {
-            kind: np.einsum("tai,taj->ij", jacobian[:, index], jacobian[:, index]) for index, kind in enumerate(KINDS)
+        rows = {
+            kind: np.linalg.qr(jacobian[:, index].reshape(-1, posterior.size), mode="r")
+            for index, kind in enumerate(KINDS)
         }
-        return cls(blocks, physical_slope(posterior, z), posterior.unknowns.names, truth)
+        prior = Knowledge(*linearise(posterior, z), np.eye(posterior.size))
+        return cls(rows, prior, posterior.unknowns.names, truth)
 
     def sd(self, sigma: Mapping[Kind, float], known: Collection[str] = ()) -> Floats:
         """Posterior standard deviation of the base's ten quantities.
@@ -113,11 +116,9 @@ class Information:
         known : collection of str
             Of `ARM`, `RATE`, `TILT`, `ACCEL_BIAS`: what is known exactly.
         """
-        keep = np.array([_group(name) not in known for name in self.names])
-        total = np.eye(len(keep))  # the prior
-        for kind, value in sigma.items():
-            total = total + self.by_sensor[kind] * (UNIT / value) ** 2
-        return physical_sd(self.slope[:, keep], _inverse(total[np.ix_(keep, keep)]))
+        rows = [self.by_sensor[kind] * (UNIT / value) for kind, value in sigma.items()]
+        exact = [index for index, name in enumerate(self.names) if _group(name) in known]
+        return self.prior.having(np.concatenate(rows)).fixing(exact).sd
 
     def relative_sd(self, sigma: Mapping[Kind, float], known: Collection[str] = ()) -> Floats:
         """`sd` over the true values."""
@@ -128,7 +129,7 @@ class Information:
         """Largest rate [rad/s], acceleration [m/s2] and rotation since the start [rad] of any axis."""
         vector = 2.0 * self.truth.attitude[:, :3]
         values = {Kind.RATE: self.truth.rate, Kind.ACCEL: self.truth.accel, Kind.ATTITUDE: vector}
-        return {kind: float(np.abs(own).max()) for kind, own in values.items()}
+        return {kind: float(np.abs(reading).max()) for kind, reading in values.items()}
 
 
 def _group(name: str) -> str:
@@ -136,8 +137,3 @@ def _group(name: str) -> str:
         if name.startswith(start):
             return group
     return BASE
-
-
-def _inverse(information: Floats) -> Floats:
-    scale = 1.0 / np.sqrt(np.diag(information))
-    return np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)

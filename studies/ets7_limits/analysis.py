@@ -15,7 +15,7 @@ from bayesid.design.plan import Trajectory
 from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.simulation.sensors import Noise, StarTracker
 from studies.common.ets7 import ACCEL, RATE, START, FlightManoeuvre
-from studies.ets7_limits.information import LONGEST, Grade, Knowledge, wide_posterior
+from studies.ets7_limits.information import LONGEST, Asked, Grade, wide_posterior
 from studies.ets7_limits.setting import ARM_SPREAD
 
 __all__ = [
@@ -110,21 +110,21 @@ def design_manoeuvre(
     return Designed(found, problem.reached(found.parameters), trajectory, problem.plan.family.motion(found.parameters))
 
 
-def knowledge_of(designed: Designed, arm_spread: float = ARM_SPREAD) -> tuple[Knowledge, Knowledge]:
+def knowledge_of(designed: Designed, arm_spread: float = ARM_SPREAD) -> tuple[Asked, Asked]:
     """Return what can be asked of the designed manoeuvre and of the flight's."""
     duration = designed.motion.family.duration
-    own = wide_posterior(designed.motion, None, duration, arm_spread)
-    return Knowledge(own, duration), Knowledge(wide_posterior(FlightManoeuvre(START), own, duration), duration)
+    wide = wide_posterior(designed.motion, None, duration, arm_spread)
+    return Asked(wide, duration), Asked(wide_posterior(FlightManoeuvre(START), wide, duration), duration)
 
 
-def tell(knowledge: Knowledge) -> Telling:
+def tell(knowledge: Asked) -> Telling:
     """Return what one manoeuvre tells."""
     exact, uncertain = (knowledge.repeated(CHECKED, known) for known in (True, False))
-    return Telling(knowledge.truth, exact.sd(0.0), exact.sd(1.0), uncertain.sd(1.0))
+    return Telling(knowledge.prior.values, exact.sd(0.0), exact.sd(1.0), uncertain.sd(1.0))
 
 
 def answers(
-    knowledge: Knowledge, rates: Sequence[str], accels: Mapping[str, float | None], progress: Callable[[str], None]
+    knowledge: Asked, rates: Sequence[str], accels: Mapping[str, float | None], progress: Callable[[str], None]
 ) -> dict[tuple[str, str], dict[tuple[bool, bool], Answer]]:
     """Return the answers by labels of rate and accelerometer, then by (arm known, bias known)."""
     table: dict[tuple[str, str], dict[tuple[bool, bool], Answer]] = {}

@@ -12,16 +12,16 @@ from scipy.optimize import brentq
 from bayesid import Kind, Sensor, White
 from bayesid.design import planned_manoeuvre, planned_posterior
 from bayesid.design.designed import sample_times
+from bayesid.identifiability.local_knowledge import Knowledge, marginalised
+from bayesid.inference.body_quantities import linearise
 from bayesid.inference.noise_changes import with_sensors
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import Motion
-from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.simulation.sensors import Noise
-from studies.base_body.physical import physical_sd, physical_slope
 from studies.common.ets7 import ACCELEROMETER, ENCODER
 from studies.ets7_limits.setting import ARM_SPREAD, DURATION, INTERVAL, model_of
 
-__all__ = ["LONGEST", "Grade", "Knowledge", "Repeated", "wide_posterior"]
+__all__ = ["LONGEST", "Asked", "Grade", "Repeated", "wide_posterior"]
 
 Floats = NDArray[np.floating]
 
@@ -50,31 +50,26 @@ class Repeated:
 
     Attributes
     ----------
-    information : (c, c) array
-        Of the unknowns that all repetitions share, each repetition's initial rate marginalised; without prior.
-    slope : (10, c) array
-        Of the base's quantities.
-    truth : (10,) array
+    prior : Knowledge
+        The base's quantities before any manoeuvre, by the c unknowns that all repetitions share.
+    rows : (c, c) array
+        Rows equivalent to the whitened Jacobian of one repetition, its initial rate marginalised.
     duration : float
-        Of one repetition [s].
+        Duration of one repetition [s].
     """
 
-    information: Floats
-    slope: Floats
-    truth: Floats
+    prior: Knowledge
+    rows: Floats
     duration: float
 
     def sd(self, repetitions: float) -> Floats:
         """Posterior standard deviation of the base's ten quantities, in their units."""
-        total = np.eye(len(self.information)) + repetitions * self.information
-        scale = 1.0 / np.sqrt(np.diag(total))
-        inverse = np.linalg.inv(total * np.outer(scale, scale)) * np.outer(scale, scale)
-        return physical_sd(self.slope, inverse)
+        return self.prior.having(np.sqrt(repetitions) * self.rows).sd
 
     def relative(self, repetitions: float) -> Floats:
         """Relative standard deviation of the base's mass and three moments of inertia, shape (4,)."""
         judged = list(JUDGED)
-        return self.sd(repetitions)[judged] / self.truth[judged]
+        return self.sd(repetitions)[judged] / self.prior.values[judged]
 
     def worst(self, repetitions: float) -> float:
         """Return the largest of `relative`."""
@@ -95,50 +90,43 @@ class Repeated:
 
 
 @dataclass
-class Knowledge:
+class Asked:
     """A manoeuvre's posterior with everything unknown that a question may fix; see `wide_posterior`."""
 
     posterior: Posterior
     duration: float = DURATION
-    _fisher: dict[tuple[Noise, float], Floats] = field(default_factory=dict)
+    _kept: dict[tuple[Noise, float], Floats] = field(default_factory=dict)
 
     def repeated(self, grade: Grade, arm_known: bool) -> Repeated:
         """Return what repetitions tell with some sensors; without an accelerometer its bias does not matter."""
-        information, names = self.fisher(grade), self.posterior.unknowns.names
-        rates = [index for index, name in enumerate(names) if name.startswith("initial-rate")]
-        shared = [index for index, name in enumerate(names) if _shared(name, grade, arm_known)]
-        cross = information[np.ix_(shared, rates)]
-        inner = information[np.ix_(rates, rates)] + np.eye(len(rates))
-        own = information[np.ix_(shared, shared)] - cross @ np.linalg.solve(inner, cross.T)
-        return Repeated(own, self.slope[:, shared], self.truth, self.duration)
+        size, names = self.posterior.size, self.posterior.unknowns.names
+        rates = list(range(size))[self.posterior.unknowns.layout.all_rates]
+        exact = [index for index, name in enumerate(names) if _exact(name, grade, arm_known)]
+        once = np.concatenate([self.rows(grade), np.eye(size)[rates]])
+        shared = np.delete(np.arange(size), rates)
+        rows = np.delete(marginalised(once, rates), np.flatnonzero(np.isin(shared, exact)), axis=1)
+        return Repeated(self.prior.fixing([*rates, *exact]), rows, self.duration)
 
-    def fisher(self, grade: Grade) -> Floats:
-        """Information of one manoeuvre, without prior, the encoders' noise carried into the sensors; kept."""
+    def rows(self, grade: Grade) -> Floats:
+        """Whitened Jacobian of one manoeuvre, without prior, the encoders' noise carried into the sensors; kept."""
         accel = ABSENT if grade.accel is None else grade.accel
-        if (grade.rate, accel) not in self._fisher:
+        if (grade.rate, accel) not in self._kept:
             sensors = (Sensor(Kind.RATE, grade.rate), Sensor(Kind.ACCEL, White(accel), position=ACCELEROMETER))
             z = np.zeros(self.posterior.size)
             jacobian = with_sensors(self.posterior, sensors, z).jacobian(z)[: -self.posterior.size]
-            self._fisher[grade.rate, accel] = jacobian.T @ jacobian
-        return self._fisher[grade.rate, accel]
+            self._kept[grade.rate, accel] = np.linalg.qr(jacobian, mode="r")
+        return self._kept[grade.rate, accel]
 
     @cached_property
-    def slope(self) -> Floats:
-        """Derivative of the base's quantities, shape (10, n)."""
-        return physical_slope(self.posterior, np.zeros(self.posterior.size))
-
-    @cached_property
-    def truth(self) -> Floats:
-        """The base's quantities, shape (10,)."""
-        inertial = self.posterior.unknowns.values_at(np.zeros(self.posterior.size)).inertial[:10]
-        return np.asarray(mass_com_inertia(np.asarray(inertial)))
+    def prior(self) -> Knowledge:
+        """The base's quantities before any manoeuvre."""
+        size = self.posterior.size
+        return Knowledge(*linearise(self.posterior, np.zeros(size)), np.eye(size))
 
 
-def _shared(name: str, grade: Grade, arm_known: bool) -> bool:
-    """Whether an unknown is the same in all repetitions and unknown."""
-    if name.startswith("initial-rate") or (arm_known and name.startswith("link")):
-        return False
-    return not (grade.bias_known and name.startswith("accel-bias"))
+def _exact(name: str, grade: Grade, arm_known: bool) -> bool:
+    """Whether an unknown that all repetitions share is taken for known exactly."""
+    return (arm_known and name.startswith("link")) or (grade.bias_known and name.startswith("accel-bias"))
 
 
 def wide_posterior(

@@ -16,10 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, Posterior, Robot
+from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference.noise_changes import with_manoeuvres
+from bayesid.robot.inertial_parameters import PARAMETERS
 from studies.whole_system.setting import bodies, model_of, spreads
 
-__all__ = ["Information", "Knowledge", "Sensors", "informed"]
+__all__ = ["Information", "Known", "Sensors", "informed"]
 
 Floats = NDArray[np.floating]
 
@@ -33,18 +35,19 @@ class Sensors(Enum):
 
 
 @dataclass(frozen=True)
-class Knowledge:
-    """A posterior covariance of the unknowns, whose prior is standard normal.
+class Known:
+    """What is known of the bodies after a manoeuvre, in coordinates whose prior is standard normal.
 
     Attributes
     ----------
     robot : Robot
-        The point of linearisation.
+        Robot about which the posterior was linearised.
     names : tuple of str
-        Unknown bodies, ten coordinates each, first in the covariance.
+        Names of the unknown bodies, whose ten coordinates each come first.
     widths : mapping of str to float
-        The prior's width of every body.
+        Width of every body's prior.
     covariance : (n, n) array
+        Posterior covariance of the coordinates.
     """
 
     robot: Robot
@@ -58,19 +61,19 @@ class Knowledge:
         total = sum(self.robot.link(name).inertial.mass for name in members)
         for index, name in enumerate(self.names):
             if name in members:  # the mass goes with the square of the scale exp(alpha)
-                slope[10 * index] = 2.0 * self.widths[name] * self.robot.link(name).inertial.mass / total
+                slope[PARAMETERS * index] = 2.0 * self.widths[name] * self.robot.link(name).inertial.mass / total
         return float(np.linalg.norm(slope)), float(np.sqrt(slope @ self.covariance @ slope))
 
     def shrinkage(self, name: str) -> Floats:
         """One less the ratio of posterior to prior width of the ten coordinates of a body, shape (10,)."""
-        first = 10 * self.names.index(name)
-        return 1.0 - np.sqrt(np.diag(self.covariance)[first : first + 10])
+        first = PARAMETERS * self.names.index(name)
+        return 1.0 - np.sqrt(np.diag(self.covariance)[first : first + PARAMETERS])
 
     @cached_property
     def directions(self) -> Floats:
         """Posterior over prior width of the independent directions of the bodies' coordinates, ascending."""
-        own = self.covariance[: 10 * len(self.names), : 10 * len(self.names)]
-        return np.sqrt(np.clip(np.linalg.eigvalsh(own), 0.0, None))
+        count = PARAMETERS * len(self.names)
+        return np.sqrt(np.clip(np.linalg.eigvalsh(self.covariance[:count, :count]), 0.0, None))
 
     @property
     def contraction(self) -> int:
@@ -87,33 +90,32 @@ class Information:
 
     def knowledge(
         self, sensors: Sensors, *, known: Sequence[str] = (), widths: Mapping[str, float] | None = None
-    ) -> Knowledge:
+    ) -> Known:
         """Return what is known after the manoeuvre.
 
         Parameters
         ----------
         sensors : Sensors
         known : sequence of str
-            Bodies taken for exactly known.
+            Names of bodies taken for exactly known.
         widths : mapping of str to float, optional
-            Another prior's width of the bodies.
+            Other widths of the bodies' priors.
         """
-        own = spreads(self.robot)
-        wanted = own if widths is None else widths
+        designed = spreads(self.robot)
+        wanted = designed if widths is None else widths
         names = bodies(self.robot)
-        j = self.jacobian[:, : sensors.value[1]].reshape(-1, self.jacobian.shape[-1]).copy()
-        for index, name in enumerate(names):
-            j[:, 10 * index : 10 * index + 10] *= wanted[name] / own[name]
-        left = [10 * i + k for i, name in enumerate(names) if name not in known for k in range(10)]
-        left += list(range(10 * len(names), j.shape[1]))
-        j = j[:, left]
-        covariance = np.linalg.inv(j.T @ j + np.eye(len(left)))
-        return Knowledge(self.robot, tuple(name for name in names if name not in known), wanted, covariance)
+        size = self.jacobian.shape[-1]
+        scale = np.ones(size)
+        scale[: PARAMETERS * len(names)] = np.repeat([wanted[name] / designed[name] for name in names], PARAMETERS)
+        rows = self.jacobian[:, : sensors.value[1]].reshape(-1, size) * scale
+        exact = [PARAMETERS * i + k for i, name in enumerate(names) if name in known for k in range(PARAMETERS)]
+        after = Knowledge((), np.zeros(0), np.zeros((0, size)), np.concatenate([rows, np.eye(size)])).fixing(exact)
+        return Known(self.robot, tuple(name for name in names if name not in known), wanted, after.coordinates)
 
 
 def informed(truth: Robot, manoeuvres: Mapping[str, Manoeuvre]) -> dict[str, Information]:
     """Linearise manoeuvres of the true robot about the truth, each by itself."""
-    found: dict[str, Information] = {}
+    linearised: dict[str, Information] = {}
     posterior: Posterior | None = None
     for name, manoeuvre in manoeuvres.items():
         posterior = (
@@ -122,5 +124,5 @@ def informed(truth: Robot, manoeuvres: Mapping[str, Manoeuvre]) -> dict[str, Inf
             else with_manoeuvres(posterior, [manoeuvre])  # shares what is compiled
         )
         jacobian = posterior.jacobian(posterior.starting_point())[: -posterior.size]
-        found[name] = Information(truth, jacobian.reshape(-1, posterior.residual_shape[2], posterior.size))
-    return found
+        linearised[name] = Information(truth, jacobian.reshape(-1, posterior.residual_shape[2], posterior.size))
+    return linearised

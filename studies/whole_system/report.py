@@ -17,7 +17,7 @@ from bayesid.report.numbers import format_number
 from studies.common.ets7 import ACCEL, BASE, ENCODER, RATE
 from studies.whole_system.contest import QUANTITIES, Method
 from studies.whole_system.coverage import Coverage
-from studies.whole_system.information import Information, Knowledge, Sensors
+from studies.whole_system.information import Information, Known, Sensors
 from studies.whole_system.sampled import Sampled
 from studies.whole_system.setting import ARM, BASE_SPREAD, COULOMB, LOAD, LOAD_SPREAD, TORQUE, VISCOUS, bodies
 
@@ -58,7 +58,7 @@ def write_report(result: Result, output: Path) -> None:
     document.write(output)
 
 
-def masses(knowledge: Knowledge) -> list[tuple[float, float]]:
+def masses(knowledge: Known) -> list[tuple[float, float]]:
     """Prior and posterior relative width of four masses, in the order of `GROUPS`."""
     names = bodies(knowledge.robot)
     arm = [name for name in names if name not in (BASE, LOAD)]
@@ -331,7 +331,7 @@ def _assumed(document: Document, result: Result) -> None:
 
 
 @styled
-def _directions_figure(knowledge: Mapping[str, Knowledge]) -> Figure:
+def _directions_figure(knowledge: Mapping[str, Known]) -> Figure:
     figure = wide_figure(2.6)
     axes = figure.subplots()
     for index, (name, known) in enumerate(knowledge.items()):
