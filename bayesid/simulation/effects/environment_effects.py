@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["AerodynamicDrag", "GravityGradient", "MagneticDipole", "RotationalDrag", "SolarPressure", "ThrusterLeak"]
 
 EARTH_FIELD = 3.12e-5 * 6371.2e3**3 / 3.986004418e14
-"""Equatorial field of the Earth's dipole times r^3 / mu, which times mu / r^3 is that at radius r [T s2]."""
+"""Equatorial field of the Earth's dipole divided by the gravity gradient mu / r^3 at the same radius [T s2]."""
 
 REACH = 2.0
 """Largest distance of a centre of pressure from the base origin along each axis [m]."""
