@@ -1,4 +1,4 @@
-"""From a posterior density to its optimum, its Laplace approximation, its evidence and its samples."""
+"""Inference: the posterior density, its mode, Laplace approximation, evidence and samples."""
 
 from bayesid.inference.ensemble import Chains, LaplaceMove, sample
 from bayesid.inference.identification import Identification, identify

@@ -1,4 +1,4 @@
-"""What is reported of a body, of draws of it and about a point; and the form of every quantity in JSON."""
+"""Reported quantities of bodies, from draws or linearised at a point, and the form of every quantity in JSON."""
 
 from __future__ import annotations
 
@@ -42,29 +42,47 @@ BODY_QUANTITIES = {
     "inertia.xz": "kg m2",
     "inertia.yz": "kg m2",
 }
-"""What is reported of a body, with units; the inertia is about its own centre of mass, in the link's axes."""
+"""Reported quantities of a body -> unit; the inertia is about the centre of mass, in the axes of the link."""
 
 
 @dataclass(frozen=True)
 class BodyDraws:
-    """Draws of one body's quantities, shape (draws, 10), in the order of `BODY_QUANTITIES`."""
+    """Draws of the reported quantities of one body.
+
+    Parameters
+    ----------
+    name : str
+        Name of the link or load.
+    values : (draws, 10) array
+        Draws of the quantities, in the order and units of `BODY_QUANTITIES`.
+    """
 
     name: str
     values: Floats
 
     @property
     def mean(self) -> Floats:
-        """Posterior mean, shape (10,)."""
+        """Mean of the draws, shape (10,)."""
         return self.values.mean(axis=0)
 
     @property
     def sd(self) -> Floats:
-        """Posterior standard deviation, shape (10,)."""
+        """Standard deviation of the draws, shape (10,)."""
         return self.values.std(axis=0, ddof=1)
 
 
 class Linearised(NamedTuple):
-    """Reported quantities of all identified bodies at one point: names, values (n,), derivative by z (n, size)."""
+    """Reported quantities of all identified bodies, linearised at one point.
+
+    Attributes
+    ----------
+    names : (n,) tuple of str
+        Names of the quantities, such as ``"load.mass"``.
+    values : (n,) array
+        Values at the linearisation point.
+    slope : (n, size) array
+        Derivatives of the values by the coordinates.
+    """
 
     names: tuple[str, ...]
     values: Floats
@@ -72,7 +90,7 @@ class Linearised(NamedTuple):
 
 
 def linearise(posterior: Posterior, z: Floats) -> Linearised:
-    """Linearise the reported quantities of the identified bodies in the coordinates."""
+    """Linearise the reported quantities of the identified bodies at the coordinates ``z`` (size,)."""
     names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
     quantities, point = quantities_of(posterior.unknowns), jnp.asarray(z)
     return Linearised(names, np.asarray(quantities(point)), np.asarray(jax.jacfwd(quantities)(point)))
@@ -80,16 +98,16 @@ def linearise(posterior: Posterior, z: Floats) -> Linearised:
 
 def quantities_of(unknowns: Unknowns) -> Callable[[Array], Array]:
     """Return the function from coordinates (size,) to the reported quantities of all identified bodies (n,)."""
-    own = jnp.asarray([index for index, prior in enumerate(unknowns.bodies) if not prior.nuisance], dtype=int)
+    identified = jnp.asarray([index for index, prior in enumerate(unknowns.bodies) if not prior.nuisance], dtype=int)
 
     def quantities(z: Array) -> Array:
-        return jnp.ravel(mass_com_inertia(unknowns.values(z).inertial.reshape(-1, 10)[own]))
+        return jnp.ravel(mass_com_inertia(unknowns.values(z).inertial.reshape(-1, 10)[identified]))
 
     return quantities
 
 
 def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
-    """Return the reported quantities of the identified bodies at many points, shape (draws, size)."""
+    """Return the reported quantities of the identified bodies at coordinates of many draws, shape (draws, size)."""
     inertial = np.asarray(posterior.unknowns.values_of(z).inertial).reshape(len(z), -1, 10)
     return {
         prior.name: BodyDraws(prior.name, mass_com_inertia(inertial[:, index]))
@@ -99,18 +117,18 @@ def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
 
 
 def reported_effect(effect: Effect, values: Floats) -> Floats:
-    """Values of an effect's parameters (..., n) to what is reported of it (..., m)."""
+    """Return the reported quantities of an effect (..., m) from values of its parameters (..., n)."""
     flat = jnp.asarray(values.reshape(-1, values.shape[-1]))
     return np.asarray(jax.vmap(effect.report)(flat)).reshape(*values.shape[:-1], len(effect.quantities))
 
 
 def quantity(mean: float, sd: float, unit: str) -> dict[str, Any]:
-    """Return the form every quantity has in JSON."""
+    """Return a quantity in the form that all quantities have in JSON."""
     return {"mean": float(mean), "sd": float(sd), "unit": unit}
 
 
 def body_dict(body: BodyDraws) -> dict[str, Any]:
-    """Return a body as it stands in identification.json."""
+    """Return a body in the form that it has in identification.json."""
     entries = [
         quantity(mean, sd, unit) for mean, sd, unit in zip(body.mean, body.sd, BODY_QUANTITIES.values(), strict=True)
     ]

@@ -1,8 +1,8 @@
-"""Compiled functions of a model given data, shared by every model and every recording that does the same operations.
+"""Compiled functions of a model given data, shared by all models and recordings that need the same operations.
 
-What decides the operations is a `Structure`, a key of the compiled code; all numbers, of the prior, the sensors, the
-effects and the recordings, are arguments. So another width of the prior, another noise or another recording of about
-the same length compiles nothing.
+The operations depend on a `Structure` alone, which is the key of the compiled code; all numbers of the prior, the
+sensors, the effects and the recordings are arguments. Another width of the prior, other noise or another recording of
+about the same length therefore needs no new compilation.
 """
 
 from __future__ import annotations
@@ -41,24 +41,44 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Structure:
-    """What decides the operations: the forward model's and those of the map from coordinates to physical values."""
+    """Static part of a problem, which decides the operations that are compiled.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        Forward model.
+    layout : Layout
+        Map from coordinates to physical values.
+    """
 
     simulator: Simulator
     layout: Layout
 
 
 class Numbers(NamedTuple):
-    """Numbers of the model and of the prior."""
+    """Numbers of the model and of the prior, which compiled code takes as arguments."""
 
     model: ModelConstants
     prior: PriorNumbers
 
 
 class Arrays(NamedTuple):
-    """Arrays of all recordings, stacked and padded, leading axis R; C columns of `Channels`, O whitened blocks.
+    """Arrays of R recordings, stacked and padded: T samples, C columns of `Channels`, O whitened blocks.
 
-    attitude (R, 4) at time 0; measured: what the sensors read, (R, T, ...); offset (R, T, C): what is added to the
-    prediction from outside the model; weights (R, O, C, width, C) and start (R, O): the whitening.
+    Attributes
+    ----------
+    grid : Grid
+        Integration nodes and samples, each array with the leading axis R.
+    attitude : (R, 4) array
+        Quaternions x, y, z, w of the base at time 0.
+    measured : Readings
+        Measured readings of the sensors, each array of shape (R, T, ...).
+    offset : (R, T, C) array
+        Readings from outside the model, which are added to the prediction.
+    weights : (R, O, C, width, C) array
+        Weights of the whitening (`bayesid.inference.whitening.Whitening`).
+    start : (R, O) array
+        First row of the residual that enters each whitened block.
     """
 
     grid: Grid
@@ -70,10 +90,20 @@ class Arrays(NamedTuple):
 
 
 class Perturbation(NamedTuple):
-    """A change of the unknowns and of what acts on the robot, from outside the model; leading axis R but for ``z``.
+    """Perturbation of the unknowns, and of what acts on the robot and its sensors from outside the model.
 
-    z (size,); rows of the kinematic tables (R, S, 28) and (R, T, 28); wrench on the base (R, S, 6) and (R, T, 6); what
-    the sensors read (R, T, C), sensor axes; S integration nodes, T samples.
+    There are R recordings, S integration nodes, T samples and C columns of `Channels`.
+
+    Attributes
+    ----------
+    z : (size,) array
+        Change of the coordinates.
+    node_rows, sample_rows : (R, S, 28) and (R, T, 28) arrays
+        Change of the rows of the kinematic tables.
+    node_wrench, sample_wrench : (R, S, 6) and (R, T, 6) arrays
+        Force and torque on the base about its origin, base axes [N, N m].
+    reading : (R, T, C) array
+        Change of the sensors' readings, sensor axes.
     """
 
     z: Traceable
@@ -85,7 +115,7 @@ class Perturbation(NamedTuple):
 
 
 class Traced(NamedTuple):
-    """A simulation: motion at nodes (R, S) and samples (R, T), readings (R, T), whitened residual (R, O, C)."""
+    """Simulated motion at nodes (R, S) and samples (R, T), readings (R, T) and whitened residual (R, O, C)."""
 
     node: Instant
     sample: Instant
@@ -94,7 +124,7 @@ class Traced(NamedTuple):
 
 
 def perturbed(arrays: Arrays, perturbation: Perturbation) -> Arrays:
-    """Return the arrays with a perturbation added to what is known."""
+    """Return the arrays with a perturbation added to the known tables, wrenches and readings."""
     node, sample = arrays.grid.node, arrays.grid.sample
     grid = arrays.grid._replace(
         node=node._replace(
@@ -110,7 +140,7 @@ def perturbed(arrays: Arrays, perturbation: Perturbation) -> Arrays:
 
 
 class Simulated(NamedTuple):
-    """What the sensors should read, (R, T, ...), and the base's attitude (R, T, 4) and rate (R, T, 3), base axes."""
+    """Predicted readings of the sensors (R, T, ...), and the attitude (R, T, 4) and rate (R, T, 3) of the base."""
 
     readings: Readings
     quaternion: Array
@@ -119,32 +149,32 @@ class Simulated(NamedTuple):
 
 @partial(jax.jit, static_argnums=0)
 def simulated(structure: Structure, numbers: Numbers, z: Array, grid: Grid, attitude: Array) -> Simulated:
-    """Simulate all recordings."""
+    """Simulate all recordings at the coordinates ``z`` (size,)."""
     values = structure.layout.values(numbers.prior, z)
     return Simulated(*structure.simulator.readings(numbers.model, values, grid, attitude))
 
 
 @partial(jax.jit, static_argnums=0)
 def residuals(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
-    """Return the whitened residual, (R, O, C)."""
+    """Return the whitened residual of all recordings, shape (R, O, C)."""
     return _whitened(structure, simulated(structure, numbers, z, arrays.grid, arrays.attitude).readings, arrays)
 
 
 @partial(jax.jit, static_argnums=0)
 def jacobian(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
-    """Return the derivative of the whitened residual by forward-mode differentiation, (R, O, C, size)."""
+    """Return the derivative of the whitened residual by forward-mode differentiation, shape (R, O, C, size)."""
     return jax.jacfwd(lambda z: residuals(structure, numbers, z, arrays))(z)
 
 
 @partial(jax.jit, static_argnums=0)
 def chi2(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
-    """Return chi-square of every recording at many points, (n, size) -> (n, R)."""
+    """Return the chi-square of every recording at many points, shape (n, size) -> (n, R)."""
     return jax.vmap(lambda z: jnp.sum(residuals(structure, numbers, z, arrays) ** 2, axis=(1, 2)))(z)
 
 
 @partial(jax.jit, static_argnums=0)
 def traced(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Traced:
-    """Return the motion behind a simulation."""
+    """Simulate all recordings and return the motion of the robot with the readings and the residual."""
     values = structure.layout.values(numbers.prior, z)
     node, sample, read = structure.simulator.trace(numbers.model, values, arrays.grid, arrays.attitude)
     return Traced(node, sample, read, _whitened(structure, read, arrays))
@@ -152,7 +182,7 @@ def traced(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> 
 
 @partial(jax.jit, static_argnums=0)
 def responses(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays, along: Perturbation) -> Array:
-    """Return derivatives of the whitened residual along perturbations with leading axis n, (n, R, O, C)."""
+    """Return the derivatives of the whitened residual along n stacked perturbations, shape (n, R, O, C)."""
 
     def shifted(z: Array, perturbation: Perturbation) -> Array:
         return residuals(structure, numbers, z, perturbed(arrays, perturbation))

@@ -1,4 +1,4 @@
-"""How much the data told of a quantity beyond its prior."""
+"""Posterior contraction: how much narrower the posterior of a quantity is than its prior."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from bayesid._math.arrays import Floats
 __all__ = ["CONTRACTED", "PRIOR_ONLY", "Contraction", "ContractionVerdict", "compare", "half_range"]
 
 CONTRACTED, PRIOR_ONLY = 0.5, 0.1
-"""Shrinkage from which on a quantity counts as learnt, and below which what is said of it is the prior."""
+"""Shrinkage from which on a quantity counts as learnt, and below which its posterior is little more than the prior."""
 
 
 class ContractionVerdict(Enum):
-    """Whether the data told of a quantity."""
+    """Verdict on the posterior contraction of one quantity."""
 
     CONTRACTED = "learnt"
     WEAKLY = "weakly"
@@ -25,16 +25,21 @@ class ContractionVerdict(Enum):
 
     @classmethod
     def of(cls, shrinkage: float) -> ContractionVerdict:
-        """Judge one minus the ratio of posterior to prior width: `CONTRACTED` and `PRIOR_ONLY` are the thresholds."""
+        """Return the verdict on a shrinkage, by the thresholds `CONTRACTED` and `PRIOR_ONLY`."""
         if shrinkage >= CONTRACTED:
             return cls.CONTRACTED
         return cls.WEAKLY if shrinkage >= PRIOR_ONLY else cls.NOT
 
 
 class Contraction(NamedTuple):
-    """What the data told of one quantity.
+    """Posterior contraction of one quantity.
 
-    ``prior_sd`` in the quantity's unit; ``shrinkage`` one minus the ratio of posterior to prior width.
+    Attributes
+    ----------
+    prior_sd : float
+        Standard deviation of the prior, from its central 68 %, in the unit of the quantity.
+    shrinkage : float
+        One minus the ratio of posterior to prior width.
     """
 
     prior_sd: float
@@ -42,18 +47,19 @@ class Contraction(NamedTuple):
 
     @property
     def verdict(self) -> ContractionVerdict:
-        """Whether the data told of it."""
+        """Verdict on the shrinkage."""
         return ContractionVerdict.of(self.shrinkage)
 
     def to_dict(self) -> dict[str, Any]:
-        """Form in JSON."""
+        """Return the contraction in the form that it has in JSON."""
         return {"prior_sd": self.prior_sd, "shrinkage": self.shrinkage, "verdict": self.verdict.value}
 
 
 def compare(names: Sequence[str], prior: Floats, posterior: Floats) -> dict[str, Contraction]:
     """Compare draws of n quantities from prior and posterior, shapes (draws, n).
 
-    Widths are half the central 68 %, which is the standard deviation of a normal distribution and finite for all.
+    A width is half the range of the central 68 %, which for a normal distribution is the standard deviation and is
+    finite for every distribution.
     """
     before, after = half_range(prior), half_range(posterior)
     return {
@@ -63,6 +69,6 @@ def compare(names: Sequence[str], prior: Floats, posterior: Floats) -> dict[str,
 
 
 def half_range(draws: Floats) -> Floats:
-    """Return half the range of the central 68 % of draws (m, n), shape (n,)."""
+    """Return half the range of the central 68 % of the draws (m, n), shape (n,)."""
     low, high = np.quantile(draws, [0.16, 0.84], axis=0)
     return np.asarray(0.5 * (high - low))

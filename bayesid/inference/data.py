@@ -1,4 +1,4 @@
-"""Recordings as a likelihood sees them: what was measured, the time grid, the whitening of the noise. Immutable."""
+"""Data of a likelihood: the samples of all recordings, their time grids and the whitening of their noise."""
 
 from __future__ import annotations
 
@@ -25,21 +25,24 @@ __all__ = ["Data", "attitudes_of", "grids_of", "stacked", "with_whitenings"]
 
 @dataclass(frozen=True)
 class Data:
-    """Everything that was recorded, with the noise it is believed to have.
+    """Samples of R recordings with the noise that is assumed for them; immutable.
 
     Parameters
     ----------
     model : Model
-        Whose sensors recorded it.
+        Model whose sensors made the recordings.
     manoeuvres : (R,) tuple of Manoeuvre
+        Recorded manoeuvres.
     recorded : (R,) tuple of RecordedSamples
+        Samples of each recording.
     whitenings : (R,) tuple of Whitening
+        Whitening of each recording.
     left_out : (R,) tuple of (O, C) arrays of bool
-        Whitened scalars that do not count.
+        Masks of the whitened scalars that the likelihood leaves out.
     step : float
         Longest integration step [s].
     arrays : Arrays
-        The same, as compiled code takes it.
+        The same data in the form that compiled code takes.
     """
 
     model: Model
@@ -52,7 +55,7 @@ class Data:
 
     @property
     def samples(self) -> int:
-        """Number of scalar samples that count."""
+        """Number of scalar samples that the likelihood uses."""
         return sum(item.samples for item in self.whitenings)
 
     @property
@@ -61,23 +64,23 @@ class Data:
         return (len(self.manoeuvres), self.arrays.start.shape[1], self.arrays.weights.shape[2])
 
     def times(self, index: int) -> Floats:
-        """Return the times at which some sensor of a recording was sampled, shape (T,)."""
+        """Return the times at which any sensor of a recording was sampled, shape (T,) [s]."""
         return self.recorded[index].time
 
     def measured(self, index: int, kind: Kind) -> Series:
-        """Return times and values of one sensor of a recording, as recorded."""
+        """Return the recorded times and values of one sensor in one recording."""
         return self.recorded[index].series[kind]
 
     def torques(self, index: int) -> Series:
-        """Return times (n,) and torques (n, joints) of a recording, as recorded."""
+        """Return the recorded times (n,) and joint torques (n, joints) of one recording."""
         return self.recorded[index].torque
 
     def sigma(self, index: int, kind: Kind) -> Floats:
-        """Return the white noise per component of one sensor of a recording, shape (size,)."""
+        """Return the standard deviations of the white noise of one sensor in one recording, shape (size,)."""
         return self.recorded[index].sigma(kind)
 
     def left_out_times(self, index: int) -> dict[Kind, Floats]:
-        """Return the times of one recording's samples that do not count, by sensor."""
+        """Return, for each sensor, the times of the samples that the likelihood leaves out of one recording [s]."""
         mask, rows = self.left_out[index], self.whitenings[index].rows
         result = {}
         for kind in self.model.channels.kinds:
@@ -90,7 +93,7 @@ class Data:
 def grids_of(
     model: Model, manoeuvres: Sequence[Manoeuvre], recorded: Sequence[RecordedSamples], step: float
 ) -> list[Grid]:
-    """Reduce every recording to a grid with the given integration step [s]."""
+    """Return the grid of integration nodes and samples of every recording, for an integration step [s]."""
     return [
         build_grid(
             model.robot,
@@ -110,7 +113,7 @@ def grids_of(
 
 
 def attitudes_of(manoeuvres: Sequence[Manoeuvre]) -> Floats:
-    """Return the attitudes at time 0, shape (R, 4)."""
+    """Return the attitudes of the base at time 0 as quaternions x, y, z, w, shape (R, 4)."""
     return np.stack([np.asarray(manoeuvre.attitude, dtype=float) for manoeuvre in manoeuvres])
 
 
@@ -121,7 +124,7 @@ def stacked(
     grids: Sequence[Grid],
     whitenings: Sequence[Whitening],
 ) -> Arrays:
-    """Stack all recordings, padded coarsely so that recordings of about one length share compiled code."""
+    """Stack all recordings, padded coarsely so that recordings of about the same length share compiled code."""
     steps, samples = max(len(grid.step) for grid in grids), max(len(grid.step_of) for grid in grids)
     grid = pad_grids(grids, rounded(steps), rounded(samples))
     count = grid.step_of.shape[1]

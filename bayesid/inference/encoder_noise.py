@@ -1,10 +1,10 @@
-"""How errors of the joints' motion reach the sensors, at the same instant.
+"""Sensitivity of the sensors to errors of the joints' motion at the same instant.
 
-The angular momentum in inertial axes does not depend on what the joints are believed to do, so an error of joint
-position, velocity or acceleration changes the base's rate and acceleration through the momentum's balance alone. An
-error of a joint's position also turns the base, and with it the momentum in base axes; what external torques make of
-that is far below any sensor's noise. Joint torques follow with the bodies that each joint carries; what friction makes
-of an error of speed is left out.
+The angular momentum in inertial axes does not depend on the assumed motion of the joints, so that an error of joint
+position, velocity or acceleration changes the base's rate and acceleration through the balance of momentum alone. An
+error of a joint's position also turns the base, and with it the momentum in base axes; the change of external torques
+by this rotation is far below any sensor's noise and is left out. The torque of a joint changes with the motion of the
+bodies that it carries; the change of its friction by an error of speed is left out.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ from bayesid.simulation.time_grid import lengthened, rounded
 __all__ = ["SampledMotion", "joint_sensitivity"]
 
 STEP = 1e-6
-"""Finite difference in joint position, velocity and acceleration [rad or m, per s, per s2]."""
+"""Step of the finite differences in joint position, velocity and acceleration [rad or m, per s, per s2]."""
 
 
 class SampledMotion(NamedTuple):
-    """The base's motion at T instants: attitude quaternion (T, 4), rate (T, 3) in base axes, surroundings."""
+    """Motion of the base at T instants: attitude quaternion (T, 4), rate (T, 3) in base axes, and environment."""
 
     quaternion: Floats
     rate: Floats
@@ -47,7 +47,7 @@ class SampledMotion(NamedTuple):
 
 
 class _Mounted(NamedTuple):
-    """Where the sensors sit: rotation (K, 3, 3), sensor to base axes, and point (K, 3)."""
+    """Mounting of K sensors: rotation from sensor to base axes (K, 3, 3), and point in the base (K, 3) [m]."""
 
     rotation: Floats
     point: Floats
@@ -56,18 +56,18 @@ class _Mounted(NamedTuple):
 def joint_sensitivity(
     robot: Robot, state: JointState, seen: SampledMotion, sensors: Sequence[Sensor], torques: Sequence[int] = ()
 ) -> Floats:
-    """Linearise the sensors in the joints' motion, by finite differences through Pinocchio's kinematics.
+    """Linearise the sensors in the motion of the joints, by finite differences of Pinocchio's kinematics.
 
     Parameters
     ----------
     robot : Robot
     state : JointState
-        At T instants.
+        Motion of the joints at T instants.
     seen : SampledMotion
-        At the same instants.
+        Motion of the base at the same instants.
     sensors : sequence of Sensor
     torques : sequence of int
-        The n joints whose torque is measured, indices into `Robot.joints`.
+        Indices into `Robot.joints` of the joints whose torque is measured.
 
     Returns
     -------
@@ -94,7 +94,8 @@ def joint_sensitivity(
     before = _read(kinds, mounted, environment, rows, beyond, momentum, quaternion)
     result = np.zeros((joints, 3, count, Channels(kinds, tuple(map(str, columns))).count))
     for joint in range(joints):
-        turn = np.zeros((length, 3))  # of the base per unit of the joint's position, as its rate follows their velocity
+        # rotation of the base per unit of joint position, which equals its rate per unit of joint velocity
+        turn = np.zeros((length, 3))
         for derivative in (1, 0, 2):
             changed = [np.array(values) for values in state]
             changed[derivative][:, joint] += STEP
@@ -116,7 +117,7 @@ def joint_sensitivity(
 
 
 class _Reading(NamedTuple):
-    """Angular velocity of the base (T, 3), readings of every sensor, torques of all joints (T, n)."""
+    """Angular velocity of the base (T, 3), readings of each sensor, and torques of all joints (T, n)."""
 
     rate: Array
     readings: tuple[Array, ...]
@@ -135,7 +136,7 @@ _turned = jax.jit(jax.vmap(tilted))
 
 @partial(jax.jit, static_argnums=0)
 def _difference(kinds: tuple[Kind, ...], before: _Reading, after: _Reading) -> Array:
-    """Return how all readings changed, in the columns of `Channels` with the torques of all joints, (T, C)."""
+    """Return the changes of all readings in the columns of `Channels`, with the torques of all joints, (T, C)."""
     parts = [
         jax.vmap(kind.residual)(new, old) for kind, new, old in zip(kinds, after.readings, before.readings, strict=True)
     ]

@@ -1,4 +1,4 @@
-"""Whitening of every recording with the encoders' noise seen through the robot at some point."""
+"""Whitening of every recording, with the encoders' noise linearised at given coordinates."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def whiten(
     z: Floats,
     windows: Sequence[int | None] | None = None,
 ) -> list[Whitening]:
-    """Build the whitening of every recording.
+    """Return the whitening of every recording.
 
     Parameters
     ----------
     z : (size,) array
-        Where the robot and its motion are linearised.
+        Linearisation point of the robot and its motion.
     windows : (R,) sequence of int or None, optional
-        Earlier blocks to condition on; where None, the shortest that is accurate.
+        Number of earlier blocks to condition on; None takes the smallest number that is accurate.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Posterior samples by emcee: independent ensembles, started from the Laplace approximation and stopped by convergence.
+"""Posterior samples by emcee: independent ensembles that start from the Laplace approximation and run to convergence.
 
-Two kinds of move alternate: an independence move that proposes from a Student-t about the mode, which mixes in a few
-steps where the posterior is nearly normal, and emcee's differential evolution, which needs no approximation.
+Two kinds of move are mixed at random: an independence move that proposes from a Student-t about the mode, which mixes
+in a few steps where the posterior is nearly normal, and emcee's differential evolution, which needs no approximation.
 """
 
 from __future__ import annotations
@@ -30,21 +30,23 @@ __all__ = ["Chains", "LaplaceMove", "sample"]
 
 
 ENSEMBLES = 4
+"""Number of independent ensembles, so that their disagreement shows a lack of convergence."""
+
 BLOCK = 40
-"""Steps between two looks at convergence."""
+"""Number of steps between two tests of convergence."""
 
 LENGTHS = 50.0
-"""Steps demanded, in autocorrelation times, as emcee advises."""
+"""Smallest number of steps of a converged sampler, in autocorrelation times, as emcee advises."""
 
 R_HAT = 1.01
 """Largest potential scale reduction of a converged sampler."""
 
 NEARLY = 1.05
-"""Potential scale reduction below which effective samples are counted as progress."""
+"""Potential scale reduction below which the effective samples are reported as progress."""
 
 
 class LaplaceMove(RedBlueMove):
-    """Independence move of emcee: propose from a Student-t about the mode, whatever the other walkers do."""
+    """Independence move of emcee, which proposes from a Student-t about the mode irrespective of the other walkers."""
 
     def __init__(self, proposal: StudentT) -> None:
         self.proposal = proposal
@@ -53,7 +55,7 @@ class LaplaceMove(RedBlueMove):
     def get_proposal(
         self, sample: Floats, complement: list[Floats], random: np.random.RandomState
     ) -> tuple[Floats, Floats]:
-        """Return proposals and the log ratio of backward to forward densities."""
+        """Return the proposals and the log ratio of backward to forward proposal densities."""
         new = self.proposal.draw(len(sample), random)
         return new, self.proposal.log_density(sample) - self.proposal.log_density(new)
 
@@ -64,20 +66,28 @@ class Chains:
 
     Attributes
     ----------
-    chart : Chart
-        Coordinates the walkers moved in.
+    parameterisation : Parameterisation
+        Coordinates in which the walkers moved.
     y : (ensembles, draws, n) array
         Draws in those coordinates; steps and walkers of an ensemble run along one axis, step-major.
     log_density : (ensembles, draws) array
-        Over the coordinates of the chart.
+        Log posterior density over those coordinates.
     effective_samples : float
-        Total draws over the longest autocorrelation time.
+        Number of draws divided by the longest autocorrelation time.
     r_hat : float
-        Largest over the coordinates, between independent ensembles.
+        Potential scale reduction between the ensembles, the largest over the coordinates.
     autocorrelation : float
-        Longest over ensembles and coordinates [steps].
+        Autocorrelation time, the longest over ensembles and coordinates [steps].
+    acceptance : float
+        Mean share of accepted proposals.
+    evaluations : int
+        Number of evaluations of the posterior density.
+    steps : int
+        Number of steps of each ensemble, burn-in included.
+    walkers : int
+        Number of walkers of each ensemble.
     converged : bool
-        Whether length, r_hat and effective samples all reached their goals.
+        Whether the chains reached their goals in length, ``r_hat`` and effective samples.
     """
 
     parameterisation: Parameterisation
@@ -117,25 +127,27 @@ def sample(
 
     Parameters
     ----------
-    chart : Chart
-        The posterior, in the coordinates the walkers move in.
+    parameterisation : Parameterisation
+        Posterior, in the coordinates in which the walkers move.
+    optimum : Optimum
+        Mode of the posterior and its Laplace approximation.
     seed : int or SeedSequence
-        Same seed, same samples; a resumed run gives what the uninterrupted one would have given.
+        Seed of all random numbers; a resumed run gives the samples of an uninterrupted one.
     effective_samples : float
-        Goal over all ensembles.
+        Goal for the effective samples of all ensembles together.
     max_steps : int
-        Per ensemble; reaching it leaves ``converged`` false.
+        Largest number of steps of each ensemble; a sampler that stops there may not have converged.
     file : path, optional
-        HDF5 file that keeps every step. If it holds part of the same run, sampling goes on from there.
+        HDF5 file that keeps every step; if it holds a part of the same run, sampling goes on from there.
     progress : Progress, optional
-        Called after every block of steps.
+        Function that is called after every block of steps.
     """
     posterior = parameterisation.posterior
     proposal = parameterisation.proposal(optimum)
     moves = [(LaplaceMove(proposal), 0.6), (DEMove(), 0.3), (DESnookerMove(), 0.1)]
     walkers = _walkers(posterior.size)
     sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-    # the optimum follows from data and model
+    # the mode stands for data and model in the key; it is rounded, so that rounding errors do not change the key
     mode = np.round(optimum.z, 6) + 0.0
     key = content_key(posterior.unknowns.names, sequence.entropy, sequence.spawn_key, mode)
     samplers = []
@@ -165,7 +177,7 @@ def sample(
 
 
 def _tell(progress: Progress, chains: Chains, limit: int, wanted: float) -> None:
-    """Tell how far the ensembles are: towards the wanted samples or, while they disagree, towards the last step."""
+    """Report the progress towards the wanted samples or, while the ensembles disagree, towards the last step."""
     sampled = chains.effective_samples / wanted if chains.r_hat < NEARLY else 0.0
     text = f"step {chains.steps}, {chains.effective_samples:.0f} effective samples, R-hat {chains.r_hat:.3f}"
     progress(min(max(sampled, chains.steps / limit), 1.0), text)
@@ -179,7 +191,7 @@ def _walkers(size: int) -> int:
 def _start(
     parameterisation: Parameterisation, proposal: StudentT, walkers: int, state: np.random.RandomState
 ) -> Floats:
-    """Draw walkers that have a finite density."""
+    """Return starting points of the walkers, all of finite density."""
     points = proposal.draw(4 * walkers, state)
     finite = points[np.isfinite(parameterisation.log_density(points))]
     if len(finite) < walkers:
@@ -188,22 +200,22 @@ def _start(
 
 
 def _backend(file: Path | None, number: int, key: str) -> emcee.backends.Backend:
-    """Return where an ensemble keeps its steps; samples of another key are refused."""
+    """Return the store of an ensemble's steps, and refuse samples of another key."""
     if file is None:
         return emcee.backends.Backend()
     name = f"ensemble-{number}"
     if file.is_file():
         try:
             with h5py.File(file, "r") as opened:
-                found = opened[name].attrs.get("key", "") if name in opened else key
+                stored = opened[name].attrs.get("key", "") if name in opened else key
         except OSError as error:
             raise InputError(f"unreadable samples: {error}", file=file, remedy="Delete the file") from error
-        refuse_other(found, key, file, "run", "data, model or seed")
+        refuse_other(stored, key, file, "run", "data, model or seed")
     return _KeyedBackend(file, name, key)
 
 
 class _KeyedBackend(emcee.backends.HDFBackend):
-    """HDF5 backend that writes down the key of what its samples depend on."""
+    """HDF5 backend that stores a key of the data, model and seed on which its samples depend."""
 
     def __init__(self, file: Path, name: str, key: str) -> None:
         super().__init__(str(file), name=name)
@@ -216,7 +228,7 @@ class _KeyedBackend(emcee.backends.HDFBackend):
 
 
 def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
-    import arviz as az  # here, as it takes a second that commands without samples save
+    import arviz as az  # imported here, since it takes a second that commands without samples save
 
     steps = min(int(sampler.iteration) for sampler in samplers)
     chains = [sampler.get_chain()[:steps] for sampler in samplers]

@@ -1,4 +1,4 @@
-"""Identification from end to end: mode, Laplace, evidence and samples of one posterior, and whether they agree."""
+"""Complete identification: mode, Laplace approximation, evidence and samples of one posterior, and their agreement."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ __all__ = ["Identification", "identify"]
 
 
 PRIOR_DRAWS = 4000
-"""From the prior, to compare its widths with the posterior's; always the same ones."""
+"""Number of draws from the prior that give its widths, for the comparison with the posterior."""
 
 MEAN_TOLERANCE, WIDTH_TOLERANCE = 0.25, 0.2
-"""How far two methods may differ before the result says so: in standard deviations, and relative in their width."""
+"""Largest unreported difference of two methods: of means in standard deviations, and of widths as a ratio."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,15 @@ class Identification:
     Attributes
     ----------
     posterior : Posterior
-        With its noise linearised at the mode.
+        Posterior with its noise linearised at the mode.
     optimum : Optimum
+        Mode and Laplace approximation.
     evidence : Evidence
+        Evidence by importance sampling.
     chains : Chains
+        Posterior samples.
     seconds : float
-        Wall time of the sampler.
+        Wall time of the sampler [s].
     """
 
     posterior: Posterior
@@ -61,12 +64,12 @@ class Identification:
 
     @cached_property
     def bodies(self) -> dict[str, BodyDraws]:
-        """Draws of every identified body."""
+        """Draws of the reported quantities of every identified body."""
         return bodies_of(self.posterior, self.chains.flat)
 
     @cached_property
     def effects(self) -> dict[str, Floats]:
-        """Draws of every effect with parameters, (draws, n) or, per recording, (draws, R, n)."""
+        """Draws of the reported quantities of every effect, (draws, n), or (draws, R, n) if recordings differ."""
         values = self.posterior.unknowns.values_of(self.chains.flat)
         return {
             effect.label: reported_effect(effect, np.asarray(draws))
@@ -76,7 +79,7 @@ class Identification:
 
     @cached_property
     def contraction(self) -> dict[str, Contraction]:
-        """What the data told of every quantity of the bodies, by its name in `names`."""
+        """Posterior contraction of every reported quantity of the bodies, by its name in `names`."""
         z = np.random.default_rng(0).normal(size=(PRIOR_DRAWS, self.posterior.size))
         prior = bodies_of(self.posterior, z)
         if not prior:
@@ -86,7 +89,7 @@ class Identification:
 
     @cached_property
     def integration_error(self) -> float:
-        """Largest error of any sample from the integration step, in its standard deviations."""
+        """Largest error of any sample due to the integration step, in standard deviations of the sample."""
         return integration_error_at(self.posterior, self.optimum.z)
 
     @property
@@ -96,13 +99,13 @@ class Identification:
 
     @property
     def covariance(self) -> Floats:
-        """Posterior covariance of the reported quantities of all bodies."""
+        """Posterior covariance of the reported quantities of all bodies, in the order of `names`."""
         return np.atleast_2d(np.cov(np.concatenate([body.values for body in self.bodies.values()], axis=1).T))
 
     @property
     def disagreements(self) -> tuple[str, ...]:
-        """Sentences on where mode, importance sampling and ensembles differ; empty when they agree."""
-        found = []
+        """Sentences on differences between mode, importance sampling and samples; empty where the methods agree."""
+        sentences = []
         draws = self.chains.flat
         mean, sd = draws.mean(axis=0), draws.std(axis=0)
         laplace_sd = np.sqrt(np.diag(self.optimum.covariance))
@@ -110,7 +113,7 @@ class Identification:
         if self.evidence.trusted:
             methods.append(("importance sampling", self.evidence.mean, self.evidence.sd))
         else:
-            found.append(
+            sentences.append(
                 f"Importance sampling is not evaluated: Pareto k-hat {self.evidence.pareto_k:.2f} is above 0.7, "
                 "so the evidence may not be trusted."
             )
@@ -119,19 +122,19 @@ class Identification:
             ratio = np.abs(other_sd / sd - 1.0)
             worst = int(np.argmax(np.maximum(shift / MEAN_TOLERANCE, ratio / WIDTH_TOLERANCE)))
             if shift[worst] > MEAN_TOLERANCE or ratio[worst] > WIDTH_TOLERANCE:
-                found.append(
+                sentences.append(
                     f"The {method} and the samples differ most in {self.posterior.unknowns.names[worst]}: "
                     f"means by {shift[worst]:.2f} sd, widths by {100.0 * ratio[worst]:.0f} %. The samples are reported."
                 )
         if not self.chains.converged:
-            found.append(
+            sentences.append(
                 f"The sampler has not converged: R-hat {self.chains.r_hat:.3f}, "
                 f"{self.chains.effective_samples:.0f} effective samples after {self.chains.steps} steps."
             )
-        return tuple(found)
+        return tuple(sentences)
 
     def to_dict(self) -> dict[str, Any]:
-        """Content of identification.json."""
+        """Return the content of identification.json."""
         return {
             "bodies": {name: body_dict(body) for name, body in self.bodies.items()},
             "effects": self._effects_dict(),
@@ -156,7 +159,7 @@ class Identification:
         }
 
     def write_json(self, file: Path) -> None:
-        """Write `to_dict`, all or nothing."""
+        """Write `to_dict` to a file, whole or not at all."""
         write_json(file, self.to_dict())
 
     def _effects_dict(self) -> dict[str, Any]:
@@ -193,10 +196,11 @@ def identify(
 
     Parameters
     ----------
+    posterior : Posterior
     seed : int
-        Every random number follows from it.
+        Seed of all random numbers.
     start : (n,) array, optional
-        Where the search for the mode begins; the prior's centre where left out.
+        Starting point of the search for the mode, by default the prior's centre.
     effective_samples, max_steps, file, progress
         See `bayesid.inference.sample`.
     """

@@ -1,8 +1,9 @@
-"""The identified robot: a URDF that any simulator can load, and beside it how uncertain its bodies are.
+"""The identified robot: a URDF that any simulator can load, and a file with the uncertainty of its bodies.
 
 Every body takes the posterior mean of its ten linear parameters. Pseudo-inertias of physical bodies form a convex cone,
 so that their mean is a physical body too (Wensing, Kim & Slotine 2018). The motion depends on ratios of sums that are
-linear in these parameters: the mean lies on the straight ridge that the data leave open, not beside it.
+linear in these parameters: the combinations that the data leave undetermined form a straight ridge, on which the mean
+lies.
 """
 
 from __future__ import annotations
@@ -32,10 +33,10 @@ def identified_robot(result: Identification) -> Robot:
 
 
 def uncertainty(result: Identification) -> dict[str, Any]:
-    """Return mean, standard deviation and joint covariance of all unknown bodies, in the form of identification.json.
+    """Return the mean, standard deviation and joint covariance of all unknown bodies, as in identification.json.
 
-    The mean of a centre of mass or inertia differs from that of `identified_robot` by their curvature in the linear
-    parameters, far less than a standard deviation where the posterior is narrow.
+    The mean of a centre of mass or inertia differs from that of `identified_robot`, since neither is linear in the
+    parameters that are averaged there; the difference is far below a standard deviation where the posterior is narrow.
     """
     bodies = {name: BodyDraws(name, mass_com_inertia(vectors)) for name, vectors in _draws(result).items()}
     values = np.concatenate([body.values for body in bodies.values()], axis=1)
@@ -49,12 +50,12 @@ def uncertainty(result: Identification) -> dict[str, Any]:
 
 
 def write_identified(result: Identification, folder: Path) -> None:
-    """Write ``identified.urdf`` and, beside it, ``identified-uncertainty.json``."""
+    """Write ``identified.urdf`` and ``identified-uncertainty.json`` to a folder."""
     identified_robot(result).write_urdf(folder / "identified.urdf")
     write_json(folder / "identified-uncertainty.json", uncertainty(result))
 
 
 def _draws(result: Identification) -> dict[str, Floats]:
-    """Linear parameters of every unknown body, shape (draws, 10)."""
+    """Return the draws of the linear parameters of every unknown body, shape (draws, 10)."""
     draws = InertialDraws.of(result)
     return {name: draws.values[:, index] for index, name in enumerate(draws.names)}

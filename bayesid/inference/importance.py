@@ -19,17 +19,28 @@ TRUSTED = 0.7
 """Pareto k-hat above which importance sampling may not be trusted (Vehtari et al., JMLR 2024)."""
 
 TRIAL = 512
-"""Draws that decide between coordinates."""
+"""Number of draws by which the coordinates are chosen."""
 
 INSIDE = 0.3
-"""Share of the draws that must be physical bodies: an ensemble starts from them."""
+"""Smallest share of the draws that are physical bodies, since an ensemble starts from such draws."""
 
 
 @dataclass(frozen=True)
 class Evidence:
     """Log evidence with its Monte Carlo error, and weighted moments of the coordinates.
 
-    ``effective_samples`` is Kish's; ``mean`` and ``sd`` have shape (n,).
+    Attributes
+    ----------
+    value, error : float
+        Log evidence and its standard error.
+    pareto_k : float
+        Pareto k-hat of the weights.
+    effective_samples : float
+        Effective sample size by Kish's formula.
+    evaluations : int
+        Number of evaluations of the posterior density.
+    mean, sd : (n,) arrays
+        Posterior mean and standard deviation of the coordinates.
     """
 
     value: float
@@ -42,21 +53,25 @@ class Evidence:
 
     @property
     def trusted(self) -> bool:
-        """Whether the estimate may be used."""
+        """Whether Pareto k-hat is small enough for the estimate to be used."""
         return bool(self.pareto_k < TRUSTED)
 
 
 def importance_sample(
     parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator, draws: int = 4000
 ) -> Evidence:
-    """Estimate the evidence.
+    """Estimate the evidence by importance sampling.
 
     Parameters
     ----------
-    chart : Chart
-        Coordinates to propose in.
+    parameterisation : Parameterisation
+        Posterior, in the coordinates of the proposal.
+    optimum : Optimum
+        Mode of the posterior and its Laplace approximation.
+    rng : numpy.random.Generator
+        Source of the draws.
     draws : int
-        Evaluations of the posterior density.
+        Number of draws, which is that of the evaluations of the posterior density.
     """
     drawn = weighted_draws(parameterisation, optimum, rng, draws)
     if not np.isfinite(drawn.top):
@@ -74,10 +89,22 @@ def importance_sample(
 
 
 class WeightedDraws(NamedTuple):
-    """Draws of a Student-t about the mode: z (n, size), Pareto-smoothed weights (n,) of sum one, and their k-hat.
+    """Draws of a Student-t about the mode, weighted by the posterior.
 
-    ``raw`` are the weights as they are over the largest, whose logarithm is ``top``; ``inside`` is the share of the
-    draws that have a density.
+    Attributes
+    ----------
+    z : (n, size) array
+        Draws in the posterior's coordinates.
+    weights : (n,) array
+        Pareto-smoothed weights, which sum to one.
+    pareto_k : float
+        Pareto k-hat of the weights.
+    raw : (n,) array
+        Weights before smoothing, relative to the largest.
+    top : float
+        Logarithm of the largest weight before smoothing.
+    inside : float
+        Share of the draws with a finite log density.
     """
 
     z: Floats
@@ -89,20 +116,20 @@ class WeightedDraws(NamedTuple):
 
     @property
     def effective_samples(self) -> float:
-        """Kish's; 0 where no draw has a density."""
+        """Effective sample size by Kish's formula; 0 where no draw has a finite log density."""
         return float(1.0 / (self.weights**2).sum()) if self.inside > 0.0 else 0.0
 
     @property
     def trusted(self) -> bool:
-        """Whether the weights may be used."""
+        """Whether Pareto k-hat is small enough for the weights to be used."""
         return bool(self.pareto_k < TRUSTED)
 
 
 def weighted_draws(
     parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator, draws: int = 4000
 ) -> WeightedDraws:
-    """Draw from the Student-t about the mode and weigh by the posterior."""
-    import arviz as az  # here, as it takes a second that commands without samples save
+    """Draw from the Student-t about the mode and weight the draws by the posterior."""
+    import arviz as az  # imported here, since it takes a second that commands without samples save
 
     proposal = parameterisation.proposal(optimum)
     y = proposal.draw(draws, rng)
@@ -113,18 +140,18 @@ def weighted_draws(
         return WeightedDraws(z, np.full(draws, 1.0 / draws), np.inf, np.zeros(draws), top, 0.0)
     inside = float(np.isfinite(log_weights).mean())
     log_weights = np.maximum(log_weights, top - 700.0)
-    with np.errstate(over="ignore"):  # where the weights hardly overlap; k-hat says so
+    with np.errstate(over="ignore"):  # overflow means hardly any overlap, which k-hat shows
         smoothed, pareto_k = az.psislw(log_weights)
     weights = np.exp(np.asarray(smoothed))
     return WeightedDraws(z, weights / weights.sum(), float(pareto_k), np.exp(log_weights - top), top, inside)
 
 
 def choose_parameterisation(posterior: Posterior, optimum: Optimum, rng: np.random.Generator) -> Parameterisation:
-    """Return the coordinates in which the Student-t about the mode is the better proposal."""
+    """Return the parameterisation in which the Student-t about the mode is the better proposal."""
 
     def merit(parameterisation: Parameterisation) -> tuple[bool, float]:
         drawn = weighted_draws(parameterisation, optimum, rng, TRIAL)
         return drawn.inside > INSIDE, drawn.effective_samples
 
-    charts: list[Parameterisation] = [LogCholeskyParameterisation(posterior), LinearParameterisation(posterior)]
-    return max(charts, key=merit)
+    candidates: list[Parameterisation] = [LogCholeskyParameterisation(posterior), LinearParameterisation(posterior)]
+    return max(candidates, key=merit)

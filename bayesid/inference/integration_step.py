@@ -1,4 +1,4 @@
-"""The integration step: as long as its error stays far below the sensors' noise."""
+"""Choice of the integration step: the longest whose error stays far below the sensors' noise."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from bayesid.simulation.time_grid import pad_grids, rounded
 __all__ = ["choose_step", "integration_error", "simulate_padded"]
 
 LONGEST_STEP = 2.0
-"""Integration step tried first [s]."""
+"""Longest integration step, from which the search starts [s]."""
 
 STEP_TOLERANCE = 0.01
 """Largest integration error allowed, in standard deviations of a sample."""
 
 FEWEST_STEPS = 512
-"""Steps that simulations which choose the step are padded to at least, and to a power of two."""
+"""Smallest number of steps to which simulations of different steps are padded; larger numbers are powers of two."""
 
 
 def choose_step(
@@ -37,7 +37,7 @@ def choose_step(
     numbers: Numbers,
     z: Floats,
 ) -> float:
-    """Return the longest step, halved from `LONGEST_STEP`, whose error at ``z`` is within `STEP_TOLERANCE` [s]."""
+    """Return the longest step [s], by halving from `LONGEST_STEP`, whose error at ``z`` is within `STEP_TOLERANCE`."""
     shortest = min(float(samples.time[-1]) for samples in recorded)
     step = min([LONGEST_STEP, 0.25 * shortest, *(effect.longest_step for effect in model.effects)])
     grids = {step: grids_of(model, manoeuvres, recorded, step)}
@@ -64,7 +64,7 @@ def integration_error(
     z: Floats,
     step: float,
 ) -> float:
-    """Return the largest error of any sample from the integration step, in its standard deviations (Richardson)."""
+    """Return the largest error of any sample due to the step, in its standard deviations, from half the step."""
     both = [grids_of(model, manoeuvres, recorded, size) for size in (step, 0.5 * step)]
     return _error(model, manoeuvres, recorded, structure, numbers, z, (both[0], both[1]))
 
@@ -77,7 +77,7 @@ def simulate_padded(
     grids: Sequence[Grid],
     steps: int | None = None,
 ) -> Simulated:
-    """Simulate with grids of any step, padded so that all share one compilation."""
+    """Simulate all recordings on grids of any step, padded so that grids of different steps share compiled code."""
     count = steps or max(len(grid.step) for grid in grids)
     count = max(FEWEST_STEPS, 1 << (count - 1).bit_length())
     samples = rounded(max(len(grid.step_of) for grid in grids))
@@ -104,4 +104,4 @@ def _error(
     if model.torque is not None:
         change = np.abs(np.asarray(coarse.torque - fine.torque))[..., model.torque.columns(model.robot)]
         worst = max(worst, float((change / np.array(model.torque.sigma)).max()))
-    return worst * 16.0 / 15.0  # the error of a fourth-order step, from its difference to half the step
+    return worst * 16.0 / 15.0  # error of a fourth-order method from the difference to half the step

@@ -1,7 +1,7 @@
-"""Layout of the vector of unknowns: which coordinates belong to what, and their map to physical values.
+"""Layout of the vector of unknowns: the coordinates of each kind of unknown, and their map to physical values.
 
-The layout decides the operations and is a key of compiled code; the numbers of the prior are its arguments, so that
-another centre or width of the prior compiles nothing.
+The layout decides the operations and is a key of compiled code; the numbers of the prior are arguments of that code, so
+that another centre or width of the prior needs no new compilation.
 """
 
 from __future__ import annotations
@@ -24,19 +24,39 @@ __all__ = ["EffectLayout", "Layout", "PriorNumbers"]
 
 
 class EffectLayout(NamedTuple):
-    """What the layout needs of an effect: the shapes of its parameters' priors, and whether recordings differ."""
+    """Layout of one effect.
+
+    Attributes
+    ----------
+    priors : tuple of Prior
+        Shape of the prior of each parameter.
+    per_recording : bool
+        Whether the parameters differ between recordings.
+    """
 
     priors: tuple[Prior, ...]
     per_recording: bool
 
 
 class PriorNumbers(NamedTuple):
-    """Centres and widths of the prior.
+    """Centres and widths of the prior of B bodies, R recordings and J joints.
 
-    factor (B, 4, 4): of each body's pseudo-inertia at the centre (`upper_cholesky`). mixing (10 B, 10 B): log-Cholesky
-    coordinates per unit of z, with its inverse. slope (10 B, 10 B): entries of relative pseudo-inertias per unit of the
-    coordinates linear in them, with its inverse. rate: standard deviation of initial rates [rad/s]; tilt (K,) of the
-    K uncertain attitudes [rad]; speed (R, J) of the joints' speeds at time 0. effects: per effect, mean and sigma (n,).
+    Attributes
+    ----------
+    factor : (B, 4, 4) array
+        Factors of the pseudo-inertias at the prior's centre (`upper_cholesky`).
+    mixing, inverse_mixing : (10 B, 10 B) arrays
+        Log-Cholesky coordinates per unit of z, and the inverse.
+    slope, inverse_slope : (10 B, 10 B) arrays
+        Entries of the relative pseudo-inertias per unit of the coordinates linear in them, and the inverse.
+    rate : scalar array
+        Standard deviation of the initial rates [rad/s].
+    tilt : (K,) array
+        Standard deviations of the K uncertain initial attitudes [rad].
+    speed : (R, J) array
+        Standard deviations of the joints' speeds at time 0 [rad/s or m/s].
+    effects : tuple of pairs of (n,) arrays
+        Mean and sigma of the prior of each parameter, by effect.
     """
 
     factor: Traceable
@@ -52,18 +72,20 @@ class PriorNumbers(NamedTuple):
 
 @dataclass(frozen=True)
 class Layout:
-    """Which coordinates belong to what, in this order: bodies, initial rates, attitudes, joint speeds, effects.
+    """Layout of the coordinates, in the order bodies, initial rates, initial attitudes, joint speeds, effects.
 
     Parameters
     ----------
     bodies, recordings : int
+        Numbers of unknown bodies and of recordings.
     rates : bool
         Whether initial rates are unknown.
     tilts : tuple of int
         Recordings whose initial attitude is unknown.
     joints : int
-        Joints whose speed at time 0 is uncertain in every recording; 0 where that is of no account.
+        Number of joints whose speed at time 0 is uncertain; 0 where such errors do not matter.
     effects : tuple of EffectLayout
+        Layout of every effect, with or without parameters.
     """
 
     bodies: int
@@ -101,7 +123,7 @@ class Layout:
         return slice(first, first + self.recordings * self.joints)
 
     def effect(self, index: int) -> slice:
-        """Return the coordinates of one effect, recording after recording where each has its own."""
+        """Return the coordinates of one effect, recording after recording where its parameters differ between them."""
         first = self.all_speeds.stop + sum(self._count(effect) for effect in self.effects[:index])
         return slice(first, first + self._count(self.effects[index]))
 
@@ -135,17 +157,17 @@ class Layout:
         return Values(vectors.ravel(), rate, tilt, speed, tuple(effects))
 
     def to_linear(self, numbers: PriorNumbers, z: Array) -> Array:
-        """Return coordinates linear in the inertial parameters.
+        """Return the coordinates that are linear in the inertial parameters.
 
         They are the entries of each body's relative pseudo-inertia, less the identity, scaled so that near the centre
-        they are z itself. Whatever else is unknown keeps its coordinates. What the dynamics determines sharply are
-        linear combinations of inertial parameters up to a common factor, so ridges of the posterior are straight here.
+        they are z itself. All other unknowns keep their coordinates. The dynamics determines linear combinations of
+        inertial parameters sharply up to a common factor, so that ridges of the posterior are straight here.
         """
         entries = jax.vmap(relative)(self._theta(numbers, z)).ravel()
         return jnp.concatenate([numbers.inverse_slope @ entries, z[self.all_bodies.stop :]])
 
     def from_linear(self, numbers: PriorNumbers, y: Array) -> Array:
-        """Return the inverse of `to_linear`; not a number where no physical body has these coordinates."""
+        """Return the inverse of `to_linear`, which is NaN where no physical body has these coordinates."""
         entries = numbers.slope @ y[self.all_bodies]
         theta = jax.vmap(absolute)(entries.reshape(self.bodies, PARAMETERS)).ravel()
         return jnp.concatenate([numbers.inverse_mixing @ theta, y[self.all_bodies.stop :]])
@@ -155,5 +177,5 @@ class Layout:
         return jax.vmap(log_volume)(self._theta(numbers, z)).sum()
 
     def _theta(self, numbers: PriorNumbers, z: Array) -> Array:
-        """Log-Cholesky coordinates of each body relative to its centre, shape (B, 10)."""
+        """Return the log-Cholesky coordinates of each body relative to its centre, shape (B, 10)."""
         return (numbers.mixing @ z[self.all_bodies]).reshape(self.bodies, PARAMETERS)

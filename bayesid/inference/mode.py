@@ -1,4 +1,4 @@
-"""Maximum a posteriori by least squares with the exact Jacobian, and the Laplace approximation there."""
+"""Mode of the posterior by least squares with the exact Jacobian, and the Laplace approximation about it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ __all__ = ["Optimum", "fit", "maximise"]
 
 
 TOLERANCE = 1e-10
-"""Relative tolerance of the search for the mode."""
+"""Relative tolerance of the least-squares solver, far below any standard deviation of the posterior."""
 
 STARTS = 8
-"""Random starts tried when the first optimum does not explain the data."""
+"""Number of random starting points that are tried if the first optimum does not explain the data."""
 
 SUSPICIOUS = 4.0
-"""chi2 per sample above which an optimum may be a local one."""
+"""Chi-square per sample above which an optimum may be a local one."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,15 @@ class Optimum:
     z : (n,) array
         Standard-normal coordinates of the mode.
     covariance : (n, n) array
-        Inverse of the Gauss-Newton Hessian; the Laplace approximation's covariance.
+        Covariance of the Laplace approximation, the inverse of the Gauss-Newton Hessian.
     chi2 : float
-        Of the data alone.
+        Chi-square of the data, without the prior.
     cost : float
-        Minus the log posterior, up to a constant.
+        Negative log posterior density, up to a constant.
     evaluations : int
+        Number of evaluations of residuals and Jacobians.
     converged : bool
+        Whether the solver met its tolerance.
     """
 
     z: Floats
@@ -50,14 +52,14 @@ class Optimum:
     converged: bool
 
     def log_evidence(self, posterior: Posterior) -> float:
-        """Laplace approximation of the log evidence."""
+        """Return the Laplace approximation of the log evidence."""
         n = posterior.size
         half_logdet = float(np.log(np.diag(np.linalg.cholesky(self.covariance))).sum())
         return float(posterior.log_density(self.z)[0]) + 0.5 * n * np.log(2.0 * np.pi) + half_logdet
 
 
 def fit(posterior: Posterior, start: Floats) -> Optimum:
-    """Run Levenberg-Marquardt from one point."""
+    """Return the optimum that Levenberg-Marquardt reaches from a starting point (n,)."""
     solution = levenberg_marquardt(posterior.least_squares, posterior.jacobian, start, TOLERANCE)
     jacobian = posterior.jacobian(solution.x)
     return Optimum(
@@ -71,14 +73,15 @@ def fit(posterior: Posterior, start: Floats) -> Optimum:
 
 
 def maximise(posterior: Posterior, rng: np.random.Generator, start: Floats | None = None) -> tuple[Posterior, Optimum]:
-    """Find the mode, then carry the encoder noise through the robot found there and polish.
+    """Find the mode, linearise the encoders' noise there, and find the mode again.
 
     Parameters
     ----------
+    posterior : Posterior
     rng : numpy.random.Generator
-        For further starts where the first optimum explains the data badly.
+        Source of further starting points if the first optimum explains the data badly.
     start : (n,) array, optional
-        The prior's centre where left out.
+        Starting point, by default the prior's centre with the measured initial rates.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""A posterior with other noise, other samples or other recordings; each returns a new one."""
+"""New posteriors made from one with other noise, other samples or other recordings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["leaving_out", "relinearised", "with_manoeuvres", "with_sensors"]
 
 
 def relinearised(posterior: Posterior, z: Floats) -> Posterior:
-    """Return the posterior with the encoders' noise carried through the robot at ``z`` in place of the prior's."""
+    """Return the posterior with the encoders' noise linearised at the coordinates ``z`` (size,)."""
     windows = [old.window for old in posterior.whitenings]
     return replace(posterior, data=_renoised(posterior.data, _whitened(posterior, posterior.data, z, windows)))
 
@@ -33,10 +33,19 @@ def with_sensors(
     like: Posterior | None = None,
     torque: TorqueSensor | None = None,
 ) -> Posterior:
-    """Return the posterior with other noise of the same sensors, the encoders' noise carried through at ``z``.
+    """Return the posterior with other noise of the same sensors.
 
-    Whitening windows are searched for where noise is coloured, or are those of ``like``. Joint torques keep their
-    noise unless ``torque`` is given.
+    Parameters
+    ----------
+    posterior : Posterior
+    sensors : sequence of Sensor
+        The same sensors with other noise.
+    z : (size,) array
+        Linearisation point of the encoders' noise.
+    like : Posterior, optional
+        Posterior whose whitening windows are taken. By default they are kept, or chosen anew if noise is coloured.
+    torque : TorqueSensor, optional
+        The same torque sensors with other noise, by default with the noise that they have.
     """
     torque = posterior.model.torque if torque is None else torque
     data = replace(
@@ -51,7 +60,7 @@ def with_sensors(
 
 
 def leaving_out(posterior: Posterior, masks: Sequence[NDArray[np.bool_]]) -> Posterior:
-    """Return the posterior with some whitened scalars left out: per recording a mask (O, C)."""
+    """Return the posterior without the whitened scalars that masks (O, C), one per recording, mark."""
     whitenings = [item.without(mask) for item, mask in zip(posterior.whitenings, masks, strict=True)]
     data = _renoised(posterior.data, whitenings)
     gone = tuple(np.logical_or(mask, old) for mask, old in zip(masks, posterior.data.left_out, strict=True))
@@ -59,7 +68,7 @@ def leaving_out(posterior: Posterior, masks: Sequence[NDArray[np.bool_]]) -> Pos
 
 
 def with_manoeuvres(posterior: Posterior, manoeuvres: Sequence[Manoeuvre]) -> Posterior:
-    """Return the posterior of the same model given other manoeuvres, with the same integration step."""
+    """Return the posterior of the same model and integration step given other manoeuvres."""
     return Posterior.of(posterior.model, manoeuvres, step=posterior.step, flat_prior=posterior.flat_prior)
 
 

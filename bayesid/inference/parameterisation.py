@@ -1,8 +1,8 @@
-"""Coordinates to propose in: log-Cholesky, or linear in the inertial parameters.
+"""Parameterisations of a posterior: log-Cholesky coordinates, or coordinates linear in the inertial parameters.
 
-Both describe the same posterior. Where one unknown body is determined well, log-Cholesky coordinates are nearly normal.
-Where several are known to a few percent and the data tie their combinations together far more sharply, the ridge is
-straight only in coordinates linear in the parameters.
+Both describe the same posterior. Where one unknown body is determined well, the posterior is nearly normal in
+log-Cholesky coordinates. Where several bodies are known to a few per cent and the data determine combinations of them
+far more sharply, the ridge of the posterior is straight only in coordinates linear in the parameters.
 """
 
 from __future__ import annotations
@@ -20,39 +20,39 @@ __all__ = ["LinearParameterisation", "LogCholeskyParameterisation", "Parameteris
 
 
 class Parameterisation(Protocol):
-    """A change of coordinates of a posterior, for many points at once, shape (n, size)."""
+    """Change of coordinates of a posterior, for many points at once, shape (n, size)."""
 
     posterior: Posterior
 
     def to_z(self, y: Floats) -> Floats:
-        """Return the posterior's coordinates; not a number outside the support."""
+        """Return the posterior's coordinates z, which are NaN outside the support."""
         ...
 
     def log_density(self, y: Floats) -> Floats:
-        """Log posterior density over y, shape (n,)."""
+        """Return the log posterior density over y, shape (n,)."""
         ...
 
     def proposal(self, optimum: Optimum) -> StudentT:
-        """Return a Student-t over y about the mode."""
+        """Return a Student-t proposal over y about the mode."""
         ...
 
 
 class LogCholeskyParameterisation:
-    """The posterior's own coordinates."""
+    """Coordinates z of the posterior itself, in which bodies are log-Cholesky coordinates."""
 
     def __init__(self, posterior: Posterior) -> None:
         self.posterior = posterior
 
     def to_z(self, y: Floats) -> Floats:
-        """Return the points themselves."""
+        """Return the coordinates unchanged."""
         return y
 
     def log_density(self, y: Floats) -> Floats:
-        """Log posterior density, shape (n,)."""
+        """Return the log posterior density, shape (n,)."""
         return self.posterior.log_density(y)
 
     def proposal(self, optimum: Optimum) -> StudentT:
-        """Return a Student-t about the mode with the Laplace covariance."""
+        """Return a Student-t proposal about the mode with the Laplace covariance."""
         return StudentT.about(optimum.z, optimum.covariance)
 
 
@@ -63,11 +63,11 @@ class LinearParameterisation:
         self.posterior = posterior
 
     def to_z(self, y: Floats) -> Floats:
-        """Return the posterior's coordinates; not a number where no physical body exists."""
+        """Return the posterior's coordinates z, which are NaN where no physical body exists."""
         return self.posterior.unknowns.from_linear(y)
 
     def log_density(self, y: Floats) -> Floats:
-        """Log posterior density over y, shape (n,); minus infinity where no physical body exists."""
+        """Return the log posterior density over y, shape (n,), minus infinity where no physical body exists."""
         z = self.to_z(y)
         physical = np.all(np.isfinite(z), axis=1)
         inside = np.where(np.isfinite(z), z, 0.0)
@@ -75,7 +75,7 @@ class LinearParameterisation:
         return np.where(physical, value, -np.inf)
 
     def proposal(self, optimum: Optimum) -> StudentT:
-        """Return a Student-t about the mode with the Laplace covariance carried over."""
+        """Return a Student-t proposal about the mode with the Laplace covariance transformed to y."""
         slope = self.posterior.unknowns.linear_slope(optimum.z)
         return StudentT.about(
             self.posterior.unknowns.to_linear(optimum.z[None])[0], slope @ optimum.covariance @ slope.T

@@ -1,4 +1,4 @@
-"""Responses of a posterior to what its model does not have."""
+"""Responses of a posterior's residual to perturbations from outside its model."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["Arrays", "Perturbation", "Traced", "perturbed", "responses", "trace"
 
 
 def trace(posterior: Posterior, z: Floats, arrays: Arrays) -> Traced:
-    """Simulate with `perturbed` arrays."""
+    """Return the simulated motion, readings and residual at ``z`` for arrays that may be `perturbed`."""
     return compiled.traced(posterior.structure, posterior.numbers, jnp.asarray(z), arrays)
 
 
 def responses(posterior: Posterior, z: Floats, arrays: Arrays, perturbations: Perturbation) -> Floats:
-    """Return derivatives of the whitened residual along perturbations (leading axis n), shape (n, R, O, C)."""
+    """Return the derivatives of the whitened residual along n stacked perturbations, shape (n, R, O, C)."""
     count = len(perturbations.z)
     padded = jax.tree.map(lambda x: np.concatenate([x, np.zeros((-count % BATCH, *x.shape[1:]))]), perturbations)
     parts = [

@@ -1,4 +1,4 @@
-"""The posterior density of the unknowns of a model given recordings: immutable, a density over `Data`."""
+"""Posterior density of the unknowns of a model, given recordings (`bayesid.inference.data.Data`)."""
 
 from __future__ import annotations
 
@@ -27,22 +27,25 @@ from bayesid.simulation.simulator import ModelConstants, Simulator
 __all__ = ["BATCH", "Posterior"]
 
 BATCH = 8
-"""Points evaluated together: what fits the processor's cache is three times faster than 64 at once."""
+"""Number of points evaluated together; a batch that fits the processor's cache is three times faster than one of 64."""
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """Posterior of the unknowns of a model given recorded manoeuvres.
+    """Posterior of the unknowns of a model given recorded manoeuvres; immutable.
 
-    Coordinates ``z`` have a standard-normal prior (`Unknowns`). Build one with `Posterior.of`; other noise, other
-    samples and predictions are functions (`bayesid.inference.noise_changes`, `bayesid.inference.predicted_readings`).
+    The coordinates ``z`` have a standard-normal prior (`Unknowns`). `Posterior.of` builds the posterior; functions of
+    `bayesid.inference.noise_changes` and `bayesid.inference.predicted_readings` give it other noise or other samples,
+    and predict readings.
 
     Attributes
     ----------
     data : Data
+        Samples with their noise.
     unknowns : Unknowns
+        Unknowns with their prior.
     flat_prior : bool
-        Leave the prior out, for the noise-free comparisons of the paper.
+        Whether the prior is left out, as in the noise-free comparisons of the paper.
     """
 
     data: Data
@@ -60,9 +63,9 @@ class Posterior:
         model : Model
         manoeuvres : sequence of Manoeuvre
         step : float, optional
-            Integration step [s]; chosen from the sensors' noise where left out.
+            Longest integration step [s], by default chosen from the sensors' noise (`choose_step`).
         flat_prior : bool
-            Leave the prior out.
+            Whether the prior is left out.
 
         Raises
         ------
@@ -85,12 +88,12 @@ class Posterior:
 
     @property
     def model(self) -> Model:
-        """The model."""
+        """Model of the robot, its sensors and effects."""
         return self.data.model
 
     @property
     def manoeuvres(self) -> tuple[Manoeuvre, ...]:
-        """The recorded manoeuvres."""
+        """Recorded manoeuvres."""
         return self.data.manoeuvres
 
     @property
@@ -110,7 +113,7 @@ class Posterior:
 
     @property
     def samples(self) -> int:
-        """Number of scalar samples."""
+        """Number of scalar samples that the likelihood uses."""
         return self.data.samples
 
     @property
@@ -120,21 +123,21 @@ class Posterior:
 
     @cached_property
     def structure(self) -> Structure:
-        """Key of the compiled code."""
+        """Static part of the problem, which is the key of the compiled code."""
         return _structure(self.model, self.unknowns)
 
     @cached_property
     def numbers(self) -> Numbers:
-        """Numbers of model and prior that compiled code takes."""
+        """Numbers of the model and the prior, which are arguments of the compiled code."""
         return _numbers(self.model, self.unknowns)
 
     @cached_property
     def log_normalisation(self) -> Floats:
-        """Constant of each recording's log likelihood, shape (R,)."""
+        """Normalisation constant of the log likelihood of each recording, shape (R,)."""
         return np.array([-0.5 * item.samples * np.log(2.0 * np.pi) - item.log_sigma for item in self.whitenings])
 
     def starting_point(self) -> Floats:
-        """Return the prior's centre, with initial rates from the first rate samples."""
+        """Return the prior's centre with the initial rates of the first rate samples, shape (size,)."""
         return starting_point(self.unknowns, self.data.recorded)
 
     def residuals(self, z: Floats) -> Floats:
@@ -142,7 +145,7 @@ class Posterior:
         return np.asarray(compiled.residuals(self.structure, self.numbers, jnp.asarray(z), self.data.arrays))
 
     def least_squares(self, z: Floats) -> Floats:
-        """Return residuals whose half square sum is minus the log posterior, up to a constant."""
+        """Return residuals of which half the sum of squares is minus the log posterior density, up to a constant."""
         r = self.residuals(z).ravel()
         return r if self.flat_prior else np.concatenate([r, z])
 
@@ -153,7 +156,7 @@ class Posterior:
         return j if self.flat_prior else np.concatenate([j, np.eye(self.size)])
 
     def log_likelihoods(self, z: Floats) -> Floats:
-        """Return the log likelihood of each recording at many points, shape (n, size) -> (n, R)."""
+        """Return the log likelihoods of all recordings at many points, shape (n, size) -> (n, R)."""
         z = np.atleast_2d(z)
         padded = np.concatenate([z, np.repeat(z[-1:], -len(z) % BATCH, axis=0)])
         parts = [
@@ -171,8 +174,9 @@ class Posterior:
 
 
 def starting_point(unknowns: Unknowns, recorded: Sequence[RecordedSamples]) -> Floats:
-    """Return the prior's centre, with initial rates from the first rate samples, shape (size,)."""
-    z = np.zeros(unknowns.size)  # bodies exactly zero: steps are scaled to the start, and rounding is no scale
+    """Return the prior's centre with the initial rates of the first rate samples, shape (size,)."""
+    # bodies are exactly zero: the solver scales its first step by the start, which must not be a rounding error
+    z = np.zeros(unknowns.size)
     if unknowns.layout.rates:
         rates = np.stack([samples.first_rate for samples in recorded])
         z[unknowns.layout.all_rates] = (rates / unknowns.rate_sigma).ravel()
@@ -197,7 +201,7 @@ def _unknowns(model: Model, manoeuvres: Sequence[Manoeuvre], recorded: Sequence[
 def _speed_errors(
     model: Model, manoeuvres: Sequence[Manoeuvre]
 ) -> tuple[tuple[tuple[float, ...], ...], tuple[str, ...]]:
-    """Return what the smoothing leaves uncertain of the joints' speeds at time 0, and the joints' names."""
+    """Return the standard deviations of the smoothed joint speeds at time 0, by recording, and the joints' names."""
     joints = tuple(joint.name for joint in model.robot.joints)
     if not model.has_speed_errors or not any(isinstance(item.motion, MeasuredMotion) for item in manoeuvres):
         return (), ()

@@ -1,8 +1,8 @@
-"""The posterior of one study as the prior of the next, with a stated change of mass in between.
+"""Posterior of one study as prior of the next, with a stated mass-property change in between.
 
-The draws of all bodies become a correlated Gaussian in their log-Cholesky coordinates about the bodies at the mean
-coordinates. Fuel burnt or a part released in between is a body taken from, or added to, each draw's linear parameters.
-Biases, initial rates and effects are not carried: they belong to their recordings.
+A correlated Gaussian is fitted to the draws of all bodies in log-Cholesky coordinates about the bodies at the mean
+coordinates. Fuel burnt, or a part released or taken on board, is subtracted from or added to the linear parameters of
+each draw. Biases, initial rates and effects are left out, since they belong to their recordings.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from bayesid.robot.mass_property_change import BodyChange
 __all__ = ["BodyChange", "InertialDraws", "JointPrior", "joint_prior"]
 
 DRAWS_PER_COORDINATE = 4
-"""Fewer draws than this times the coordinates do not give their covariance."""
+"""Smallest number of draws per coordinate from which a covariance is estimated."""
 
 RECENTRED = 10
-"""Rounds in which the centre moves to the mean; each leaves a small part of the offset of the one before."""
+"""Largest number of iterations that move the centre to the mean; each leaves a small part of the offset."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class InertialDraws:
 
     Parameters
     ----------
-    names : tuple of str
-        B bodies.
+    names : (B,) tuple of str
+        Names of the bodies.
     values : (n, B, 10) array
-        Linear parameters, `InertialParameters.vector`, in link axes.
+        Draws of the linear parameters (`InertialParameters.vector`), in link axes.
     """
 
     names: tuple[str, ...]
@@ -48,21 +48,21 @@ class InertialDraws:
 
     @classmethod
     def of(cls, result: Identification) -> InertialDraws:
-        """Take all draws of a result, bodies that were only marginalised included."""
+        """Return all draws of a result, marginalised bodies included."""
         names = tuple(prior.name for prior in result.posterior.model.priors)
         inertial = np.asarray(result.posterior.unknowns.values_of(result.chains.flat).inertial)
         return cls(names, inertial.reshape(len(inertial), len(names), 10))
 
     @classmethod
     def read(cls, file: Path) -> InertialDraws:
-        """Read the draws of a ``posterior.nc``.
+        """Return the draws that a ``posterior.nc`` holds.
 
         Raises
         ------
         InputError
-            If the file is absent or holds none.
+            If the file is absent or holds no such draws.
         """
-        import arviz as az  # here, as it takes a second that commands without samples save
+        import arviz as az  # imported here, since it takes a second that commands without samples save
 
         remedy = "Name the posterior.nc that bayesid identify wrote"
         if not file.is_file():
@@ -78,7 +78,7 @@ class InertialDraws:
         return cls(names, values.reshape(-1, len(names), 10))
 
     def of_bodies(self, names: Sequence[str]) -> InertialDraws:
-        """Return the draws of some bodies, in the order of ``names``."""
+        """Return the draws of the named bodies, in the order of ``names``."""
         for name in names:
             if name not in self.names:
                 raise InputError(
@@ -88,19 +88,19 @@ class InertialDraws:
         return InertialDraws(tuple(names), self.values[:, [self.names.index(name) for name in names]])
 
     def changed(self, change: BodyChange, rng: np.random.Generator) -> InertialDraws:
-        """Return the draws with a body added or removed, its mass drawn anew for each.
+        """Return the draws after a mass-property change, whose uncertain mass is drawn for each of them.
 
         Raises
         ------
         InputError
-            If no physical body is left in some draw.
+            If a draw does not remain a physical body, or the body is not among the draws.
         """
         self.of_bodies([change.body])
         index = self.names.index(change.body)
         mass = change.mass + change.mass_sigma * rng.normal(size=len(self.values))
         values = self.values.copy()
         values[:, index] += (mass / change.mass)[:, None] * change.vector
-        # 1e-12: what rounding leaves of a body without extent
+        # 1e-12 is the rounding error of a body without extent
         relative = _pseudo(values[:, index]) / np.abs(_pseudo(self.values[:, index])).max(axis=(1, 2), keepdims=True)
         bad = int((np.linalg.eigvalsh(relative)[:, 0] <= 1e-12).sum())
         if bad:
@@ -114,13 +114,16 @@ class InertialDraws:
 
 @dataclass(frozen=True)
 class JointPrior:
-    """A correlated Gaussian in the log-Cholesky coordinates of B bodies about their centres.
+    """Correlated Gaussian prior in the log-Cholesky coordinates of B bodies about their centres.
 
     Parameters
     ----------
-    names : tuple of str
-    centres : tuple of InertialParameters
+    names : (B,) tuple of str
+        Names of the bodies.
+    centres : (B,) tuple of InertialParameters
+        Bodies at which all coordinates are zero.
     covariance : (10 B, 10 B) array
+        Covariance of the coordinates.
     """
 
     names: tuple[str, ...]
@@ -128,7 +131,7 @@ class JointPrior:
     covariance: Floats
 
     def bodies(self, nuisance: Sequence[str] = ()) -> tuple[BodyPrior, ...]:
-        """Return the bodies for `Model.priors`; those named are marginalised only."""
+        """Return the priors of the bodies for `Model.priors`, of which those named in ``nuisance`` are marginalised."""
         widths = np.sqrt(np.diag(self.covariance).reshape(-1, 10).mean(axis=1))
         return tuple(
             BodyPrior(name, centre, float(width), nuisance=name in nuisance)
@@ -136,7 +139,7 @@ class JointPrior:
         )
 
     def mixing(self, others: Sequence[BodyPrior] = ()) -> Mixing:
-        """Return the factor for `Model.mixing`, with independent bodies after those of the prior."""
+        """Return the factor for `Model.mixing`, with other, independent bodies after those of this prior."""
         count = len(self.covariance)
         factor = np.diag(np.concatenate([np.zeros(count), np.repeat([body.spread for body in others], 10)]))
         factor[:count, :count] = np.linalg.cholesky(self.covariance)
@@ -144,7 +147,7 @@ class JointPrior:
 
 
 def joint_prior(draws: InertialDraws) -> JointPrior:
-    """Fit a joint prior to draws: the mean and covariance of their log-Cholesky coordinates.
+    """Return the joint prior with the mean and covariance of the draws in log-Cholesky coordinates.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Results as ArviZ objects: posterior, log likelihood, predictive and observed data, with units and frames."""
+"""Results as ArviZ data: posterior, log likelihood, posterior predictive and observed data, with units and frames."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ __all__ = ["to_arviz", "write_draws", "write_netcdf"]
 
 
 STORED = 1000
-"""Draws kept per ensemble: samples closer than an autocorrelation time tell nothing new."""
+"""Number of draws stored per ensemble; draws closer than an autocorrelation time carry little information."""
 
 PREDICTED = 50
-"""Draws of the posterior predictive per ensemble."""
+"""Number of posterior predictive draws per ensemble, each of which takes a simulation."""
 
 LINEAR = ("m", "mc.x", "mc.y", "mc.z", "xx", "xy", "yy", "xz", "yz", "zz")
-"""Names of the linear parameters of every body (`InertialParameters.vector`), from which a later study starts."""
+"""Names of the linear parameters of a body (`InertialParameters.vector`), which a later study reads."""
 
 
 def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceData:
-    """Convert a result.
+    """Return a result as ArviZ data, in which each independent ensemble is a chain.
 
-    Chains are independent ensembles. Groups: ``posterior`` (physical quantities; ``inertial``, the linear parameters
-    of all bodies, those only marginalised included; ``z``, the coordinates with a standard-normal prior),
-    ``log_likelihood`` per recording, ``posterior_predictive`` with sensor noise, and ``observed_data``.
+    The group ``posterior`` holds the physical quantities, ``inertial`` with the linear parameters of all bodies,
+    marginalised ones included, and ``z`` with the coordinates of standard-normal prior. The other groups are
+    ``log_likelihood`` by recording, ``posterior_predictive`` with sensor noise, and ``observed_data``.
     """
-    import arviz as az  # here, as it takes a second that commands without samples save
+    import arviz as az  # imported here, since it takes a second that commands without samples save
 
     z = _thin(result.chains.z, STORED)
     few = z[:, :: max(1, z.shape[1] // PREDICTED)][:, :PREDICTED]
@@ -70,17 +70,17 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
 
 
 def write_netcdf(result: Identification, file: Path, rng: np.random.Generator) -> None:
-    """Write `to_arviz` to a NetCDF file, all or nothing."""
+    """Write `to_arviz` to a NetCDF file, whole or not at all."""
     with complete_file(file) as part:
         to_arviz(result, rng).to_netcdf(str(part))
 
 
 def write_draws(names: Sequence[str], values: Floats, file: Path) -> None:
-    """Write draws of the linear parameters of some bodies alone, (chains, draws, bodies, 10), all or nothing.
+    """Write draws (chains, draws, bodies, 10) of the linear parameters of bodies to a file, whole or not at all.
 
-    `InertialDraws` reads them as it reads the whole posterior.
+    `InertialDraws.read` reads them as it reads the file of a whole posterior.
     """
-    import arviz as az  # here, as it takes a second that commands without samples save
+    import arviz as az  # imported here, since it takes a second that commands without samples save
 
     dims, coords = {"inertial": ["body", "parameter"]}, {"body": list(names), "parameter": list(LINEAR)}
     data = az.from_dict(posterior={"inertial": values}, dims=dims, coords=coords)
@@ -151,7 +151,7 @@ def _sensor_dims(result: Identification) -> dict[str, list[str]]:
 
 
 def _axis(kind: Kind) -> str:
-    """Name of the dimension of a sensor's components."""
+    """Return the name of the dimension of a sensor's components."""
     return {("x", "y", "z"): "axis", ("x", "y", "z", "w"): "quaternion"}.get(kind.axes, f"axis.{kind.value}")
 
 
@@ -183,7 +183,7 @@ def _observed(result: Identification) -> dict[str, Floats]:
 
 
 def _predictive(result: Identification, z: Floats, rng: np.random.Generator) -> dict[str, Floats]:
-    """PredictedReadings with fresh noise of the sensors, for draws of shape (chains, draws, size)."""
+    """Return predicted readings with fresh noise of the sensors, for draws of shape (chains, draws, size)."""
     chains, draws, size = z.shape
     points = [predicted_readings(result.posterior, point) for point in z.reshape(-1, size)]
     predictive = {}

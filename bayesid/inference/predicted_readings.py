@@ -1,4 +1,4 @@
-"""What a posterior's sensors should read at a point, and draws of it with the sensors' noise."""
+"""Readings that a posterior predicts at given coordinates, without or with the sensors' noise."""
 
 from __future__ import annotations
 
@@ -17,9 +17,16 @@ __all__ = ["PredictedReadings", "integration_error_at", "noise_of", "noisy", "pr
 
 
 class PredictedReadings(NamedTuple):
-    """What one recording's sensors should read, sensor axes.
+    """Predicted readings of the sensors in one recording, in sensor axes.
 
-    time (T,); channels: readings (T, axes) by kind of sensor; torque (T, n) of the n joints of the torque sensor.
+    Attributes
+    ----------
+    time : (T,) array
+        Sample times of all sensors [s].
+    channels : dict of Kind to (T, axes) array
+        Readings of each sensor.
+    torque : (T, n) array
+        Torques of the n joints that have a torque sensor [N m], or forces of prismatic joints [N].
     """
 
     time: Floats
@@ -27,7 +34,7 @@ class PredictedReadings(NamedTuple):
     torque: Floats
 
     def __getattr__(self, family: str) -> Floats:
-        """Return the readings of one sensor by the family of its channels: ``predicted.rate``."""
+        """Return the readings of one sensor by the family of its channels, such as ``predicted.rate``."""
         for kind, values in () if family.startswith("_") else self.channels.items():
             if kind.value == family:
                 return values
@@ -35,7 +42,7 @@ class PredictedReadings(NamedTuple):
 
 
 def predicted_readings(posterior: Posterior, z: Floats) -> list[PredictedReadings]:
-    """Return what the sensors of each recording should read at ``z``."""
+    """Return the readings of each recording that are predicted at the coordinates ``z`` (size,)."""
     arrays, model = posterior.data.arrays, posterior.model
     simulated = compiled.simulated(
         posterior.structure, posterior.numbers, jnp.asarray(z), arrays.grid, arrays.attitude
@@ -47,17 +54,17 @@ def predicted_readings(posterior: Posterior, z: Floats) -> list[PredictedReading
     result = []
     for index, samples in enumerate(posterior.data.recorded):
         count = len(samples.time)
-        own = {kind: values[index, :count] for kind, values in channels.items()}
-        result.append(PredictedReadings(samples.time, own, torque[index, :count]))
+        readings = {kind: values[index, :count] for kind, values in channels.items()}
+        result.append(PredictedReadings(samples.time, readings, torque[index, :count]))
     return result
 
 
 def noisy(
     posterior: Posterior, index: int, predicted: PredictedReadings, rng: np.random.Generator
 ) -> PredictedReadings:
-    """Return predictions of one recording with fresh noise of the sensors, white and coloured.
+    """Return the predicted readings of one recording with fresh white and coloured noise of the sensors.
 
-    What the encoders' noise does to a prediction is no noise of the sensors and is left out.
+    The error of a prediction that is due to the encoders' noise is left out.
     """
     channels = {}
     for sensor in posterior.model.sensors:
@@ -71,13 +78,13 @@ def noisy(
 
 
 def noise_of(sensor: Sensor, time: Floats, sigma: Floats, rng: np.random.Generator) -> Floats:
-    """Draw the noise of a sensor at some times: white of ``sigma`` (size,), and coloured where declared, (T, size)."""
+    """Draw a sensor's noise at times (T,), white of ``sigma`` (size,) and coloured where declared; shape (T, size)."""
     noise = sigma * rng.normal(size=(len(time), sensor.kind.size))
     return noise if sensor.coloured is None else noise + _coloured(sensor.coloured, time, rng)
 
 
 def _coloured(noise: Coloured, time: Floats, rng: np.random.Generator) -> Floats:
-    """Draw an Ornstein-Uhlenbeck process in its stationary state, exactly at the given times."""
+    """Draw a stationary Ornstein-Uhlenbeck process at the given times, by its exact transition."""
     unit = rng.normal(size=(len(time), len(noise.sigma)))
     kept = np.exp(-np.diff(time, prepend=-np.inf) / noise.time)
     state, values = np.zeros(len(noise.sigma)), np.zeros_like(unit)
@@ -88,7 +95,7 @@ def _coloured(noise: Coloured, time: Floats, rng: np.random.Generator) -> Floats
 
 
 def integration_error_at(posterior: Posterior, z: Floats) -> float:
-    """Return the largest error of any sample from the integration step at ``z``, in its standard deviations."""
+    """Return the largest error of any sample due to the integration step at ``z``, in its standard deviations."""
     data = posterior.data
     return integration_error(
         data.model, data.manoeuvres, data.recorded, posterior.structure, posterior.numbers, z, data.step

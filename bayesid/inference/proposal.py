@@ -1,4 +1,4 @@
-"""Multivariate Student-t about the mode: proposal of importance sampling and of the ensemble's independence move."""
+"""Multivariate Student-t about the mode, the proposal of importance sampling and of the independence move."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ class StudentT:
     Parameters
     ----------
     mean : (n,) array
+        Centre of the distribution.
     factor : (n, n) array
         Lower Cholesky factor of the scale matrix.
     freedom : float
@@ -31,21 +32,21 @@ class StudentT:
 
     @classmethod
     def about(cls, mean: Floats, covariance: Floats) -> StudentT:
-        """Choose the degrees of freedom for a posterior of this mode and covariance.
+        """Return the proposal for a posterior of this mode and covariance.
 
-        Tails are heavier than the posterior's, but not so heavy that in many dimensions most draws fall outside: the
-        degrees of freedom grow with the dimension from eight.
+        Its degrees of freedom are the number of dimensions and at least eight: the tails are heavier than the
+        posterior's, but not so heavy that most draws in many dimensions lie outside the posterior.
         """
         return cls(mean, np.linalg.cholesky(covariance), max(8.0, float(len(mean))))
 
     def draw(self, count: int, rng: np.random.Generator | np.random.RandomState) -> Floats:
-        """Draw points, shape (count, n)."""
+        """Draw points from the distribution, shape (count, n)."""
         normal = rng.normal(size=(count, len(self.mean)))
         mixing = np.sqrt(self.freedom / rng.chisquare(self.freedom, size=count))
         return self.mean + mixing[:, None] * (normal @ self.factor.T)
 
     def log_density(self, z: Floats) -> Floats:
-        """Log density at points, shape (count, n) -> (count,)."""
+        """Return the log density at points, shape (count, n) -> (count,)."""
         n, nu = len(self.mean), self.freedom
         scaled = np.linalg.solve(self.factor, (z - self.mean).T)
         constant = gammaln(0.5 * (nu + n)) - gammaln(0.5 * nu) - 0.5 * n * np.log(nu * np.pi)

@@ -1,4 +1,4 @@
-"""The samples of one recording's sensors on one time grid, and the second moments of their errors."""
+"""Sensor samples of one recording on one time grid, and the second moments of their errors."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from bayesid.simulation.sensors import Filter, Kind, Sensor
 __all__ = ["RecordedSamples", "Series", "first_rate"]
 
 FEWEST = 4
-"""Samples a sensor must have in a recording."""
+"""Smallest number of samples that a declared sensor must have in a recording."""
 
 Series = tuple[Floats, Floats]
 """Times (n,) and values (n, axes) of one sensor."""
@@ -32,22 +32,23 @@ Series = tuple[Floats, Floats]
 
 @dataclass(frozen=True)
 class RecordedSamples:
-    """Sensor samples of one recording on one time grid: every time at which some sensor was sampled.
+    """Sensor samples of one recording on one grid of all times at which any sensor was sampled.
 
     Parameters
     ----------
     motion : Motion
-        Of the joints.
+        Motion of the joints.
     sensors : tuple of Sensor
     torque_sensor : TorqueSensor or None
     time : (T,) array
-        The grid [s].
+        Times of the grid [s].
     series : mapping of Kind to Series
-        What each sensor read, as recorded.
+        Recorded times and readings of each sensor.
     torque : Series
-        Torques of the joints that are measured.
+        Recorded times and torques of the joints that have a torque sensor.
     torque_rows : tuple of integer arrays
-        For each of those joints, the rows of the grid whose torque is used: dry friction at rest can be anything.
+        Rows of the grid whose torque is used, for each of those joints; a joint with dry friction is left out while it
+        stands still, when its friction is undetermined.
     """
 
     motion: Motion
@@ -60,12 +61,12 @@ class RecordedSamples:
 
     @classmethod
     def of(cls, model: Model, manoeuvre: Manoeuvre) -> RecordedSamples:
-        """Collect what the sensors of a model recorded.
+        """Return the samples of the sensors of a model in one recording.
 
         Raises
         ------
         InputError
-            Where a declared sensor was not recorded or hardly.
+            If the recording lacks a declared sensor or has too few samples of it.
         """
         recording = manoeuvre.recording
         series = {sensor.kind: _series(recording, sensor.kind.value, sensor.kind.axes) for sensor in model.sensors}
@@ -78,7 +79,7 @@ class RecordedSamples:
         return cls(manoeuvre.motion, model.sensors, model.torque, time, series, torque, used)
 
     def with_sensors(self, sensors: Sequence[Sensor], torque: TorqueSensor | None) -> RecordedSamples:
-        """Return the samples of the same sensors with other noise."""
+        """Return the same samples with other noise of the sensors."""
         return replace(self, sensors=tuple(sensors), torque_sensor=torque)
 
     def rows(self, kind: Kind) -> Integers:
@@ -86,28 +87,28 @@ class RecordedSamples:
         return np.searchsorted(self.time, self.series[kind][0])
 
     def gridded(self, kind: Kind) -> Floats:
-        """Return what a sensor read on the grid, (T, axes); where it was not sampled, its reading at rest."""
+        """Return the readings of a sensor on the grid, (T, axes), with its reading at rest where it was not sampled."""
         values = np.tile(np.array(kind.rest), (len(self.time), 1))
         values[self.rows(kind)] = self.series[kind][1]
         return values
 
     @property
     def gridded_torque(self) -> Floats:
-        """Torques on the grid, (T, n); zero where not sampled."""
+        """Torques on the grid, shape (T, n), zero where they were not sampled."""
         values = np.zeros((len(self.time), self.torque[1].shape[1]))
         values[np.searchsorted(self.time, self.torque[0])] = self.torque[1]
         return values
 
     @property
     def first_rate(self) -> Floats:
-        """Rate at the start, base axes, from the first samples; zero where no rate is measured."""
+        """Rate of the base at the start from the first samples, base axes [rad/s]; zero if no rate is measured."""
         for sensor in self.sensors:
             if sensor.kind == Kind.RATE:
                 return first_rate(sensor, self.series[Kind.RATE][1])
         return np.zeros(3)
 
     def sigma(self, kind: Kind) -> Floats:
-        """Return the white noise per component of a sensor, shape (size,)."""
+        """Return the standard deviations of the white noise of a sensor, shape (size,)."""
         sensor = next(sensor for sensor in self.sensors if sensor.kind == kind)
         return sensor.noise.sigma(float(np.median(np.diff(self.series[kind][0]))))
 
@@ -117,9 +118,9 @@ class RecordedSamples:
         Parameters
         ----------
         robot : Robot
-            Through which the encoders' noise is seen.
+            Robot whose dynamics carries the encoders' noise to the sensors.
         seen : SampledMotion
-            The base's motion on the grid.
+            Motion of the base on the grid.
         """
         torque_sigma = () if self.torque_sensor is None else self.torque_sensor.sigma
         channels = [
@@ -140,7 +141,7 @@ class RecordedSamples:
 
 
 def first_rate(sensor: Sensor, values: Floats) -> Floats:
-    """Return the rate at the start, base axes, as the mean of a rate sensor's first three samples of (n, 3) values."""
+    """Return the mean of the first three samples (n, 3) of a rate sensor, base axes, as the rate at the start."""
     return np.asarray(sensor.rotation @ values[:3].mean(axis=0))
 
 
@@ -150,7 +151,7 @@ def _coloured(sensor: Sensor) -> list[tuple[float, float]]:
 
 
 def _moving(model: Model, motion: Motion, time: Floats) -> list[NDArray[np.bool_]]:
-    """For each torque sensor, which of its samples dry friction leaves of use."""
+    """Return a mask of the samples of each torque sensor that are used, which leaves out dry friction at standstill."""
     if model.torque is None:
         return []
     state = motion.evaluate(time)
@@ -163,7 +164,7 @@ def _moving(model: Model, motion: Motion, time: Floats) -> list[NDArray[np.bool_
 
 
 def _series(recording: Recording, family: str, axes: Sequence[str]) -> Series:
-    """Read a declared sensor, or say what is missing."""
+    """Return the samples of a declared sensor, and raise an error if columns or samples are missing."""
     if absent := [axis for axis in axes if f"{family}.{axis}" not in recording.channels]:
         raise InputError(
             f"no column {family}.{'|'.join(absent)}, but the study declares the sensor",

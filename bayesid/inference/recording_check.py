@@ -1,4 +1,4 @@
-"""What a study's recordings look like before anyone waits for a sampler, and the mistakes that can be seen there."""
+"""Check of a study's recordings before the sampler runs, which shows their sampling, noise and likely mistakes."""
 
 from __future__ import annotations
 
@@ -23,17 +23,28 @@ __all__ = ["ChannelSampling", "JointCheck", "RecordingCheck", "SensorCheck", "ch
 
 
 STILL = 1e-3
-"""A joint that moves less than this hardly excites anything [rad or m]."""
+"""Range of a joint's motion below which it hardly excites the base [rad or m]."""
 
 DEGREES = 180.0 / np.pi
+"""Degrees per radian."""
 
 WRONG_UNIT = 15.0
-"""Factor between measured and possible motion that no plausible error of the robot explains."""
+"""Ratio of measured to predicted readings that no plausible error of the robot explains."""
 
 
 @dataclass(frozen=True)
 class ChannelSampling:
-    """Sampling of one sensor or joint: samples, median interval [s], longest gap [s]."""
+    """Sampling of one sensor or joint.
+
+    Attributes
+    ----------
+    name : str
+        Name of the sensor or channel.
+    samples : int
+        Number of samples.
+    interval, longest_gap : float
+        Median and longest time between samples [s].
+    """
 
     name: str
     samples: int
@@ -43,9 +54,24 @@ class ChannelSampling:
 
 @dataclass(frozen=True)
 class JointCheck:
-    """A joint's motion: range and largest speed, encoder noise used, misfit of the smoothing, and its uncertainty.
+    """Motion of one joint and the quality of its smoothing.
 
-    ``velocity_sd`` and ``acceleration_sd`` are the medians over time of what the smoothing leaves uncertain.
+    Attributes
+    ----------
+    name, unit : str
+        Name of the joint and unit of its position.
+    lowest, highest : float
+        Range of its positions [rad or m].
+    speed : float
+        Largest speed [rad/s or m/s].
+    sigma : float
+        Standard deviation of the encoder noise that the smoothing uses [rad or m].
+    declared : bool
+        Whether this noise is declared and not estimated.
+    chi2_per_sample : float
+        Chi-square per sample of the smoothing spline.
+    velocity_sd, acceleration_sd : float
+        Medians over time of the standard deviations of the smoothed velocity and acceleration.
     """
 
     name: str
@@ -67,12 +93,20 @@ class JointCheck:
 
 @dataclass(frozen=True)
 class SensorCheck:
-    """A sensor's noise and clock.
+    """Noise and delay of one sensor.
 
-    ``measured_sigma`` (3,) is estimated from quiet stretches, with the relative standard error ``sigma_error``; None
-    where there are too few quiet samples. ``delay`` is
-    how far the samples lag behind the joints' motion [s], with its standard deviation, None where the motion is too
-    faint to tell.
+    Attributes
+    ----------
+    kind : Kind
+    sigma : (3,) array
+        Declared standard deviation of the white noise.
+    measured_sigma : (3,) array or None
+        Standard deviation estimated from quiet stretches; None if there are too few quiet samples.
+    sigma_error : float
+        Relative standard error of ``measured_sigma``.
+    delay : pair of float or None
+        Delay of the samples behind the joints' motion and its standard deviation [s]; None if the motion is too weak
+        to determine it.
     """
 
     kind: Kind
@@ -84,7 +118,23 @@ class SensorCheck:
 
 @dataclass(frozen=True)
 class RecordingCheck:
-    """Everything `check_recording` found."""
+    """Result of `check_recording`.
+
+    Attributes
+    ----------
+    name : str
+        Name of the recording.
+    duration : float
+        Duration of the recording [s].
+    channels : tuple of ChannelSampling
+        Sampling of every sensor and joint.
+    joints : tuple of JointCheck
+        Motion of every joint.
+    sensors : tuple of SensorCheck
+        Noise and delay of every sensor.
+    rate_is_differenced : bool
+        Whether the rate is the difference of the attitude and no independent measurement.
+    """
 
     name: str
     duration: float
@@ -95,13 +145,13 @@ class RecordingCheck:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Sentences on what deserves a look."""
-        found = [
+        """Sentences on properties of the recording that need attention."""
+        sentences = [
             f"Joint {joint.name} moves by {joint.highest - joint.lowest:.2g} {joint.unit} only."
             for joint in self.joints
             if joint.still
         ]
-        found += [
+        sentences += [
             f"The spline does not follow joint {joint.name}: chi-square per sample {joint.chi2_per_sample:.2f}."
             for joint in self.joints
             if joint.chi2_per_sample > 1.5
@@ -110,26 +160,26 @@ class RecordingCheck:
             if sensor.measured_sigma is not None:
                 off = np.abs(sensor.measured_sigma / sensor.sigma - 1.0)
                 if (off > max(0.3, 4.0 * sensor.sigma_error)).any():
-                    found.append(
+                    sentences.append(
                         f"The noise of {sensor.kind.value} in quiet stretches is "
                         f"{', '.join(f'{value:.2g}' for value in sensor.measured_sigma)} {sensor.kind.unit}, declared "
                         f"{', '.join(f'{value:.2g}' for value in sensor.sigma)}."
                     )
             if sensor.delay is not None and abs(sensor.delay[0]) > 4.0 * sensor.delay[1]:
-                found.append(
+                sentences.append(
                     f"The samples of {sensor.kind.value} seem {sensor.delay[0]:.3g} +- {sensor.delay[1]:.2g} s late "
                     "against the joints."
                 )
         if self.rate_is_differenced:
-            found.append("The rate is the difference of the attitude, not a second sensor: declare one of them.")
+            sentences.append("The rate is the difference of the attitude, not a second sensor: declare one of them.")
         for channel in self.channels:
             if channel.longest_gap > 5.0 * channel.interval:
-                found.append(f"{channel.name} has a gap of {channel.longest_gap:.3g} s.")
-        return tuple(found)
+                sentences.append(f"{channel.name} has a gap of {channel.longest_gap:.3g} s.")
+        return tuple(sentences)
 
 
 def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
-    """Look at one recording of a posterior, with the robot at the prior's centre."""
+    """Check one recording of a posterior against the readings that the prior's centre predicts."""
     manoeuvre, model = posterior.manoeuvres[index], posterior.model
     recording = manoeuvre.recording
     predicted = predicted_readings(posterior, posterior.starting_point())[index]
@@ -149,7 +199,7 @@ def refuse_wrong_units(posterior: Posterior) -> None:
     Raises
     ------
     InputError
-        Where a joint leaves its limits, or a sensor shows many times more or less than the joints can cause.
+        If a joint leaves its limits, or the readings of a sensor are many times larger or smaller than predicted.
     """
     for manoeuvre in posterior.manoeuvres:
         refuse_impossible_joints(manoeuvre.recording, posterior.model.robot)
@@ -161,7 +211,21 @@ def refuse_wrong_units(posterior: Posterior) -> None:
 
 @dataclass(frozen=True)
 class _Comparison:
-    """What a channel or a sensor read and what the model expects at the same times, (n, axes)."""
+    """Measured readings of one sensor and those that the model predicts at the same times.
+
+    Attributes
+    ----------
+    column, unit : str
+        Name and unit of the columns in error messages.
+    mistaken : str
+        Unit that users most often give instead.
+    time : (n,) array
+        Sample times [s].
+    measured, expected : (n, axes) arrays
+        Measured and predicted readings.
+    sigma : float
+        Standard deviation of the white noise.
+    """
 
     column: str
     unit: str
@@ -173,24 +237,24 @@ class _Comparison:
 
 
 def _comparisons(posterior: Posterior, index: int, predicted: PredictedReadings) -> list[_Comparison]:
-    found = []
+    comparisons = []
     for sensor in posterior.model.sensors:
         if sensor.kind.mounted:
             time, measured = posterior.data.measured(index, sensor.kind)
             expected = predicted.channels[sensor.kind][np.searchsorted(predicted.time, time)]
             sigma = float(sensor.noise.sigma(float(np.median(np.diff(time)))).max())
             column = f"{sensor.kind.value}.x|y|z"
-            found.append(_Comparison(column, sensor.kind.unit, sensor.kind.slip, time, measured, expected, sigma))
+            comparisons.append(_Comparison(column, sensor.kind.unit, sensor.kind.slip, time, measured, expected, sigma))
     if (torque := posterior.model.torque) is not None:
         time, measured = posterior.data.torques(index)
         expected = predicted.torque[np.searchsorted(predicted.time, time)]
         for k, (joint, sigma) in enumerate(zip(torque.joints, torque.sigma, strict=True)):
-            own = slice(k, k + 1)
+            one = slice(k, k + 1)
             mistaken = "mN m or at the motor before the gear"
-            found.append(
-                _Comparison(f"torque.{joint}", "N m", mistaken, time, measured[:, own], expected[:, own], sigma)
+            comparisons.append(
+                _Comparison(f"torque.{joint}", "N m", mistaken, time, measured[:, one], expected[:, one], sigma)
             )
-    return found
+    return comparisons
 
 
 def _refuse_factor(recording: Recording, seen: _Comparison) -> None:
@@ -274,7 +338,7 @@ def _sensor(sensor: Sensor, manoeuvre: Manoeuvre, model: Model, predicted: Predi
 
 
 def _is_differenced(manoeuvre: Manoeuvre, model: Model) -> bool:
-    """Whether the rate repeats the attitude's own noise, whichever neighbours it was differenced from."""
+    """Return whether the rate repeats the noise of the attitude, by a backward, forward or central difference."""
     sensors = {sensor.kind: sensor for sensor in model.sensors}
     if not {Kind.RATE, Kind.ATTITUDE} <= set(sensors):
         return False
@@ -286,14 +350,15 @@ def _is_differenced(manoeuvre: Manoeuvre, model: Model) -> bool:
     turned = Rotation.from_quat(quaternion[here])
     step = np.diff(common)[:, None]
     difference = (turned[:-1].inv() * turned[1:]).as_rotvec() / step
-    own = rate[there] @ sensors[Kind.RATE].rotation.T
-    candidates = (own[:-1] - difference, own[1:] - difference, own[1:-1] - 0.5 * (difference[1:] + difference[:-1]))
+    in_base = rate[there] @ sensors[Kind.RATE].rotation.T
+    central = 0.5 * (difference[1:] + difference[:-1])
+    candidates = (in_base[:-1] - difference, in_base[1:] - difference, in_base[1:-1] - central)
     noise = np.sqrt(2.0) * sensors[Kind.ATTITUDE].noise.sigma(1.0).max() / float(np.median(step))
     return min(float(np.sqrt((miss**2).mean())) for miss in candidates) < 0.3 * noise
 
 
 def _quiet_sigma(expected: Floats, measured: Floats) -> tuple[Floats | None, float]:
-    """Noise, and its relative error, from third differences where the expected signal hardly changes meanwhile."""
+    """Return the noise and its relative error, from third differences where the expected signal hardly changes."""
     rough = np.abs(np.diff(expected, n=3, axis=0)).max(axis=1)
     difference = np.diff(measured, n=3, axis=0)
     quiet = rough < 0.2 * np.median(np.abs(difference))
@@ -304,7 +369,7 @@ def _quiet_sigma(expected: Floats, measured: Floats) -> tuple[Floats | None, flo
 
 
 def _delay(time: Floats, expected: Floats, measured: Floats) -> tuple[float, float] | None:
-    """Delay of the measured against the expected signal, with gain and trend fitted, axis by axis."""
+    """Return the delay of the measured against the expected signal [s], with gain and trend fitted axis by axis."""
     estimates = []
     for axis in range(3):
         slope = np.gradient(expected[:, axis], time)
@@ -324,7 +389,6 @@ def _delay(time: Floats, expected: Floats, measured: Floats) -> tuple[float, flo
     weight = np.array([1.0 / sd**2 for _, sd in estimates])
     values = np.array([value for value, _ in estimates])
     mean = float((weight * values).sum() / weight.sum())
-    scatter = float(
-        np.sqrt((weight * (values - mean) ** 2).sum() / weight.sum())
-    )  # the robot's own errors also shift it
+    # errors of the robot also shift the estimates, which then differ between the axes
+    scatter = float(np.sqrt((weight * (values - mean) ** 2).sum() / weight.sum()))
     return mean, float(np.hypot(weight.sum() ** -0.5, scatter))

@@ -73,7 +73,7 @@ class Residuals:
         return len(self.posterior.manoeuvres)
 
     def series(self, recording: int, kind: Kind, axis: int) -> tuple[Floats, Floats]:
-        """Return times [s] and residuals of one sensor axis in one recording, where it has samples."""
+        """Return the times [s] and residuals of one sensor axis in one recording, where it has samples."""
         item, channel = self.posterior.whitenings[recording], self.posterior.model.channels.of(kind).start + axis
         present = np.flatnonzero(item.outputs[:, channel])
         time = self.posterior.data.times(recording)[item.rows[present]]

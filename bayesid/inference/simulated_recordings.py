@@ -1,4 +1,4 @@
-"""Simulated recordings: what the sensors of a model would read, with their declared noise."""
+"""Simulated recordings: readings that the sensors of a model would give, with their declared noise."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ def simulate_recordings(
 
     Parameters
     ----------
+    posterior : Posterior
     rng : numpy.random.Generator, optional
-        For the sensors' noise; none is added where left out.
+        Source of the sensors' noise; without it there is no noise.
     z : (size,) array, optional
-        Point to simulate at; `Posterior.starting_point` where left out.
+        Coordinates at which the recordings are simulated, by default `Posterior.starting_point`.
     """
     predictions = predicted_readings(posterior, posterior.starting_point() if z is None else z)
     recordings = []
@@ -64,17 +65,19 @@ def simulate_manoeuvre(
 
     Parameters
     ----------
+    model : Model
     motion : Motion
+        Planned motion of the joints.
     time : (T,) array
         Sample times of all sensors and joints [s].
     attitude : (4,) array, optional
-        Base to orbit axes at time 0.
+        Quaternion x, y, z, w from base to orbit axes at time 0, by default the identity.
     argument_of_latitude : float
         Argument of latitude at time 0 [rad].
     rng : numpy.random.Generator, optional
-        For the noise of sensors and encoders.
+        Source of the noise of sensors and encoders; without it there is no noise.
     encoder_sigma : float
-        Noise of the recorded joint positions [rad or m].
+        Standard deviation of the noise of the recorded joint positions [rad or m].
     """
     joints = sample_joints(motion, model.robot, time)
     planned = Recording(name, None, time, {**joints, **blank_channels(model.sensors, len(time), model.torque)})
@@ -88,7 +91,7 @@ def simulate_manoeuvre(
 
 
 def blank_channels(sensors: Sequence[Sensor], count: int, torque: TorqueSensor | None = None) -> dict[str, Floats]:
-    """Return channels of sensors at rest, to be simulated: a posterior wants every sensor to have samples."""
+    """Return channels of the sensors at rest, which stand in a recording that is to be simulated."""
     joints = () if torque is None else torque.joints
     return {
         name: np.full(count, value)

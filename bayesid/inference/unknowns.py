@@ -1,8 +1,8 @@
-"""The unknowns of an identification: one vector of coordinates whose prior is standard normal.
+"""Unknowns of an identification, as one vector of coordinates whose prior is standard normal.
 
-Inertial parameters are log-Cholesky coordinates relative to the prior's centre (`bayesid.robot.log_cholesky`), so that
-every value is a physical body. They are ``theta = spread z`` body by body, or ``theta = mixing z`` for all bodies
-together where the prior correlates them, as the posterior of an earlier study does.
+Bodies have log-Cholesky coordinates ``theta`` relative to the prior's centre (`bayesid.robot.log_cholesky`), of which
+every value is a physical body. Independent bodies have ``theta = spread z`` each; bodies that the prior correlates, as
+the posterior of an earlier study does, have ``theta = mixing z`` all together.
 """
 
 from __future__ import annotations
@@ -28,31 +28,33 @@ from bayesid.simulation.simulator import Values
 __all__ = ["Unknowns"]
 
 MAPPED = 256
-"""Points whose coordinates are converted together."""
+"""Number of points that are mapped together, so that one compilation serves any number of points."""
 
 
 @dataclass(frozen=True)
 class Unknowns:
-    """What is unknown, its prior, and the map from coordinates to physical values.
+    """Unknowns with their prior, and the map from coordinates to physical values.
 
     Parameters
     ----------
     bodies : sequence of BodyPrior
+        Priors of the unknown bodies.
     effects : sequence of Effect
         All effects of the model, with or without parameters.
     recordings : int
+        Number of recordings.
     rate_sigma : float
-        Prior standard deviation of the initial rate [rad/s]; 0 for exactly zero.
+        Prior standard deviation of the initial rate [rad/s]; 0 for a start at rest.
     tilt_sigma : (R,) tuple
-        Of the initial attitude [rad]; 0 for exact.
+        Prior standard deviation of the initial attitude of each recording [rad]; 0 if it is exact.
     mixing : (10 B, 10 B) tuple of tuples, optional
-        Lower-triangular factor of the joint prior covariance of the log-Cholesky coordinates of all B bodies; left out,
-        they are independent, each with its body's spread.
+        Lower-triangular factor of the joint prior covariance of the log-Cholesky coordinates of all B bodies, which by
+        default are independent, each with the spread of its body.
     speed_sigma : (R,) tuple of (J,) tuples
-        Standard deviation of the error of each joint's smoothed speed at time 0 [rad/s or m/s]; empty where such errors
-        are of no account (`Model.has_speed_errors`).
+        Standard deviation of the error of each joint's smoothed speed at time 0 [rad/s or m/s]; empty where the model
+        has no such errors (`Model.has_speed_errors`).
     joints : (J,) tuple of str
-        Names of those joints.
+        Names of the joints with such errors.
     """
 
     bodies: tuple[BodyPrior, ...]
@@ -66,7 +68,7 @@ class Unknowns:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """One name per coordinate."""
+        """Names of all coordinates."""
         recordings = range(self.recordings)
         names = [f"{body.name}.{key}" for body in self.bodies for key in LOG_CHOLESKY]
         names += [f"initial-rate[{i}].{axis}" for i in recordings if self.layout.rates for axis in "xyz"]
@@ -84,7 +86,7 @@ class Unknowns:
 
     @cached_property
     def layout(self) -> Layout:
-        """Which coordinates belong to what."""
+        """Layout of the coordinates."""
         return Layout(
             bodies=len(self.bodies),
             recordings=self.recordings,
@@ -102,7 +104,7 @@ class Unknowns:
         """Centres and widths of the prior."""
         mixing = self.widths
         per_theta = np.kron(np.eye(len(self.bodies)), SLOPE)
-        # independent bodies: entries over widths, as they are; correlated ones so that the determinant is the mixing's
+        # for correlated bodies, a slope of the same determinant as the mixing
         slope = mixing if self.mixing is None else per_theta @ mixing @ np.linalg.inv(per_theta)
         factors = [upper_cholesky(body.centre.pseudo_inertia) for body in self.bodies]
         tilts = list(self.layout.tilts)
@@ -123,7 +125,7 @@ class Unknowns:
 
     @property
     def widths(self) -> Floats:
-        """Log-Cholesky coordinates of all bodies per unit of z, shape (10 B, 10 B)."""
+        """Derivative of the log-Cholesky coordinates of all bodies by z, shape (10 B, 10 B)."""
         if self.mixing is None:
             return np.diag(np.repeat([body.spread for body in self.bodies], PARAMETERS))
         return np.array(self.mixing)
@@ -131,7 +133,7 @@ class Unknowns:
     # ---- maps ----
 
     def values(self, z: Array) -> Values:
-        """Return the physical values of standard-normal coordinates, shape (size,), in a traced function."""
+        """Return the physical values of coordinates z (size,), in a function that JAX traces."""
         return self.layout.values(self.numbers, z)
 
     def values_at(self, z: Floats) -> Values:
@@ -139,7 +141,7 @@ class Unknowns:
         return jax.tree.map(lambda x: x[0], self.values_of(np.asarray(z)[None]))
 
     def values_of(self, z: Floats) -> Values:
-        """Return the physical values at many points, shape (n, size); every array gets a leading axis."""
+        """Return the physical values at many points (n, size), each array with a leading axis n."""
         return self._mapped(_values, z)
 
     def inertials(self, z: Floats) -> list[InertialParameters]:
@@ -148,15 +150,15 @@ class Unknowns:
         return [InertialParameters.from_vector(row) for row in vectors]
 
     def to_linear(self, z: Floats) -> Floats:
-        """Return `Layout.to_linear` of many points, shape (n, size)."""
+        """Return `Layout.to_linear` at many points, shape (n, size)."""
         return self._mapped(_to_linear, z)
 
     def from_linear(self, y: Floats) -> Floats:
-        """Return `Layout.from_linear` of many points, shape (n, size)."""
+        """Return `Layout.from_linear` at many points, shape (n, size)."""
         return self._mapped(_from_linear, y)
 
     def log_volume(self, z: Floats) -> Floats:
-        """Return `Layout.log_volume` of many points, shape (n, size) -> (n,)."""
+        """Return `Layout.log_volume` at many points, shape (n, size) -> (n,)."""
         return self._mapped(_log_volume, z)
 
     def linear_slope(self, z: Floats) -> Floats:
@@ -164,7 +166,7 @@ class Unknowns:
         return np.asarray(_linear_slope(self.layout, self.numbers, jnp.asarray(z)))
 
     def coordinates(self, inertials: Sequence[InertialParameters], rate: Floats | None = None) -> Floats:
-        """Return the coordinates of given bodies and initial rates (R, 3), everything else at its prior mean."""
+        """Return the coordinates of given bodies and initial rates (R, 3), with all others at the prior's centre."""
         z = np.zeros(self.size)
         theta = [
             body.spread * coordinates_of(body, inertial) for body, inertial in zip(self.bodies, inertials, strict=True)
@@ -176,17 +178,17 @@ class Unknowns:
         return z
 
     def body_indices(self, *, nuisance: bool = False) -> list[int]:
-        """Return the coordinates of the bodies to identify, or of all with those only marginalised."""
+        """Return the indices of the coordinates of the bodies to identify, with those of marginalised ones if asked."""
         slices = [self.layout.body(index) for index, body in enumerate(self.bodies) if nuisance or not body.nuisance]
         return [index for part in slices for index in range(part.start, part.stop)]
 
     def effect_indices(self, label: str) -> list[int]:
-        """Return the coordinates of an effect of the model; none where the model lacks it."""
+        """Return the indices of the coordinates of an effect, none where the model lacks it."""
         parts = [self.layout.effect(i) for i, effect in enumerate(self.effects) if effect.label == label]
         return [index for part in parts for index in range(part.start, part.stop)]
 
     def _mapped(self, function: Callable[..., Any], z: Floats) -> Any:
-        """Apply a compiled function to batches of one length, so that it compiles once."""
+        """Apply a compiled function to the points in batches of one length, so that it is compiled once."""
         z = np.asarray(z)
         padded = np.concatenate([z, np.repeat(z[-1:], -len(z) % MAPPED, axis=0)])
         batches = [padded[i : i + MAPPED] for i in range(0, len(padded), MAPPED)]

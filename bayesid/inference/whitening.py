@@ -1,8 +1,8 @@
-"""Whitening of the residual: sensor noise, encoder noise through the dynamics, and filters, as one banded operator.
+"""Whitening of the residual as one banded operator, for sensor noise, encoder noise through the dynamics, and filters.
 
-The error of a sample is its sensor's white noise plus what the joints' smoothed velocity and acceleration leave
-uncertain, which is correlated over a few samples. Each block of scalars is whitened given the blocks shortly before it
-(Vecchia 1988), which tends to the exact Gaussian as the window grows and stays positive definite for any window.
+The error of a sample is the noise of its sensor plus the effect of the errors of the smoothed joint motion, which is
+correlated over a few samples. Each block of scalars is whitened given a window of blocks before it (Vecchia 1988); the
+result tends to the exact Gaussian as the window grows and is positive definite for any window.
 """
 
 from __future__ import annotations
@@ -28,16 +28,25 @@ __all__ = ["NoiseChannel", "NoiseModel", "Whitening", "apply", "build"]
 
 
 WINDOWS = (0, 2, 4, 8, 16, 32)
-"""Earlier blocks to condition on; the first window that changes the log determinant little is taken."""
+"""Numbers of earlier blocks to condition on, of which the first that is accurate to `TOLERANCE` is taken."""
 
 TOLERANCE = 2e-4
-"""Change of log standard deviation per scalar below which a longer window is not worth its cost."""
+"""Change of log standard deviation per scalar below which a longer window does not justify its cost."""
 
 
 class NoiseChannel(NamedTuple):
-    """One sensor axis: its white noise, the rows of the sample grid where it was sampled, its filter.
+    """Noise and sampling of one sensor axis.
 
-    ``coloured`` is the standard deviation and correlation time [s] of exponentially correlated noise beside it.
+    Attributes
+    ----------
+    sigma : float
+        Standard deviation of the white noise.
+    rows : (n,) integer array
+        Rows of the sample grid at which the axis was sampled.
+    filter : Filter
+        Filter of the samples.
+    coloured : pair of float
+        Standard deviation and correlation time [s] of additional, exponentially correlated noise.
     """
 
     sigma: float
@@ -53,12 +62,13 @@ class NoiseModel:
     Parameters
     ----------
     time : (T,) array
-        Sample grid: every time at which some channel has a sample.
-    channels : sequence of Channel
+        Sample grid of all times at which any channel has a sample [s].
+    channels : sequence of NoiseChannel
+        Noise and sampling of the C channels.
     sensitivity : (joints, 3, T, C) array
         Change of each channel per unit error of joint position, velocity and acceleration at that time.
     joint_covariance : (joints, lags + 1, T, 3, 3) array
-        Of those errors with earlier ones, for the longest window.
+        Covariances of these errors with those at up to ``lags`` earlier samples.
     """
 
     time: Floats
@@ -68,23 +78,38 @@ class NoiseModel:
 
 
 class Whitening(NamedTuple):
-    """Banded operator: output block o is ``weights[o]`` (C, width, C) applied to residual rows from ``start[o]``.
+    """Banded operator that makes O blocks of C whitened scalars of the residual.
 
-    ``log_sigma`` is the sum of the log standard deviations taken out, ``samples`` the number of scalars.
+    Attributes
+    ----------
+    weights : (O, C, width, C) array
+        Weights of the residual's rows in each block.
+    start : (O,) integer array
+        First row of the residual that enters each block.
+    log_sigma : float
+        Sum of the log standard deviations of all scalars before whitening.
+    samples : int
+        Number of scalars.
+    outputs : (O, C) array of bool
+        Mask of the scalars that exist.
+    rows : (O,) integer array
+        Row of the sample grid to which each block belongs.
+    window : int
+        Number of earlier blocks on which each block is conditioned.
     """
 
     weights: Floats
     start: Integers
     log_sigma: float
     samples: int
-    outputs: NDArray[np.bool_]  # (O, C): which scalars exist
-    rows: Integers  # (O,): row of the sample grid an output block belongs to
+    outputs: NDArray[np.bool_]
+    rows: Integers
     window: int
 
     def without(self, left_out: NDArray[np.bool_]) -> Whitening:
-        """Leave out some outputs, (O, C), and the part of the others that was predicted from their samples.
+        """Return the whitening without the scalars of a mask (O, C), whose samples lose their weight in the others too.
 
-        Their share of ``log_sigma`` stays: comparisons of evidence are between fits that leave out the same samples.
+        ``log_sigma`` keeps their share, since evidences are compared between fits that leave out the same samples.
         """
         weights = self.weights.copy()
         gone = {(int(self.rows[o]), int(c)) for o, c in zip(*np.nonzero(left_out), strict=True)}
@@ -99,7 +124,7 @@ class Whitening(NamedTuple):
 
 
 def apply(weights: Array, start: Array, residual: Array) -> Array:
-    """Whiten a residual (T, C), padded with at least one window of zeros; returns (O, C)."""
+    """Return the whitened residual (O, C) of a residual (T, C) that is padded with zeros for at least one window."""
     width = weights.shape[2]
     if width == 1:
         return jnp.einsum("oij,oj->oi", weights[:, :, 0], residual[start])
@@ -108,9 +133,9 @@ def apply(weights: Array, start: Array, residual: Array) -> Array:
 
 
 def build(noise: NoiseModel, window: int | None = None) -> Whitening:
-    """Build the whitening of one recording, with the shortest window that is accurate unless one is given."""
+    """Return the whitening of one recording, by default with the shortest window that is accurate."""
     outputs = _outputs(noise)
-    with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
+    with threadpool_limits(limits=1):  # threads only slow down thousands of small factorisations
         return _shortest(noise, outputs) if window is None else _whiten(noise, outputs, window)
 
 
@@ -128,7 +153,7 @@ def _shortest(noise: NoiseModel, outputs: list[tuple[int, list[_Output]]]) -> Wh
 
 
 class _Output(NamedTuple):
-    """One filtered scalar: the residual rows that enter it and their weights."""
+    """One filtered scalar of a channel: the residual rows that enter it, and their weights."""
 
     channel: int
     rows: Integers
@@ -136,7 +161,7 @@ class _Output(NamedTuple):
 
 
 def _outputs(noise: NoiseModel) -> list[tuple[int, list[_Output]]]:
-    """Group the filtered scalars of all channels by their row of the sample grid."""
+    """Return the filtered scalars of all channels, grouped by their row of the sample grid."""
     blocks: dict[int, list[_Output]] = {}
     for index, channel in enumerate(noise.channels):
         for output in _filtered(noise.time, channel, index):
@@ -145,14 +170,14 @@ def _outputs(noise: NoiseModel) -> list[tuple[int, list[_Output]]]:
 
 
 def _filtered(time: Floats, channel: NoiseChannel, index: int) -> list[_Output]:
-    own = time[channel.rows]
+    sampled = time[channel.rows]
     if channel.filter == Filter():
-        return [_Output(index, channel.rows[i : i + 1], np.ones(1)) for i in range(len(own))]
-    interval = float(np.median(np.diff(own)))
+        return [_Output(index, channel.rows[i : i + 1], np.ones(1)) for i in range(len(sampled))]
+    interval = float(np.median(np.diff(sampled)))
     taps = channel.filter.taps(interval)
     half = len(taps) // 2
-    centres = range(half, len(own) - half, channel.filter.decimate)
-    even = np.abs(np.diff(own) - interval) < 0.02 * interval  # a filter does not reach across a gap
+    centres = range(half, len(sampled) - half, channel.filter.decimate)
+    even = np.abs(np.diff(sampled) - interval) < 0.02 * interval  # a filter does not reach across a gap
     result = [
         _Output(index, channel.rows[i - half : i + half + 1], taps) for i in centres if even[i - half : i + half].all()
     ]
@@ -184,7 +209,7 @@ def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: 
         combine = _combination(local, start, stop, channels)
         factor = np.linalg.cholesky(combine @ raw @ combine.T)
         unit = np.eye(len(local))[:, -len(group) :]
-        # the last rows of the inverse factor: what is new in this block given those before it
+        # the last rows of the inverse factor whiten this block given those before it
         last = sla.solve_triangular(factor, unit, lower=True, trans="T", check_finite=False).T
         rows = (combine.T @ last.T).T.reshape(len(group), stop - start, channels)
         slots = [output.channel for output in group]
@@ -207,7 +232,7 @@ def _is_coloured(noise: NoiseModel) -> bool:
 
 
 def _correlated(noise: NoiseModel, start: int, stop: int) -> Floats:
-    """Covariance of the channels' exponentially correlated noise, rows start to stop."""
+    """Return the covariance of the channels' exponentially correlated noise, rows start to stop."""
     time = noise.time[start:stop]
     apart = np.abs(time[:, None] - time[None, :])
     count = len(noise.channels)
@@ -219,7 +244,7 @@ def _correlated(noise: NoiseModel, start: int, stop: int) -> Floats:
 
 
 def _combination(outputs: list[_Output], start: int, stop: int, channels: int) -> sparse.csr_array:
-    """Return the matrix that makes filtered scalars of the flattened residual rows start to stop."""
+    """Return the matrix from the flattened residual rows start to stop to the filtered scalars."""
     columns = np.concatenate([(output.rows - start) * channels + output.channel for output in outputs])
     row = np.repeat(np.arange(len(outputs)), [len(output.rows) for output in outputs])
     taps = np.concatenate([output.taps for output in outputs])
@@ -227,7 +252,7 @@ def _combination(outputs: list[_Output], start: int, stop: int, channels: int) -
 
 
 class _Band:
-    """Covariance that the joints' errors give the residual, between rows of the sample grid."""
+    """Covariance of the residual due to errors of the joint motion, between rows of the sample grid."""
 
     def __init__(self, noise: NoiseModel) -> None:
         self.lags = noise.joint_covariance.shape[1] - 1
@@ -245,7 +270,7 @@ class _Band:
             )
 
     def between(self, start: int, stop: int) -> Floats:
-        """Return the dense covariance of rows start to stop."""
+        """Return the dense covariance of the rows start to stop."""
         row = np.arange(start, stop)
         later = np.maximum(row[:, None], row[None, :])
         lag = np.abs(row[:, None] - row[None, :])

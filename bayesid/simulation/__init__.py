@@ -1,1 +1,1 @@
-"""The forward model: orbit, effects, dynamics of the composite body, sensors."""
+"""Simulation: the forward model with its orbit, effects, dynamics of the composite body, and sensors."""

@@ -1,4 +1,4 @@
-"""Layout of the residual: which of its columns belong to which sensor and which joint."""
+"""Layout of the residual: the columns of each sensor and of each joint torque."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ __all__ = ["Channels"]
 
 @dataclass(frozen=True)
 class Channels:
-    """Columns of the residual: the components of every sensor one after the other, then the torques of joints.
+    """Columns of the residual: the components of each sensor, one sensor after the other, then the joint torques.
 
     Parameters
     ----------
     kinds : tuple of Kind
+        Kinds of the sensors.
     joints : tuple of str
-        Joints whose torque is measured.
+        Names of the joints whose torque is measured.
     """
 
     kinds: tuple[Kind, ...]
@@ -35,7 +36,7 @@ class Channels:
 
     @property
     def torques(self) -> slice:
-        """Columns of the joints' torques."""
+        """Columns of the joint torques."""
         first = sum(kind.size for kind in self.kinds)
         return slice(first, first + len(self.joints))
 
@@ -46,17 +47,17 @@ class Channels:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """One name per column, as recorded."""
+        """Names of all columns, as in recordings."""
         sensors = [name for kind in self.kinds for name in kind.components]
         return (*sensors, *(f"torque.{joint}" for joint in self.joints))
 
     @property
     def units(self) -> tuple[str, ...]:
-        """One unit per column."""
+        """Units of all columns."""
         sensors = [kind.unit for kind in self.kinds for _ in range(kind.size)]
         return (*sensors, *("N m or N" for _ in self.joints))
 
     def groups(self) -> Sequence[tuple[str, slice]]:
-        """Return the name and columns of every sensor, joint torques as one."""
+        """Return the name and columns of every sensor, with all joint torques as one group."""
         groups = [(kind.value, self.of(kind)) for kind in self.kinds]
         return [*groups, ("torque", self.torques)] if self.joints else groups

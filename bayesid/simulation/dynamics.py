@@ -1,8 +1,8 @@
-"""Motion of the composite body: seven states, one small rigid body however many links the robot has.
+"""Motion of the composite body, which has seven states however many links the robot has.
 
 About the composite centre of mass rotation decouples from translation. With ``L`` the angular momentum about it in base
 axes, ``L = I w + spin + h`` and ``dL/dt = N - w x L``; the attitude quaternion (x, y, z, w; base to orbit axes) follows
-``w``. The base's position and velocity are an exact gauge of what the sensors read and do not appear.
+``w``. The position and velocity of the base do not appear, since no sensor reading depends on them.
 """
 
 from __future__ import annotations
@@ -30,12 +30,22 @@ from bayesid.simulation.joint_torques import BaseMotion, Beyond, joint_torques
 __all__ = ["Grid", "Samples", "Start", "TimeTables", "UnitSpeed", "composite", "simulate", "trace"]
 
 ATTITUDE, MOMENTUM, INNER = slice(0, 4), slice(4, 7), slice(7, None)
+"""Parts of the state: attitude quaternion, angular momentum [N m s], and inner states of the effects."""
 
 
 class TimeTables(NamedTuple):
-    """Tables at some instants: rows of the known bodies (T, 28), coefficients of the unknown ones (T, 28, p).
+    """Kinematic tables at T instants.
 
-    ``beyond`` is what the joints carry, for their torques.
+    Attributes
+    ----------
+    known : (T, 28) array
+        Rows of the known bodies.
+    unknown : (T, 28, p) array
+        Coefficients of the unknown bodies' parameters and of the effects.
+    environment : Environment
+        Environment at these instants.
+    beyond : Beyond
+        Bodies that each joint carries, for the joint torques.
     """
 
     known: Traceable
@@ -45,17 +55,31 @@ class TimeTables(NamedTuple):
 
 
 class UnitSpeed(NamedTuple):
-    """Tables at time 0 of each of n joints moving alone at unit speed, known (n, 28) and unknown (n, 28, p) bodies."""
+    """Tables at time 0 with each of n joints moving alone at unit speed, known (n, 28) and unknown (n, 28, p)."""
 
     known: Traceable
     unknown: Traceable
 
 
 class Grid(NamedTuple):
-    """Everything about one recording that a simulation needs, reduced to arrays.
+    """One recording, reduced to the arrays that a simulation with K integration steps and T samples needs.
 
-    ``node`` holds nodes and midpoints of the K integration steps, 2 K + 1 instants; ``zero_order_hold`` the known
-    force and torque on the base during each step, (K, 6); a sample lies in step ``step_of`` at the given ``fraction``.
+    Attributes
+    ----------
+    step : (K,) array
+        Lengths of the steps [s].
+    node : TimeTables
+        Tables at the nodes and midpoints of the steps, 2 K + 1 instants.
+    zero_order_hold : (K, 6) array
+        Known force and torque on the base during each step, base axes [N, N m].
+    sample : TimeTables
+        Tables at the sample times.
+    step_of : (T,) integer array
+        Step in which each sample lies.
+    fraction : (T,) array
+        Position of each sample within its step, from 0 to 1.
+    unit_speed : UnitSpeed
+        Tables at time 0 for errors of the joint speeds.
     """
 
     step: Traceable
@@ -70,8 +94,14 @@ class Grid(NamedTuple):
 class Start(NamedTuple):
     """State of a recording at time 0.
 
-    attitude (4,): quaternion, base to orbit axes; rate (3,): angular velocity, base axes [rad/s]; speed_error (n,): the
-    excess of the smoothed joint speeds [rad/s or m/s], empty where it is of no account.
+    Attributes
+    ----------
+    attitude : (4,) array
+        Quaternion x, y, z, w from base to orbit axes.
+    rate : (3,) array
+        Angular velocity of the base, base axes [rad/s].
+    speed_error : (n,) array
+        Excess of the smoothed joint speeds over the true ones [rad/s or m/s]; empty where the model has no such errors.
     """
 
     attitude: Traceable
@@ -80,7 +110,7 @@ class Start(NamedTuple):
 
 
 def composite(row: Array) -> Composite:
-    """Turn one table row, shape (28,), into the composite body."""
+    """Return the composite body of one row of a table, shape (28,)."""
     entry = {name: row[columns] for name, columns in ENTRIES.items()}
     mass = entry["mass"][0]
     com, com_rate, com_acceleration = (entry[key] / mass for key in ("first", "first_rate", "first_acceleration"))
@@ -102,10 +132,18 @@ def composite(row: Array) -> Composite:
 
 
 class Samples(NamedTuple):
-    """The motion at the sample times, as sensors meet it.
+    """Simulated motion at T sample times, from which the sensors' readings follow.
 
-    instant (T,); quaternion (T, 4), base to orbit axes; specific_force (T, K, 3): what effects add to an accelerometer
-    at each of K mounting points [m/s2], base axes; torque (T, n) of the joints [N m or N].
+    Attributes
+    ----------
+    instant : Instant
+        Instants of the simulation, each array with the leading axis T.
+    quaternion : (T, 4) array
+        Attitude x, y, z, w from base to orbit axes.
+    specific_force : (T, K, 3) array
+        Specific force that effects add at each of K mounting points, base axes [m/s2].
+    torque : (T, n) array
+        Torques of the n joints [N m], or forces of prismatic joints [N].
     """
 
     instant: Instant
@@ -122,12 +160,12 @@ def simulate(
     Parameters
     ----------
     grid : Grid
-        With the tables of the effects after those of the unknown bodies.
+        Arrays of the recording, with the tables of the effects after those of the unknown bodies.
     inertial : (p,) array
         Linear inertial parameters of the unknown bodies.
     start : Start
     effects, values : sequences
-        Active effects and their parameters.
+        Effects and the values of their parameters.
     points : (K, 3) array
         Mounting points of the sensors in the base [m].
 
@@ -141,7 +179,7 @@ def simulate(
 def trace(
     grid: Grid, inertial: Array, start: Start, effects: Sequence[Effect], values: Sequence[Array], points: Array
 ) -> tuple[Instant, Samples]:
-    """Return the motion at every integration node, leading axis 2 K + 1, and at the samples (`simulate`)."""
+    """Return the motion at all integration nodes and midpoints, leading axis 2 K + 1, and at the samples."""
     system, loads, trajectory = _integrate(grid, inertial, start, effects, values)
     steps = len(grid.step)
     index = jnp.minimum(jnp.arange(2 * steps + 1) // 2, steps - 1)
@@ -154,7 +192,7 @@ def trace(
 
 
 class _StateTrajectory(NamedTuple):
-    """States at the start and end of every step, and their slopes times the step's length."""
+    """States at the start and end of every step, and their derivatives times the length of the step."""
 
     left: Array
     right: Array
@@ -162,7 +200,7 @@ class _StateTrajectory(NamedTuple):
     right_slope: Array
 
     def at(self, step: Array, fraction: Array) -> Array:
-        """Hermite interpolation."""
+        """Return the states at fractions of steps by Hermite interpolation."""
         left, right, left_slope, right_slope = (part[step] for part in self)
         return hermite(left, right, left_slope, right_slope, fraction[:, None])
 
@@ -170,21 +208,21 @@ class _StateTrajectory(NamedTuple):
 def _integrate(
     grid: Grid, inertial: Array, start: Start, effects: Sequence[Effect], values: Sequence[Array]
 ) -> tuple[_System, Array, _StateTrajectory]:
-    """Run the classical Runge-Kutta method over the grid; also return what multiplies its tables."""
+    """Return the system, the factors of its tables, and its trajectory by the classical Runge-Kutta method."""
     system = _System(tuple(effects), tuple(values))
     more = [effect.body_loads(v, inertial) for effect, v in zip(effects, values, strict=True)]
     loads = jnp.concatenate([inertial, *more])
     bodies = jax.vmap(composite)(grid.node.known + grid.node.unknown @ loads)
-    stages = (bodies, grid.node.environment)
+    nodes = (bodies, grid.node.environment)
     first, middle, last = (
-        jax.tree.map(lambda x, s=s: x[s], stages) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
+        jax.tree.map(lambda x, s=s: x[s], nodes) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
     )
-    initial = system.initial(jax.tree.map(lambda x: x[0], stages), start, _spin_error(grid.unit_speed, loads, start))
+    initial = system.initial(jax.tree.map(lambda x: x[0], nodes), start, _spin_error(grid.unit_speed, loads, start))
 
     def step(state: Array, given: tuple) -> tuple[Array, tuple[Array, Array, Array]]:
         size, hold, here, half, there = given
         new, slope, _ = runge_kutta_step(partial(system.derivative, hold=hold), state, size, here, half, there)
-        # the slope at the end is that of the next step's start, but for a jump of the wrench that is held
+        # the slope at the end differs from that at the next start where the held wrench jumps
         return new, (state, size * slope, size * system.derivative(new, there, hold))
 
     final, (states, slopes, end_slopes) = jax.lax.scan(
@@ -194,7 +232,7 @@ def _integrate(
 
 
 def _spin_error(tables: UnitSpeed, loads: Array, start: Start) -> Array:
-    """Return the angular momentum relative to the base that errors of the joints' speeds at time 0 feign [N m s]."""
+    """Return the spurious angular momentum relative to the base due to errors of the joint speeds at time 0 [N m s]."""
     if not len(start.speed_error):
         return jnp.zeros(3)
     spins = jax.vmap(lambda row: composite(row).spin)(tables.known + tables.unknown @ loads)
@@ -210,17 +248,28 @@ def _sample(grid: Grid, points: Array, system: _System, loads: Array, trajectory
 
 
 class _Inner(NamedTuple):
-    """One effect with its values and what the state holds of it."""
+    """One effect with the values of its parameters and its part of the state.
+
+    Attributes
+    ----------
+    effect : Effect
+    values : (p,) array
+        Values of the parameters.
+    states : (k,) array
+        Inner states.
+    amplitude, speed : (n,) arrays
+        Amplitudes of the vibration modes and their derivatives.
+    """
 
     effect: Effect
     values: Array
-    own: Array  # its inner states
-    amplitude: Array  # of its modes
-    speed: Array  # derivative of the amplitudes
+    states: Array
+    amplitude: Array
+    speed: Array
 
 
 class _System(NamedTuple):
-    """Equations of motion with a set of effects."""
+    """Equations of motion of the composite body with a set of effects."""
 
     effects: tuple[Effect, ...]
     values: tuple[Array, ...]
@@ -241,9 +290,9 @@ class _System(NamedTuple):
         torque = wrench.torque - cross(instant.body.com, wrench.force)
         parts = [quaternion_rate(state[ATTITUDE], instant.rate), torque - cross(instant.rate, state[MOMENTUM])]
         used = 0
-        for effect, values, own, _, speed in self.inner(state[INNER]):
+        for effect, values, states, _, speed in self.inner(state[INNER]):
             if effect.states:
-                parts.append(effect.derivative(values, instant, own))
+                parts.append(effect.derivative(values, instant, states))
             if effect.modes_count:
                 parts += [speed, mode_changes[used : used + effect.modes_count]]
                 used += effect.modes_count
@@ -271,7 +320,7 @@ class _System(NamedTuple):
         return Samples(instant, quaternion, added, torque)
 
     def motion(self, state: Array, given: tuple[Composite, Environment], hold: Array) -> tuple[Instant, Array]:
-        """Return the instant with its accelerations, and those of the modes' amplitudes."""
+        """Return the instant with the accelerations of the base, and those of the modes' amplitudes."""
         instant, momentum_rate = self.instant(state, given)
         body, rate = instant.body, instant.rate
         wrench = self.wrench(instant, state[INNER], hold)
@@ -324,11 +373,11 @@ class _System(NamedTuple):
         return still._replace(rate=body.inverse @ (state[MOMENTUM] - body.spin - momentum)), momentum_rate
 
     def momentum(self, instant: Instant, inner: Array) -> tuple[Array, Array]:
-        """Return momentum relative to the base, about the centre of mass, and its derivative but for the modes'."""
+        """Return the momentum relative to the base about the centre of mass, and its derivative without modes."""
         momentum, rate = instant.environment.wheel_momentum, instant.environment.wheel_torque
-        for effect, values, own, _, speed in self.inner(inner):
+        for effect, values, states, _, speed in self.inner(inner):
             if effect.uses("momentum"):
-                more, more_rate = effect.momentum(values, instant, own)
+                more, more_rate = effect.momentum(values, instant, states)
                 momentum, rate = momentum + more, rate + more_rate
             if effect.modes_count:
                 momentum = momentum + _about_com(effect.modes(values), instant.body.com).T @ speed
@@ -337,14 +386,14 @@ class _System(NamedTuple):
     def wrench(self, instant: Instant, inner: Array, hold: Array) -> Wrench:
         given = hold + instant.environment.wrench
         total = Wrench(given[:3], given[3:])
-        for effect, values, own, *_ in self.inner(inner):
+        for effect, values, states, *_ in self.inner(inner):
             if effect.uses("wrench"):
-                more = effect.wrench(values, instant, own)
+                more = effect.wrench(values, instant, states)
                 total = Wrench(total.force + more.force, total.torque + more.torque)
         return total
 
     def gravity_gradient_tensor(self, instant: Instant) -> Array:
-        """Return gravitational acceleration per distance from the centre of mass, (3, 3)."""
+        """Return the gravity-gradient tensor of all effects, shape (3, 3) [1/s2]."""
         parts = zip(self.effects, self.values, strict=True)
         return sum(
             (e.gravity_gradient_tensor(v, instant) for e, v in parts if e.uses("gravity_gradient_tensor")),
@@ -361,5 +410,5 @@ class _System(NamedTuple):
 
 
 def _about_com(modes: Modes, com: Array) -> Array:
-    """Angular momentum of unit modal speeds about the common centre of mass, shape (n, 3)."""
+    """Return the angular momentum of unit modal speeds about the common centre of mass, shape (n, 3)."""
     return modes.angular - jnp.cross(com[None], modes.linear)

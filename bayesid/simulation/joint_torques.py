@@ -1,7 +1,8 @@
-"""Joint torques: the sensors that measure them, and what they read of the bodies that each joint carries.
+"""Joint torques: the sensors that measure them, and the torques that move the bodies beyond each joint.
 
-The torque through a joint is the power per unit of its speed of the wrench that moves everything beyond it, less what
-the gravity gradient gives those bodies. It takes rows of kinematic tables of the bodies beyond the joint.
+The torque through a joint is the virtual power, per unit of its speed, of the wrench that moves all bodies beyond it,
+less that of the gravity gradient on those bodies. It is computed from the kinematic tables of the bodies beyond the
+joint.
 """
 
 from __future__ import annotations
@@ -28,15 +29,16 @@ __all__ = ["BaseMotion", "Beyond", "TorqueSensor", "beyond_joints", "joint_torqu
 
 @dataclass(frozen=True)
 class TorqueSensor:
-    """Torque (force of a prismatic joint) that the parent exerts on the child along the axis, at the motor's side.
+    """Sensors of the torques (forces of prismatic joints) that parents exert on children, at the motors' side.
 
-    Friction of the joint is part of the reading as far as the model has it (`JointFriction`).
+    Friction of a joint is part of the reading if the model has it as an effect (`JointFriction`).
 
     Parameters
     ----------
     joints : tuple of str
+        Names of the joints with a sensor.
     sigma : tuple of float
-        White noise per sample of each of them [N m, N].
+        Standard deviation of the white noise per sample, for each joint [N m, N].
     """
 
     joints: tuple[str, ...]
@@ -57,11 +59,18 @@ class TorqueSensor:
 
 
 class Beyond(NamedTuple):
-    """What each of n joints carries, at T instants; no joint where no torque is measured.
+    """Bodies beyond each of n joints at T instants; n is 0 where no torque is measured.
 
-    known (T, n, 28): table rows of the known bodies beyond a joint; carried (T, n, p): one where a column of the
-    unknown tables belongs to a body beyond the joint; axis (T, n, 6): velocity of what is beyond per unit of joint
-    speed, linear at the base origin and angular, base axes; velocity (T, n): of the joints.
+    Attributes
+    ----------
+    known : (T, n, 28) array
+        Rows of the tables of the known bodies beyond each joint.
+    carried : (T, n, p) array
+        One where a column of the unknown tables belongs to a body beyond the joint, zero elsewhere.
+    axis : (T, n, 6) array
+        Twist at the base origin of the bodies beyond each joint at unit joint speed, linear part first, base axes.
+    velocity : (T, n) array
+        Speeds of the joints [rad/s or m/s].
     """
 
     known: Traceable
@@ -71,32 +80,32 @@ class Beyond(NamedTuple):
 
 
 def no_joints(count: int, columns: int) -> Beyond:
-    """Return what is needed at ``count`` instants where no torque is measured."""
+    """Return an empty `Beyond` at ``count`` instants, for models without torque sensors."""
     return Beyond(*(np.zeros((count, *shape)) for shape in ((0, WIDTH), (0, columns), (0, 6), (0,))))
 
 
 def beyond_joints(
     robot: Robot, state: JointState, moved: Kinematics, unknown: Sequence[str] = (), owners: Sequence[str | None] = ()
 ) -> Beyond:
-    """Reduce a motion to what the torques of all joints need.
+    """Return the bodies beyond all joints along a motion.
 
     Parameters
     ----------
     robot : Robot
     state, moved : JointState, Kinematics
-        The motion at T instants.
+        Motion of the joints and of their frames at T instants.
     unknown : sequence of str
         Links that are not among the known bodies.
     owners : sequence of str or None
-        Link that each of the p columns of the unknown tables belongs to.
+        Link to which each of the p columns of the unknown tables belongs, None if to none.
     """
     links = list(robot.links)
     beyond = carried_bodies(robot, links)
     rows = [
-        composite_rows(robot, moved, leave_out={*unknown, *(n for n, far in zip(links, own, strict=True) if not far)})
-        for own in beyond
+        composite_rows(robot, moved, leave_out={*unknown, *(n for n, far in zip(links, mask, strict=True) if not far)})
+        for mask in beyond
     ]
-    carried = np.array([[0.0 if name is None else own[links.index(name)] for name in owners] for own in beyond])
+    carried = np.array([[0.0 if name is None else mask[links.index(name)] for name in owners] for mask in beyond])
     return Beyond(
         known=np.stack(rows, axis=1),
         carried=np.tile(carried, (len(state.position), 1, 1)),
@@ -106,7 +115,7 @@ def beyond_joints(
 
 
 class BaseMotion(NamedTuple):
-    """Angular velocity of the base, its derivative and the non-gravitational acceleration of its origin, base axes."""
+    """Angular velocity of the base, its derivative, and the specific force at the base origin, in base axes."""
 
     rate: Array
     rate_change: Array
@@ -116,21 +125,22 @@ class BaseMotion(NamedTuple):
 def joint_torques(
     beyond: Beyond, unknown: Array, loads: Array, motion: BaseMotion, com: Array, gravity_gradient_tensor: Array
 ) -> Array:
-    """Return the torques of one instant, shape (n,).
+    """Return the joint torques at one instant, shape (n,).
 
     Parameters
     ----------
     beyond : Beyond
-        Of the instant, without the leading axis.
+        Bodies beyond the joints at the instant, without the leading axis.
     unknown : (28, p) array
-        The unknown tables.
+        Tables of the unknown bodies and of the effects.
     loads : (p,) array
-        What multiplies them.
+        Factors of the columns of these tables.
     motion : BaseMotion
+        Motion of the base.
     com : (3,) array
         Centre of mass of the whole system, base axes [m].
-    tide : (3, 3) array
-        Gravitational acceleration per distance from it, base axes [1/s2].
+    gravity_gradient_tensor : (3, 3) array
+        Gravitational acceleration per distance from the centre of mass, base axes [1/s2].
     """
     if not len(beyond.known):
         return jnp.zeros(0)
@@ -141,11 +151,12 @@ def joint_torques(
 
 
 def _pulled(row: Array, com: Array, gravity_gradient_tensor: Array) -> Array:
-    """Force and torque about the base origin that a field growing linearly from ``com`` exerts on bodies."""
+    """Return the force and torque about the base origin that the gravity gradient about ``com`` exerts."""
     mass, first = row[ENTRIES["mass"]], row[ENTRIES["first"]]
     xx, yy, zz, xy, xz, yz = row[ENTRIES["second"]]
     second = jnp.stack([jnp.stack([xx, xy, xz]), jnp.stack([xy, yy, yz]), jnp.stack([xz, yz, zz])])
-    spread = second @ gravity_gradient_tensor  # integral of r (tide r)'; its antisymmetric part is the torque
+    # integral of r (G r)' over the mass, whose antisymmetric part is the torque
+    spread = second @ gravity_gradient_tensor
     torque = jnp.stack([spread[1, 2] - spread[2, 1], spread[2, 0] - spread[0, 2], spread[0, 1] - spread[1, 0]])
     return jnp.concatenate(
         [gravity_gradient_tensor @ (first - mass * com), torque - jnp.cross(first, gravity_gradient_tensor @ com)]

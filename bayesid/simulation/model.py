@@ -1,4 +1,4 @@
-"""What is assumed: the robot, its sensors, the effects at work, the priors; and the manoeuvres that were recorded."""
+"""Model of a robot with its sensors, effects and priors, and the manoeuvres that it was recorded in."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from bayesid.simulation.sensors import Kind, Sensor
 __all__ = ["Manoeuvre", "Model"]
 
 RATE_SIGMA = 0.1
-"""Default prior standard deviation of an unknown initial rate [rad/s]; wide for anything in orbit."""
+"""Default prior standard deviation of an unknown initial rate [rad/s], wide for any spacecraft."""
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,14 @@ class Manoeuvre:
     Parameters
     ----------
     recording : Recording
-        What the sensors read; may hold no sensor channels when only simulating.
+        Readings of the sensors; a recording that is only to be simulated may lack them.
     motion : Motion
-        The joints' motion.
+        Motion of the joints.
     attitude : (4,) array_like
-        Base to orbit axes at time 0, quaternion x, y, z, w.
+        Quaternion x, y, z, w from base to orbit axes at time 0.
     attitude_sigma : float
-        Its standard deviation per axis [rad]; 0 = exact.
-    latitude : float
+        Standard deviation of this attitude per axis [rad]; 0 if it is exact.
+    argument_of_latitude : float
         Argument of latitude at time 0 [rad].
     """
 
@@ -53,24 +53,26 @@ class Manoeuvre:
 
 @dataclass(frozen=True)
 class Model:
-    """A robot with its sensors, the effects in its simulation and the priors of its unknown bodies.
+    """Robot with its sensors, the effects of its simulation and the priors of its unknown bodies.
 
     Parameters
     ----------
     robot : Robot
     sensors : sequence of Sensor
+        Sensors on the base, at most one of each kind.
     priors : sequence of BodyPrior
-        Bodies to identify, and those to marginalise.
+        Priors of the bodies to identify and of those to marginalise.
     orbit : Orbit, optional
-        None in a laboratory.
+        Orbit of the robot, None in a laboratory.
     effects : sequence of Effect
+        Effects beyond the motion of rigid bodies.
     rate_sigma : float
         Prior standard deviation of the initial rate of each recording [rad/s]; 0 for a start at rest.
     mixing : (10 B, 10 B) tuple of tuples, optional
-        Joint prior of all B ``priors`` about their centres (`Unknowns`), such as the posterior of an earlier study;
-        left out, bodies and coordinates are independent.
+        Factor of the joint prior of all B ``priors`` about their centres (`Unknowns`), such as the posterior of an
+        earlier study; by default bodies and coordinates are independent.
     torque : TorqueSensor, optional
-        Where joint torques are measured.
+        Sensors of the joint torques.
     speed_errors : bool, optional
         Whether the smoothed joint speeds at time 0 are uncertain; by default where the initial rate is zero.
     """
@@ -128,7 +130,7 @@ class Model:
 
     @property
     def without_torque(self) -> Model:
-        """The model without torque sensors and what only they read."""
+        """The same model without torque sensors and without effects that only they can read."""
         rest = tuple(effect for effect in self.effects if not effect.uses("friction"))
         return self if self.torque is None and rest == self.effects else replace(self, torque=None, effects=rest)
 
@@ -143,26 +145,26 @@ class Model:
         return Channels(tuple(sensor.kind for sensor in self.sensors), joints)
 
     def sensor(self, kind: Kind) -> Sensor | None:
-        """Return the sensor of a kind, None where none is declared."""
+        """Return the sensor of a kind, or None if none is declared."""
         return next((sensor for sensor in self.sensors if sensor.kind == kind), None)
 
     @property
     def has_speed_errors(self) -> bool:
         """Whether errors of the smoothed joint speeds at time 0 are unknowns.
 
-        They are where the initial rate is declared zero: the base rests if the joints truly do, and a smoothed speed
-        that is not the true one would be read as momentum. An unknown initial rate takes them up.
+        By default they are unknowns if the initial rate is declared zero: the base then rests if the joints truly do,
+        and an error of a smoothed speed would be taken for momentum. An unknown initial rate absorbs such errors.
         """
         return self.rate_sigma == 0.0 if self.speed_errors is None else self.speed_errors
 
     @property
     def bodies(self) -> tuple[BodyPrior, ...]:
-        """The bodies to identify, without those only marginalised."""
+        """Priors of the bodies to identify, without those that are marginalised."""
         return tuple(prior for prior in self.priors if not prior.nuisance)
 
 
 def spread_links(robot: Robot, spread: float, known: Sequence[str]) -> tuple[BodyPrior, ...]:
-    """Put every link with mass that is not in ``known`` under a prior of the given relative width."""
+    """Return priors of the given relative width for all links with mass except those in ``known``, to marginalise."""
     if spread <= 0.0:
         return ()
     return tuple(

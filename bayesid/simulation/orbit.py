@@ -1,7 +1,7 @@
-"""The orbit as the robot feels it: zenith, gravity gradient, velocity and Sun in the recording's orbit axes.
+"""Orbit of the robot: zenith, gravity gradient, velocity and Sun in the orbit axes of a recording.
 
 Orbit axes do not rotate: x is the zenith at time 0 of the recording, z the orbit normal, y along-track. The paper notes
-that its equations (14)-(16) hold for any eccentricity; only the zenith's angle and the radius then change with time.
+that its equations (14)-(16) hold for any eccentricity; it changes only the zenith's angle and the radius over time.
 """
 
 from __future__ import annotations
@@ -22,27 +22,46 @@ EARTH = 3.986004418e14
 
 
 class OrbitState(NamedTuple):
-    """What the orbit gives at some times; vectors in orbit axes, shape (T, 3), scalars shape (T,)."""
+    """State of the orbit at T times, with vectors in orbit axes.
+
+    Attributes
+    ----------
+    zenith : (T, 3) array
+        Unit vectors from the Earth's centre.
+    gradient : (T,) array
+        Gravity gradient mu / r^3 [1/s2].
+    velocity : (T, 3) array
+        Unit vectors along the direction of motion.
+    sun : (T, 3) array
+        Unit vectors to the Sun, zero where its direction is unknown.
+    argument_of_latitude : (T,) array
+        Argument of latitude [rad].
+    north : (T, 3) array
+        Unit vectors along the Earth's axis to the north, zero where the inclination is unknown.
+    """
 
     zenith: Floats
-    gradient: Floats  # mu / r^3 [1/s2]
-    velocity: Floats  # direction of motion
+    gradient: Floats
+    velocity: Floats
     sun: Floats
-    argument_of_latitude: Floats  # argument of latitude [rad]
-    north: Floats  # the Earth's north pole
+    argument_of_latitude: Floats
+    north: Floats
 
 
 @dataclass(frozen=True)
 class Orbit:
-    """A Kepler orbit around the Earth.
+    """Kepler orbit around the Earth.
 
     Parameters
     ----------
     radius : float
         Semi-major axis [m].
     eccentricity : float
-    inclination, argument_of_perigee : float
-        [rad]
+        Eccentricity, from 0 to less than 1.
+    inclination : float, optional
+        Inclination against the equator [rad].
+    argument_of_perigee : float
+        Argument of perigee [rad].
     sun : (3,) array_like, optional
         Unit vector to the Sun in Earth-centred axes: ascending node, along-orbit, normal.
     """
@@ -68,14 +87,14 @@ class Orbit:
         return float(np.sqrt(EARTH / self.radius**3))
 
     def state(self, time: ArrayLike, argument_of_latitude: float = 0.0) -> OrbitState:
-        """Evaluate the orbit.
+        """Return the state of the orbit.
 
         Parameters
         ----------
         time : (T,) array_like
-            Since the start of the recording [s].
+            Times since the start of the recording [s].
         argument_of_latitude : float
-            At time 0 [rad].
+            Argument of latitude at time 0 [rad].
         """
         t = np.asarray(time, dtype=float)
         anomaly_start = argument_of_latitude - self.argument_of_perigee
@@ -123,7 +142,7 @@ class Orbit:
 
 
 def _from_node(vector: Floats, argument_of_latitude: float) -> Floats:
-    """Turn a direction from axes (ascending node, along-orbit, normal) to orbit axes, as a unit vector."""
+    """Return a direction in axes (ascending node, along-orbit, normal) as a unit vector in orbit axes."""
     cos, sin = np.cos(argument_of_latitude), np.sin(argument_of_latitude)
     node, along, normal = vector / np.linalg.norm(vector)
     return np.array([cos * node + sin * along, -sin * node + cos * along, normal])

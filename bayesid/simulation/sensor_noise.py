@@ -1,6 +1,6 @@
-"""Noise of sensors: per sample, from data sheets, coloured, quantised; and filters.
+"""Noise of sensors, given per sample or by data sheets, coloured or quantised, and filters of their samples.
 
-Every class is a plain value; nothing here depends on what a sensor measures.
+Every class is a plain value that does not depend on the quantity that a sensor measures.
 """
 
 from __future__ import annotations
@@ -32,32 +32,32 @@ ARCSEC = np.pi / 180.0 / 3600.0
 
 
 class Noise(Protocol):
-    """White noise of a sensor."""
+    """White noise of a sensor, as a function of its sample interval."""
 
     def sigma(self, interval: float) -> Floats:
-        """Return the standard deviation per axis, (3,), of samples taken every ``interval`` seconds."""
+        """Return the standard deviation per axis of samples that are ``interval`` seconds apart, shape (3,)."""
         ...
 
 
 @dataclass(frozen=True)
 class White:
-    """Noise given per sample."""
+    """Noise whose standard deviation is given per sample."""
 
     value: float | tuple[float, float, float]
 
     def sigma(self, interval: float) -> Floats:
-        """Return the given value, whatever the interval."""
+        """Return the given value, which does not depend on the interval."""
         return np.broadcast_to(np.asarray(self.value, dtype=float), (3,)).copy()
 
 
 @dataclass(frozen=True)
 class AngleRandomWalk:
-    """Gyro noise from a data sheet [rad/sqrt(s)]: the angle's error grows as the square root of time."""
+    """Angle random walk of a gyro from a data sheet [rad/sqrt(s)], the angle's error per square root of time."""
 
     value: float | tuple[float, float, float]
 
     def sigma(self, interval: float) -> Floats:
-        """Return the rate's noise: walk / sqrt(interval)."""
+        """Return the standard deviation of the rate, walk / sqrt(interval)."""
         return White(self.value).sigma(interval) / np.sqrt(interval)
 
 
@@ -68,53 +68,53 @@ class NoiseDensity:
     value: float | tuple[float, float, float]
 
     def sigma(self, interval: float) -> Floats:
-        """Return density * sqrt(Nyquist frequency)."""
+        """Return the standard deviation, density * sqrt(Nyquist frequency)."""
         return White(self.value).sigma(interval) * np.sqrt(0.5 / interval)
 
 
 @dataclass(frozen=True)
 class StarTracker:
-    """Rate from differencing a star sensor's attitude, whose samples have the given error in seconds of arc."""
+    """Noise of a rate that is differenced from a star sensor's attitude of a given error per sample [arcsec]."""
 
     arcsec: float | tuple[float, float, float]
 
     def sigma(self, interval: float) -> Floats:
-        """Return sqrt(2) * error / interval."""
+        """Return the standard deviation of the rate, sqrt(2) * error / interval."""
         return np.sqrt(2.0) * White(self.arcsec).sigma(interval) * ARCSEC / interval
 
 
 @dataclass(frozen=True)
 class Scaled:
-    """Another noise, times a factor per axis: an understated data sheet."""
+    """Another noise times a factor per axis, for a data sheet that understates the noise."""
 
     noise: Noise
     factor: tuple[float, float, float]
 
     def sigma(self, interval: float) -> Floats:
-        """Return the scaled noise."""
+        """Return the scaled standard deviation."""
         return self.noise.sigma(interval) * np.asarray(self.factor)
 
 
 @dataclass(frozen=True)
 class Quantised:
-    """Another noise, rounded to multiples of a step per axis: rounding adds a twelfth of the step's square."""
+    """Another noise with rounding to a step per axis, which adds a twelfth of the squared step to the variance."""
 
     noise: Noise
     step: tuple[float, float, float]
 
     def sigma(self, interval: float) -> Floats:
-        """Return the noise with that of rounding."""
+        """Return the standard deviation of noise and rounding."""
         return np.hypot(self.noise.sigma(interval), np.asarray(self.step) / np.sqrt(12.0))
 
 
 @dataclass(frozen=True)
 class Coloured:
-    """Exponentially correlated noise (Ornstein-Uhlenbeck) beside the white one.
+    """Exponentially correlated noise (Ornstein-Uhlenbeck) in addition to the white noise.
 
     Parameters
     ----------
-    sigma : (3,)
-        Standard deviation per axis, in the sensor's unit.
+    sigma : (3,) tuple of float
+        Standard deviation per axis, in the unit of the sensor.
     time : float
         Correlation time [s].
     """
@@ -125,21 +125,21 @@ class Coloured:
 
 @dataclass(frozen=True)
 class Filter:
-    """Zero-phase low-pass and decimation, applied alike to measurement and prediction.
+    """Zero-phase low-pass filter and decimation, which apply to measurement and prediction alike.
 
     Parameters
     ----------
     low_pass : float, optional
-        Cut-off (half amplitude) [Hz].
+        Cut-off frequency, at half amplitude [Hz].
     decimate : int
-        Keep every n-th sample.
+        Number n of which every n-th sample is kept.
     """
 
     low_pass: float | None = None
     decimate: int = 1
 
     def taps(self, interval: float) -> Floats:
-        """Return the symmetric kernel, of odd length, for samples every ``interval`` seconds."""
+        """Return the symmetric kernel, of odd length, for samples that are ``interval`` seconds apart."""
         if self.low_pass is None:
             return np.ones(1)
         cut = self.low_pass * interval
@@ -148,7 +148,7 @@ class Filter:
                 f"low_pass {self.low_pass:g} Hz is not below half the sampling rate, {0.5 / interval:g} Hz",
                 remedy="Choose a lower cut-off or leave it out",
             )
-        half = int(np.ceil(1.65 / cut))  # a Hamming window's transition band is then as wide as the pass band
+        half = int(np.ceil(1.65 / cut))  # the transition band of a Hamming window is then as wide as the pass band
         n = np.arange(-half, half + 1)
         kernel = np.sinc(2.0 * cut * n) * np.hamming(2 * half + 1)
         return kernel / kernel.sum()

@@ -1,7 +1,7 @@
-"""Sensors on the base: what a kind of sensor measures, where one sits, how it is turned and how noisy it is.
+"""Sensors on the base: the quantity that each kind measures, and the mounting and noise of a sensor.
 
-A kind of sensor is one class: the channels it is recorded in, what it reads at an instant of the simulation, and how a
-measured and a predicted reading differ. `Kind.register` makes it known by the name of its channels.
+A kind of sensor is one class, which defines its channels in recordings, its reading at an instant of the simulation,
+and the residual of a measured and a predicted reading. `Kind.register` makes it known by the name of its channels.
 """
 
 from __future__ import annotations
@@ -51,10 +51,18 @@ __all__ = [
 
 
 class Sensed(NamedTuple):
-    """One instant of the simulation as a sensor meets it.
+    """One instant of the simulation, from which a sensor takes its reading.
 
-    ``quaternion`` (4,) turns base to orbit axes; ``point`` (3,) is the sensor's mounting point in the base [m];
-    ``specific_force`` (3,) is what effects add to an accelerometer there [m/s2], base axes.
+    Attributes
+    ----------
+    instant : Instant
+        Motion of the robot.
+    quaternion : (4,) array
+        Attitude x, y, z, w from base to orbit axes.
+    point : (3,) array
+        Mounting point of the sensor in the base [m].
+    specific_force : (3,) array
+        Specific force that effects add at this point, base axes [m/s2].
     """
 
     instant: Instant
@@ -64,26 +72,26 @@ class Sensed(NamedTuple):
 
 
 class Kind:
-    """What a sensor measures. Subclass it, set the attributes, define `read`, and decorate it with `Kind.register`.
+    """Kind of sensor. To add one, subclass it, set the attributes, define `read`, and decorate it with `Kind.register`.
 
     Attributes
     ----------
     value : str
-        Family of its channels in recordings, whose columns are ``value.axis``.
+        Name of the family of its channels in recordings, whose columns are ``value.axis``.
     unit : str
         Unit of the residual.
     axes : tuple of str
-        Components as recorded.
+        Names of the recorded components.
     rest : tuple of float
-        Reading, component by component, of a base at rest in orbit axes.
+        Recorded components of a base at rest in orbit axes.
     mounted : bool
-        Whether readings are vectors that the sensor's mounting turns.
+        Whether the readings are vectors in sensor axes, which the mounting turns.
     feels_force : bool
-        Whether the specific forces that effects add reach it.
+        Whether the sensor reads the specific forces that effects add.
     frame : str
-        What the reading is, and in which axes.
+        Meaning and axes of the reading, in the files of results.
     slip : str
-        The unit by which users most often mistake it.
+        Unit that users most often give by mistake.
     """
 
     value: ClassVar[str]
@@ -96,7 +104,7 @@ class Kind:
     slip: ClassVar[str] = "another unit"
 
     size: ClassVar[int] = 3
-    """Components of the residual."""
+    """Number of components of the residual."""
 
     RATE: ClassVar[Kind]
     ACCEL: ClassVar[Kind]
@@ -106,10 +114,10 @@ class Kind:
 
     @staticmethod
     def register(kind: type[K]) -> type[K]:
-        """Class decorator: make a kind known by the family of its channels."""
+        """Make a kind known by the family of its channels; a class decorator."""
         known = Kind._known.get(kind.value)
         if known is not None and type(known).__qualname__ != kind.__qualname__:
-            raise InputError(f"two kinds of sensor are named {kind.value!r}", remedy="Give each channels of its own")
+            raise InputError(f"two kinds of sensor are named {kind.value!r}", remedy="Give each different channels")
         declare_family(kind.value, kind.axes)
         Kind._known[kind.value] = kind()
         return kind
@@ -123,20 +131,20 @@ class Kind:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of its channels."""
+        """Names of the channels."""
         return tuple(f"{self.value}.{axis}" for axis in self.axes)
 
     @property
     def components(self) -> tuple[str, ...]:
-        """Names of the components of its residual."""
+        """Names of the components of the residual."""
         return tuple(f"{self.value}.{axis}" for axis in self.axes[: self.size])
 
     def read(self, sensed: Sensed) -> Array:
-        """Return the true reading, base axes, shape (axes,)."""
+        """Return the true reading in base axes, shape (axes,)."""
         raise NotImplementedError
 
     def residual(self, measured: Array, predicted: Array) -> Array:
-        """Return how a measured reading differs from a predicted one, shape (size,)."""
+        """Return a measured less a predicted reading, shape (size,)."""
         return measured - predicted
 
     def noisy(self, readings: Floats, noise: Floats) -> Floats:
@@ -144,7 +152,7 @@ class Kind:
         return readings + noise
 
     def shown(self, readings: Floats, reference: Floats) -> Floats:
-        """Return readings (n, axes) as they are drawn, (n, size), where need be relative to a reference (axes,)."""
+        """Return readings (n, axes) as figures draw them, (n, size), some relative to a reference reading (axes,)."""
         return readings
 
     def __eq__(self, other: object) -> bool:
@@ -169,13 +177,13 @@ class AngularRate(Kind):
     slip = "degrees per second"
 
     def read(self, sensed: Sensed) -> Array:
-        """Return the base's angular velocity."""
+        """Return the angular velocity of the base."""
         return sensed.instant.rate
 
 
 @Kind.register
 class SpecificForce(Kind):
-    """Non-gravitational acceleration of the mounting point."""
+    """Specific force (non-gravitational acceleration) at the mounting point."""
 
     value, unit = "accel", "m/s2"
     feels_force = True
@@ -183,7 +191,7 @@ class SpecificForce(Kind):
     slip = "mm/s2 or micro-g"
 
     def read(self, sensed: Sensed) -> Array:
-        """Return the acceleration of the base origin, what rotation adds at the point, and what effects add."""
+        """Return the specific force at the base origin, with the parts that rotation and effects add at the point."""
         from bayesid._math.small_matrices import cross
 
         instant, point = sensed.instant, sensed.point
@@ -193,7 +201,7 @@ class SpecificForce(Kind):
 
 @Kind.register
 class StarAttitude(Kind):
-    """Attitude of the base, a quaternion x, y, z, w from base to orbit axes; its residual is a small rotation."""
+    """Attitude of the base as a quaternion x, y, z, w from base to orbit axes, whose residual is a small rotation."""
 
     value, unit = "attitude", "rad"
     axes, rest = ("x", "y", "z", "w"), (0.0, 0.0, 0.0, 1.0)
@@ -211,7 +219,7 @@ class StarAttitude(Kind):
         return rotation_between(predicted, measured)
 
     def noisy(self, readings: Floats, noise: Floats) -> Floats:
-        """Return attitudes turned by small rotations in base axes."""
+        """Return the attitudes turned by small rotations in base axes."""
         half = 0.5 * noise
         vector = readings[..., 3:] * half + np.cross(readings[..., :3], half)
         scalar = readings[..., 3] - (readings[..., :3] * half).sum(axis=-1)
@@ -219,7 +227,7 @@ class StarAttitude(Kind):
         return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
 
     def shown(self, readings: Floats, reference: Floats) -> Floats:
-        """Return rotation vectors from the reference [rad]."""
+        """Return the rotation vectors from the reference, in its axes [rad]."""
         from scipy.spatial.transform import Rotation
 
         return (Rotation.from_quat(reference).inv() * Rotation.from_quat(readings)).as_rotvec()
@@ -230,19 +238,21 @@ Kind.RATE, Kind.ACCEL, Kind.ATTITUDE = Kind.of("rate"), Kind.of("accel"), Kind.o
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor on the base.
+    """Sensor on the base.
 
     Parameters
     ----------
     kind : Kind
     noise : Noise
+        White noise.
     mounting : (4,) array_like
         Quaternion x, y, z, w that turns sensor axes into base axes.
     position : (3,) array_like
         Mounting point in the base [m].
     filter : Filter
+        Filter of the samples, by default none.
     coloured : Coloured, optional
-        Correlated noise beside the white one.
+        Correlated noise in addition to the white noise.
     """
 
     kind: Kind
@@ -254,7 +264,7 @@ class Sensor:
 
     @property
     def rotation(self) -> Floats:
-        """Rotation matrix, sensor to base axes."""
-        from scipy.spatial.transform import Rotation  # study files, which name a noise, are checked without SciPy
+        """Rotation matrix from sensor to base axes, shape (3, 3)."""
+        from scipy.spatial.transform import Rotation  # imported here, so that study files are checked without SciPy
 
         return Rotation.from_quat(np.asarray(self.mounting, dtype=float)).as_matrix()

@@ -1,4 +1,4 @@
-"""The forward model: from the physical values of the unknowns to what the sensors read, and to the residual."""
+"""Forward model from the physical values of the unknowns to the readings of the sensors and the residual."""
 
 from __future__ import annotations
 
@@ -24,11 +24,20 @@ __all__ = ["ModelConstants", "Simulator", "Values"]
 
 
 class Values(NamedTuple):
-    """Physical values of the unknowns.
+    """Physical values of the unknowns of R recordings.
 
-    inertial (10 bodies,) linear parameters body after body; rate (R, 3) initial rates; tilt (R, 3) small rotation
-    of the initial attitude, base axes; speed (R, n) errors of the smoothed joint speeds at time 0, n = 0 where they are
-    of no account; effects: per effect (n,) or, per recording, (R, n).
+    Attributes
+    ----------
+    inertial : (10 B,) array
+        Linear inertial parameters of B bodies, body after body.
+    rate : (R, 3) array
+        Initial rates, base axes [rad/s].
+    tilt : (R, 3) array
+        Small rotations of the initial attitudes, base axes [rad].
+    speed : (R, n) array
+        Errors of the n smoothed joint speeds at time 0 [rad/s or m/s]; n is 0 where the model has no such errors.
+    effects : tuple of (n,) or (R, n) arrays
+        Parameters of each effect, with a leading axis R if they differ between recordings.
     """
 
     inertial: Array
@@ -39,10 +48,16 @@ class Values(NamedTuple):
 
 
 class ModelConstants(NamedTuple):
-    """Numbers of a model that compiled code takes as arguments.
+    """Numbers of a model with K sensors that compiled code takes as arguments.
 
-    rotation (K, 3, 3), sensor to base axes, and point (K, 3), mounting point in the base [m], of every sensor; and the
-    constants of every effect.
+    Attributes
+    ----------
+    rotation : (K, 3, 3) array
+        Rotations from sensor to base axes.
+    point : (K, 3) array
+        Mounting points in the base [m].
+    effects : tuple
+        Constants of each effect (`Effect.constants`).
     """
 
     rotation: Traceable
@@ -51,7 +66,7 @@ class ModelConstants(NamedTuple):
 
     @classmethod
     def of(cls, model: Model) -> ModelConstants:
-        """Collect the constants of a model."""
+        """Return the constants of a model."""
         return cls(
             rotation=np.stack([sensor.rotation for sensor in model.sensors]),
             point=np.stack([np.asarray(sensor.position, dtype=float) for sensor in model.sensors]),
@@ -61,17 +76,18 @@ class ModelConstants(NamedTuple):
 
 @dataclass(frozen=True)
 class Simulator:
-    """The forward model; every method can be traced, batched and differentiated by JAX.
+    """Forward model, every method of which can be traced, batched and differentiated by JAX.
 
-    Simulators that do the same operations are equal. Grids, attitudes and readings have a leading axis R of recordings.
+    Simulators of the same operations are equal. Grids, attitudes and readings have a leading axis R of recordings.
 
     Parameters
     ----------
     channels : Channels
+        Layout of the residual.
     torques : tuple of int
-        Joints whose torque is measured, indices into `Robot.joints`.
+        Indices into `Robot.joints` of the joints whose torque is measured.
     keys : tuple of EffectKey
-        Effects at work.
+        Effects of the model.
     """
 
     channels: Channels
@@ -87,7 +103,7 @@ class Simulator:
     def readings(
         self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array
     ) -> tuple[Readings, Array, Array]:
-        """Return what the sensors read, sensor axes, (R, T, ...), and the base's attitude and rate, base axes."""
+        """Return the readings of the sensors (R, T, ...), sensor axes, and the attitude and rate of the base."""
 
         def one(values: Values, grid: Grid, attitude: Array) -> tuple[Readings, Array, Array]:
             samples = simulate(*self._arguments(constants, values, grid, attitude))
@@ -98,7 +114,7 @@ class Simulator:
     def trace(
         self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array
     ) -> tuple[Instant, Instant, Readings]:
-        """Return the motion at the integration nodes and at the samples, and the readings."""
+        """Return the motion at the integration nodes and at the samples, and the readings of the sensors."""
 
         def one(values: Values, grid: Grid, attitude: Array) -> tuple[Instant, Instant, Readings]:
             node, samples = trace(*self._arguments(constants, values, grid, attitude))
@@ -115,7 +131,7 @@ class Simulator:
         return jnp.concatenate([*parts, measured.torque - self.measured_torques(readings)], axis=-1)
 
     def measured_torques(self, readings: Readings) -> Array:
-        """Return the predicted torques of the joints that are measured, (R, T, n)."""
+        """Return the predicted torques of the joints with a torque sensor, shape (R, T, n)."""
         if not self.torques:
             return jnp.zeros((*readings.time.shape, 0))
         return readings.torque[..., list(self.torques)]
@@ -126,14 +142,14 @@ class Simulator:
         return Values(None, 0, 0, 0, effects)  # type: ignore[arg-type]
 
     def _effects(self, constants: ModelConstants) -> tuple[Effect, ...]:
-        return tuple(key.effect.bound(own) for key, own in zip(self.keys, constants.effects, strict=True))
+        return tuple(key.effect.bound(numbers) for key, numbers in zip(self.keys, constants.effects, strict=True))
 
     def _arguments(self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array) -> tuple[Any, ...]:
         start = Start(tilted(attitude, values.tilt), values.rate, values.speed)
         return grid, values.inertial, start, self._effects(constants), values.effects, constants.point
 
     def _read(self, constants: ModelConstants, values: Values, grid: Grid, samples: Samples) -> Readings:
-        """Return what the sensors make of the motion of one recording."""
+        """Return the readings of the sensors in one recording, with the faults and friction that effects add."""
         channels = {}
         for index, kind in enumerate(self.channels.kinds):
             sensed = Sensed(
@@ -145,9 +161,9 @@ class Simulator:
             reading = jax.vmap(kind.read)(sensed)
             channels[kind.value] = reading @ constants.rotation[index] if kind.mounted else reading
         readings = Readings(samples.instant.environment.time, channels, samples.torque)
-        for effect, own in zip(self._effects(constants), values.effects, strict=True):
-            readings = effect.read(own, readings)
+        for effect, parameters in zip(self._effects(constants), values.effects, strict=True):
+            readings = effect.read(parameters, readings)
             if self.torques and effect.uses("friction"):
-                friction = effect.friction(own, grid.sample.beyond.velocity)
+                friction = effect.friction(parameters, grid.sample.beyond.velocity)
                 readings = readings._replace(torque=readings.torque + friction)
         return readings

@@ -1,4 +1,4 @@
-"""From a recording's motion to the arrays a simulation runs on: integration steps, samples and their tables."""
+"""Grids of recordings: the integration steps and samples of a simulation, with their kinematic tables."""
 
 from __future__ import annotations
 
@@ -39,31 +39,36 @@ def build_grid(
     torques: bool = False,
     speed_errors: bool = False,
 ) -> Grid:
-    """Reduce one recording to a `Grid`.
+    """Return the grid to which one recording is reduced.
 
     Parameters
     ----------
     robot : Robot
     unknown : tuple of str
-        Links whose parameters the simulation takes as an argument, in that order; the others are summed.
+        Links whose parameters are arguments of the simulation, in that order; all others are summed.
     motion : Motion
+        Motion of the joints.
     samples : (T,) array
-        Times at which sensors are read [s].
+        Times at which any sensor is sampled [s].
     step : float
-        Longest integration step [s]; steps end where a held action changes.
+        Longest integration step [s]; a step also ends where the held wrench changes.
+    orbit : Orbit, optional
+        Orbit of the robot, None in a laboratory.
     argument_of_latitude : float
         Argument of latitude at time 0 [rad].
+    actions : Actions, optional
+        Known actions on the base, by default none.
     effects : sequence of Effect
-        Whose tables follow those of the unknown links.
+        Effects whose tables follow those of the unknown links.
     torques : bool
-        Whether the joints' torques are sampled too.
+        Whether joint torques are computed at the samples.
     speed_errors : bool
-        Whether errors of the joints' speeds at time 0 are told apart (`UnitSpeed`).
+        Whether the grid has tables for errors of the joint speeds at time 0 (`UnitSpeed`).
 
     Returns
     -------
     Grid
-        Of NumPy arrays, or of JAX's where the motion is traced.
+        Arrays of NumPy, or of JAX if the motion is traced.
     """
     actions = Actions.none() if actions is None else actions
     nodes = _nodes(float(samples[-1]), step, actions.time)
@@ -92,7 +97,8 @@ def _unit_speed(robot: Robot, unknown: tuple[str, ...], motion: Motion, columns:
     position = np.tile(motion.evaluate(np.zeros(1)).position, (count, 1))
     moved = kinematics(robot, JointState(position, np.eye(count), np.zeros((count, count))))
     tables = [link_table(robot, name, moved) for name in unknown]
-    rest = np.zeros((count, WIDTH, columns - 10 * len(tables)))  # effects: of second order
+    # effects change the momentum of such errors to second order only
+    rest = np.zeros((count, WIDTH, columns - 10 * len(tables)))
     return UnitSpeed(composite_rows(robot, moved, leave_out=unknown), np.concatenate([*tables, rest], axis=2))
 
 
@@ -140,20 +146,20 @@ def _instants(
 
 
 FINEST = 32
-"""Lengths are padded to multiples of this at least, so that recordings of about one length share compiled functions."""
+"""Smallest unit of padded lengths, so that recordings of about the same length share compiled functions."""
 
 PARTS = 4
-"""Lengths beyond are padded to one of so many steps between a power of two and the next."""
+"""Number of padded lengths between a power of two and the next, for lengths beyond the smallest unit."""
 
 
 def rounded(length: int) -> int:
-    """Return a length rounded up coarsely, by at most a quarter where it is not short."""
+    """Return a length rounded up to a coarse one, by at most a quarter unless it is short."""
     unit = max(FINEST, (1 << max(length - 1, 1).bit_length() - 1) // PARTS)
     return -(-length // unit) * unit
 
 
 def pad_grids(grids: Sequence[Grid], steps: int | None = None, samples: int | None = None) -> Grid:
-    """Stack grids of different lengths, shape (R, ...); the padding is steps of no length and copies of a sample."""
+    """Return grids stacked to shape (R, ...), padded with steps of zero length and copies of the last sample."""
     steps = max(len(grid.step) for grid in grids) if steps is None else steps
     samples = max(len(grid.step_of) for grid in grids) if samples is None else samples
     padded = [

@@ -1,7 +1,7 @@
-"""Effects a model can carry; see `bayesid.simulation.effects.effect.Effect` for writing a new one.
+"""Effects that a model can have; `bayesid.simulation.effects.effect.Effect` describes how to write a new one.
 
-This file is the list of shipped effects: importing a class that is decorated with `register` makes it known to study
-files, and everything else that the package needs to know of an effect its class states itself.
+This file lists the shipped effects. The import of a class that is decorated with `register` makes the effect known to
+study files; the class states everything else that the package needs to know of the effect.
 """
 
 from bayesid.simulation.effects.arm_effects import LinkInertia, Payload

@@ -1,4 +1,4 @@
-"""What a link of the robot is, differently from what the model believes."""
+"""Effects of a link whose inertial parameters differ from those of the model."""
 
 from __future__ import annotations
 
@@ -31,13 +31,14 @@ CHANGES = (
     *(Quantity(f"com.{axis}", "m") for axis in "xyz"),
     *(Quantity(f"inertia.{axes}", "kg m2") for axes in ("xx", "yy", "zz", "xy", "xz", "yz")),
 )
+"""Reported changes of a link, with the inertia about the centre of mass in link axes."""
 
 
 class _OnLink(Placed):
-    """A change of one link's ten inertial parameters that leaves the link a physical body.
+    """Change of one link's ten inertial parameters, after which the link is still a physical body.
 
-    The coordinates are log-Cholesky relative to the nominal link; reported are changes of mass, centre of mass and
-    inertia about it, link axes.
+    The parameters are log-Cholesky coordinates relative to the nominal link; the reported quantities are the changes of
+    mass, centre of mass and inertia (`CHANGES`).
     """
 
     spread = 1.0
@@ -52,13 +53,13 @@ class _OnLink(Placed):
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
-        """Return the effect on every link with volume whose parameters the model does not leave open anyway."""
+        """Return the effect on every link with volume that the model does not identify anyway."""
         unknown = {prior.name for prior in model.bodies}
         links = model.robot.links.items()
         return [cls(name) for name, link in links if name not in unknown and link.inertial.is_extended]
 
     def attach(self, robot: Robot) -> Self:
-        """Take the nominal link from the robot."""
+        """Return the effect with the nominal link of the robot."""
         nominal = robot.link(self.place).inertial
         if not nominal.is_extended:
             raise InputError(
@@ -71,25 +72,25 @@ class _OnLink(Placed):
 
     @property
     def link(self) -> str | None:
-        """The link."""
+        """Link that changes."""
         return self.place
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Changes of mass, centre of mass and inertia."""
+        """Reported changes of mass, centre of mass and inertia."""
         return CHANGES
 
     def report(self, values: Array) -> Array:
-        """Return the link less the nominal link."""
+        """Return the differences of the link from the nominal link."""
         factor, nominal = self._attached
         return mass_com_inertia(vector_from_factor(factor, values)) - mass_com_inertia(nominal)
 
     def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
-        """Return the link's own table."""
+        """Return the kinematic table of the link."""
         return link_table(robot, self.place, kinematics(robot, motion.evaluate(time)))
 
     def loads(self, values: Array) -> Array:
-        """Return the change of the ten parameters."""
+        """Return the changes of the ten linear parameters."""
         factor, _ = self._attached
         return vector_from_factor(factor, values) - vector_from_factor(factor, jnp.zeros(len(LOG_CHOLESKY)))
 
@@ -103,13 +104,13 @@ class _OnLink(Placed):
 
 @register
 class Payload(_OnLink):
-    """A rigid body nobody mentioned, fixed on a link.
+    """Rigid body that is fixed on a link and missing in the model.
 
-    The prior is that of a link of the nominal mass, wrong by a factor of e^2 at one standard deviation.
+    At one standard deviation of the prior, the mass of the link is wrong by a factor of e^2.
     """
 
     name = "payload"
-    summary = "Something is fixed on the link that the model does not have: a tool, a captured body."
+    summary = "A body that the model lacks is fixed on the link, such as a tool or a captured body."
     separated_by = (
         "It moves with its link: move that joint through another range with the other joints still, and with the wrist "
         "in another posture, so that mass, centre of mass and inertia act apart."
@@ -118,7 +119,7 @@ class Payload(_OnLink):
 
 @register
 class LinkInertia(_OnLink):
-    """An error of one link's inertial parameters; the prior is 10 % in log-Cholesky coordinates, 20 % of the mass."""
+    """Error of one link's inertial parameters, with a prior of 10 % in log-Cholesky coordinates and 20 % in mass."""
 
     name = "link-inertia"
     summary = "The link's mass, centre of mass or inertia differ from the model's (CAD) values."

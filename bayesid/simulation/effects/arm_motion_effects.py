@@ -1,4 +1,4 @@
-"""What the joints do, differently from what the recording says."""
+"""Effects of joints that move differently from what the recording says."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
 __all__ = ["EncoderOffset", "JointFlexibility", "JointLatency"]
 
 OFFSET_STEP = 0.02
-"""Joint offset at which the tables are sampled for a quadratic [rad or m]; its cubic rest is below 1e-5 at 0.03 rad."""
+"""Joint offset at which the tables are sampled for a quadratic [rad or m], with an error below 1e-5 at 0.03 rad."""
 
 
 @register
 class EncoderOffset(DisplacedMotion, OnJoint):
     """Constant error of a joint's recorded position: recorded = true + offset.
 
-    The prior of 0.02 rad is a wrong zero by a degree.
+    The prior of 0.02 rad is about one degree.
     """
 
     name = "encoder-offset"
-    summary = "The joint's encoder has a wrong zero: the arm stands elsewhere than the recording says."
+    summary = "The joint's encoder has a wrong zero: the arm is in another posture than the recording says."
     separated_by = (
         "It acts as a wrong posture: move that joint through another range with the others still; the offset stays the "
         "same, an error of a mass does not."
@@ -50,7 +50,7 @@ class EncoderOffset(DisplacedMotion, OnJoint):
         self.parameters = (Parameter("offset", "rad", sigma),)
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
-        """Return first and second differences in the joint's position."""
+        """Return the first and second differences in the position of the joint."""
         unit = np.eye(len(robot.joints))[self.index_in(robot)]
         state = motion.evaluate(time)
         motions = [
@@ -62,60 +62,60 @@ class EncoderOffset(DisplacedMotion, OnJoint):
         return Displaced(motions, np.stack([first, second]))
 
     def loads(self, values: Array) -> Array:
-        """Return the powers of the offset: the true position is the recorded one less it."""
+        """Return the powers of the offset, with the sign of true less recorded position."""
         return jnp.stack([-values[0], values[0] ** 2])
 
 
 LATENCY_STEP = 0.15
-"""Delay at which the tables are sampled for a quartic [s]."""
+"""Distance in time of the samples to which a quartic in the delay is fitted [s]."""
 
 
 @register
 class JointLatency(DisplacedMotion):
-    """Delay of the joint record: the position stamped t is that of t - delay.
+    """Delay of the recorded joint motion: the position stamped t is that of t - delay.
 
     The prior of 0.2 s is a few cycles of a slow data bus.
     """
 
     name = "joint-latency"
-    summary = "The joints' record is late: the arm has moved on from where the recording says it is."
+    summary = "The recorded joint motion is late: the arm has moved on from where the recording says it is."
     separated_by = (
-        "It grows with speed: repeat the same motion twice as fast; errors of bodies keep their ratio to the motion, a "
-        "delay's grow with frequency."
+        "It grows with speed: repeat the same motion twice as fast; errors of bodies stay in proportion to the motion, "
+        "those of a delay grow with frequency."
     )
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
-        """Return the effect where any joint moves."""
+        """Return the effect if the robot has a moving joint."""
         return super().instances(model) if model.robot.joints else []
 
     def __init__(self, sigma: float = 0.2) -> None:
         self.parameters = (Parameter("delay", "s", sigma),)
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
-        """Return the quartic's coefficients through five samples in time."""
+        """Return the coefficients of the quartic through five samples in time."""
         shifts = LATENCY_STEP * np.arange(-2, 3)
         motions = [kinematics(robot, motion.evaluate(time + shift)) for shift in shifts]
         return Displaced(motions, np.linalg.inv(np.vander(shifts, increasing=True))[1:])
 
     def loads(self, values: Array) -> Array:
-        """Return the powers of the delay, after which the record will show the arm."""
+        """Return the powers of the delay, by which the arm is ahead of its record."""
         return values[0] ** jnp.arange(1, 5)
 
 
 @register
 class JointFlexibility(DisplacedMotion, OnJoint):
-    """A joint whose link side gives way behind the measured motor side, on a damped spring.
+    """Compliance of a joint, whose link side follows the measured motor side on a damped spring.
 
-    ``frequency`` is that of everything beyond the joint swinging on the spring with the base held and all joints at
-    zero, so that one frequency is one stiffness in all recordings. The deflection follows the torque through the joint
-    as long as the motion is slow against that frequency: to second order in the ratio of frequencies here, which holds
-    above about 0.2 Hz. Deflection and what it displaces are computed with the bodies that the robot has, the centres of
-    the priors where they are unknown: a load far from its prior's centre is displaced wrongly.
+    ``frequency`` is that of all bodies beyond the joint on the spring, with the base held and all joints at zero, so
+    that one frequency is one stiffness in all recordings. The deflection follows the torque through the joint if the
+    motion is slow against that frequency; it is computed to second order in the ratio of frequencies, which is accurate
+    above about 0.2 Hz. The deflection and the displacement of the links are computed with the bodies of the robot, and
+    with the centres of the priors for unknown ones: the displacement of a load far from its prior's centre is wrong.
     """
 
     name = "joint-flexibility"
-    summary = "The joint's gear is elastic: what is beyond it lags behind the encoder when the arm accelerates."
+    summary = "The joint's gear is elastic: the bodies beyond it lag behind the encoder when the arm accelerates."
     separated_by = "It grows with the joint's acceleration: repeat the motion of that joint twice as fast."
 
     def __init__(self, place: str = "", frequency: float = 1.0, spread: float = 0.7) -> None:
@@ -127,25 +127,25 @@ class JointFlexibility(DisplacedMotion, OnJoint):
 
     @property
     def starts(self) -> Sequence[Floats]:
-        """Stiff, so that the fit is nearly linear in the compliance."""
+        """Starting point of a stiff joint, where the fit is nearly linear in the compliance."""
         return [np.array([1.5, 0.0])]
 
     @property
     def absent(self) -> Floats:
-        """A rigid joint: an infinite frequency."""
+        """Values of a rigid joint, which has an infinite frequency."""
         return np.array([np.inf, self.parameters[1].mean])
 
     def in_amplitudes(self) -> Effect:
-        """Return the effect in its compliance and the lag of its damping."""
+        """Return the effect with its compliance and the lag of its damping as parameters."""
         return _JointCompliance(self)
 
     def amplitudes(self, values: Array) -> Array:
-        """Return compliance and lag, each times the inertia beyond the joint at zero."""
+        """Return the compliance and the lag, each times the inertia beyond the joint at zero."""
         omega = 2.0 * jnp.pi * values[0]
         return jnp.stack([omega**-2, 2.0 * values[1] * omega**-3])
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
-        """Return what the deflection that the joint's torque makes does, and what its derivatives do."""
+        """Return the displacements by the deflection under the joint's torque, and by its derivatives."""
         index, state = self.index_in(robot), motion.evaluate(time)
         deflection = _Deflection(robot, motion, index, float(time[-1]))
         motions = []
@@ -157,17 +157,17 @@ class JointFlexibility(DisplacedMotion, OnJoint):
                 motions.append(kinematics(robot, JointState(*changed)))
         return Displaced(motions, np.kron(np.eye(3), [-0.5, 0.5]))
 
-    # a heavier body deflects the joint less where the base floats: changes in proportion to it would be far too large
+    # on a floating base, changes in proportion to the parameters of unknown bodies would be far too large
     body_tables, body_loads = Effect.body_tables, Effect.body_loads
 
     def loads(self, values: Array) -> Array:
-        """Expand the slow response of the oscillator in the inverse of its frequency."""
+        """Return the coefficients of the oscillator's slow response, expanded in the inverse of its frequency."""
         omega, damping = 2.0 * jnp.pi * values[0], values[1]
         return jnp.stack([omega**-2, -(1.0 - 4.0 * damping**2) * omega**-4, -2.0 * damping * omega**-3])
 
 
 class _JointCompliance(JointFlexibility):
-    """A flexible joint in amplitudes in which it is linear to first order; their scales are those at the median."""
+    """Flexible joint with parameters in which it is linear to first order, on the scales of the prior's median."""
 
     def __init__(self, flexibility: JointFlexibility) -> None:
         super().__init__(flexibility.place)
@@ -181,16 +181,16 @@ class _JointCompliance(JointFlexibility):
     in_amplitudes, amplitudes = Effect.in_amplitudes, Effect.amplitudes
 
     def loads(self, values: Array) -> Array:
-        """Return the compliance and the lag as coefficients of the deflection and of its speed."""
+        """Return the compliance and the lag as coefficients of the deflection and its speed."""
         return jnp.stack([values[0], jnp.zeros(()), -values[1]])
 
 
 KNOTS = 0.5
-"""Distance of the instants at which a joint's torque is computed [s]."""
+"""Interval between the instants at which a joint's torque is computed [s]."""
 
 
 class _Deflection:
-    """Less the torque through a joint over the inertia beyond it at zero [1/s2], as a function of time."""
+    """Negative torque through a joint divided by the inertia beyond it at zero [1/s2], as a function of time."""
 
     def __init__(self, robot: Robot, motion: Motion, index: int, end: float) -> None:
         knots = np.linspace(0.0, end, int(np.ceil(end / KNOTS)) + 1)
@@ -204,7 +204,7 @@ class _Deflection:
             speed, acceleration = state.velocity[row], state.acceleration[row]
             mass = pin.crba(model, data, q)
             mass = np.triu(mass) + np.triu(mass, 1).T
-            # the base floats, without momentum: it answers the joints' speed, and no wrench is left on it
+            # the base floats with zero momentum and without an external wrench
             base_speed = -np.linalg.solve(mass[:6, :6], mass[:6, 6:] @ speed)
             drift = pin.nonLinearEffects(model, data, q, np.concatenate([base_speed, speed]))
             base = -np.linalg.solve(mass[:6, :6], mass[:6, 6:] @ acceleration + drift[:6])
@@ -214,12 +214,12 @@ class _Deflection:
         self.span = (knots[0], knots[-1])
 
     def derivative(self, time: Floats, order: int) -> Floats:
-        """Return a derivative at some times."""
+        """Return the derivative of an order at the times (T,)."""
         return np.asarray(self.spline(np.clip(time, *self.span), nu=order))
 
 
 def _loaded(robot: Robot) -> pin.Model:
-    """Pinocchio's model with the robot's present links and loads."""
+    """Return Pinocchio's model with the links and loads that the robot has now."""
     model = robot.model.copy()
     for joint in range(1, model.njoints):
         model.inertias[joint] = pin.Inertia.Zero()

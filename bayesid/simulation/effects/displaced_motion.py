@@ -1,4 +1,4 @@
-"""Effects by which the links move otherwise than the recording says."""
+"""Effects that displace the links against the recorded motion."""
 
 from __future__ import annotations
 
@@ -22,32 +22,39 @@ __all__ = ["Displaced", "DisplacedMotion"]
 
 
 class Displaced(NamedTuple):
-    """Change of the motion of all links, as motions to compare and m columns of weights.
+    """Change of the motion of all links, as a weighted sum over motions with m coefficients.
 
     The change of any body's kinematic table is ``sum_k c_k sum_s weights[k, s] table(motions[s])``, where the c_k are
-    the effect's coefficients (`Effect.loads`) and weights has the shape (m, S).
+    the effect's coefficients (`Effect.loads`).
+
+    Attributes
+    ----------
+    motions : (S,) sequence of Kinematics
+        Motions of the joint frames.
+    weights : (m, S) array
+        Weights of the motions for each coefficient.
     """
 
     motions: Sequence[Kinematics]
     weights: Floats
 
     def weighted(self, tables: Sequence[Floats]) -> Floats:
-        """Contract tables along the motions, each (T, 28, ...), to columns (T, 28, m, ...)."""
+        """Return the weighted sums (T, 28, m, ...) of tables along the motions, each (T, 28, ...)."""
         xp = namespace(tables[0])
         return cast("Floats", xp.einsum("ks,std...->tdk...", self.weights, xp.stack(list(tables))))
 
 
 class DisplacedMotion(Effect):
-    """An effect that displaces links against the recorded motion.
+    """Effect that displaces links against the recorded motion.
 
-    It changes the tables of every body that is carried along. The tables of bodies whose parameters are unknown change
-    in proportion to those parameters, so that they are kept apart from the tables of the known ones. Joint torques are
-    not followed.
+    It changes the tables of all bodies that the links carry. The tables of bodies with unknown parameters change in
+    proportion to those parameters and are therefore kept apart from those of the known bodies. The effect on joint
+    torques is left out.
     """
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
-        """Return the effect wherever it can occur, but not beside torque sensors."""
+        """Return the effect wherever it can occur, and nowhere in a model with torque sensors."""
         return [] if model.torque is not None else super().instances(model)
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
@@ -62,13 +69,13 @@ class DisplacedMotion(Effect):
     def body_tables(
         self, robot: Robot, unknown: Sequence[str], motion: Motion, time: Floats
     ) -> list[tuple[str | None, Floats]]:
-        """Return the change of the known bodies' tables, (T, 28, m), then of each unknown body's, (T, 28, 10 m)."""
+        """Return the changes of the known bodies' table, (T, 28, m), and of each unknown body's, (T, 28, 10 m)."""
         change = self.displaced(robot, motion, time)
         known = change.weighted([composite_rows(robot, moved, leave_out=unknown) for moved in change.motions])
         tables: list[tuple[str | None, Floats]] = [(None, known)]
         for name in unknown:
-            own = change.weighted([link_table(robot, name, moved) for moved in change.motions])
-            tables.append((None, own.reshape(*own.shape[:2], -1)))
+            table = change.weighted([link_table(robot, name, moved) for moved in change.motions])
+            tables.append((None, table.reshape(*table.shape[:2], -1)))
         return tables
 
     def body_loads(self, values: Array, inertial: Array) -> Array:

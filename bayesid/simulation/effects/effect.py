@@ -1,9 +1,9 @@
-"""The unit of extension: a physical effect that a model can carry.
+"""Interface of a physical effect that a model can have, by which users extend the package.
 
-An effect states its parameters with units and a prior on a physical scale, where it can occur, how a fit of it may
-start and what separates it from others, and overrides only the hooks it needs. All hooks are pure functions of JAX
-arrays. ``values`` are the effect's parameters in the order of ``parameters``; ``inner`` are its own states. Vectors are
-in base axes unless said otherwise.
+An effect states its parameters with units and a prior on a physical scale, the places where it can occur, the starting
+points of a fit and the evidence that separates it from others, and overrides only the hooks that it needs. All hooks
+are pure functions of JAX arrays, in which ``values`` are the parameters in the order of ``parameters`` and ``inner``
+are the effect's inner states. Vectors are in base axes unless stated otherwise.
 """
 
 from __future__ import annotations
@@ -30,23 +30,24 @@ __all__ = ["Effect"]
 
 
 class Effect:
-    """A physical effect. Subclass it, set ``name`` and ``parameters``, override the hooks that apply, and `register`.
+    """Physical effect. To add one, subclass it, set ``name`` and ``parameters``, override hooks, and `register` it.
 
     Attributes
     ----------
     name : str
-        As used in study files; a class that needs a place is written ``name:place``.
+        Name in study files; an effect that needs a place is written ``name:place``.
     summary : str
-        What the effect is, in one sentence of a report.
+        One sentence of a report on what the effect is.
     separated_by : str
-        What the effect looks like and which manoeuvre or sensor separates it from rivals, in one sentence of a report.
+        One sentence of a report on what characterises the effect and which manoeuvre separates it from rivals.
     parameters : tuple of Parameter
+        Parameters with their units and priors.
     per_recording : bool
-        Whether every recording has its own values.
+        Whether the values differ between recordings.
     needs_orbit : bool
         Whether the effect exists only in orbit.
     needs_latitude : bool
-        Whether it cannot be computed unless the recordings say where on the orbit they were made.
+        Whether the effect can be computed only if the recordings state their argument of latitude.
     states : int
         Number of inner states, zero at time 0.
     modes_count : int
@@ -67,8 +68,8 @@ class Effect:
     def instances(cls, model: Model) -> Sequence[Effect]:
         """Return the effect at every place of a model's robot where it can occur and show in the model's sensors.
 
-        By default once, without an orbit only if `needs_orbit` is not set, and nowhere if the class needs arguments or
-        a place, which cannot be guessed.
+        By default it occurs once; it does not occur if it needs an orbit that the model lacks, or if the class needs
+        arguments, such as a place, which cannot be guessed.
         """
         if cls.needs_orbit and model.orbit is None:
             return []
@@ -79,78 +80,78 @@ class Effect:
 
     @property
     def longest_step(self) -> float:
-        """Longest integration step the effect allows [s]."""
+        """Longest integration step that the effect allows [s]."""
         return float("inf")
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """What is reported of the effect; by default its parameters."""
+        """Reported quantities of the effect, by default its parameters."""
         return [Quantity(parameter.name, parameter.unit) for parameter in self.parameters]
 
     def report(self, values: Array) -> Array:
-        """Turn values of the parameters into those of `quantities`, shape (n,) -> (m,)."""
+        """Return the reported quantities for values of the parameters, shape (n,) -> (m,)."""
         return values
 
     def attach(self, robot: Robot) -> Self:
-        """Return the effect as it is on a robot; an `InputError` where it has no such place."""
+        """Return the effect on a robot, and raise an `InputError` if the robot lacks its place."""
         return self
 
     @property
     def starts(self) -> Sequence[Floats]:
-        """Coordinates, with a standard-normal prior, from which a fit of the effect is started; by default zero."""
+        """Starting points of a fit, in coordinates of standard-normal prior, by default zero."""
         return [np.zeros(len(self.parameters))]
 
     @property
     def absent(self) -> Floats:
-        """Values at which nothing is there, by default zero amplitudes and the others at their centre, (n,).
+        """Values at which the effect vanishes, by default zero amplitudes and all others at their centre, shape (n,).
 
-        An effect whose size is no amplitude overrides it; one without parameters is there or is not in the model.
+        An effect whose size is not given by amplitudes overrides this. An effect without parameters cannot vanish.
         """
         return np.array([0.0 if parameter.is_amplitude else parameter.mean for parameter in self.parameters])
 
     def in_amplitudes(self) -> Effect:
-        """Return the effect in amplitudes that are zero where it is absent, for linear tests; by default itself.
+        """Return the effect with amplitudes as parameters, which vanish with it, for linear tests; by default itself.
 
-        An effect whose prior is not centred where it is absent overrides it, and `amplitudes` with it.
+        An effect whose prior is not centred where it vanishes overrides this together with `amplitudes`.
         """
         return self
 
     def amplitudes(self, values: Array) -> Array:
-        """Turn values of the parameters into those of the parameters of `in_amplitudes`."""
+        """Return the parameters of `in_amplitudes` for values of the parameters."""
         return values
 
     def starts_near(self, resonances: Sequence[Resonance], alone: bool) -> Sequence[Floats]:
-        """Return the coordinates from which a fit of a vibration is started, by default `starts`.
+        """Return the starting points of a fit of a vibration, by default `starts`.
 
         Parameters
         ----------
         resonances : sequence of Resonance
-            What the residual asks for, the most wanted first.
+            Resonances that the residual suggests, the strongest first.
         alone : bool
-            Whether no other effect is fitted beside it, so that more starts can be afforded.
+            Whether the effect is fitted without others, so that the cost of more starting points is acceptable.
         """
         return self.starts
 
     def tuned(self, values: Floats) -> Self:
-        """Return the effect with what depends on the size of its values, as `longest_step` may, chosen for them."""
+        """Return the effect with settings that suit the values of its parameters, such as `longest_step`."""
         return self
 
     @property
     def label(self) -> str:
-        """Name with the place, as in study files."""
+        """Name of the effect with its place, as in study files."""
         return self.name
 
     @property
     def link(self) -> str | None:
-        """Link that `table` is a table of; None where it changes others too, which joint torques do not follow."""
+        """Link to which `table` belongs; None if it changes several, for which joint torques are not computed."""
         return None
 
     constant_names: ClassVar[tuple[str, ...]] = ()
-    """Attributes that hold numbers, or trees of arrays, which compiled code takes as arguments (`EffectKey`)."""
+    """Names of attributes with numbers, or trees of arrays, that compiled code takes as arguments (`EffectKey`)."""
 
     @property
     def constants(self) -> tuple[Any, ...]:
-        """Values of the attributes in ``constant_names``."""
+        """Values of the attributes that ``constant_names`` lists."""
         return tuple(getattr(self, name) for name in self.constant_names)
 
     def bound(self, constants: tuple[Any, ...]) -> Self:
@@ -162,7 +163,7 @@ class Effect:
         return changed
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
-        """Return angular momentum relative to the base and its derivative, as a free couple [N m s, N m]."""
+        """Return the angular momentum relative to the base and its derivative, as a free couple [N m s, N m]."""
         return jnp.zeros(3), jnp.zeros(3)
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
@@ -174,11 +175,11 @@ class Effect:
         return jnp.zeros(self.states)
 
     def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
-        """Return what an accelerometer at ``lever`` from the centre of mass reads beyond wrench and motion [m/s2]."""
+        """Return the specific force at ``lever`` from the centre of mass beyond that of wrench and motion [m/s2]."""
         return jnp.zeros(3)
 
     def gravity_gradient_tensor(self, values: Array, instant: Instant) -> Array:
-        """Return gravitational acceleration per distance from the centre of mass, shape (3, 3) [1/s2]."""
+        """Return the gravitational acceleration per distance from the centre of mass, shape (3, 3) [1/s2]."""
         return jnp.zeros((3, 3))
 
     def modes(self, values: Array) -> Modes:
@@ -186,31 +187,31 @@ class Effect:
         raise NotImplementedError
 
     def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
-        """Return coefficients of changes of the tables (`bayesid.robot.composite_tables`), shape (T, 28, m)."""
+        """Return the changes of the tables (`bayesid.robot.composite_tables`) per coefficient, shape (T, 28, m)."""
         return np.zeros((len(time), 28, 0))
 
     def loads(self, values: Array) -> Array:
-        """Return what multiplies the coefficients of `table`, shape (m,)."""
+        """Return the coefficients that multiply the columns of `table`, shape (m,)."""
         return jnp.zeros(0)
 
     def body_tables(
         self, robot: Robot, unknown: Sequence[str], motion: Motion, time: Floats
     ) -> list[tuple[str | None, Floats]]:
-        """Return `table` in parts (T, 28, n), each with the link it is a table of, where some links are unknown."""
+        """Return `table` in parts (T, 28, n), each with the link to which it belongs, for given unknown links."""
         return [(self.link, self.table(robot, motion, time))]
 
     def body_loads(self, values: Array, inertial: Array) -> Array:
-        """Return what multiplies all columns of `body_tables`, given all unknown links' parameters, ten each."""
+        """Return the coefficients of the columns of `body_tables`, given ten parameters of each unknown link."""
         return self.loads(values)
 
     def read(self, values: Array, readings: Readings) -> Readings:
-        """Return what faulty sensors make of the true readings, in sensor axes."""
+        """Return the readings of faulty sensors from the true readings, in sensor axes."""
         return readings
 
     def friction(self, values: Array, velocity: Array) -> Array:
-        """Return torques of the joints' motors beyond those that move the bodies, (T, n), of joint speeds (T, n)."""
+        """Return the motor torques (T, n) in addition to those that move the bodies, at joint speeds (T, n)."""
         return jnp.zeros_like(velocity)
 
     def uses(self, hook: str) -> bool:
-        """Whether the class overrides a hook."""
+        """Return whether the class overrides a hook."""
         return getattr(type(self), hook) is not getattr(Effect, hook)

@@ -1,4 +1,4 @@
-"""An effect as a key of compiled code: what decides the operations, apart from the numbers that may change freely."""
+"""Key of compiled code for an effect, which depends on its operations and not on its numbers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ __all__ = ["EffectKey"]
 
 
 class EffectKey:
-    """An effect, equal to every other whose hooks do the same operations.
+    """Key of an effect, equal to that of every other effect whose hooks do the same operations.
 
-    Equal are effects of one class whose attributes are equal, but for the centres and widths of their priors and what
-    `Effect.constants` names: those are arguments of the compiled code. An effect with an attribute that cannot be
-    hashed equals itself only.
+    Effects of one class have equal keys if their attributes are equal, apart from the centres and widths of their
+    priors and the attributes that `Effect.constant_names` lists, which are arguments of the compiled code. The key of
+    an effect with an attribute that cannot be hashed equals only a key of the same object.
     """
 
     def __init__(self, effect: Effect) -> None:

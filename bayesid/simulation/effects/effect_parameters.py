@@ -1,4 +1,4 @@
-"""Parameters of an effect: their units and the priors on a physical scale that they have."""
+"""Parameters of an effect, with units and priors on a physical scale."""
 
 from __future__ import annotations
 
@@ -18,14 +18,18 @@ __all__ = ["Parameter", "Prior", "Quantity", "coordinates_of"]
 
 
 class Prior(Enum):
-    """Shape of a parameter's prior, and what its mean and sigma then are."""
+    """Shape of a parameter's prior, which decides the meaning of its mean and sigma.
+
+    The mean of a log-normal prior is its median and sigma the standard deviation of the logarithm; a uniform prior
+    extends by sigma to both sides of the mean.
+    """
 
     NORMAL = "normal"
-    LOG_NORMAL = "log-normal"  # mean is the median, sigma the standard deviation of the logarithm
-    UNIFORM = "uniform"  # within sigma of the mean
+    LOG_NORMAL = "log-normal"
+    UNIFORM = "uniform"
 
     def physical(self, mean: Array | float, sigma: Array | float, z: Array) -> Array:
-        """Return the physical value of a coordinate with a standard-normal prior."""
+        """Return the physical values of coordinates with a standard-normal prior."""
         if self is Prior.LOG_NORMAL:
             return mean * jnp.exp(sigma * z)
         if self is Prior.UNIFORM:
@@ -34,7 +38,7 @@ class Prior(Enum):
 
 
 class Quantity(NamedTuple):
-    """A name and a unit."""
+    """Name and unit of a reported quantity."""
 
     name: str
     unit: str
@@ -43,7 +47,14 @@ class Quantity(NamedTuple):
 class Parameter(NamedTuple):
     """One parameter of an effect, with its prior.
 
-    ``sigma`` is the prior's standard deviation and ``mean`` its centre; see `Prior` for other shapes.
+    Attributes
+    ----------
+    name, unit : str
+        Name and unit of the parameter.
+    sigma, mean : float
+        Standard deviation and mean of a normal prior; `Prior` defines them for other shapes.
+    prior : Prior
+        Shape of the prior.
     """
 
     name: str
@@ -54,20 +65,20 @@ class Parameter(NamedTuple):
 
     @property
     def is_amplitude(self) -> bool:
-        """Whether zero means that nothing is there."""
+        """Whether the parameter is an amplitude, which is zero where the effect is absent."""
         return self.prior is Prior.NORMAL and self.mean == 0.0
 
     def value(self, z: Array) -> Array:
-        """Physical value of a coordinate with a standard-normal prior."""
+        """Return the physical value of a coordinate with a standard-normal prior."""
         return self.prior.physical(self.mean, self.sigma, z)
 
 
 WELL_INSIDE = 0.8
-"""Share of a bounded range that a starting value may lie from its middle."""
+"""Largest distance of a starting value from the middle of a bounded range, relative to half the range."""
 
 
 def coordinates_of(parameters: Sequence[Parameter], values: Sequence[float]) -> Floats:
-    """Coordinates with a standard-normal prior of physical values; what lies outside a range is moved into it."""
+    """Return the coordinates of physical values, of which those outside a bounded range are moved into it."""
     coordinates = []
     for parameter, value in zip(parameters, values, strict=True):
         if parameter.prior is Prior.LOG_NORMAL:

@@ -1,4 +1,4 @@
-"""What the surroundings do to the robot."""
+"""Effects of the environment on the robot."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
 __all__ = ["AerodynamicDrag", "GravityGradient", "MagneticDipole", "RotationalDrag", "SolarPressure", "ThrusterLeak"]
 
 EARTH_FIELD = 3.12e-5 * 6371.2e3**3 / 3.986004418e14
-"""Equatorial field of the Earth's dipole times its radius cubed, over mu: the field is this times mu / r^3 [T s2]."""
+"""Equatorial field of the Earth's dipole divided by the gravity gradient mu / r^3 at the same radius [T s2]."""
 
 REACH = 2.0
-"""Half the size of the space in which a centre of pressure may lie, from the base origin [m]."""
+"""Largest distance of a centre of pressure from the base origin along each axis [m]."""
 
 
 @register
 class GravityGradient(Effect):
-    """Gravity gradient on every body, the paper's (12)-(16), for any Kepler orbit; no free parameter.
+    """Gravity gradient on every body, the paper's (12)-(16), for any Kepler orbit; it has no free parameter.
 
-    Summed over the bodies, the forces of (14) and the torques of (16) are a pure torque about the common centre of mass
-    that depends on the composite second moment alone.
+    Summed over the bodies, the forces of (14) and the torques of (16) are a pure torque about the common centre of
+    mass, which depends only on the composite second moment.
     """
 
     name = "gravity-gradient"
     summary = (
-        "Gravity pulls harder on what is nearer the Earth. The difference over the robot's extent turns it, "
+        "Gravity is stronger on parts nearer the Earth. The difference over the robot's extent turns it, "
         "and an accelerometer away from the centre of mass feels it."
     )
     separated_by = (
@@ -52,17 +52,17 @@ class GravityGradient(Effect):
         return Wrench(jnp.zeros(3), 3.0 * instant.environment.gradient * jnp.cross(instant.body.second_moment @ up, up))
 
     def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
-        """Return less the tidal acceleration at the accelerometer."""
+        """Return the negative gravity-gradient acceleration at the accelerometer."""
         return -self.gravity_gradient_tensor(values, instant) @ lever
 
     def gravity_gradient_tensor(self, values: Array, instant: Instant) -> Array:
-        """Return mu/r^3 (3 u u' - 1)."""
+        """Return the tensor mu/r^3 (3 u u' - 1)."""
         up = instant.to_base(instant.environment.zenith)
         return instant.environment.gradient * (3.0 * jnp.outer(up, up) - jnp.eye(3))
 
 
 class _Pressure(Effect):
-    """A force of constant size and a known direction at a point of the base."""
+    """Force of constant size and known direction at a point of the base."""
 
     needs_orbit = True
 
@@ -74,20 +74,20 @@ class _Pressure(Effect):
 
     @property
     def absent(self) -> Floats:
-        """No force, in the middle."""
+        """Values without a force, at the base origin."""
         return np.zeros(4)
 
     def in_amplitudes(self) -> Effect:
-        """Return the effect in its force and the product of force and lever."""
+        """Return the effect with the force and its product with the lever as parameters."""
         return _LinearPressure(self)
 
     def amplitudes(self, values: Array) -> Array:
-        """Return the force and its products with the lever."""
+        """Return the force and its product with the lever."""
         return jnp.concatenate([values[:1], values[0] * values[1:]])
 
     @staticmethod
     def direction(instant: Instant) -> Array:
-        """Return the force's direction in orbit axes."""
+        """Return the direction of the force in orbit axes."""
         raise NotImplementedError
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
@@ -97,10 +97,10 @@ class _Pressure(Effect):
 
 
 class _LinearPressure(Effect):
-    """A pressure in amplitudes in which it is linear: its force, and force times lever, whose moment it exerts.
+    """Pressure with parameters in which it is linear, the force and the force times its lever.
 
-    The scales are those of the pressure's prior: the force's change by one standard deviation of its logarithm at the
-    median, and the median at the farthest lever.
+    Their scales follow from the pressure's prior: the change of the force by one standard deviation of its logarithm at
+    the median, and the median force at the longest lever.
     """
 
     needs_orbit = True
@@ -115,7 +115,7 @@ class _LinearPressure(Effect):
 
     @property
     def label(self) -> str:
-        """Name of the pressure."""
+        """Name of the pressure effect."""
         return self.kind.name
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
@@ -126,10 +126,10 @@ class _LinearPressure(Effect):
 
 @register
 class AerodynamicDrag(_Pressure):
-    """Constant drag against the orbital motion, off the centre of mass.
+    """Constant drag against the orbital motion, at a centre of pressure beside the centre of mass.
 
-    The prior's median of 5 mN is ten square metres at 350 km; e-fold 1.5 for density and area. The centre of pressure
-    lies anywhere within two metres of the base origin.
+    The prior's median of 5 mN is the drag of ten square metres at 350 km; its spread of 1.5 in the logarithm stands for
+    density and area. The centre of pressure lies within two metres of the base origin along each axis.
     """
 
     name = "aerodynamic-drag"
@@ -144,15 +144,16 @@ class AerodynamicDrag(_Pressure):
 
     @staticmethod
     def direction(instant: Instant) -> Array:
-        """Return backwards along the orbit."""
+        """Return the direction against the orbital motion."""
         return -instant.environment.velocity
 
 
 @register
 class SolarPressure(_Pressure):
-    """Constant radiation pressure from the Sun's direction, off the centre of mass.
+    """Constant radiation pressure from the Sun's direction, at a centre of pressure beside the centre of mass.
 
-    The prior's median is 0.3 mN, 45 square metres of absorbing panel; e-fold 2 for area and reflection.
+    The prior's median of 0.3 mN is that of 45 square metres of absorbing panel; its spread of 2 in the logarithm stands
+    for area and reflection.
     """
 
     name = "solar-pressure"
@@ -168,7 +169,7 @@ class SolarPressure(_Pressure):
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
-        """Return the effect where the direction of the Sun is known."""
+        """Return the effect if the direction of the Sun is known."""
         return [] if model.orbit is None or model.orbit.sun is None else super().instances(model)
 
     def __init__(self, force: float = 3.0e-4, spread: float = 2.0) -> None:
@@ -176,13 +177,13 @@ class SolarPressure(_Pressure):
 
     @staticmethod
     def direction(instant: Instant) -> Array:
-        """Return away from the Sun."""
+        """Return the direction away from the Sun."""
         return -instant.environment.sun
 
 
 @register
 class MagneticDipole(Effect):
-    """Residual magnetic dipole of the base in the Earth's field, a centred dipole along the Earth's axis.
+    """Residual magnetic dipole of the base in the Earth's field, which is modelled as a dipole along the Earth's axis.
 
     The prior of 10 A m2 is that of a small satellite without magnetic cleanliness.
     """
@@ -198,7 +199,7 @@ class MagneticDipole(Effect):
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
-        """Return the effect where the inclination says how the Earth's field lies."""
+        """Return the effect if the inclination, and with it the direction of the Earth's field, is known."""
         return [] if model.orbit is None or model.orbit.inclination is None else super().instances(model)
 
     def __init__(self, sigma: float = 10.0) -> None:
@@ -213,9 +214,9 @@ class MagneticDipole(Effect):
 
 @register
 class ThrusterLeak(Effect):
-    """Constant force and torque fixed in the base: a valve that does not close.
+    """Constant force and torque fixed in the base, such as those of a valve that does not close.
 
-    The prior of 50 mN and 50 mN m is a per cent of a small thruster on a lever of a metre.
+    The prior of 50 mN and 50 mN m is one per cent of a small thruster on a lever of one metre.
     """
 
     name = "thruster-leak"
@@ -234,13 +235,13 @@ class ThrusterLeak(Effect):
         )
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
-        """Return the parameters."""
+        """Return the parameters, which are force and torque."""
         return Wrench(values[:3], values[3:])
 
 
 @register
 class RotationalDrag(Effect):
-    """Torque against the base's rotation, proportional to its rate about each axis: air in a laboratory.
+    """Torque against the base's rotation, proportional to its rate about each axis, as from the air of a laboratory.
 
     The prior of 0.1 N m s brakes a body of 1 kg m2 within ten seconds.
     """
@@ -253,5 +254,5 @@ class RotationalDrag(Effect):
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
-        """Return the torque, less the rates times the coefficients."""
+        """Return the torque, the negative product of rates and coefficients."""
         return Wrench(jnp.zeros(3), -values * instant.rate)

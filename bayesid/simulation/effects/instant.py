@@ -1,4 +1,4 @@
-"""What an effect sees of an instant of the simulation, and what it may give back."""
+"""Quantities that effects receive at an instant of the simulation, and those that they return."""
 
 from __future__ import annotations
 
@@ -12,10 +12,20 @@ __all__ = ["Composite", "Environment", "Instant", "Modes", "Readings", "Resonanc
 
 
 class Composite(NamedTuple):
-    """The whole system seen as one body, in base axes; derivatives are relative to the base.
+    """Composite body of the whole system, in base axes, with derivatives relative to the base.
 
-    ``com`` is the centre of mass with two derivatives; inertia, second moment and spin (angular momentum relative to
-    the base) are about it.
+    Attributes
+    ----------
+    mass : scalar array
+        Mass [kg].
+    com, com_rate, com_acceleration : (3,) arrays
+        Centre of mass and its two derivatives [m, m/s, m/s2].
+    inertia, inertia_rate, inverse : (3, 3) arrays
+        Inertia about the centre of mass, its derivative and its inverse [kg m2, kg m2/s, 1/(kg m2)].
+    second_moment : (3, 3) array
+        Second moment of mass about the centre of mass [kg m2].
+    spin, spin_rate : (3,) arrays
+        Angular momentum relative to the base about the centre of mass, and its derivative [N m s, N m].
     """
 
     mass: Array
@@ -31,26 +41,52 @@ class Composite(NamedTuple):
 
 
 class Environment(NamedTuple):
-    """What is known of an instant beforehand. Orbit vectors are in orbit axes, zero away from orbit."""
+    """Known quantities of an instant; those of the orbit are zero for a robot without an orbit.
+
+    Attributes
+    ----------
+    time : scalar array
+        Time since the start of the recording [s].
+    zenith, velocity, sun, north : (3,) arrays
+        Directions from the Earth's centre, of motion, to the Sun and of the Earth's north pole, orbit axes.
+    gradient : scalar array
+        Gravity gradient mu / r^3 [1/s2].
+    argument_of_latitude : scalar array
+        Argument of latitude [rad].
+    wheel_momentum, wheel_torque : (3,) arrays
+        Recorded momentum of the wheels and its derivative, base axes [N m s, N m].
+    wrench : (6,) array
+        Known force and torque about the base origin, base axes [N, N m].
+    """
 
     time: Traceable
     zenith: Traceable
-    gradient: Traceable  # mu / r^3 [1/s2]
+    gradient: Traceable
     velocity: Traceable
     sun: Traceable
-    argument_of_latitude: Traceable  # argument of latitude [rad]
-    north: Traceable  # direction of the Earth's north pole
-    wheel_momentum: Traceable  # recorded [N m s]
-    wheel_torque: Traceable  # its derivative
-    wrench: Traceable  # known force and torque about the base origin, base axes (6,)
+    argument_of_latitude: Traceable
+    north: Traceable
+    wheel_momentum: Traceable
+    wheel_torque: Traceable
+    wrench: Traceable
 
 
 class Instant(NamedTuple):
-    """One instant of a simulation, as an effect sees it.
+    """One instant of a simulation, as the hooks of effects receive it.
 
-    ``attitude`` rotates base axes to orbit axes. ``rate`` is zero while momenta are being summed: it follows from
-    them. ``rate_change`` and ``acceleration`` (of the base origin, non-gravitational) are known to
-    `Effect.specific_force` only.
+    Attributes
+    ----------
+    environment : Environment
+        Known quantities of the instant.
+    body : Composite
+        Composite body.
+    attitude : (3, 3) array
+        Rotation from base to orbit axes.
+    rate : (3,) array
+        Angular velocity of the base [rad/s]; zero for `Effect.momentum`, from whose result it follows.
+    rate_change, acceleration : (3,) arrays
+        Derivative of the rate, and specific force at the base origin [rad/s2, m/s2]; available to
+        `Effect.specific_force` only.
     """
 
     environment: Environment
@@ -61,25 +97,37 @@ class Instant(NamedTuple):
     acceleration: Array
 
     def to_base(self, vector: Array) -> Array:
-        """Rotate a vector from orbit axes to base axes."""
+        """Return a vector in base axes from one in orbit axes."""
         return self.attitude.T @ vector
 
 
 class Wrench(NamedTuple):
-    """An external force and its torque about the base origin."""
+    """External force and its torque about the base origin, base axes [N, N m]."""
 
     force: Array
     torque: Array
 
 
 class Modes(NamedTuple):
-    """Vibration modes of parts that move in the base, in mass-normalised (hybrid) coordinates (Likins 1970).
+    """Vibration modes of parts that move in the base, n of them in mass-normalised coordinates (Likins 1970).
 
     Mode i follows ``q'' + 2 damping omega q' + omega^2 q = -linear . a - angular . dw/dt - moment : (w w' - w^2 1)``
     with ``a`` the acceleration of the base origin, and has the momentum ``linear q'`` and, about the base origin,
     ``angular q'``. With ``phi(r)`` the displacement of unit amplitude, ``linear`` is the integral of phi over the mass,
     ``angular`` that of r x phi and ``moment`` that of the outer product of phi and r.
-    omega (n,) [rad/s], damping (n,), linear (n, 3) [sqrt(kg)], angular (n, 3) and moment (n, 3, 3) [sqrt(kg) m].
+
+    Attributes
+    ----------
+    omega : (n,) array
+        Angular frequencies with the base held [rad/s].
+    damping : (n,) array
+        Damping ratios.
+    linear : (n, 3) array
+        Linear momenta of unit modal speed [sqrt(kg)].
+    angular : (n, 3) array
+        Angular momenta of unit modal speed about the base origin [sqrt(kg) m].
+    moment : (n, 3, 3) array
+        Moments that couple the modes to the centrifugal acceleration [sqrt(kg) m].
     """
 
     omega: Array
@@ -90,11 +138,17 @@ class Modes(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What the sensors read at their sample times (T,), sensor axes.
+    """Readings of the sensors at T sample times, in sensor axes.
 
-    ``channels`` holds the readings (T, axes) of every declared sensor by the family of its channels, and
-    ``readings.rate`` is ``readings.channels["rate"]``; ``torque`` (T, n) has a column for every joint of the robot, or
-    none where no torque is measured.
+    Attributes
+    ----------
+    time : (T,) array
+        Sample times [s].
+    channels : dict of str to (T, axes) array
+        Readings of every declared sensor by the family of its channels; ``readings.rate`` is short for
+        ``readings.channels["rate"]``.
+    torque : (T, n) array
+        Torques of all joints of the robot [N m or N]; n is 0 where no torque is measured.
     """
 
     time: Array
@@ -102,21 +156,26 @@ class Readings(NamedTuple):
     torque: Array
 
     def __getattr__(self, family: str) -> Array:
-        """Return the readings of one sensor."""
+        """Return the readings of one sensor by the family of its channels."""
         if family.startswith("_") or family not in self.channels:
             raise AttributeError(f"no sensor {family!r} is declared")
         return self.channels[family]
 
     def replace(self, **changed: Array) -> Readings:
-        """Return the readings with those of some sensors changed."""
+        """Return the readings with those of some sensors replaced."""
         return self._replace(channels={**self.channels, **changed})
 
 
 class Resonance(NamedTuple):
-    """A frequency at which a residual asks for a hidden vibration.
+    """Frequency at which a residual suggests a hidden vibration.
 
-    frequency [Hz]; coupling (6, 6), the sum over the modes of the outer products of linear and angular momentum per
-    modal speed [sqrt(kg), sqrt(kg) m] that fits best, no matter whether any mode can have it.
+    Attributes
+    ----------
+    frequency : float
+        Frequency [Hz].
+    coupling : (6, 6) array
+        Sum over the modes of the outer products of linear and angular momentum per modal speed [sqrt(kg), sqrt(kg) m]
+        that fits the residual best, which need not be positive semidefinite.
     """
 
     frequency: float

@@ -1,4 +1,4 @@
-"""Moving parts inside or on the base that no encoder sees."""
+"""Effects of moving parts inside or on the base that no encoder measures."""
 
 from __future__ import annotations
 
@@ -19,35 +19,35 @@ from bayesid.simulation.effects.register import register
 __all__ = ["FlexibleAppendage", "FuelSlosh", "WheelMomentum"]
 
 FREQUENCY, FREQUENCY_SPREAD = 0.12, 1.0
-"""Median of a hidden vibration's frequency [Hz], standard deviation of its logarithm: 0.02 to 0.9 Hz at 2 sd."""
+"""Median of a hidden vibration's frequency [Hz] and standard deviation of its logarithm, for 0.02 to 0.9 Hz at 2 sd."""
 
 DAMPING, DAMPING_SPREAD = 0.01, 1.0
-"""Median of its damping relative to critical, and the standard deviation of the logarithm."""
+"""Median of its damping ratio, and standard deviation of the logarithm."""
 
 STEPS_PER_PERIOD = 10.0
-"""Integration steps in one period of the vibration."""
+"""Number of integration steps in one period of the vibration."""
 
 RESONANCES = 2
-"""Number of resonances from which the fit of an appendage is started."""
+"""Largest number of resonances from which the fit of an appendage starts."""
 
 SMALLEST_COUPLING = 0.1
-"""Least square of a mode's coupling at which a fit is started [kg m2]; from zero it would not find its sign."""
+"""Smallest squared coupling of a mode at the start of a fit [kg m2]; from zero the fit could not choose its sign."""
 
 SLOSH_FREQUENCIES, SLOSH_MASS = (0.06, 0.25), 5.0
-"""Frequencies [Hz] and mass [kg] at which the fit of slosh is started: it converges from afar."""
+"""Frequencies [Hz] and mass [kg] from which the fit of slosh starts; two suffice, since it converges from afar."""
 
 TANK_DISTANCE = 0.4
-"""Distance of further starting places of the tank from the middle of the spacecraft, along each axis [m]."""
+"""Distance of further starting positions of the tank from the middle of the spacecraft, along each axis [m]."""
 
 TANK_CORNERS = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
-"""Directions of those places, the corners of a tetrahedron."""
+"""Directions of these positions, which are the corners of a tetrahedron."""
 
 
 @register
 class WheelMomentum(Effect):
     """Residual momentum of reaction wheels at constant speed, in base axes.
 
-    The prior of 1 N m s is the capacity of a small wheel: a resting attitude control leaves less than that.
+    The prior of 1 N m s is the capacity of a small wheel, more than an inactive attitude control leaves.
     """
 
     name = "wheel-momentum"
@@ -56,30 +56,30 @@ class WheelMomentum(Effect):
     )
     separated_by = (
         "Its torque grows with the base's rate: repeat with the base turning faster, and about other axes; a torque "
-        "that is there at rest is not of wheels."
+        "at rest does not come from wheels."
     )
 
     def __init__(self, sigma: float = 1.0) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
-        """Return the wheels' momentum; they keep their speed."""
+        """Return the momentum of the wheels, and a zero derivative."""
         return values, jnp.zeros(3)
 
 
 class _Vibration(Effect):
-    """Something on a spring inside the base: what such effects share."""
+    """Common part of effects of a mass on a spring in the base."""
 
-    separated_by = "It goes on swinging: excite it with one quick motion, then record with the arm at rest."
+    separated_by = "It continues to swing: excite it with one quick motion, then record with the arm at rest."
     frequency: float = FREQUENCY
 
     @property
     def longest_step(self) -> float:
-        """A tenth of the period at the frequency the fit starts from [s]."""
+        """Longest integration step, a tenth of the period at the frequency of the start or of `tuned` [s]."""
         return 1.0 / (STEPS_PER_PERIOD * self.frequency)
 
     def tuned(self, values: Floats) -> Self:
-        """Return the effect with its integration step for the frequency among the values."""
+        """Return the effect with an integration step that suits the frequency among the values."""
         changed = type(self).__new__(type(self))
         changed.__dict__.update(self.__dict__)
         changed.frequency = float(values[[parameter.name for parameter in self.parameters].index("frequency")])
@@ -88,18 +88,18 @@ class _Vibration(Effect):
 
 @register
 class FlexibleAppendage(_Vibration):
-    """One vibration mode of a panel, boom or antenna, with base held: frequency, damping and how it couples.
+    """One vibration mode of a panel, boom or antenna, with its frequency with the base held, damping and coupling.
 
-    The momentum of unit modal speed has a linear part [sqrt(kg)] and an angular one about the base origin
-    [sqrt(kg) m]; ``participation`` is the length of the angular one, whose square is the inertia that swings. The prior
-    of 5 sqrt(kg) m per axis is 25 kg m2, a pair of small panels; of 3 sqrt(kg), 9 kg. The centrifugal load on the mode
-    is left out.
+    The momentum of unit modal speed has a linear part [sqrt(kg)] and an angular part about the base origin
+    [sqrt(kg) m]; ``participation`` is the norm of the angular part, whose square is the inertia that vibrates. The
+    prior of 5 sqrt(kg) m per axis corresponds to 25 kg m2, a pair of small panels, and that of 3 sqrt(kg) to 9 kg. The
+    centrifugal load on the mode is left out.
     """
 
     name = "flexible-appendage"
     summary = (
-        "A panel, boom or antenna on the base is not rigid: it lags behind the base and swings at a frequency of its "
-        "own, and the base swings against it."
+        "A panel, boom or antenna on the base is not rigid: it lags behind the base and swings at its natural "
+        "frequency, and the base swings against it."
     )
     modes_count = 1
 
@@ -113,22 +113,22 @@ class FlexibleAppendage(_Vibration):
 
     @property
     def quantities(self) -> Sequence[Quantity]:
-        """Frequency, damping, participation, then the coupling itself."""
+        """Reported quantities: frequency, damping, participation, and the coupling."""
         first, second, *rest = (Quantity(parameter.name, parameter.unit) for parameter in self.parameters)
         return [first, second, Quantity("participation", "sqrt(kg) m"), *rest]
 
     def report(self, values: Array) -> Array:
-        """Insert the participation; the sign of the coupling has no meaning, its largest part is made positive."""
+        """Return the quantities with the largest angular coupling made positive, since the sign has no meaning."""
         coupling = values[2:]
         sign = jnp.sign(coupling[3 + jnp.argmax(jnp.abs(coupling[3:]))])
         return jnp.concatenate([values[:2], jnp.linalg.norm(coupling[3:])[None], sign * coupling])
 
     def modes(self, values: Array) -> Modes:
-        """Return the mode."""
+        """Return the single mode."""
         return Modes(2.0 * jnp.pi * values[:1], values[1:2], values[None, 2:5], values[None, 5:8], jnp.zeros((1, 3, 3)))
 
     def starts_near(self, resonances: Sequence[Resonance], alone: bool) -> Sequence[Floats]:
-        """Return one mode per resonance: the largest eigenvector of its coupling."""
+        """Return one start per resonance, with the eigenvector of its coupling of largest eigenvalue as mode."""
         starts = []
         for frequency, matrix in resonances[:RESONANCES]:
             values, vectors = np.linalg.eigh(matrix)
@@ -139,10 +139,10 @@ class FlexibleAppendage(_Vibration):
 
 @register
 class FuelSlosh(_Vibration):
-    """Fuel in a tank as a mass held by equal springs along three axes (Dodge 2000), at rest part of the base.
+    """Fuel in a tank, as a mass on equal springs along three axes (Dodge 2000) that at rest is part of the base.
 
-    The prior's median is 10 kg, e-fold 1; the tank lies within the spacecraft, taken as one and a half times the
-    uniform box of the base's mass and inertia.
+    The prior's median is 10 kg with a spread of 1 in the logarithm; the tank lies within the spacecraft, which is taken
+    as one and a half times the uniform box of the base's mass and inertia.
     """
 
     name = "fuel-slosh"
@@ -159,11 +159,11 @@ class FuelSlosh(_Vibration):
 
     @property
     def absent(self) -> Floats:
-        """No mass, all else in the middle of the prior."""
+        """Values with zero mass and all others at the middle of the prior."""
         return np.array([0.0, *(parameter.mean for parameter in self.parameters[1:])])
 
     def attach(self, robot: Robot) -> Self:
-        """Bound the tank to the spacecraft."""
+        """Return the effect with the position of the tank bounded by the spacecraft."""
         centre, reach = spacecraft_box(robot)
         changed = type(self).__new__(type(self))
         changed.__dict__.update(self.__dict__)
@@ -177,17 +177,17 @@ class FuelSlosh(_Vibration):
         return changed
 
     def starts_near(self, resonances: Sequence[Resonance], alone: bool) -> Sequence[Floats]:
-        """Return two frequencies in the middle of the spacecraft, and where affordable other places of the tank."""
+        """Return starts at two frequencies in the middle of the spacecraft and, for a fit alone, at other positions."""
         middle = np.array([parameter.mean for parameter in self.parameters[3:]])
         places = [(frequency, middle) for frequency in SLOSH_FREQUENCIES]
-        if alone:  # the place may have several optima
+        if alone:  # the position may have several optima
             places += [(resonances[0].frequency, middle + TANK_DISTANCE * corner) for corner in TANK_CORNERS]
         return [
             coordinates_of(self.parameters, [SLOSH_MASS, frequency, DAMPING, *place]) for frequency, place in places
         ]
 
     def modes(self, values: Array) -> Modes:
-        """Return one mode per axis."""
+        """Return three modes, one along each axis."""
         root, position = jnp.sqrt(values[0]), values[3:]
         linear = root * jnp.eye(3)
         return Modes(
@@ -200,7 +200,7 @@ class FuelSlosh(_Vibration):
 
 
 def spacecraft_box(robot: Robot) -> tuple[Floats, Floats]:
-    """Centre and half sizes [m], base axes, of one and a half times the uniform box with the base's inertia."""
+    """Return the centre and half sizes of one and a half times the uniform box of the base's inertia, base axes [m]."""
     base = robot.link(robot.base).inertial
     second = np.diag(base.pseudo_inertia[:3, :3]) / base.mass - base.com**2
     return base.com, 1.5 * np.sqrt(3.0 * second)

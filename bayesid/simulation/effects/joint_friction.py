@@ -1,4 +1,4 @@
-"""What a joint's torque sensor reads beyond the torque that moves the bodies."""
+"""Effects on the reading of a joint's torque sensor: friction and a constant error."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 __all__ = ["STANDSTILL", "JointFriction", "TorqueBias"]
 
 STANDSTILL = 5e-4
-"""Joint speed below which dry friction can be anything between its two values [rad/s, m/s]: no torque is read there."""
+"""Joint speed below which samples are left out, since dry friction at rest is undetermined [rad/s, m/s]."""
 
 REVERSAL = 1e-4
-"""Joint speed within which the formula passes from one to the other; well below, so that it never shows."""
+"""Joint speed over which the formula reverses dry friction [rad/s, m/s], well below `STANDSTILL`."""
 
 
 class _OnTorque(OnJoint):
-    """An effect on what the torque sensor of one joint reads."""
+    """Effect on the reading of the torque sensor of one joint."""
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
@@ -35,7 +35,7 @@ class _OnTorque(OnJoint):
         return [] if model.torque is None else [cls(joint) for joint in model.torque.joints]
 
     def attach(self, robot: Robot) -> Self:
-        """Take the joint's index from the robot."""
+        """Return the effect with the index of its joint in the robot."""
         changed = self.copied()
         changed.index = self.index_in(robot)
         return changed
@@ -43,11 +43,11 @@ class _OnTorque(OnJoint):
     index: int = -1
 
     def friction(self, values: Array, velocity: Array) -> Array:
-        """Return the torque of the effect in the column of its joint, zero in the others."""
+        """Return the torque of the effect in the column of its joint, and zero in all others."""
         return jnp.zeros_like(velocity).at[:, self.index].set(self.extra(values, velocity[:, self.index]))
 
     def extra(self, values: Array, velocity: Array) -> Array:
-        """Return what the sensor reads beyond, shape (T,), at joint speeds (T,)."""
+        """Return the additional reading of the sensor at joint speeds (T,), shape (T,)."""
         raise NotImplementedError
 
 
@@ -55,12 +55,12 @@ class _OnTorque(OnJoint):
 class JointFriction(_OnTorque):
     """Dry and viscous friction between motor and link: ``coulomb sign(v) + viscous v``.
 
-    Samples of a joint that stands nearly still are not used. The priors, 5 N m and 50 N m s/rad, hold the gears of
-    large manipulators. Friction does not change how the joints move, which is measured: it shows in torques only.
+    Samples of a joint that stands nearly still are left out. The priors of 5 N m and 50 N m s/rad include the gears of
+    large manipulators. Friction appears in torques only, since the motion of the joints is measured.
     """
 
     name = "joint-friction"
-    summary = "The motor works against friction in the joint, which its torque sensor reads with the rest."
+    summary = "The motor works against friction in the joint, which its torque sensor also reads."
     separated_by = (
         "It changes sign with the joint's speed, not with its acceleration: run that joint at two constant speeds, "
         "forwards and back, with the others still."
@@ -71,7 +71,7 @@ class JointFriction(_OnTorque):
         self.parameters = (Parameter("coulomb", "N m", coulomb), Parameter("viscous", "N m s", viscous))
 
     def extra(self, values: Array, velocity: Array) -> Array:
-        """Return the torque that overcomes friction."""
+        """Return the motor torque that overcomes friction."""
         return values[0] * jnp.tanh(velocity / REVERSAL) + values[1] * velocity
 
 
@@ -82,7 +82,7 @@ class TorqueBias(_OnTorque):
     name = "torque-bias"
     summary = "The torque sensor of the joint reads a constant without load."
     separated_by = (
-        "It is there when the joint stands free of load: read the torques at rest, before and after the motion."
+        "It is present when the joint carries no load: read the torques at rest, before and after the motion."
     )
 
     def __init__(self, place: str = "", sigma: float = 2.0) -> None:
@@ -90,5 +90,5 @@ class TorqueBias(_OnTorque):
         self.parameters = (Parameter("offset", "N m", sigma),)
 
     def extra(self, values: Array, velocity: Array) -> Array:
-        """Return the constant."""
+        """Return the constant error."""
         return jnp.broadcast_to(values[0], velocity.shape)

@@ -1,4 +1,4 @@
-"""Effects that exist at a place of the robot: a link or a joint, named after a colon."""
+"""Effects at a place of the robot, a link or a joint, whose name follows a colon in the label."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["OnJoint", "Placed"]
 
 
 class Placed(Effect):
-    """An effect at a link or a joint."""
+    """Effect at a link or a joint."""
 
     def __init__(self, place: str = "") -> None:
         if not place:
@@ -27,18 +27,18 @@ class Placed(Effect):
 
     @property
     def label(self) -> str:
-        """Name and place."""
+        """Name of the effect and of its place, separated by a colon."""
         return f"{self.name}:{self.place}"
 
     def copied(self) -> Self:
-        """Return a copy that may be changed."""
+        """Return a copy whose attributes may be changed."""
         changed = type(self).__new__(type(self))
         changed.__dict__.update(self.__dict__)
         return changed
 
 
 class OnJoint(Placed):
-    """An effect at one joint."""
+    """Effect at one joint."""
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
@@ -46,7 +46,7 @@ class OnJoint(Placed):
         return [cls(joint.name) for joint in model.robot.joints]
 
     def attach(self, robot: Robot) -> Self:
-        """Check that the joint exists."""
+        """Return the effect after a check that the robot has the joint."""
         self.index_in(robot)
         return self
 

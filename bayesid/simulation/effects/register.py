@@ -1,4 +1,4 @@
-"""The register of effects that study files know by name."""
+"""Register of the effects that study files name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ E = TypeVar("E", bound=type[Effect])
 
 
 def register(effect: E) -> E:
-    """Class decorator: make an effect known to study files by its name."""
+    """Make an effect known to study files by its name; a class decorator."""
     if not effect.name:
         raise InputError(f"effect {effect.__name__} has no name", remedy="Set the class attribute `name`")
     _REGISTER[effect.name] = effect
@@ -24,12 +24,12 @@ def register(effect: E) -> E:
 
 
 def known_effects() -> dict[str, type[Effect]]:
-    """Return every registered effect by its name, in the order of registration."""
+    """Return all registered effects by their names, in the order of registration."""
     return dict(_REGISTER)
 
 
 def create(label: str, **options: Any) -> Effect:
-    """Build an effect by the label used in study files, such as ``"gravity-gradient"``.
+    """Return the effect of a label as in study files, such as ``"gravity-gradient"``.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Faults of the sensors, in sensor axes.
+"""Faults of sensors, in sensor axes.
 
-``measured = (1 + scale) * (rotation(misalignment) * true(t - latency)) + bias + drift * t``; a positive latency means
-that the sample stamped t shows the past.
+The reading is ``measured = (1 + scale) * (rotation(misalignment) * true(t - latency)) + bias + drift * t``; with a
+positive latency the sample stamped t shows the past.
 """
 
 from __future__ import annotations
@@ -39,33 +39,33 @@ __all__ = [
 
 
 class SensorFault(Effect):
-    """An effect on what one sensor reads.
+    """Effect on the readings of one sensor.
 
     Attributes
     ----------
     sensor : Kind
-        The sensor it needs.
+        Kind of the sensor that is faulty.
     """
 
     sensor: ClassVar[Kind]
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
-        """Return the effect where the sensor is declared."""
+        """Return the effect if the sensor is declared."""
         return super().instances(model) if model.sensor(cls.sensor) is not None else []
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
-        """Return what the faulty sensor reads, shape (T, 3), of the true reading."""
+        """Return the reading of the faulty sensor from the true reading, both of shape (T, 3)."""
         raise NotImplementedError
 
     def read(self, values: Array, readings: Readings) -> Readings:
-        """Apply the fault to the sensor."""
+        """Return the readings with the fault of the sensor applied."""
         key = self.sensor.value
         return readings.replace(**{key: self.change(values, readings.time, readings.channels[key])})
 
 
 class _Axes(SensorFault):
-    """A fault with one parameter per sensor axis."""
+    """Fault with one parameter per sensor axis."""
 
     unit: ClassVar[str]
     sigma: ClassVar[float]
@@ -80,8 +80,8 @@ class _Axes(SensorFault):
 
 class _Bias(_Axes):
     separated_by = (
-        "It is there at rest and does not care for motion: record a longer rest before and after the motion, and run "
-        "the motion the other way; what the dynamics do changes its sign, a bias does not."
+        "It is present at rest and does not depend on motion: record a longer rest before and after the motion, and "
+        "run the motion the other way; the readings due to the motion change their sign, a bias does not."
     )
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
@@ -90,7 +90,7 @@ class _Bias(_Axes):
 
 class _Drift(_Axes):
     separated_by = (
-        "It grows with the clock and does not care for motion: record a longer rest before and after the motion, and "
+        "It grows with time and does not depend on motion: record a longer rest before and after the motion, and "
         "repeat the motion the other way."
     )
 
@@ -118,15 +118,15 @@ class _Misalignment(_Axes):
 
 class _Latency(SensorFault):
     separated_by = (
-        "It grows with speed: repeat the same motion twice as fast; errors of bodies keep their ratio to the motion, a "
-        "delay's grow with frequency."
+        "It grows with speed: repeat the same motion twice as fast; errors of bodies stay in proportion to the motion, "
+        "those of a delay grow with frequency."
     )
 
     def __init__(self, sigma: float = 0.2) -> None:
         self.parameters = (Parameter("delay", "s", sigma),)
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
-        # the interpolation's own error cancels to first order in the delay
+        # written as a change of the reading
         return reading + _interpolate(time - values[0], time, reading) - reading
 
 
@@ -150,7 +150,7 @@ class AccelBias(_Bias):
 
 @register
 class RateDrift(_Drift):
-    """Error of the measured rate that grows with time; the prior is the prior bias gained in a minute."""
+    """Error of the measured rate that grows with time; in a minute it gains about the prior bias."""
 
     name = "rate-drift"
     summary = "The rate sensor's zero wanders steadily, as when it warms up."
@@ -159,7 +159,7 @@ class RateDrift(_Drift):
 
 @register
 class AccelDrift(_Drift):
-    """Error of the accelerometer that grows with time; the prior is the prior bias gained in a minute."""
+    """Error of the accelerometer that grows with time; in a minute it gains about the prior bias."""
 
     name = "accel-drift"
     summary = "The accelerometer's zero wanders steadily, as when it warms up."
@@ -168,19 +168,19 @@ class AccelDrift(_Drift):
 
 @register
 class RateScale(_Scale):
-    """Scale factor of the rate sensor; the prior is 3 %, far outside a calibrated sensor's."""
+    """Error of the rate sensor's scale factor; the prior is 3 %, far above that of a calibrated sensor."""
 
     name = "rate-scale"
-    summary = "The rate sensor reads in proportion too much or too little."
+    summary = "The rate sensor reads too much or too little in proportion to the rate."
     sensor, sigma = Kind.RATE, 0.03
 
 
 @register
 class AccelScale(_Scale):
-    """Scale factor of the accelerometer; the prior is 3 %, far outside a calibrated sensor's."""
+    """Error of the accelerometer's scale factor; the prior is 3 %, far above that of a calibrated sensor."""
 
     name = "accel-scale"
-    summary = "The accelerometer reads in proportion too much or too little."
+    summary = "The accelerometer reads too much or too little in proportion to the acceleration."
     sensor, sigma = Kind.ACCEL, 0.03
 
 
@@ -206,18 +206,18 @@ class AccelMisalignment(_Misalignment):
 class AccelPosition(_Axes):
     """Error of the accelerometer's mounting point: true less stated position, base axes; the prior is 5 cm.
 
-    The gravity gradient over the error is left out: below 1e-7 m/s2 for 5 cm in any orbit.
+    The gravity gradient over the error is left out, since it is below 2e-7 m/s2 for 5 cm in any orbit.
     """
 
     name = "accel-position"
-    summary = "The accelerometer sits elsewhere than stated and feels another part of the base's rotation."
+    summary = "The accelerometer is mounted elsewhere than stated and reads another part of the base's rotation."
     separated_by = (
         "It grows with the base's rate squared and angular acceleration: turn the base faster about each axis in turn."
     )
     sensor, unit, sigma = Kind.ACCEL, "m", 0.05
 
     def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
-        """Return what rotation adds over the error of position."""
+        """Return the acceleration by rotation over the error of position."""
         return jnp.cross(instant.rate_change, values) + jnp.cross(instant.rate, jnp.cross(instant.rate, values))
 
     read = Effect.read
@@ -242,7 +242,7 @@ class AccelLatency(_Latency):
 
 
 def _rotation(vector: Array) -> Array:
-    """Rotation matrix of a rotation vector, smooth at zero."""
+    """Return the rotation matrix of a rotation vector, by a series that is smooth at zero."""
     x, y, z = vector
     zero = jnp.zeros(())
     hat = jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])
@@ -255,7 +255,7 @@ def _rotation(vector: Array) -> Array:
 
 
 def _interpolate(at: Array, time: Array, values: Array) -> Array:
-    """Cubic Hermite interpolation of samples (T, C) with parabolic slopes; padding repeats the last time."""
+    """Return the cubic Hermite interpolation of samples (T, C) with parabolic slopes; padding repeats the last time."""
     step = jnp.diff(time)
     safe = jnp.where(step > 0.0, step, 1.0)[:, None]
     slope = jnp.where(step[:, None] > 0.0, jnp.diff(values, axis=0) / safe, 0.0)
