@@ -32,13 +32,13 @@ from bayesid.simulation.sensors import Kind, Sensor
 __all__ = ["AddedMeasurement", "NotEvaluated", "Swung", "candidates"]
 
 KNOWN_MASS = 0.01
-"""Relative standard deviation of a mass that counts as known, as a weighing on the ground would give it."""
+"""Relative standard deviation of a mass that counts as known."""
 
 PUSH, TURN = 1e-3, 1e-4
 """Acceleration [m/s2] and angular acceleration [rad/s2] of the whole robot by a pulse of thrust and of torque."""
 
 SPIN = 2e-3
-"""Change of the angular velocity by a pulse of the wheels [rad/s], small enough for any reaction wheel."""
+"""Change of the robot's angular velocity by a pulse of the wheels [rad/s]."""
 
 SWING = {"rad": 0.5, "m": 0.2}
 """Amplitude of an added swing of a revolute joint [rad] and of a prismatic one [m]."""
