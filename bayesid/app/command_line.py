@@ -34,6 +34,7 @@ SUFFIX = "_command"
 """Ending of the names of those modules of this folder that are commands."""
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
+"""Application of typer, to which the commands are added below."""
 
 
 def _show_version(wanted: bool) -> None:

@@ -111,3 +111,4 @@ class History:
 
 
 _ENDING = {"plan": "plan.csv", "recording": "recording.csv", "identification": "posterior.nc"}
+"""Endings of the file names, by stage."""

@@ -146,7 +146,7 @@ def base_parameters(
     Raises
     ------
     InputError
-        If a name in ``keep`` is unknown, or the rank cannot be told from rounding.
+        If a name in ``keep`` is unknown, or rounding errors leave the rank unclear.
     """
     bodies = massive_bodies(robot)
     names = standard_names(bodies)

@@ -23,6 +23,7 @@ NAMED = 3
 """Largest number of parts named, so that the words remain readable."""
 
 NOUNS = {"mass": "mass", "com": "centre of mass", "inertia": "inertia"}
+"""Nouns in sentences by the first part of a quantity's name."""
 
 
 class Part(Enum):

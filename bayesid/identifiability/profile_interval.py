@@ -21,6 +21,7 @@ from bayesid._math.arrays import Floats
 __all__ = ["Profile", "Target", "profile"]
 
 Vector = Callable[[Floats], Floats]
+"""Function of the coordinates (n,) that returns an array."""
 
 LEVELS = {"68 %": 1.0, "95 %": 1.959963984540054}
 """Square roots of the chi-square quantiles of one degree of freedom, by the level of the interval."""

@@ -60,6 +60,7 @@ def stacked_regressor(
     Parameters
     ----------
     robot : Robot
+        Robot with its joints and links.
     bodies : sequence of str
         Bodies whose parameters multiply the columns, ten for each body.
     base : Base

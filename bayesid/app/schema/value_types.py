@@ -59,7 +59,7 @@ def no_less_than(limit: float, remedy: str) -> AfterValidator:
 
 
 def list_of(size: int, *, or_number: bool = False) -> BeforeValidator:
-    """Return a validator that requires a list of ``size``; with ``or_number``, one number stands for all."""
+    """Return a validator that requires a list of ``size`` numbers, or with ``or_number`` one number for all of them."""
 
     def check(value: Any) -> Any:
         if or_number and isinstance(value, (int, float)) and not isinstance(value, bool):
