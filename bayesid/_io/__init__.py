@@ -1,1 +1,1 @@
-"""Errors that a user meets, files that are complete or absent, results kept under a key, and progress."""
+"""Errors for the user, files that are complete or absent, results kept under a key, and progress."""

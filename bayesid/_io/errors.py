@@ -1,4 +1,4 @@
-"""The errors a user meets: each names the file, the place in it, the value received and the remedy."""
+"""Errors for the user, each with the file, the place in it, the value received and the remedy."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ __all__ = ["InputError"]
 
 
 class InputError(ValueError):
-    """Input that cannot be used.
+    """Error in the input of a user.
 
     Parameters
     ----------
     problem : str
-        What is wrong, with the value received.
+        Description of the problem, with the value received.
     file : path, optional
-        The file it is in.
+        File that contains the problem.
     place : str, optional
-        Where in the file: a key, a column, a row, a link.
+        Place in the file, such as a key, a column, a row or a link.
     remedy : str, optional
-        What to do about it.
+        Advice on how to correct the input.
     """
 
     def __init__(
@@ -31,5 +31,5 @@ class InputError(ValueError):
         super().__init__(f"{message}. {remedy}" if remedy else message)
 
     def within(self, *, file: str | Path | None = None, place: str | None = None) -> InputError:
-        """Return the same error with its file or place filled in where it has none."""
+        """Return the same error with the given file and place where it has none."""
         return InputError(self.problem, file=self.file or file, place=self.place or place, remedy=self.remedy)

@@ -1,4 +1,4 @@
-"""Files of results, complete or absent: written beside their place and then moved there."""
+"""Files of results that are complete or absent, because they are written elsewhere and then moved into place."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["complete_file", "complete_folder", "create_folder", "write_json", "w
 
 @contextmanager
 def complete_file(file: str | Path) -> Iterator[Path]:
-    """Yield a path to write to; what was written takes the place of the file, unless the block fails."""
+    """Yield a temporary path to write to; its file replaces the given one, unless the block fails."""
     target = Path(file)
     part = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
@@ -31,23 +31,23 @@ def complete_file(file: str | Path) -> Iterator[Path]:
 
 
 def write_text(file: str | Path, text: str) -> None:
-    """Write text as UTF-8."""
+    """Write text as UTF-8, whole or not at all."""
     with complete_file(file) as part:
         part.write_text(text, encoding="utf-8")
 
 
 def write_json(file: str | Path, content: dict[str, Any]) -> None:
-    """Write JSON, arrays as lists."""
+    """Write JSON with arrays as lists, whole or not at all."""
     write_text(file, json.dumps(content, indent=1, default=lambda value: np.asarray(value).tolist()))
 
 
 def create_folder(folder: Path) -> None:
-    """Create a folder for results, unless there is one.
+    """Create a folder for results, unless it exists.
 
     Raises
     ------
     InputError
-        If it cannot be created.
+        If the folder cannot be created.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -59,7 +59,7 @@ def create_folder(folder: Path) -> None:
 
 @contextmanager
 def complete_folder(output: Path) -> Iterator[Path]:
-    """Yield a folder whose files appear in the output together, or not at all."""
+    """Yield a temporary folder whose files are moved to the output together, unless the block fails."""
     create_folder(output)
     with tempfile.TemporaryDirectory(dir=output, prefix=".part-") as name:
         yield Path(name)

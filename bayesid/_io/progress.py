@@ -1,4 +1,4 @@
-"""Progress of a long computation, as its caller is told of it."""
+"""Progress of a long computation, reported to its caller."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ __all__ = ["Progress", "part_of", "silent"]
 
 
 class Progress(Protocol):
-    """A callback that long computations call now and then.
+    """Callback that long computations call repeatedly.
 
     Parameters
     ----------
     fraction : float
-        How much is done, 0 to 1.
+        Fraction of the computation that is done, 0 to 1.
     text : str
-        What is being done.
+        Description of the present activity.
     """
 
     def __call__(self, fraction: float, text: str, /) -> None:
-        """Take note of the state."""
+        """Receive the present state."""
         ...
 
 
 def silent(fraction: float, text: str, /) -> None:
-    """Take no note of it."""
+    """Ignore the present state."""
 
 
 def part_of(progress: Progress, start: float, end: float) -> Progress:
-    """Return the progress of a part that leads from one fraction of the whole to another."""
+    """Return the progress for a part of a computation, from one fraction of the whole to another."""
     return lambda fraction, text: progress(start + (end - start) * fraction, text)

@@ -1,7 +1,7 @@
-"""Results kept in files under a key, so that an interrupted run goes on from them.
+"""Results kept in files under a key, so that an interrupted run continues from them.
 
-The key is the SHA-256 of everything the results depend on. A file with another key is never used, by one rule: it is
-refused, so that nothing a user waited for or flew is overwritten, unless its store is disposable; then it is replaced.
+The key is the SHA-256 of everything on which the results depend. A file with another key is never used. The file of a
+disposable store is then replaced; any other is refused, so that no result of a long run or a flight is overwritten.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["JsonStore", "content_key", "file_key", "refuse_other"]
 
 
 def content_key(*parts: object) -> str:
-    """Return the SHA-256 of some content: files by what they hold, arrays by their values, all else by its `repr`."""
+    """Return the SHA-256 of files by their content, of arrays by their values and of other objects by their `repr`."""
     digest = hashlib.sha256()
     for part in parts:
         if isinstance(part, Path):
@@ -35,30 +35,32 @@ def content_key(*parts: object) -> str:
 
 
 def file_key(file: Path) -> str:
-    """Return the SHA-256 of a file, as other programs compute it."""
+    """Return the SHA-256 of the bytes of a file."""
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
-def refuse_other(found: object, key: str, file: Path, owner: str, content: str) -> None:
+def refuse_other(stated: object, key: str, file: Path, owner: str, content: str) -> None:
     """Refuse a file with another key.
 
     Parameters
     ----------
-    found : object
-        The key that the file states.
+    stated : object
+        Key that the file states.
     key : str
-        The key that it should state.
+        Key that the file should state.
+    file : Path
+        File with the key.
     owner : str
-        What the file belongs to, such as "loop".
+        Kind of computation that the file belongs to, such as "loop", for the message.
     content : str
-        What the key was made of, for the message.
+        Description of what the key is made of, for the message.
 
     Raises
     ------
     InputError
-        If the two differ.
+        If the two keys differ.
     """
-    if found != key:
+    if stated != key:
         raise InputError(
             f"it belongs to another {owner}: {content} differ",
             file=file,
@@ -68,17 +70,18 @@ def refuse_other(found: object, key: str, file: Path, owner: str, content: str) 
 
 @dataclass(frozen=True)
 class JsonStore:
-    """One JSON file of results.
+    """JSON file of results under a key.
 
     Parameters
     ----------
     file : Path
+        File of the results.
     key : str
-        The SHA-256 of what the results depend on, from `content_key`.
+        SHA-256 of everything on which the results depend, from `content_key`.
     owner, content : str
-        See `refuse_other`.
+        Parameters of `refuse_other`.
     disposable : bool
-        Whether a file with another key is forgotten rather than refused.
+        True if a file with another key is replaced instead of refused.
     """
 
     file: Path
@@ -88,7 +91,7 @@ class JsonStore:
     disposable: bool = False
 
     def read(self, name: str) -> Any:
-        """Return the results of a name; None where there are none.
+        """Return the results under a name, None where there are none.
 
         Raises
         ------
@@ -99,19 +102,19 @@ class JsonStore:
             return None
         try:
             content = json.loads(self.file.read_text(encoding="utf-8"))
-            found, results = content["key"], content[name]
+            stated, results = content["key"], content[name]
         except (ValueError, KeyError, TypeError) as error:
             raise InputError(
                 f"unreadable state of an interrupted {self.owner}: {type(error).__name__}: {error}",
                 file=self.file,
                 remedy="Delete the file or choose another output folder",
             ) from error
-        if self.disposable and found != self.key:
+        if self.disposable and stated != self.key:
             return None
-        refuse_other(found, self.key, self.file, self.owner, self.content)
+        refuse_other(stated, self.key, self.file, self.owner, self.content)
         return results
 
     def write(self, **results: Any) -> None:
-        """Write all results by name."""
+        """Write all results by their names, in place of earlier ones."""
         self.file.parent.mkdir(parents=True, exist_ok=True)
         write_json(self.file, {"key": self.key, **results})

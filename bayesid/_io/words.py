@@ -1,4 +1,4 @@
-"""Words in sentences: lists of names, and nouns that agree with their number."""
+"""Words for sentences: lists of names, and nouns that agree with their number."""
 
 from __future__ import annotations
 
@@ -28,5 +28,5 @@ def counted(number: int, noun: str) -> str:
 
 
 def ordinal(number: int) -> str:
-    """Return the position that a number from one on counts: ``first``, ``second``, ``third``, ``4th``."""
+    """Return the ordinal of a number that counts from one: ``first``, ``second``, ``third``, ``4th``."""
     return {1: "first", 2: "second", 3: "third"}.get(number, f"{number}th")

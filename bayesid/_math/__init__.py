@@ -1,1 +1,1 @@
-"""Array types, rotations and small linear algebra, each once."""
+"""Array types, rotations, interpolation, integration and small linear algebra, each in one place."""

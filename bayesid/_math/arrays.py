@@ -1,4 +1,4 @@
-"""Array types of signatures, shapes stand in the docstrings; and code that serves both NumPy and JAX."""
+"""Array types for signatures (docstrings give the shapes), and support of code for both NumPy and JAX."""
 
 from typing import Any, TypeAlias
 
@@ -8,12 +8,16 @@ from numpy.typing import NDArray
 __all__ = ["Floats", "Integers", "Traceable", "namespace"]
 
 Floats: TypeAlias = NDArray[np.floating[Any]]
+"""NumPy array of floating-point numbers."""
+
 Integers: TypeAlias = NDArray[np.integer[Any]]
+"""NumPy array of integers."""
+
 Traceable: TypeAlias = Any
-"""An array of NumPy, or one of JAX, which may be traced: a leaf of what compiled code takes."""
+"""NumPy array or JAX array, traced or not, as an argument of compiled code."""
 
 
 def namespace(*arrays: Any) -> Any:
-    """Return the module whose functions act on arrays: NumPy's or, where any of them is JAX's or traced, JAX's."""
+    """Return the module whose functions act on the arrays: ``jax.numpy`` if any is a JAX array, otherwise ``numpy``."""
     modules = [array.__array_namespace__() for array in arrays]
     return next((module for module in modules if module is not np), np)

@@ -1,4 +1,4 @@
-"""One step of the classical Runge-Kutta method of fourth order."""
+"""Step of the classical Runge-Kutta method of fourth order."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from jax import Array
 __all__ = ["runge_kutta_step"]
 
 G = TypeVar("G")
+"""Type of the derivative's inputs at an instant."""
 
 
 def runge_kutta_step(
@@ -20,16 +21,18 @@ def runge_kutta_step(
     Parameters
     ----------
     derivative : callable
-        Derivative of a state, given what is known of the instant.
+        Function of a state and of the inputs at an instant that returns the derivative of the state.
+    state : array
+        State at the beginning of the step.
     size : scalar array
         Length of the step.
     start, middle, end
-        What is known at the beginning, middle and end of the step.
+        Inputs of the derivative at the beginning, middle and end of the step.
 
     Returns
     -------
     state, first, last : arrays
-        The new state, and the derivatives with which the method entered and left the step (k1 and k4).
+        State at the end of the step, and the first and last derivatives of the method (k1 and k4).
     """
     k1 = derivative(state, start)
     k2 = derivative(state + 0.5 * size * k1, middle)

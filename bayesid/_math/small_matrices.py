@@ -1,4 +1,4 @@
-"""Algebra of vectors and small matrices written out: calls to LAPACK for thousands of them block the processor."""
+"""Algebra of vectors and small matrices, written out because thousands of small calls to LAPACK are slow."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["cross", "inverse", "inverse_small", "solve_small", "symmetric", "tra
 
 
 def solve_small(matrix: Array, right: Array) -> Array:
-    """Solve a small positive-definite system by elimination, written out as `inverse` is."""
+    """Solve a small positive-definite system, shapes (n, n) and (n,), by elimination without pivoting."""
     size = len(right)
     rows = [jnp.concatenate([matrix[i], right[i : i + 1]]) for i in range(size)]
     for i in range(size):
@@ -24,13 +24,13 @@ def cross(a: Array, b: Array) -> Array:
 
 
 def symmetric(six: Array) -> Array:
-    """Return the symmetric matrix of its entries xx, yy, zz, xy, xz, yz, shape (3, 3)."""
+    """Return the symmetric matrix, shape (3, 3), with the entries xx, yy, zz, xy, xz, yz."""
     xx, yy, zz, xy, xz, yz = six
     return jnp.stack([jnp.stack([xx, xy, xz]), jnp.stack([xy, yy, yz]), jnp.stack([xz, yz, zz])])
 
 
 def trace_less(second: Array) -> Array:
-    """Return trace(M) 1 - M: the inertia that goes with a second moment of mass M, shape (3, 3)."""
+    """Return the inertia trace(M) 1 - M of a second moment of mass M, shape (3, 3)."""
     return jnp.trace(second) * jnp.eye(3) - second
 
 

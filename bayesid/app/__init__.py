@@ -1,1 +1,1 @@
-"""Commands, study files and what they name, turned into objects."""
+"""Commands of ``bayesid``, study files, and the conversion of a study into objects."""

@@ -1,4 +1,4 @@
-"""``bayesid check``: what a study and its recordings hold."""
+"""Command ``bayesid check``, which shows the contents of a study and its recordings."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["run"]
 
 
 def run(file: StudyFile, output: Output) -> Iterator[str]:
-    """Validate a study and its recordings and say what was read, before anyone waits for a sampler."""
+    """Validate a study and its recordings, and report their contents: check.json and report.pdf."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

@@ -1,10 +1,10 @@
-"""The command line: ``bayesid COMMAND STUDY.toml --output DIR``.
+"""Command line ``bayesid COMMAND STUDY.toml --output DIR``.
 
-A command is one file of this folder: ``NAME_command.py`` with a generator function ``run``. Its parameters are the
-command's arguments and options, its docstring is the help, and what it yields are the sentences to show. A parameter
-``progress`` is no option: it is handed a `Progress` that draws a bar. JAX, Pinocchio and the like take seconds to
-import; a command imports what it needs within ``run``, after it has read the study file, so that help and errors in
-the file come at once.
+A command is one file of this folder, ``NAME_command.py``, with a generator function ``run``. The parameters of the
+function are the command's arguments and options, its docstring is the help, and it yields the sentences to show. A
+parameter ``progress`` is not an option; it receives a `Progress` that draws a bar. JAX and Pinocchio take seconds to
+import. A command therefore imports what it needs within ``run``, after it has read the study file, so that help and
+errors in the file appear at once.
 """
 
 from __future__ import annotations
@@ -31,9 +31,10 @@ if TYPE_CHECKING:
 __all__ = ["app", "main"]
 
 SUFFIX = "_command"
-"""Modules of this folder whose names end so are commands."""
+"""Ending of the names of those modules of this folder that are commands."""
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
+"""Application of typer, to which the commands are added below."""
 
 
 def _show_version(wanted: bool) -> None:
@@ -52,7 +53,7 @@ def _common(
 
 
 def _command(run: Callable[..., Iterator[str]]) -> Callable[..., None]:
-    """Return what typer calls: a command's function without its progress, its sentences and errors shown."""
+    """Return the function that typer calls: it supplies the progress, and shows the command's sentences and errors."""
     signature = inspect.signature(run, eval_str=True)
     options = [parameter for name, parameter in signature.parameters.items() if name != "progress"]
 
@@ -63,7 +64,7 @@ def _command(run: Callable[..., Iterator[str]]) -> Callable[..., None]:
             if len(options) < len(signature.parameters):
                 given["progress"] = progress
             for line in run(**given):
-                # words are wrapped, paths stay whole so that they can be copied
+                # wrap at words, but keep paths whole so that they can be copied
                 _console().print(line, markup=False, overflow="ignore", crop=False)
 
     command.__signature__ = signature.replace(parameters=options, return_annotation=None)  # type: ignore[attr-defined]
@@ -79,20 +80,20 @@ def _console() -> Console:
 
 @contextmanager
 def _reported() -> Iterator[None]:
-    """Turn errors a user can mend into one message and exit status 2."""
+    """Turn errors in the user's input into one message and exit status 2."""
     try:
         yield
     except InputError as error:
         typer.secho(f"Error: {error}", fg="red", err=True)
         raise typer.Exit(2) from None
     except KeyboardInterrupt:
-        typer.echo("Interrupted; the same command goes on from what was kept so far.", err=True)
+        typer.echo("Interrupted; the same command continues from the results kept so far.", err=True)
         raise typer.Exit(130) from None
 
 
 @contextmanager
 def _shown() -> Iterator[Progress]:
-    """Yield a progress that draws a bar from its first call on."""
+    """Yield a progress that draws a bar, beginning with its first call."""
     with ExitStack() as stack:
         update: list[Callable[[float, str], None]] = []
 

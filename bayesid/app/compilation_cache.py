@@ -1,4 +1,4 @@
-"""Compiled functions kept between runs, so that a second command on a like study starts at once."""
+"""Cache of compiled functions between runs, so that a second command on a similar study starts at once."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ SETTINGS = {
     "jax_persistent_cache_min_compile_time_secs": 0.0,
     "jax_persistent_cache_min_entry_size_bytes": -1,
 }
-"""What is kept, in the options of JAX: everything, as reading a small function costs less than compiling it."""
+"""Options of JAX that keep every function, as reading even a small one takes less time than compiling it."""
 
 FOLDER = "jax_compilation_cache_dir"
-"""The option of JAX that names the folder."""
+"""Name of the option of JAX for the folder."""
 
 
 def keep_compiled(folder: Path | None = None) -> None:
-    """Keep compiled functions in a folder; by default what ``BAYESID_CACHE`` names, or else the user's cache.
+    """Keep compiled functions in a folder, by default the one in ``BAYESID_CACHE`` or else the user's cache.
 
-    An empty ``BAYESID_CACHE`` keeps nothing, and a folder that JAX was given before stays. JAX need not be imported.
+    An empty ``BAYESID_CACHE`` switches the cache off, and a folder that JAX uses already stays. JAX need not be
+    imported.
     """
     named = os.environ.get("BAYESID_CACHE")
     if folder is None and (named == "" or (named is None and _given())):
@@ -30,7 +31,7 @@ def keep_compiled(folder: Path | None = None) -> None:
     chosen = folder or (Path(named) if named else home / "bayesid")
     try:
         chosen.mkdir(parents=True, exist_ok=True)
-    except OSError:  # a read-only home costs time, nothing else
+    except OSError:  # with a read-only home there is no cache, which only costs time
         return
     for option, value in {FOLDER: str(chosen), **SETTINGS}.items():
         if "jax" in sys.modules:

@@ -1,4 +1,4 @@
-"""``bayesid demo``: shipped recordings with a hidden cause, diagnosed."""
+"""Command ``bayesid demo``, which diagnoses shipped recordings with a hidden cause."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["run"]
 
 
 def run(output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4000.0) -> Iterator[str]:
-    """Diagnose shipped recordings with a hidden cause, say what was hidden and write the report; needs no file."""
+    """Diagnose shipped recordings with a hidden cause, show that cause and write the report, without any input file."""
     from bayesid.app.demonstration import copy_demonstration
     from bayesid.app.diagnose_command import diagnose_study
     from bayesid.app.schema import Study

@@ -1,4 +1,4 @@
-"""The demonstration: recordings shipped with the package in which MuJoCo hid a cause; and ETS-VII, simulated."""
+"""Demonstration studies: shipped recordings of MuJoCo with a hidden cause, and a simulated ETS-VII."""
 
 from __future__ import annotations
 
@@ -22,16 +22,23 @@ from bayesid.simulation.sensors import Kind, Sensor, White
 __all__ = ["copy_demonstration", "write_demo"]
 
 RATE_SIGMA, ACCEL_SIGMA, ENCODER_SIGMA = 1.0e-5, 1.0e-5, 1.0e-6
-ACCELEROMETER = (0.4, 0.3, 0.8)
-RADIUS = 6.916e6
-INTERVAL = 0.5
+"""Noise per sample of gyro [rad/s], accelerometer [m/s2] and encoders [rad], typical of good instruments."""
 
-# offsets and amplitudes of (27) on the six joints; the wrist moves too, so that three manoeuvres differ in kind
+ACCELEROMETER = (0.4, 0.3, 0.8)
+"""Position of the accelerometer from the base origin, base axes [m]."""
+
+RADIUS = 6.916e6
+"""Radius of the orbit [m], about 540 km above the ground."""
+
+INTERVAL = 0.5
+"""Interval between samples [s]."""
+
 MANOEUVRES = (
     ((0.63, -2.18, 0.05, 0.4, -0.3, 0.2), (-0.9, -0.15, -0.56, 0.3, 0.4, 0.2)),
     ((-0.4, -0.8, 1.0, -0.5, 0.6, 0.0), (0.5, 0.7, -0.4, 0.5, -0.3, 0.4)),
     ((1.2, -1.2, -0.7, 0.3, 0.2, -0.5), (-0.3, 0.5, 0.8, -0.4, 0.5, 0.3)),
 )
+"""Offsets and amplitudes of (27) on the six joints [rad]; the wrist moves too, so that the manoeuvres differ."""
 
 STUDY = """title = "Demonstration: the base of ETS-VII"
 
@@ -57,12 +64,14 @@ bodies = ["base_link"]
 [model]
 effects = ["gravity-gradient"]
 """
+"""Template of the study file."""
 
 RECORDING = """
 [[recordings]]
 file = "{file}"
 attitude = {attitude}
 """
+"""Template of a recording's section in the study file."""
 
 
 def copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
@@ -71,7 +80,7 @@ def copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
     Returns
     -------
     dict
-        What is hidden in its recordings: effect -> key -> true value, in SI units.
+        True values of the effects hidden in its recordings, by effect and key, in SI units.
     """
     create_folder(folder)
     shipped = files("bayesid.app") / "demonstration_data"
@@ -86,12 +95,12 @@ def copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
 
 
 def write_demo(folder: Path, seed: int) -> InertialParameters:
-    """Write the study and its recordings; the URDF's base is a wrong guess.
+    """Write a study of the simulated ETS-VII and its recordings, with a wrong guess of the base in the URDF.
 
     Returns
     -------
     InertialParameters
-        The true base.
+        Inertial parameters of the true base.
     """
     rng = np.random.default_rng(seed)
     robot = Robot.shipped("ets7")

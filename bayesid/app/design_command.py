@@ -1,4 +1,4 @@
-"""``bayesid design``: manoeuvres by several criteria, within limits."""
+"""Command ``bayesid design``, which designs manoeuvres by several criteria, within limits."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def run(
     output: Output,
     progress: Progress,
     seed: Seed = 0,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts of the search, for every criterion.")] = 2,
-    iterations: Annotated[int, typer.Option(min=1, help="Iterations of the optimiser from each start.")] = 60,
+    starts: Annotated[int, typer.Option(min=1, help="Number of random starts for every criterion.")] = 2,
+    iterations: Annotated[int, typer.Option(min=1, help="Iterations of the optimiser per start.")] = 60,
 ) -> Iterator[str]:
     """Design manoeuvres by several criteria, within limits: design.json, a CSV file for each, and report.pdf."""
     from bayesid.app.schema import Study

@@ -1,4 +1,4 @@
-"""``bayesid diagnose``: what the simulation gets wrong, its cause, and what the extended model gains."""
+"""Command ``bayesid diagnose``, which finds the cause of model errors and measures the gain of an extended model."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def run(
     samples: Samples = 4000.0,
     sample: Annotated[bool, typer.Option(help="Sample the extended model with emcee at the end.")] = True,
 ) -> Iterator[str]:
-    """Show what the simulation gets wrong, name the cause, extend the model by it and measure the gain."""
+    """Show how the simulation deviates, name the cause, extend the model by it and measure the gain."""
     from bayesid.app.schema import Study
 
     yield from diagnose_study(Study.load(file), output, seed, samples if sample else None, progress)
@@ -44,10 +44,23 @@ def diagnose_study(
 
     Parameters
     ----------
+    study : Study
+        Study to diagnose.
+    output : Path
+        Folder of the results.
+    seed : int
+        Seed of all random numbers.
     effective_samples : float or None
-        Samples wanted of the extended model, which is not sampled where this is None.
+        Number of effective samples of the extended model, which is not sampled where it is None.
+    progress : Progress
+        Receiver of the fraction done.
     keep : callable
-        Handed the result.
+        Function that receives the diagnosis.
+
+    Yields
+    ------
+    str
+        Sentences to show.
     """
     import numpy as np
 

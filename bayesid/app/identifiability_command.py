@@ -1,4 +1,4 @@
-"""``bayesid identifiability``: what can be known of a robot, and what a study tells of it."""
+"""Command ``bayesid identifiability``, which shows what a robot's structure and a study's data can determine."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def run(
     output: Output,
     progress: Progress,
     seed: Seed = 0,
-    samples: Annotated[float, typer.Option(help="Effective samples wanted where emcee is needed.")] = 500.0,
-    profiles: Annotated[int, typer.Option(min=0, help="Parameters that are profiled at most.")] = 6,
+    samples: Annotated[float, typer.Option(help="Number of effective samples where emcee is needed.")] = 500.0,
+    profiles: Annotated[int, typer.Option(min=0, help="Largest number of parameters to profile.")] = 6,
 ) -> Iterator[str]:
-    """Say what robot, manoeuvres and sensors can tell of the bodies, and what would tell more: identifiability.json."""
+    """Determine what manoeuvres and sensors tell of the bodies, and what would tell more: identifiability.json."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)

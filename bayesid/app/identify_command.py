@@ -1,4 +1,4 @@
-"""``bayesid identify``: the unknown bodies of a study, sampled by emcee."""
+"""Command ``bayesid identify``, which samples the unknown bodies of a study by emcee."""
 
 from __future__ import annotations
 

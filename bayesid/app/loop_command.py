@@ -1,4 +1,4 @@
-"""``bayesid loop``: plan a manoeuvre, have it executed, identify, and plan again from the posterior."""
+"""Command ``bayesid loop``, which plans a manoeuvre, has it executed, identifies the bodies and plans again."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ def run(
     seed: Seed = 0,
     samples: Samples = 2000.0,
     spacecraft: Annotated[
-        Path | None, typer.Option(help="Python file that executes plans; left out, the recordings are put into DIR.")
+        Path | None, typer.Option(help="Python file that executes plans; without it, put the recordings into DIR.")
     ] = None,
-    wanted: Annotated[float, typer.Option(help="Relative sd at which to stop, of mass and principal moments.")] = 0.01,
-    at_most: Annotated[int, typer.Option(help="Manoeuvres.")] = 5,
+    wanted: Annotated[float, typer.Option(help="Relative sd of mass and principal moments at which to stop.")] = 0.01,
+    at_most: Annotated[int, typer.Option(help="Largest number of manoeuvres.")] = 5,
 ) -> Iterator[str]:
     """Plan a manoeuvre, have it executed, identify, and plan again from the posterior: loop.json."""
     if not 0.0 < wanted < 1.0:
@@ -65,16 +65,18 @@ def _sentences(history: History, wanted: float) -> Iterator[str]:
         number, attempts = step["step"], step["plan"]["attempts"]
         if len(attempts) > 1:
             yield f"Step {number}: limits tightened {len(attempts) - 1} times until they held with 99 %."
-        found = step.get("identification")
-        if found is not None:
-            for name, body in found["bodies"].items():
+        identification = step.get("identification")
+        if identification is not None:
+            for name, body in identification["bodies"].items():
                 yield f"Step {number}: {name}: mass {body['mass']['mean']:.6g} +- {body['mass']['sd']:.2g} kg"
-            yield f"Step {number}: the worst of mass and principal moments is known to {found['precision']:.2%}."
-            yield from found["disagreements"]
+            precision = identification["precision"]
+            yield f"Step {number}: the worst of mass and principal moments is known to {precision:.2%}."
+            yield from identification["disagreements"]
     number = len(history.steps)
     if history.status == "waiting":
         yield f"Fly {history.path(number, 'plan')}: positions, velocities and accelerations of the joints."
-        yield f"Put what the sensors and encoders read into {history.path(number, 'recording')}, then call this again."
+        recording = history.path(number, "recording")
+        yield f"Write the readings of the sensors and encoders to {recording}, then run this command again."
     elif history.status == "no-go":
         broken = [name for name, item in attempts[-1]["limits"].items() if not item["quantile_99"] <= item["limit"]]
         yield f"No go: {', '.join(broken)} would not hold with 99 %, however small the manoeuvre was made."

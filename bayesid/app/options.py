@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options that several commands share, as annotations for typer."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer
 
 __all__ = ["Output", "Samples", "Seed", "StudyFile"]
 
-StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")]
+StudyFile = Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study file.")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; it is created.")]
-Seed = Annotated[int, typer.Option(help="Every random number follows from it.")]
-Samples = Annotated[float, typer.Option("--samples", help="Effective samples wanted.")]
+Seed = Annotated[int, typer.Option(help="Seed of all random numbers.")]
+Samples = Annotated[float, typer.Option("--samples", help="Number of effective samples.")]

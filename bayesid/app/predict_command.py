@@ -1,4 +1,4 @@
-"""``bayesid predict``: where planned joint motions take base and end-effector."""
+"""Command ``bayesid predict``, which predicts the trajectories of base and end-effector in planned manoeuvres."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def run(
     output: Output,
     progress: Progress,
     seed: Seed = 0,
-    draws: Annotated[int, typer.Option(help="Draws of what is known of the robot.")] = 500,
+    draws: Annotated[int, typer.Option(help="Number of draws of the robot's parameters.")] = 500,
     posterior: Annotated[
         Path | None, typer.Option(help="posterior.nc of an earlier study, in place of the study's prior.")
     ] = None,

@@ -1,4 +1,4 @@
-"""``bayesid simulate``: what a study's sensors would read at the given values."""
+"""Command ``bayesid simulate``, which computes the readings of a study's sensors at the given values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a study file to its design problem."""
+"""Conversion of a study file into its design problem."""
 
 from __future__ import annotations
 
@@ -39,13 +39,13 @@ from bayesid.simulation.model import Model
 __all__ = ["defining_files", "load_loop_problem", "load_problem"]
 
 SAMPLES = 120
-"""Largest number of samples of a manoeuvre that are simulated, each standing for as many as it takes."""
+"""Largest number of samples that are simulated; in longer manoeuvres each of them stands for several."""
 
 LONGEST_STEP, STEPS = 2.0, 60
-"""Longest step of the integration [s], and fewest steps of a manoeuvre."""
+"""Longest step of the integration [s], and smallest number of steps of a manoeuvre."""
 
 FUNCTIONS = 8
-"""Free functions of every joint where a study does not say."""
+"""Default number of free functions of every joint."""
 
 CRITERIA: tuple[Criterion, ...] = (
     Paper26(),
@@ -56,10 +56,10 @@ CRITERIA: tuple[Criterion, ...] = (
     EOptimal(),
     InformationGain(),
 )
-"""Criteria that need nothing but the plan."""
+"""Criteria that have no parameters."""
 
 BASE_AT_START = ("attitude", "attitude_sigma", "argument_of_latitude")
-"""Keys that ``[design]`` shares with a recording."""
+"""Keys of the base's initial state, which ``[design]`` shares with a recording."""
 
 
 def load_problem(study: Study) -> Problem:
@@ -68,7 +68,7 @@ def load_problem(study: Study) -> Problem:
     Raises
     ------
     InputError
-        Naming file, place, value and remedy.
+        If the study does not define a design problem; the message names file, place, value and remedy.
     """
     section, model = study.design or DesignSection(), load_model(study).without_torque
     try:
@@ -95,15 +95,15 @@ def load_problem(study: Study) -> Problem:
 
 
 def load_loop_problem(study: Study) -> Problem:
-    """Return the design problem for the loop, which plans by one criterion: the first that is named, or D-optimal.
+    """Return the design problem for the loop, which plans by the first criterion named, by default D-optimal.
 
-    Where ``[design]`` does not say how the base starts, it starts as in the first of the ``[[recordings]]``, whose file
-    is not read.
+    Where ``[design]`` does not state the base's initial state, it is that of the first of the ``[[recordings]]``, whose
+    file is not read.
 
     Raises
     ------
     InputError
-        Naming file, place, value and remedy.
+        If the study does not define a design problem; the message names file, place, value and remedy.
     """
     section = study.design or DesignSection()
     named = section.criteria or (DOptimal.name,)
@@ -116,12 +116,12 @@ def load_loop_problem(study: Study) -> Problem:
 
 
 def defining_files(study: Study) -> list[Path | None]:
-    """Return all files that define the problem of a study, None for those it does not name."""
+    """Return all files that define the problem of a study, None for those that it does not name."""
     return [study.file, study.robot.urdf, study.unknowns.posterior, *study.model.plugins]
 
 
 def _with_rivals(model: Model, section: DesignSection) -> Model:
-    """Extend the model by those effects to be told apart that it lacks."""
+    """Return the model extended by the rival effects that it lacks."""
     try:
         for label in section.rivals:
             if label not in [effect.label for effect in model.effects]:
@@ -173,7 +173,7 @@ def _joint_index(name: str, names: list[str], place: str) -> int:
 
 
 def _start(robot: Robot, section: DesignSection) -> Floats:
-    """Return the positions of all joints before and after the manoeuvre."""
+    """Return the positions of all joints before and after the manoeuvre, shape (joints,) [rad or m]."""
     start = np.array([np.clip(0.0, joint.lower, joint.upper) for joint in robot.joints])
     for name, value in section.start.items():
         index = _joint_index(name, [joint.name for joint in robot.joints], f"design.start.{name}")
@@ -189,26 +189,26 @@ def _start(robot: Robot, section: DesignSection) -> Floats:
 
 
 def _step(model: Model, section: DesignSection, limits: Limits) -> float:
-    """Return a step of the integration that is short against everything that happens; limits are seen twice a step."""
+    """Return an integration step [s] shorter than every time scale; the limits are evaluated every half step."""
     functions = section.functions or FUNCTIONS
     steps = [LONGEST_STEP, section.duration / STEPS, section.duration / (4 * functions), 4.0 * section.interval]
     return min(*steps, 2.0 * limits.finest, *(effect.longest_step for effect in model.effects))
 
 
 def _check_traceable(plan: Plan) -> None:
-    """Reject effects whose tables JAX cannot differentiate in the motion."""
+    """Reject effects whose tables JAX cannot differentiate with respect to the motion."""
     times = np.linspace(0.0, plan.family.duration, 3)
     for effect in plan.model.effects:
         if not effect.uses("table"):
             continue
         try:
             jax.eval_shape(
-                lambda p, own=effect: own.table(plan.model.robot, plan.family.motion(p), times),
+                lambda p, effect=effect: effect.table(plan.model.robot, plan.family.motion(p), times),
                 jnp.asarray(plan.family.centre),
             )
         except InputError:
             raise
-        except (TypeError, ValueError) as error:  # JAX's own, and NumPy's where it is handed a traced array
+        except (TypeError, ValueError) as error:  # from JAX, or from NumPy for a traced array
             raise InputError(
                 f"effect {effect.label!r} computes the joints' motion outside JAX, so that a design has no gradient",
                 place="model.effects",

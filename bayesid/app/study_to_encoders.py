@@ -1,4 +1,4 @@
-"""The noise of the joints' encoders, as a study states it."""
+"""Noise of the joints' encoders, as a study states it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bayesid.robot.robot import Robot
 __all__ = ["ASSUMED", "JointNoise", "assume_missing", "encoder_noise"]
 
 ASSUMED = 1e-6
-"""Noise of an encoder of which the study says nothing, and no data tell [rad or m]."""
+"""Noise of an encoder for which neither study nor data give a value, that of a good encoder [rad or m]."""
 
 JointNoise = dict[int, dict[str, float | None]]
 """Noise of position (0), velocity (1), acceleration (2) by joint; None where it is to be estimated from the data."""
@@ -26,7 +26,7 @@ def encoder_noise(study: Study, robot: Robot) -> JointNoise:
 
 
 def assume_missing(noise: JointNoise) -> tuple[JointNoise, list[str]]:
-    """Return the noise with `ASSUMED` for positions of which the study says nothing, and the joints this concerns.
+    """Return the noise with `ASSUMED` for positions whose noise the study omits, and the names of these joints.
 
     Planned motion has no samples from which the noise could be estimated.
     """

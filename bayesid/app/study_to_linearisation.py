@@ -1,4 +1,7 @@
-"""What practical identifiability of a study rests on: a fit of its recordings or, for planned motion, a prediction."""
+"""Linearisation point for the practical identifiability of a study: a fit of its recordings, or a prediction.
+
+Planned motion without readings gives a prediction.
+"""
 
 from __future__ import annotations
 
@@ -25,17 +28,23 @@ __all__ = ["LinearisationPoint", "missing_part", "prepare"]
 
 
 MISFIT = 3.0
-"""Deviation of chi-square, in its own standard deviations, that noise alone rarely reaches."""
+"""Deviation of chi-square from its mean, in standard deviations of chi-square, that noise alone rarely reaches."""
 
 
 @dataclass(frozen=True)
 class LinearisationPoint:
-    """A posterior with its mode.
+    """Posterior with the mode at which it is linearised.
 
     Attributes
     ----------
+    basis : Basis
+        Basis of the posterior, a fit or a prediction.
     statement : str
-        What it rests on, in a sentence.
+        Description of the basis in sentences.
+    posterior : Posterior
+        Posterior with its noise linearised at the mode.
+    optimum : Optimum
+        Mode of the posterior.
     """
 
     basis: Basis
@@ -45,14 +54,24 @@ class LinearisationPoint:
 
 
 def missing_part(study: Study) -> str:
-    """Return what a study lacks for a practical part; empty if nothing."""
+    """Return what a study lacks for practical identifiability, an empty text if nothing."""
     if not study.recordings:
         return "the study names no [[recordings]], not even a planned motion of the joints"
     return "" if study.unknowns.bodies else "the study has no [unknowns] bodies"
 
 
 def prepare(study: Study, seed: int) -> LinearisationPoint:
-    """Fit the recordings of a study, or take its motion for a plan where they lack what a declared sensor reads."""
+    """Return the linearisation point of a study.
+
+    The recordings are fitted. Where they lack the readings of a declared sensor, their motion is taken as planned.
+
+    Parameters
+    ----------
+    study : Study
+        Study with at least one recording and one unknown body.
+    seed : int
+        Seed of the random starts of the fit.
+    """
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
     if lacking := _lacking(model, manoeuvres):
@@ -76,7 +95,7 @@ def _predicted(
     planned = []
     for section, manoeuvre in zip(study.recordings, manoeuvres, strict=True):
         refuse_impossible_joints(manoeuvre.recording, robot)
-        # a plan has no noise from which the encoders' could be estimated
+        # a plan has no noise, so the encoders' noise cannot be estimated from it
         motion = MeasuredMotion.from_recording(manoeuvre.recording, robot, sigma=noise, start=section.start)
         planned.append(blanked(replace(manoeuvre, motion=motion), model.sensors, model.torque))
     posterior = planned_posterior(model, planned)

@@ -1,4 +1,4 @@
-"""From a study file to the objects it describes: robot, model, manoeuvres, posterior."""
+"""Conversion of a study file into the objects that it describes: robot, model, manoeuvres and posterior."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ __all__ = ["load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", 
 
 
 CHANGE_SEED = 0
-"""Of the draws of an uncertain change of mass, so that a study always has the same prior."""
+"""Seed of the draws of an uncertain mass-property change, so that a study always has the same prior."""
 
 
 def load_posterior(study: Study) -> Posterior:
-    """Read everything a study names and build its posterior.
+    """Read all files that a study names, and return its posterior.
 
     Raises
     ------
     InputError
-        Naming file, place, value and remedy.
+        If a file is absent or a rule is broken; the message names file, place, value and remedy.
     """
     model = load_model(study)
     return Posterior.of(model, load_manoeuvres(study, model.robot))
 
 
 def load_robot(study: Study) -> Robot:
-    """Read the robot with its loads; bodies whose prior the study gives have that prior's centre."""
+    """Return the robot with its loads; bodies with a prior in the study have the inertial parameters of its centre."""
     return _load_robot(study)[0]
 
 
 def _load_robot(study: Study) -> tuple[Robot, JointPrior | None]:
-    """Read the robot, and the joint prior of the bodies of an earlier posterior if the study names one."""
+    """Return the robot, and the joint prior from an earlier posterior if the study names one."""
     robot = Robot.from_urdf(study.robot.urdf)
     try:
         for load in study.robot.loads:
@@ -67,10 +67,10 @@ def _load_robot(study: Study) -> tuple[Robot, JointPrior | None]:
 
 
 def _carried(study: Study, robot: Robot) -> JointPrior | None:
-    """Return the joint prior from an earlier posterior.
+    """Return the joint prior from an earlier posterior, None where the study names no posterior.
 
-    Bodies it holds beside those of the study are carried too if the robot has them: they were not known exactly then,
-    and are correlated with the others.
+    Further bodies of that posterior are included if the robot has them, because they were not known exactly and are
+    correlated with the others.
     """
     section = study.unknowns
     if section.posterior is None:
@@ -87,7 +87,7 @@ def _carried(study: Study, robot: Robot) -> JointPrior | None:
 
 
 def load_model(study: Study) -> Model:
-    """Build the model of a study."""
+    """Return the model of a study, after running its plugins."""
     for plugin in study.model.plugins:
         run_user_file(Path(plugin), "model.plugins", "Correct the path of the plugin")
     robot, carried = _load_robot(study)
@@ -108,25 +108,25 @@ def load_model(study: Study) -> Model:
 
 
 def _priors(study: Study, robot: Robot, carried: JointPrior | None) -> tuple[tuple[BodyPrior, ...], Mixing | None]:
-    """Return the priors of identified bodies, then of bodies only marginalised, and what correlates them."""
+    """Return the priors of the identified and then of the marginalised bodies, and the mixing of their joint prior."""
     section, spread = study.unknowns, study.robot.link_spread
     if carried is None:
-        own = [BodyPrior(name, robot.link(name).inertial, section.spread_of(name)) for name in section.bodies]
-        return (*own, *spread_links(robot, spread, section.bodies)), None
+        identified = [BodyPrior(name, robot.link(name).inertial, section.spread_of(name)) for name in section.bodies]
+        return (*identified, *spread_links(robot, spread, section.bodies)), None
     known = carried.bodies([name for name in carried.names if name not in section.bodies])
     links = spread_links(robot, spread, carried.names)
     return (*known, *links), carried.mixing(links)
 
 
 def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:
-    """Read all recordings of a study and smooth their joint motion."""
+    """Read all recordings of a study, and return them as manoeuvres with smoothed joint motion."""
     if not study.recordings:
         raise InputError("no [[recordings]]", file=study.file, remedy="Name at least one recording")
     return [load_manoeuvre(study, section, robot) for section in study.recordings]
 
 
 def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
-    """Read one recording of a study."""
+    """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
     recording = Recording.read(section.file)
     motion = MeasuredMotion.from_recording(recording, robot, sigma=encoder_noise(study, robot), start=section.start)
     return Manoeuvre(
@@ -183,7 +183,7 @@ def _torque(study: Study, robot: Robot) -> TorqueSensor | None:
 
 def _effects(study: Study) -> tuple[Effect, ...]:
     effects = [create(label) for label in study.model.effects]
-    # a sensor whose study states the prior of its bias has the bias in its model
+    # a sensor with a bias_sigma in the study has a bias in the model
     for section, kind in ((study.sensors.rate, RateBias), (study.sensors.accel, AccelBias)):
         if section is not None and section.bias_sigma is not None and kind.name not in study.model.effects:
             effects.append(kind(section.bias_sigma))
@@ -199,7 +199,7 @@ def _effects(study: Study) -> tuple[Effect, ...]:
 
 
 def with_prior(effect: Effect, sigma: Mapping[str, float]) -> Effect:
-    """Return the effect with other prior standard deviations of the named parameters."""
+    """Return the effect with other prior standard deviations of the parameters that ``sigma`` names."""
     keys = [parameter.name for parameter in effect.parameters]
     for key in sigma:
         if key not in keys:

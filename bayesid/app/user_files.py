@@ -1,4 +1,4 @@
-"""Python files of the user: effects of a study, and spacecraft that execute plans."""
+"""Python files of the user, with effects for a study or a spacecraft that executes plans."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ def run_user_file(file: Path, place: str, remedy: str) -> ModuleType:
 
     Parameters
     ----------
+    file : Path
+        Python file to run.
     place : str
-        The key or option that names the file.
+        Key or option that names the file, for errors.
     remedy : str
-        What to do where there is no such file.
+        Remedy where there is no such file, for errors.
 
     Raises
     ------
@@ -32,7 +34,7 @@ def run_user_file(file: Path, place: str, remedy: str) -> ModuleType:
     if not file.is_file() or spec is None or spec.loader is None:
         raise InputError("no such Python file", file=file, place=place, remedy=remedy)
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # where dataclasses look for the types of their fields
+    sys.modules[name] = module  # dataclasses look up the types of their fields there
     try:
         spec.loader.exec_module(module)
     except Exception as error:

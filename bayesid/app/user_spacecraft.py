@@ -1,4 +1,4 @@
-"""A spacecraft of the user: a Python file that executes the plans of ``bayesid loop``."""
+"""Spacecraft in a Python file of the user, which executes the plans of ``bayesid loop``."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["Nobody", "load_spacecraft"]
 
 
 def load_spacecraft(file: Path) -> Spacecraft:
-    """Run a user's file and return what it calls ``execute``, or an instance of its class ``Spacecraft``.
+    """Run a user's file, and return its function ``execute`` or an instance of its class ``Spacecraft``.
 
     Raises
     ------
     InputError
-        If there is no such file, it fails, or it defines neither.
+        If there is no such file, it fails, or it defines neither of the two.
     """
     remedy = "Define a function execute(plan) that returns a Recording, or a class Spacecraft with that method"
     module = run_user_file(file, "--spacecraft", remedy)
@@ -34,13 +34,13 @@ def load_spacecraft(file: Path) -> Spacecraft:
 
 
 class _Checked:
-    """A user's spacecraft, whose answer is looked at."""
+    """Spacecraft of the user whose results are checked."""
 
     def __init__(self, inner: Any, file: Path) -> None:
         self.inner, self.file = inner, file
 
     def execute(self, plan: Recording) -> Recording:
-        """Execute and refuse what is no recording."""
+        """Execute a plan, and refuse a result that is not a recording."""
         try:
             recording = self.inner.execute(plan)
         except (InputError, NotFlown):
@@ -59,8 +59,8 @@ class _Checked:
 
 
 class Nobody:
-    """Stands for a robot that is flown elsewhere."""
+    """Spacecraft in place of a robot that is flown elsewhere."""
 
     def execute(self, plan: Recording) -> Recording:
-        """Wait."""
+        """Raise `NotFlown`, because the recording will come later."""
         raise NotFlown

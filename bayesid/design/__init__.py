@@ -1,8 +1,9 @@
 """Design of the excitation: manoeuvres chosen by the posterior they lead to, within the limits of the robot.
 
-Data flows one way: `parameterisation` -> `planned` (what the robot does, what its sensors tell) -> `criteria` and
-`limits` -> `problem` (compiled, with gradients) -> `optimise` -> `design` (with the posterior each leads to).
-`loop` plans, lets a `spacecraft` execute, identifies and plans again from the posterior.
+Data flow in one direction: `trajectories` -> `plan` (motion of the robot and information of its sensors) -> `criteria`
+and `motion_limits` -> `design_problem` (compiled, with gradients) -> `trajectory_search` -> `designed` (each manoeuvre
+with its predicted posterior). `excitation_loop` plans a manoeuvre, has a spacecraft execute it, identifies the bodies
+and plans again from the posterior.
 """
 
 from bayesid.design.criteria import (

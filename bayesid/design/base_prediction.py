@@ -1,8 +1,9 @@
-"""Where a planned joint motion takes the base and the end-effector, given what is known of the robot.
+"""Prediction of the trajectories of base and end-effector under a planned joint motion, given what is known.
 
-Without external force the centre of mass stays at rest: with k(t) its place in base axes and R(t) the attitude of the
-base (base to orbit axes), the base moves by ``R(0) k(0) - R(t) k(t)``. The initial linear velocity is zero; another
-only adds to it. Every draw of the prior, or of a posterior that is the prior, gives one course of both.
+Without external force the centre of mass stays at rest. With its position k(t) in base axes and the attitude R(t) of
+the base (base to orbit axes), the base moves by ``R(0) k(0) - R(t) k(t)``. The initial linear velocity is zero; any
+other one adds a uniform motion. Every draw of the prior, or of a posterior used as prior, gives one trajectory of the
+base and one of the end-effector.
 """
 
 from __future__ import annotations
@@ -30,14 +31,13 @@ from bayesid.simulation.sensors import Kind, Sensor, White
 __all__ = ["BasePredictor", "Prediction", "last_link", "predict"]
 
 ATTITUDE = Sensor(Kind.ATTITUDE, White(1e-6))
-"""Fixes the integration step: its error is below a hundredth of this angle [rad]."""
+"""Sensor that sets the integration step, whose error stays below a hundredth of the sensor's noise [rad]."""
 
 INSTANTS = 121
-"""At which the course is given."""
-
+"""Number of instants of a predicted trajectory, enough for a smooth curve in a figure."""
 
 FEWEST = 16
-"""Draws."""
+"""Smallest number of draws from which the covariance of a region is computed."""
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,13 @@ class Prediction:
     Parameters
     ----------
     name : str
-        Of the manoeuvre.
+        Name of the manoeuvre.
     tip_frame : str
+        Name of the end-effector's frame in the URDF.
     rate : (3,) array
-        Initial rate, base axes [rad/s].
-    base, tip : Course
+        Initial angular velocity of the base, base axes [rad/s].
+    base, tip : PoseTrajectory
+        Trajectories of the base and of the end-effector.
     """
 
     name: str
@@ -61,7 +63,7 @@ class Prediction:
     tip: PoseTrajectory
 
     def to_dict(self) -> dict[str, Any]:
-        """Content of one recording in prediction.json."""
+        """Return the entry of the manoeuvre in prediction.json."""
         return {
             "name": self.name,
             "duration": float(self.base.time[-1]),
@@ -74,20 +76,20 @@ class Prediction:
 
 
 class BasePredictor:
-    """Base and end-effector of one manoeuvre as functions of the unknowns.
+    """Predictor of the poses of base and end-effector in one manoeuvre as functions of the unknowns.
 
     Parameters
     ----------
     model : Model
-        Its sensors play no part.
+        Model whose priors are propagated; its sensors are ignored.
     manoeuvre : Manoeuvre
-        Joint motion, taken as exact, and initial attitude. The initial rate is that of the first samples of the rate
-        sensor if there are any and the model has it unknown, and zero otherwise. Known torques and momenta of the
-        wheels act; a known force would move the centre of mass and is refused.
+        Joint motion, which is taken as exact, and initial attitude. The initial rate is that of the first samples of
+        the rate sensor if they exist and the model's initial rate is unknown, and zero otherwise. Known torques and
+        momenta of the wheels act; a known force would move the centre of mass and is refused.
     tip_frame : str, optional
-        Frame of the URDF; the last link where left out.
-    like : Predictor, optional
-        Of the same model; its compiled functions and integration step are shared.
+        Frame of the end-effector in the URDF, by default the last link.
+    like : BasePredictor, optional
+        Predictor of the same model whose compiled functions and integration step are shared.
     """
 
     def __init__(
@@ -104,14 +106,14 @@ class BasePredictor:
         self._tip = Tip.of(model.robot, self.tip_frame).motion(model.robot, manoeuvre.motion.evaluate(self.time))[0]
 
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
-        """Draw from the prior; the initial rate is the known one, shape (count, size)."""
+        """Return draws of the prior in which the initial rate is the known one, shape (count, size)."""
         z = rng.normal(size=(count, self.posterior.size))
         rates = self.posterior.unknowns.layout.all_rates
         z[:, rates] = self.centre[rates]
         return z
 
     def predict(self, draws: int, rng: np.random.Generator) -> Prediction:
-        """Predict with so many draws of the prior."""
+        """Return the prediction from a number of draws of the prior."""
         if draws < FEWEST:
             raise InputError(f"{draws} draws give no region", remedy=f"Ask for {FEWEST} or more; hundreds are usual")
         return Prediction(self.name, self.tip_frame, self.rate, *self.courses(self.draw(draws, rng)))
@@ -125,11 +127,11 @@ class BasePredictor:
         return z
 
     def courses(self, z: Floats) -> tuple[PoseTrajectory, PoseTrajectory]:
-        """Return the courses of base and end-effector at many points, shape (n, size)."""
-        moments = [trace(self.posterior, point, self.posterior.data.arrays).sample for point in z]
+        """Return the trajectories of base and end-effector at many points of the unknowns, shape (n, size)."""
+        instants = [trace(self.posterior, point, self.posterior.data.arrays).sample for point in z]
         count = len(self.time)
-        com = np.stack([np.asarray(instant.body.com)[0, :count] for instant in moments])
-        turn = np.stack([np.asarray(instant.attitude)[0, :count] for instant in moments])
+        com = np.stack([np.asarray(instant.body.com)[0, :count] for instant in instants])
+        turn = np.stack([np.asarray(instant.attitude)[0, :count] for instant in instants])
         place = np.einsum("ntij,ntj->nti", turn, com)
         base = place[:, :1] - place
         tip = base + np.einsum("ntij,tj->nti", turn, self._tip[:, :3, 3])
@@ -147,32 +149,37 @@ def predict(
     draws: int = 500,
     tip_frame: str | None = None,
 ) -> Prediction:
-    """Predict where a manoeuvre takes base and end-effector under the prior of a model.
+    """Predict the trajectories of base and end-effector in a manoeuvre under the prior of a model.
 
     Parameters
     ----------
     model, manoeuvre, tip_frame
-        See `BasePredictor`.
+        Parameters of `BasePredictor`.
+    rng : numpy.random.Generator
+        Source of the draws.
     draws : int
-        Of the prior.
+        Number of draws of the prior.
     """
     return BasePredictor(model, manoeuvre, tip_frame).predict(draws, rng)
 
 
 def last_link(robot: Robot) -> str:
-    """Return the last link of the robot's chain, loads not counted."""
+    """Return the name of the last link of the robot, without loads."""
     return [name for name in robot.links if name not in robot.loads][-1]
 
 
 class _Exact:
-    """A joint motion without its uncertainty."""
+    """Joint motion without its uncertainty."""
 
     def __init__(self, motion: Any) -> None:
         self.evaluate = motion.evaluate
 
 
 def _planned(recording: Recording) -> Recording:
-    """Return the known actions of a recording, on its times or fewer, with a blank attitude."""
+    """Return a recording of the known actions alone, with placeholder samples of the attitude.
+
+    It has the times of the given recording, or `INSTANTS` even ones where there are no actions.
+    """
     if any(np.nan_to_num(recording.channels.get(f"base_force.{axis}", np.zeros(1))).any() for axis in "xyz"):
         raise InputError(
             "a known force acts on the base, and moves the centre of mass",

@@ -1,7 +1,8 @@
-"""What makes a manoeuvre good. Every criterion is a cost, to be minimised, of what a plan would bring.
+"""Criteria by which a manoeuvre is designed; each is a cost of a planned manoeuvre, to be minimised.
 
-The paper's (26) looks at the motion of the base, the condition number at the regressor, the others at the posterior
-covariance that the sensors' noise leaves, with everything that is not a body to identify marginalised.
+The paper's (26) evaluates the motion of the base, the condition number evaluates the regressor. The other criteria
+evaluate the posterior covariance given the sensors' noise, in which all unknowns other than the bodies to identify are
+marginalised.
 """
 
 from __future__ import annotations
@@ -31,30 +32,31 @@ __all__ = [
 
 
 class Criterion(Protocol):
-    """What a criterion must offer.
+    """Interface of a criterion.
 
     Attributes
     ----------
     name : str
-        As in design.json.
+        Name of the criterion in design.json.
     """
 
     name: ClassVar[str]
 
     @property
     def draws(self) -> int:
-        """Points of the prior to average over."""
+        """Number of draws of the prior over which the cost is averaged; 0 for the prior's centre alone."""
         ...
 
     def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
-        """Return a number to be minimised, differentiable by JAX."""
+        """Return the scalar to be minimised, differentiable by JAX."""
         ...
 
 
 def covariance(plan: Plan, outcome: PlannedOutcome) -> Array:
-    """Posterior covariance (Laplace) of the log-Cholesky coordinates of the bodies to identify, all else marginalised.
+    """Return the Laplace posterior covariance of the log-Cholesky coordinates of the bodies to identify.
 
-    These are relative: a mass is known to twice the coordinate's standard deviation.
+    All other unknowns are marginalised. The coordinates are relative: the relative standard deviation of a mass is
+    twice that of its coordinate.
     """
     return _of_bodies(plan, outcome.information + _prior(plan, outcome))
 
@@ -64,17 +66,17 @@ def _prior(plan: Plan, outcome: PlannedOutcome) -> Array:
 
 
 def _of_bodies(plan: Plan, precision: Array) -> Array:
-    own, count = jnp.asarray(plan.bodies(), dtype=int), len(plan.unknowns.widths)
+    identified, count = jnp.asarray(plan.bodies(), dtype=int), len(plan.unknowns.widths)
     every = plan.unknowns.widths @ _inverse(precision)[:count, :count] @ plan.unknowns.widths.T
-    return every[jnp.ix_(own, own)]
+    return every[jnp.ix_(identified, identified)]
 
 
 @dataclass(frozen=True)
 class Paper26:
-    """The paper's (26) as printed, from the largest excursion of each state of the base.
+    """The paper's (26) as printed, computed from the largest excursion of each state of the base.
 
-    Its signed differences cancel most of it: of three states -y1^2 + y2^2 + 3 y3^2 remains, so that it rewards the
-    third state alone, penalises the first, and says nothing of balance. It adds metres to radians.
+    Its signed differences cancel most terms. For three states -y1^2 + y2^2 + 3 y3^2 remains, which rewards mostly the
+    third state, penalises the first, and does not measure balance. It also adds metres to radians.
     """
 
     name: ClassVar[str] = "paper-26"
@@ -91,9 +93,9 @@ class Paper26:
 
 @dataclass(frozen=True)
 class Paper26Intended:
-    """What (26) appears to intend: large differences between the states count against it, whatever their sign.
+    """Apparent intention of (26): large differences between the states increase the cost, whatever their sign.
 
-    Of three states, sorted, 3 smallest^2 + middle^2 - largest^2 remains.
+    For three states, 3 smallest^2 + middle^2 - largest^2 remains.
     """
 
     name: ClassVar[str] = "paper-26-intended"
@@ -112,8 +114,8 @@ class Paper26Intended:
 class ConditionNumber:
     """Logarithm of the condition number of the regressor (Armstrong 1989, Gautier & Khalil 1992).
 
-    Of the base's force balance (19) along the manoeuvre. Columns are per unit of the prior's standard deviation,
-    torques are divided by the bodies' radius of gyration, so that no units are mixed.
+    The regressor is that of the base's balance (19) along the manoeuvre. Columns are per unit of the prior's standard
+    deviation, and torques are divided by the bodies' radius of gyration, so that no units are mixed.
     """
 
     name: ClassVar[str] = "condition-number"
@@ -127,7 +129,7 @@ class ConditionNumber:
 
 @dataclass(frozen=True)
 class DOptimal:
-    """Volume of the posterior: half the logarithm of its covariance's determinant."""
+    """Volume of the posterior, as half the logarithm of the determinant of its covariance."""
 
     name: ClassVar[str] = "d-optimal"
     draws: int = 0
@@ -139,13 +141,13 @@ class DOptimal:
 
 @dataclass(frozen=True)
 class AOptimal:
-    """Logarithm of the root mean variance of the log-Cholesky coordinates."""
+    """Logarithm of the root mean square of the standard deviations of the log-Cholesky coordinates."""
 
     name: ClassVar[str] = "a-optimal"
     draws: int = 0
 
     def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
-        """Return the logarithm of a standard deviation."""
+        """Return the logarithm of the root mean square."""
         return 0.5 * jnp.log(jnp.mean(jnp.diag(covariance(plan, outcome))))
 
 
@@ -157,15 +159,15 @@ class EOptimal:
     draws: int = 0
 
     def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
-        """Return the logarithm of a standard deviation."""
+        """Return the logarithm of the largest standard deviation over all directions."""
         return 0.5 * jnp.log(jnp.linalg.eigvalsh(covariance(plan, outcome))[-1])
 
 
 @dataclass(frozen=True)
 class InformationGain:
-    """Expected gain of information about the bodies, averaged over their prior [nats], with its sign turned.
+    """Minus the expected information gain about the bodies, averaged over their prior [nats].
 
-    The posterior at each draw is taken as normal (Chaloner & Verdinelli 1995, section 2.2).
+    The posterior at each draw is approximated as normal (Chaloner & Verdinelli 1995, section 2.2).
     """
 
     name: ClassVar[str] = "information-gain"
@@ -179,15 +181,16 @@ class InformationGain:
 
 @dataclass(frozen=True)
 class Separation:
-    """Signal-to-noise by which rival effects can be told apart: of each, with all else and its rivals marginalised.
+    """Smallest signal-to-noise ratio of any of several rival effects, with all other unknowns marginalised.
 
-    For two effects of one parameter this is lambda (1 - rho^2) of the weaker one. The model of the plan must carry the
-    rivals; their amplitudes are those of their priors.
+    The other unknowns include the remaining rivals. For two effects of one parameter the squared ratio is
+    lambda (1 - rho^2) of the weaker one. The model of the plan must contain the rivals; their amplitudes are those of
+    their priors.
 
     Parameters
     ----------
     rivals : tuple of str
-        Labels of effects.
+        Labels of the effects to distinguish, at least two.
     """
 
     rivals: tuple[str, ...]
@@ -203,30 +206,30 @@ class Separation:
     def noncentrality(self, plan: Plan, outcome: PlannedOutcome) -> Array:
         """Return the expected lambda (1 - rho^2) of each rival, shape (rivals,)."""
         groups = [jnp.asarray(self._coordinates(plan, label), dtype=int) for label in self.rivals]
-        # a rival may have any size: its amplitude has no prior here
+        # no prior on the rivals' amplitudes, because a rival may have any size
         free = jnp.ones(plan.unknowns.size).at[jnp.concatenate(groups)].set(0.0)
         total = outcome.information + _prior(plan, outcome) * jnp.outer(free, free) + 1e-9 * jnp.diag(1.0 - free)
         values = []
         for group in groups:
             rest = jnp.setdiff1d(jnp.arange(plan.unknowns.size), group, size=plan.unknowns.size - len(group))
-            own = outcome.information[jnp.ix_(group, group)]
+            direct = outcome.information[jnp.ix_(group, group)]
             cross = outcome.information[jnp.ix_(group, rest)]
-            values.append(jnp.trace(own - cross @ _inverse(total[jnp.ix_(rest, rest)]) @ cross.T))
+            values.append(jnp.trace(direct - cross @ _inverse(total[jnp.ix_(rest, rest)]) @ cross.T))
         return jnp.stack(values)
 
     def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
-        """Return minus the logarithm of the smallest root noncentrality."""
+        """Return minus the logarithm of the smallest square root of a noncentrality."""
         return -0.5 * jnp.log(jnp.maximum(jnp.min(self.noncentrality(plan, outcome)), 1e-12))
 
     def _coordinates(self, plan: Plan, label: str) -> list[int]:
-        found = list(plan.effect(label))
-        if not found:
+        coordinates = list(plan.effect(label))
+        if not coordinates:
             raise InputError(
                 f"the plan's model has no effect {label!r} with parameters",
                 place="design.rivals",
                 remedy="Extend the model by the rivals",
             )
-        return found
+        return coordinates
 
 
 def _largest_squares(outcome: PlannedOutcome) -> Array:
@@ -234,6 +237,6 @@ def _largest_squares(outcome: PlannedOutcome) -> Array:
 
 
 def _inverse(matrix: Array) -> Array:
-    """Inverse of a positive-definite matrix whose rows differ in scale."""
+    """Return the inverse of a positive-definite matrix whose rows differ in scale."""
     scale = 1.0 / jnp.sqrt(jnp.diag(matrix))
     return jnp.linalg.inv(matrix * jnp.outer(scale, scale)) * jnp.outer(scale, scale)

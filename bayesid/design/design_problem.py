@@ -1,4 +1,4 @@
-"""A design problem: a plan, limits and criteria, compiled once, with exact gradients."""
+"""Design problem: a plan, limits and criteria, compiled once, with exact gradients."""
 
 from __future__ import annotations
 
@@ -20,18 +20,30 @@ from bayesid.design.plan import Plan, Trajectory
 __all__ = ["FINER", "Known", "Problem", "Reached"]
 
 QUICKLY = {"xla_llvm_disable_expensive_passes": True}
-"""Of XLA: compiles a third faster, and what it compiles is as fast."""
+"""Options of XLA with which compilation is a third faster and the compiled code is as fast."""
 
 FINER = 8
-"""How much finer than the optimiser's grid the limits of a result are checked."""
+"""Ratio of the optimiser's time step to the one at which the limits of a result are checked."""
 
 _SHARED = ("_cost", "_fractions", "_fine_trajectory")
-"""Compiled functions that neither bounds nor what is known enter."""
+"""Names of the compiled functions that depend neither on bounds nor on prior knowledge, both of which are arguments."""
 
 
 @dataclass(frozen=True)
 class Reached:
-    """A limit and how near a manoeuvre comes to it."""
+    """Limit with the largest value that a manoeuvre reaches.
+
+    Parameters
+    ----------
+    name : str
+        Name of the limit.
+    limit : float
+        Bound of the limited quantity, in the unit.
+    largest : float
+        Largest value along the manoeuvre, in the unit.
+    unit : str
+        Unit of the quantity.
+    """
 
     name: str
     limit: float
@@ -40,24 +52,25 @@ class Reached:
 
     @property
     def active(self) -> bool:
-        """Whether it is what holds the manoeuvre back."""
+        """True if the limit restricts the manoeuvre."""
         return self.largest > ACTIVE * self.limit
 
     @property
     def kept(self) -> bool:
-        """Whether it is respected."""
+        """True if the manoeuvre keeps the limit."""
         return self.largest <= self.limit
 
 
 @dataclass(frozen=True)
 class Known:
-    """What earlier manoeuvres told: a normal distribution of the unknowns' coordinates.
+    """Knowledge from earlier manoeuvres, a normal distribution of the unknowns' coordinates.
 
     Parameters
     ----------
     centre : (n,) array
+        Mean of the coordinates.
     precision : (n, n) array
-        Inverse of the covariance.
+        Inverse covariance of the coordinates.
     """
 
     centre: Floats
@@ -66,16 +79,18 @@ class Known:
 
 @dataclass(frozen=True)
 class Problem:
-    """A family of manoeuvres to choose from.
+    """Choice of a manoeuvre from a family, by criteria and within limits.
 
     Parameters
     ----------
     plan : Plan
+        Family of manoeuvres.
     limits : Limits
+        Limits that a manoeuvre must keep.
     criteria : sequence of Criterion
-        All that will be asked for: they share one compiled simulation.
+        Criteria that may be evaluated; they share one compiled simulation.
     known : Known, optional
-        Takes the place of the prior of the plan's model.
+        Knowledge in place of the prior of the plan's model.
     """
 
     plan: Plan
@@ -85,7 +100,7 @@ class Problem:
 
     @cached_property
     def applied(self) -> tuple[Limit, ...]:
-        """The limits that apply."""
+        """Limits that apply to the robot."""
         return self.limits.of(self.plan.model.robot)
 
     @cached_property
@@ -94,14 +109,14 @@ class Problem:
         return np.array([limit.bound for limit in self.applied])
 
     def with_limits(self, limits: Limits) -> Problem:
-        """Return the problem with other bounds of the same limits, without compiling anything anew."""
+        """Return the problem with other bounds of the same limits, without a new compilation."""
         new = replace(self, limits=limits)
         if [limit.name for limit in new.applied] != [limit.name for limit in self.applied]:
             raise InputError("other limits apply than before", place="limits", remedy="Change bounds only")
         return self._sharing(new)
 
     def knowing(self, known: Known) -> Problem:
-        """Return the problem after earlier manoeuvres, without compiling anything anew."""
+        """Return the problem with the knowledge from earlier manoeuvres, without a new compilation."""
         return self._sharing(replace(self, known=known))
 
     def _sharing(self, other: Problem) -> Problem:
@@ -110,16 +125,16 @@ class Problem:
 
     @cached_property
     def centre(self) -> Floats:
-        """The prior's centre, in the unknowns' coordinates."""
+        """Centre of the prior in the unknowns' coordinates, shape (n,)."""
         return np.zeros(self.plan.unknowns.size) if self.known is None else self.known.centre
 
     @cached_property
     def precision(self) -> Floats:
-        """The prior's precision, in the unknowns' coordinates."""
+        """Precision of the prior in the unknowns' coordinates, shape (n, n)."""
         return np.eye(self.plan.unknowns.size) if self.known is None else self.known.precision
 
     def draws(self, count: int, rng: np.random.Generator) -> Floats:
-        """Draw the bodies from their prior, everything else at its centre, shape (count, n)."""
+        """Return draws of the bodies from their prior, other unknowns at its centre, shape (count, n)."""
         bodies = 10 * len(self.plan.model.priors)
         points = np.tile(self.centre, (count, 1))
         covariance = np.linalg.inv(self.precision)[:bodies, :bodies]
@@ -127,7 +142,7 @@ class Problem:
         return points
 
     def cost(self, criterion: Criterion, parameters: Floats, points: Sequence[Floats] = ()) -> tuple[float, Floats]:
-        """Return a criterion and its gradient, averaged over points of the unknowns (the prior's centre if none)."""
+        """Return a criterion and its gradient, averaged over points of the unknowns, by default the prior's centre."""
         index = self.criteria.index(criterion)
         pairs = [self._cost(parameters, z, index, self.precision) for z in (points or [self.centre])]
         return float(np.mean([pair[0] for pair in pairs])), np.mean([np.asarray(pair[1]) for pair in pairs], axis=0)
@@ -137,9 +152,12 @@ class Problem:
         return {criterion.name: self.cost(criterion, parameters)[0] for criterion in self.criteria}
 
     def fractions(self, parameters: Floats) -> tuple[Floats, Floats]:
-        """Return how much of every limit is used, shape (m,), smooth and never too small; and its Jacobian (m, n)."""
+        """Return the used fractions of all limits, shape (m,), and their Jacobian, shape (m, n).
+
+        The fractions are smooth functions of the parameters and never smaller than the true ones.
+        """
         key = np.asarray(parameters, dtype=float).tobytes()
-        if key not in self._latest:  # the optimiser asks for value and slope of one point one after the other
+        if key not in self._latest:  # the optimiser requests value and slope at one point in two calls
             value, slope = self._fractions(parameters, self.centre, self.bounds)
             self._latest.clear()
             self._latest[key] = (np.asarray(value), np.asarray(slope))
@@ -147,18 +165,18 @@ class Problem:
 
     @cached_property
     def _latest(self) -> dict[bytes, tuple[Floats, Floats]]:
-        """The fractions asked for last."""
+        """Latest result of `fractions`, by the parameters."""
         return {}
 
     def reached(self, parameters: Floats) -> list[Reached]:
-        """Check every limit on a grid `FINER` times finer than the optimiser's."""
+        """Return the largest values of all limited quantities, on a grid `FINER` times finer than the optimiser's."""
         trajectory = self.trajectory(parameters)
         return [
             Reached(limit.name, limit.bound, float(limit.largest(trajectory)), limit.unit) for limit in self.applied
         ]
 
     def largest(self, parameters: Floats, points: Floats, limits: Sequence[Limit]) -> Floats:
-        """Largest value of some limits for many points of the unknowns, shape (k, n) -> (k, limits)."""
+        """Return the largest values (k, limits) of some limited quantities at points (k, n) of the unknowns."""
         rows = []
         for z in points:
             trajectory = self.trajectory(parameters, z)
@@ -166,11 +184,11 @@ class Problem:
         return np.array(rows).reshape(len(points), len(limits))
 
     def trajectory(self, parameters: Floats, z: Floats | None = None) -> Trajectory:
-        """Return what the robot does, on the fine grid."""
+        """Return the motion of the robot on the fine grid, by default at the prior's centre."""
         return jax.tree.map(np.asarray, self._fine_trajectory(parameters, self.centre if z is None else z))
 
     def points(self, criterion: Criterion, rng: np.random.Generator) -> list[Floats]:
-        """Draw points of the prior of all bodies to average a criterion over; none if it looks at the centre alone."""
+        """Return draws of the prior over which a criterion is averaged, an empty list if it uses the centre alone."""
         return list(self.draws(criterion.draws, rng))
 
     # ---- compiled ----

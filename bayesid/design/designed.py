@@ -1,4 +1,4 @@
-"""Manoeuvres designed by several criteria, each with the posterior it leads to and the limits it keeps."""
+"""Manoeuvres designed by several criteria, each with its predicted posterior and the limits it reaches."""
 
 from __future__ import annotations
 
@@ -24,23 +24,26 @@ from bayesid.simulation.model import Manoeuvre
 __all__ = ["Design", "Risk", "best_design", "design", "evaluate", "sample_times"]
 
 CERTAIN = 0.99
-"""Probability with which a limit must hold for a go."""
+"""Probability with which a limit must hold for a manoeuvre to be flown."""
 
 DRAWS = 200
-"""Of the prior, for the risk of breaking a limit."""
+"""Number of draws of the prior for the risk of breaking a limit, enough for a 99 % quantile."""
 
 
 @dataclass(frozen=True)
 class Risk:
-    """A limit under the present uncertainty of the robot.
+    """Risk of breaking a limit under the present uncertainty of the robot.
 
     Attributes
     ----------
     name : str
+        Name of the limit.
     limit : float
+        Bound of the limited quantity, in the unit.
     quantile : float
-        What the largest value along the manoeuvre stays below with probability `CERTAIN`.
+        Value that the quantity stays below along the whole manoeuvre with probability `CERTAIN`, in the unit.
     unit : str
+        Unit of the quantity.
     """
 
     name: str
@@ -50,32 +53,36 @@ class Risk:
 
     @property
     def go(self) -> bool:
-        """Whether the limit holds with that probability."""
+        """True if the limit holds with probability `CERTAIN`."""
         return self.quantile <= self.limit
 
 
 @dataclass(frozen=True)
 class Design:
-    """A designed manoeuvre.
+    """Designed manoeuvre.
 
     Attributes
     ----------
     name : str
-        Also its file's stem.
+        Name of the manoeuvre, which is also the stem of its file.
     criterion : str
-        What it was designed by.
+        Name of the criterion by which it was designed.
     problem : Problem
+        Design problem.
     parameters : (n,) array
-        Of the family of motions.
+        Parameters of the motion in its family.
     found : Found
-        How the search went.
+        Outcome of the search.
     costs : mapping of str to float
-        Every criterion of the problem.
+        Values of all criteria of the problem, by name.
     posterior : Posterior
-        Of the manoeuvre as it would be recorded without noise.
+        Posterior of the manoeuvre as it would be recorded without noise.
     predicted : Predicted
+        Predicted posterior of the bodies to identify.
     reached : sequence of Reached
+        Largest values of all limited quantities.
     risks : sequence of Risk
+        Risks of the limits that depend on the inertial parameters.
     """
 
     name: str
@@ -91,26 +98,26 @@ class Design:
 
     @property
     def manoeuvre(self) -> Manoeuvre:
-        """The manoeuvre as it would be recorded, without noise."""
+        """Manoeuvre as it would be recorded without noise."""
         return self.posterior.manoeuvres[0]
 
     @property
     def motion(self) -> ParameterisedMotion:
-        """The joints' motion."""
+        """Motion of the joints."""
         return self.problem.plan.family.motion(self.parameters)
 
     @property
     def trajectory(self) -> Trajectory:
-        """What the robot does at the prior's centre, on a fine grid."""
+        """Motion of the robot at the prior's centre, on a fine grid."""
         return self.problem.trajectory(self.parameters)
 
     @property
     def go(self) -> bool:
-        """Whether every limit holds with 99 % under the present uncertainty."""
+        """True if every limit holds with 99 % probability under the present uncertainty."""
         return all(risk.go for risk in self.risks) and all(reached.kept for reached in self.reached)
 
     def to_dict(self) -> dict[str, Any]:
-        """Entry of design.json."""
+        """Return the entry of the manoeuvre in design.json."""
         family = self.problem.plan.family
         return {
             "name": self.name,
@@ -142,7 +149,13 @@ class Design:
 
 
 def best_design(designs: Sequence[Design]) -> Design:
-    """Return the design that leads to the smallest posterior, of those that keep their limits."""
+    """Return the design with the smallest posterior covariance among those that keep their limits.
+
+    Raises
+    ------
+    InputError
+        If no design keeps its limits.
+    """
     kept = [design for design in designs if all(reached.kept for reached in design.reached)]
     if not kept:
         broken = {item.name for design in designs for item in design.reached if not item.kept}
@@ -155,7 +168,7 @@ def best_design(designs: Sequence[Design]) -> Design:
 
 
 def sample_times(duration: float, interval: float) -> Floats:
-    """Return the times of all samples of a manoeuvre [s]; the last one is its end if the interval divides it."""
+    """Return the times of all samples of a manoeuvre [s]; the last is its end if the interval divides the duration."""
     return interval * np.arange(int(np.floor(duration / interval + 1e-6)) + 1)
 
 
@@ -170,36 +183,43 @@ def design(
 ) -> list[Design]:
     """Design a manoeuvre by every criterion of a problem.
 
-    Each criterion is searched from its own random starts, then from the best that the others found, so that none is
-    worse off for a search that happened to fail.
+    Each criterion is minimised from separate random starts, and then from the best result over all criteria, so that a
+    search that happened to fail does no harm.
 
     Parameters
     ----------
+    problem : Problem
+        Design problem with its criteria.
     seed : int
+        Seed of all random numbers.
     encoder : Encoder
         Noise of the encoders, for the predicted posterior.
+    search : Search
+        Effort of the search by each criterion.
     store : Store, optional
-        Keeps what was found, for a run that is interrupted.
+        Store of the results, for a run that may be interrupted.
+    progress : Progress
+        Receiver of the fraction done.
 
     Raises
     ------
     InputError
-        Where no manoeuvre keeps the limits.
+        If no manoeuvre keeps the limits.
     """
     store = Store.forgetful() if store is None else store
     seeds = np.random.SeedSequence(seed).spawn(2 * len(problem.criteria) + 1)
     count = len(problem.criteria)
-    found: list[Found] = []
+    first: list[Found] = []
     for index, criterion in enumerate(problem.criteria):
-        own = store.of(f"{problem.plan.family.name}.{criterion.name}")
-        found.append(
+        starts = store.of(f"{problem.plan.family.name}.{criterion.name}")
+        first.append(
             optimise(
                 problem,
                 criterion,
                 np.random.default_rng(seeds[index]),
                 search,
-                known=own.known,
-                keep=own.keep,
+                known=starts.known,
+                keep=starts.keep,
                 progress=part_of(progress, index / (2 * count), (index + 1) / (2 * count)),
             )
         )
@@ -210,7 +230,7 @@ def design(
                 problem,
                 criterion,
                 index,
-                found,
+                first,
                 np.random.default_rng(seeds[count + index]),
                 search,
                 store,
@@ -233,9 +253,22 @@ def evaluate(
     rng: np.random.Generator,
     like: Posterior | None = None,
 ) -> Design:
-    """Compute the posterior a manoeuvre leads to, with the noise of all sensors and encoders, and its limits.
+    """Return the design of a motion with its predicted posterior, given all sensor and encoder noise, and its limits.
 
-    Compiled functions are shared with those of ``like``.
+    Parameters
+    ----------
+    problem : Problem
+        Design problem.
+    name : str
+        Name of the manoeuvre and of its criterion.
+    found : Found
+        Outcome of the search, with the parameters of the motion.
+    encoder : Encoder
+        Noise of the encoders.
+    rng : numpy.random.Generator
+        Source of the draws for the risks.
+    like : Posterior, optional
+        Posterior of another design of the problem; it has no effect any more.
     """
     plan = problem.plan
     parameters = found.parameters
@@ -265,9 +298,9 @@ def evaluate(
 
 
 def risks(problem: Problem, parameters: Floats, rng: np.random.Generator, draws: int = DRAWS) -> list[Risk]:
-    """Return, for every limit that depends on the inertial parameters, its 99 % quantile over their prior.
+    """Return the risks of all limits that depend on the inertial parameters, with 99 % quantiles over their prior.
 
-    The base starts at rest: the uncertainty of the initial rate, which the manoeuvre does not cause, is left out.
+    The base starts at rest. The uncertainty of the initial rate is left out, because the manoeuvre does not cause it.
     """
     limits = [limit for limit in problem.applied if limit.depends]
     largest = problem.largest(parameters, problem.draws(draws, rng), limits)
@@ -281,16 +314,16 @@ def _crossed(
     problem: Problem,
     criterion: Criterion,
     index: int,
-    found: Sequence[Found],
+    first: Sequence[Found],
     rng: np.random.Generator,
     search: Search,
     store: Store,
     progress: Progress,
 ) -> Found:
-    """Search once more from the best of what all criteria found, and return the better result."""
+    """Search once more from the best result over all criteria, and return the outcome with the costs of all starts."""
     points = problem.points(criterion, rng)
-    own = problem.cost(criterion, found[index].parameters, points)[0]
-    candidates = [(problem.cost(criterion, other.parameters, points)[0], other.parameters) for other in found]
+    present = problem.cost(criterion, first[index].parameters, points)[0]
+    candidates = [(problem.cost(criterion, other.parameters, points)[0], other.parameters) for other in first]
     best_cost, best = min(candidates, key=lambda pair: pair[0])
     kept = store.of(f"{problem.plan.family.name}.{criterion.name}.crossed")
     again = optimise(
@@ -298,11 +331,11 @@ def _crossed(
         criterion,
         rng,
         Search(1, search.iterations, search.tolerance),
-        first=best if best_cost < own else found[index].parameters,
+        first=best if best_cost < present else first[index].parameters,
         known=kept.known,
         keep=kept.keep,
         progress=progress,
     )
-    costs = (again.cost, *found[index].costs)
-    evaluations = again.evaluations + found[index].evaluations
+    costs = (again.cost, *first[index].costs)
+    evaluations = again.evaluations + first[index].evaluations
     return Found(again.parameters, again.cost, costs, evaluations)

@@ -1,8 +1,8 @@
-"""The loop of section 3.3 of the paper: plan from what is known, execute, identify, update, until it is known well.
+"""Loop of section 3.3 of the paper: plan a manoeuvre, execute it, identify the bodies, and repeat to some precision.
 
-Every manoeuvre is designed from the posterior of those before it, and flown only if its limits hold with 99 % under it.
-All random numbers follow from one seed and the step's number, and everything between two stages goes through the files
-of the folder: a loop that was killed goes on to the very same result.
+Every manoeuvre is designed from the posterior of those before it, and flown only if its limits hold with 99 %
+probability under that posterior. All random numbers follow from one seed and the step's number, and all data between
+two stages pass through files of the folder. An interrupted loop therefore continues to exactly the same result.
 """
 
 from __future__ import annotations
@@ -48,36 +48,39 @@ from bayesid.simulation.sensors import Kind
 __all__ = ["Loop", "NotFlown"]
 
 LOOSE = 10.0
-"""Initial attitude taken from a star sensor's first sample: this many times its noise, as that sample counts again."""
+"""Factor on a star sensor's noise for an initial attitude from its first sample, as the fit uses that sample again."""
 
 NARROW = 0.5
-"""Width of a prior up to which readings ten times too large are wrong units rather than another body."""
+"""Largest relative width of a prior at which readings ten times too large mean wrong units and not another body."""
 
 
 class NotFlown(Exception):  # noqa: N818  (nothing went wrong)
-    """A spacecraft raises it where the recording will only come later."""
+    """Signal from a spacecraft that the recording of a plan will be available only later."""
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Plan, execute, identify, update.
+    """Loop that plans, executes and identifies manoeuvres, each from the posterior of the earlier ones.
 
     Parameters
     ----------
     problem : Problem
-        Family of manoeuvres, limits, and the criterion, the first one; its plan's model is what is known at first.
+        Family of manoeuvres, limits and criteria, of which the first is used; the model of its plan is the initial
+        knowledge.
     encoder : Encoder
         Noise of the joints' encoders.
     seed : int
+        Seed of all random numbers.
     wanted : float
-        Where to stop.
+        Precision at which the loop stops.
     at_most : int
-        Manoeuvres.
+        Largest number of manoeuvres.
     precision : callable
-        Draws of the identified bodies, by name -> what must come below ``wanted``.
+        Function of the draws of the identified bodies, by name, whose value must reach ``wanted`` or less.
     search : Search
         Effort of each design.
     identifier : Identifier
+        Method of the identification.
     """
 
     problem: Problem
@@ -90,18 +93,21 @@ class Loop:
     identifier: Identifier = Sampled()  # noqa: RUF009  (immutable)
 
     def run(self, spacecraft: Spacecraft, folder: Path, progress: Progress = silent) -> History:
-        """Go on until the wanted precision, the limit of steps, a no-go, or `NotFlown`.
+        """Run the loop until the wanted precision, the limit of steps, a no-go, or `NotFlown`.
 
         Parameters
         ----------
         spacecraft : Spacecraft
+            Spacecraft that executes the plans.
         folder : Path
-            Holds ``step-N-plan.csv``, ``step-N-recording.csv``, ``step-N-posterior.nc`` and ``loop.json``.
+            Folder of ``step-N-plan.csv``, ``step-N-recording.csv``, ``step-N-posterior.nc`` and ``loop.json``.
+        progress : Progress
+            Receiver of the fraction done.
 
         Raises
         ------
         InputError
-            Where a plan is impossible or a recording does not fit.
+            If a plan is impossible or a recording does not fit.
         """
         history = History.open(folder, self._key())
         problem, model = self.problem, self.problem.plan.model
@@ -130,7 +136,7 @@ class Loop:
         return history
 
     def _plan(self, history: History, number: int, problem: Problem, progress: Progress) -> bool:
-        """Plan a step unless that is done; return whether it may be flown."""
+        """Plan a step unless it is planned already, and return whether it may be flown."""
         entry = history.entry(number, "plan")
         if entry is not None:
             return bool(entry["go"])
@@ -159,7 +165,7 @@ class Loop:
         return best.go
 
     def _execute(self, history: History, number: int, spacecraft: Spacecraft) -> None:
-        """Fly a step unless there is a recording."""
+        """Have a step executed unless its recording exists."""
         file = history.path(number, "recording")
         if not file.is_file():
             plan = replace(Recording.read(history.path(number, "plan")), name=f"step-{number}")
@@ -168,7 +174,7 @@ class Loop:
             recording.write(file)
 
     def _check(self, recording: Recording) -> None:
-        """Refuse what cannot be identified from, before it is kept."""
+        """Refuse a recording that does not allow an identification, before it is written."""
         model = self.problem.plan.model
         flown(self.problem.plan, recording, self.encoder)
         refuse_impossible_joints(recording, model.robot)
@@ -176,7 +182,7 @@ class Loop:
             recording.vector(sensor.kind.value, sensor.kind.axes)
 
     def _identify(self, history: History, number: int, model: Model) -> None:
-        """Identify a step unless that is done."""
+        """Identify the bodies from the recording of a step unless it is done already."""
         if history.entry(number, "identification") is not None:
             return
         file = history.path(number, "identification")
@@ -194,7 +200,7 @@ class Loop:
         history.record(number, "identification", entry)
 
     def _key(self) -> str:
-        """Return what tells this loop from others; how long it goes on is not part of it."""
+        """Return the key of everything that the results depend on; when the loop stops is not part of it."""
         plan, limits = self.problem.plan, self.problem.applied
         model = plan.model
         return content_key(
@@ -216,10 +222,10 @@ class Loop:
 
 
 def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
-    """Return a recording as a manoeuvre, its joints smoothed.
+    """Return a recording as a manoeuvre with smoothed joint motion.
 
-    The attitude at the start is that of the plan unless the recording has one; so are the positions of joints that are
-    recorded by speed alone.
+    The initial attitude is that of the plan unless the recording has an attitude. The initial positions of joints that
+    are recorded by speed alone are those of the plan.
     """
     attitude, sigma = plan.attitude, plan.attitude_sigma
     if "attitude.x" in recording.channels:
@@ -241,5 +247,5 @@ def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
 
 
 def start_of(plan: Plan) -> Floats:
-    """Positions of all joints at the start of a plan's manoeuvres, shape (joints,) [rad or m]."""
+    """Return the positions of all joints at the start of a plan's manoeuvres, shape (joints,) [rad or m]."""
     return plan.family.motion(plan.family.centre).evaluate(np.zeros(1)).position[0]

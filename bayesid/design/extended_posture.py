@@ -1,4 +1,4 @@
-"""Where the joints that the paper's excitation does not move are put: the arm beyond the others extended."""
+"""Posture of the joints that the paper's excitation does not move, in which the outer arm is extended."""
 
 from __future__ import annotations
 
@@ -16,28 +16,32 @@ from bayesid.robot.robot import Robot
 __all__ = ["extended_posture"]
 
 STARTS = 12
-"""Of the search, at random within the ranges; the distance has several local maxima."""
+"""Number of random starts of the search, since the distance has several local maxima."""
 
 PULL = 1e-6
-"""Towards the start, per square of radian or metre: joints that do not matter stay there."""
+"""Penalty on the squared distance from the start [m/rad2, 1/m], so that joints without influence stay there."""
 
 
 def extended_posture(robot: Robot, start: Sequence[float] | Floats, free: Sequence[int], last: int, tip: Tip) -> Floats:
-    """Return joint positions with the tip farthest from a joint.
+    """Return joint positions in which the tip is farthest from a joint.
 
     Parameters
     ----------
+    robot : Robot
+        Robot with its joint ranges.
     start : (joints,) array_like
-        Positions of all joints [rad or m].
+        Positions of all joints at the start [rad or m].
     free : sequence of int
-        Joints that may be placed; of those only the ones between ``last`` and the tip are.
+        Indices of the joints that may move; only those between ``last`` and the tip do.
     last : int
-        The joint from whose origin the distance is taken.
+        Index of the joint from whose origin the distance is measured.
     tip : Tip
+        End-effector.
 
     Returns
     -------
     (joints,) array
+        Positions of all joints [rad or m].
     """
     start = np.array(start, dtype=float)
     between = [joint for joint in _chain(robot, tip.joint) if joint in free and joint > last]
@@ -59,14 +63,14 @@ def extended_posture(robot: Robot, start: Sequence[float] | Floats, free: Sequen
         away = x - start[between]
         return -float(np.linalg.norm(end[:3, 3] - poses.pose[0, last, :3, 3])) + PULL * float(away @ away)
 
-    rng = np.random.default_rng(0)  # where the search begins is no matter of chance
+    rng = np.random.default_rng(0)  # a fixed seed, so that the posture repeats
     begins = [start[between], *(low + (high - low) * rng.uniform(size=(STARTS, len(between))))]
     ends = [minimize(shortness, begin, method="L-BFGS-B", bounds=bounds) for begin in begins]
     return posture(min(ends, key=lambda end: end.fun).x)
 
 
 def _chain(robot: Robot, joint: int) -> list[int]:
-    """Return the joints from one down to the base."""
+    """Return the indices of the joints from one joint down to the base."""
     chain = []
     while joint >= 0:
         chain.append(joint)
@@ -75,7 +79,7 @@ def _chain(robot: Robot, joint: int) -> list[int]:
 
 
 def _range(robot: Robot, index: int) -> tuple[float, float]:
-    """Return a joint's range, a turn about zero or a metre where it has none."""
+    """Return a joint's range; ends that it lacks are half a turn or a metre away from zero."""
     joint = robot.joints[index]
     reach = 1.0 if joint.kind == "prismatic" else np.pi
     low = joint.lower if np.isfinite(joint.lower) else -reach

@@ -1,4 +1,4 @@
-"""A plan that may be flown: every limit holds with 99 % under the present uncertainty, or the plan is made smaller."""
+"""Plans that may be flown: every limit holds with 99 % probability, or the plan is designed under tighter limits."""
 
 from __future__ import annotations
 
@@ -19,28 +19,29 @@ from bayesid.design.trajectory_search import Found, Search, optimise
 __all__ = ["Attempt", "plan_to_go"]
 
 ATTEMPTS = 5
-"""Designs until it is a no-go."""
+"""Largest number of designs before the step is a no-go."""
 
 MARGIN = 0.97
-"""Of the tightened limit, for a risk that is not quite proportional to it."""
+"""Factor on a tightened limit, since the quantile is not exactly proportional to the limit."""
 
 SMALLEST = 0.05
-"""Part to which one attempt tightens a limit at most."""
+"""Smallest factor by which one attempt tightens a limit, so that a manoeuvre remains possible."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """One design on the way to a go.
+    """One design on the way to a plan that may be flown.
 
     Attributes
     ----------
     limits : Limits
-        Under which it was designed.
+        Limits under which the manoeuvre was designed.
     found : Found
+        Outcome of the search.
     risks : sequence of Risk
-        Against the limits wanted.
+        Risks against the limits of the problem.
     reached : sequence of Reached
-        At the prior's centre, against the limits wanted.
+        Largest values at the prior's centre, against the limits of the problem.
     """
 
     limits: Limits
@@ -50,11 +51,11 @@ class Attempt:
 
     @property
     def go(self) -> bool:
-        """Whether it may be flown."""
+        """True if the plan may be flown."""
         return all(risk.go for risk in self.risks) and all(item.kept for item in self.reached)
 
     def to_dict(self) -> dict[str, Any]:
-        """Entry of loop.json: per uncertain limit what was wanted, what it was designed for, and the 99 % quantile."""
+        """Return the entry of loop.json: for each uncertain limit its value, the tightened value and the quantile."""
         return {
             "go": self.go,
             "limits": {
@@ -78,19 +79,36 @@ def plan_to_go(
     store: Store,
     progress: Progress = silent,
 ) -> list[Attempt]:
-    """Design, and design anew under limits tightened by the ratio of limit to quantile until all hold.
+    """Design a manoeuvre, and repeat the design under tighter limits until all limits hold with 99 % probability.
+
+    A limit that does not hold is tightened by the ratio of the limit to the 99 % quantile of the largest value.
+
+    Parameters
+    ----------
+    problem : Problem
+        Design problem with the limits that must hold.
+    criterion : Criterion
+        Criterion to minimise.
+    seed : numpy.random.SeedSequence
+        Source of all random numbers.
+    search : Search
+        Effort of the first design; the later ones use one start.
+    store : Store
+        Results of earlier runs, and place for new ones.
+    progress : Progress
+        Receiver of the fraction done.
 
     Returns
     -------
     list of Attempt
-        The last one is to be flown if it is a go.
+        All attempts; the last one may be flown if it is a go.
     """
     attempts: list[Attempt] = []
     tight, first = problem, None
     for number, stream in enumerate(seed.spawn(ATTEMPTS)):
         starts, draws = stream.spawn(2)
         known = store.of(f"attempt-{number + 1}")
-        found = optimise(
+        optimum = optimise(
             tight,
             criterion,
             np.random.default_rng(starts),
@@ -100,16 +118,16 @@ def plan_to_go(
             keep=known.keep,
             progress=progress,
         )
-        risky = risks(problem, found.parameters, np.random.default_rng(draws))
-        attempts.append(Attempt(tight.limits, found, risky, problem.reached(found.parameters)))
+        risky = risks(problem, optimum.parameters, np.random.default_rng(draws))
+        attempts.append(Attempt(tight.limits, optimum, risky, problem.reached(optimum.parameters)))
         if attempts[-1].go:
             break
-        tight, first = tight.with_limits(_tightened(tight.limits, risky)), found.parameters
+        tight, first = tight.with_limits(_tightened(tight.limits, risky)), optimum.parameters
     return attempts
 
 
 def _tightened(limits: Limits, risky: Sequence[Risk]) -> Limits:
-    """Return limits smaller by the ratio of limit to quantile where a risk is no go."""
+    """Return the limits, tightened by the ratio of limit to quantile where they do not hold."""
     changed = {}
     for risk in risky:
         if not risk.go:

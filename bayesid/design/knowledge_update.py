@@ -1,4 +1,4 @@
-"""How a flown manoeuvre updates what is known: identified by emcee or by its normal approximation, then carried."""
+"""Update of the knowledge by a flown manoeuvre: identification, and the posterior as prior of the next manoeuvre."""
 
 from __future__ import annotations
 
@@ -36,28 +36,30 @@ __all__ = [
 
 
 class Identifier(Protocol):
-    """How a posterior is found and kept."""
+    """Method of the identification inside the loop."""
 
     def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
-        """Write draws to a file that `InertialDraws.read` reads, and return what is to be remembered of the fit."""
+        """Write draws to a file that `InertialDraws.read` reads, and return the entry of the fit for loop.json."""
         ...
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """By emcee, as ``bayesid identify`` does; an interrupted run goes on from its samples.
+    """Identification by emcee, as in ``bayesid identify``; an interrupted run continues from its samples.
 
     Parameters
     ----------
     effective_samples : float
+        Number of effective samples at which emcee stops.
     max_steps : int
+        Largest number of steps.
     """
 
     effective_samples: float = 2000.0
     max_steps: int = 3000
 
     def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
-        """Write the ``posterior.nc`` of ``bayesid identify``."""
+        """Write draws as the ``posterior.nc`` of ``bayesid identify``, and return the entry of the fit."""
         samples = file.with_suffix(".samples.h5")
         result: Identification = identify(
             posterior, seed, effective_samples=self.effective_samples, max_steps=self.max_steps, file=samples
@@ -75,17 +77,20 @@ class Sampled:
 
 @dataclass(frozen=True)
 class Laplace:
-    """By the normal approximation about the mode: seconds, and right where the data determine every body sharply.
+    """Identification by the normal approximation about the mode.
+
+    It takes seconds, and is accurate where the data determine every body sharply.
 
     Parameters
     ----------
     draws : int
+        Number of draws to write.
     """
 
     draws: int = 4000
 
     def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
-        """Write draws of the bodies alone."""
+        """Write draws of the bodies alone, and return the entry of the fit."""
         starts, normal = np.random.SeedSequence(seed).spawn(2)
         refined, optimum = maximise(posterior, np.random.default_rng(starts))
         noise = np.random.default_rng(normal).normal(size=(self.draws, posterior.size))
@@ -108,7 +113,7 @@ def updated_model(model: Model, draws: InertialDraws) -> Model:
 
 
 def known_of(unknowns: Unknowns, draws: InertialDraws) -> Known:
-    """Return draws of all uncertain bodies as a normal distribution of a plan's coordinates."""
+    """Return the normal distribution of a plan's coordinates that fits draws of all uncertain bodies."""
     values = draws.of_bodies([body.name for body in unknowns.bodies]).values
     parts = [
         log_cholesky_coordinates(body.centre.pseudo_inertia, np.einsum("np,pij->nij", values[:, index], BASIS))
@@ -121,7 +126,7 @@ def known_of(unknowns: Unknowns, draws: InertialDraws) -> Known:
 
 
 def bodies_of_draws(model: Model, draws: InertialDraws) -> dict[str, BodyDraws]:
-    """Return the reported quantities of the bodies to identify."""
+    """Return the draws of the reported quantities, by the name of the body to identify."""
     names = [prior.name for prior in model.bodies]
     values = draws.of_bodies(names).values
     return {name: BodyDraws(name, mass_com_inertia(values[:, index])) for index, name in enumerate(names)}
@@ -135,7 +140,7 @@ def worst_relative_sd(bodies: Mapping[str, BodyDraws]) -> float:
 
 
 def _relative_sd(values: Floats) -> Floats:
-    """Of mass and principal moments of draws (n, 10), shape (4,)."""
+    """Return the relative standard deviations (4,) of mass and principal moments of inertia, from draws (n, 10)."""
     xx, yy, zz, xy, xz, yz = values[:, 4:].T
     tensors = np.stack([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
     positive = np.column_stack([values[:, 0], np.linalg.eigvalsh(tensors)])
@@ -143,7 +148,7 @@ def _relative_sd(values: Floats) -> Floats:
 
 
 def describe_bodies(bodies: Mapping[str, BodyDraws]) -> dict[str, Any]:
-    """Return mean and sd of every quantity, by body and name."""
+    """Return mean and standard deviation of every quantity as a JSON object, by body and name."""
     return {
         name: {
             key: quantity(mean, sd, unit)

@@ -1,7 +1,7 @@
-"""What a loop has done so far, kept in its folder so that it survives an interruption at any point.
+"""History of a loop, kept in its folder so that it survives an interruption at any point.
 
-A stage counts as done when its entry is in ``loop.json`` and its file is unchanged; whatever follows a stage that is
-not done is forgotten. All else the folder holds are recordings, which nobody but the spacecraft can make.
+A stage counts as done when its entry is in ``loop.json`` and its file is unchanged; the entries after a stage that is
+not done are discarded. Recordings stay in the folder even then, because only the spacecraft can make them.
 """
 
 from __future__ import annotations
@@ -17,21 +17,23 @@ from bayesid._io.store import JsonStore, file_key
 __all__ = ["History"]
 
 STAGES = ("plan", "recording", "identification")
+"""Stages of a step, in their order."""
 
 
 @dataclass
 class History:
-    """The steps of a loop.
+    """History of a loop, step by step.
 
     Attributes
     ----------
     folder : Path
+        Folder of the loop's files.
     key : str
-        The SHA-256 of robot, sensors, prior, manoeuvre, limits, search and seed.
+        SHA-256 of robot, sensors, prior, manoeuvre, limits, search and seed.
     status : str
-        ``running``, ``waiting`` (for a recording), ``reached``, ``at-most`` or ``no-go``.
+        Status ``running``, ``waiting`` (for a recording), ``reached``, ``at-most`` or ``no-go``.
     steps : list of dict
-        Per step what is known of its ``plan``, ``recording`` and ``identification``.
+        Entries of the stages ``plan``, ``recording`` and ``identification``, one dictionary per step.
     """
 
     folder: Path
@@ -41,12 +43,12 @@ class History:
 
     @classmethod
     def open(cls, folder: Path, key: str) -> History:
-        """Read what an earlier call left in a folder, as far as its files are there.
+        """Read the history that an earlier run left in a folder, as far as its files exist.
 
         Raises
         ------
         InputError
-            If it belongs to another loop, or a recording or plan was changed after it was used.
+            If the history belongs to another loop, or a recording or plan was changed after it was used.
         """
         create_folder(folder)
         history = cls(folder, key)
@@ -54,27 +56,27 @@ class History:
         return history
 
     def path(self, number: int, stage: str) -> Path:
-        """Return the file of a stage of a step; steps count from 1."""
+        """Return the path of the file of a stage of a step; steps count from 1."""
         return self.folder / f"step-{number}-{_ENDING[stage]}"
 
     def entry(self, number: int, stage: str) -> dict[str, Any] | None:
-        """Return what is known of a stage; None if it is not done."""
+        """Return the entry of a stage, None if the stage is not done."""
         return self.steps[number - 1].get(stage) if number <= len(self.steps) else None
 
     def record(self, number: int, stage: str, entry: dict[str, Any]) -> None:
-        """Remember that a stage is done, its file being complete."""
+        """Record that a stage is done, with its entry; its file must be complete."""
         if number > len(self.steps):
             self.steps.append({"step": number})
         self.steps[number - 1][stage] = {**entry, **self._mark(number, stage)}
         self.write()
 
     def close(self, status: str) -> None:
-        """Remember how the loop stands."""
+        """Record the status with which the loop ends."""
         self.status = status
         self.write()
 
     def write(self) -> None:
-        """Write ``loop.json``, all or nothing."""
+        """Write ``loop.json``, whole or not at all."""
         self._store.write(status=self.status, steps=self.steps)
 
     @property
@@ -109,3 +111,4 @@ class History:
 
 
 _ENDING = {"plan": "plan.csv", "recording": "recording.csv", "identification": "posterior.nc"}
+"""Endings of the file names, by stage."""

@@ -1,4 +1,4 @@
-"""What a manoeuvre must respect, checked along all of it."""
+"""Limits that a manoeuvre must keep at every instant."""
 
 from __future__ import annotations
 
@@ -15,36 +15,39 @@ from bayesid.robot.robot import Robot
 __all__ = ["ACTIVE", "Limit", "Limits", "smooth_largest"]
 
 QUIET = 1e-3
-"""Part of the power of the base's motion that may lie in a quiet band."""
+"""Largest fraction of the power of the base's motion that may lie in a quiet band."""
 
 NOTHING = 1e-20
-"""Power below which the base does not move; no band is quiet then [(rad/s2)^2 s, (m/s2)^2 s]."""
+"""Power added on both sides of the ratio, so that it exists when the base does not move [(rad/s2)^2 s, (m/s2)^2 s]."""
 
 SHARPNESS = 300.0
-"""Of the smooth maximum: it is above the largest of 500 values by 2 % of the limit at most."""
+"""Sharpness of the smooth maximum, at which 500 equal values are overestimated by 2 % of the limit."""
 
 ACTIVE = 0.97
-"""Part of a limit from which on it is called active."""
+"""Fraction of a limit above which it is called active, as the smooth maximum keeps motions slightly below it."""
 
 REST = 1e-6
-"""Joint speed that counts as rest at the ends [rad/s or m/s]."""
+"""Largest joint speed that counts as rest at both ends [rad/s or m/s]."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """One quantity that must not exceed a bound at any instant.
+    """Quantity that must not exceed a bound at any instant.
 
     Parameters
     ----------
     name : str
+        Name of the limit.
     bound : float
+        Largest allowed value, in the unit.
     unit : str
+        Unit of the quantity.
     quantity : callable
-        Trajectory -> values of any shape, each to be at most the bound.
+        Function of the trajectory that returns values of any shape, none of which may exceed the bound.
     depends : bool
-        Whether the quantity depends on the inertial parameters.
+        True if the quantity depends on the inertial parameters.
     shrinks : bool
-        Whether a smaller motion reduces it.
+        True if a smaller motion reduces the quantity.
     """
 
     name: str
@@ -61,16 +64,16 @@ class Limit:
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a design; what is left out does not apply. Joint ranges and speeds of the robot always do.
+    """Limits of a design; only those given apply, besides the joint ranges and speeds of the robot.
 
     Parameters
     ----------
     tip_speed, tip_rate : float, optional
-        Of the tip frame, relative to the base as well as to inertial space [m/s, rad/s].
+        Largest speed [m/s] and angular rate [rad/s] of the tip frame, relative to the base and to inertial space.
     joint_speed : float, optional
-        [rad/s or m/s]
+        Largest speed of any joint [rad/s or m/s].
     base_rotation : float, optional
-        Of the base since the start, about any axis [rad].
+        Largest rotation of the base since the start, about any axis [rad].
     quiet_band : (2,) tuple, optional
         Frequencies between which at most a thousandth of the power of the base's acceleration and angular acceleration
         may lie [Hz].
@@ -83,7 +86,7 @@ class Limits:
     quiet_band: tuple[float, float] | None = None
 
     def of(self, robot: Robot) -> tuple[Limit, ...]:
-        """Return all that applies to a robot."""
+        """Return all limits that apply to a robot."""
         limits = [*_joint_limits(robot)]
         if self.joint_speed is not None:
             unit = "rad/s" if all(joint.kind != "prismatic" for joint in robot.joints) else "rad/s or m/s"
@@ -101,12 +104,12 @@ class Limits:
 
     @property
     def finest(self) -> float:
-        """Longest step between instants at which they can be judged [s]."""
+        """Longest interval between instants at which the limits can be evaluated [s]."""
         return float("inf") if self.quiet_band is None else 0.25 / self.quiet_band[1]
 
 
 def smooth_largest(limit: Limit, trajectory: Trajectory, bound: Array | float) -> Array:
-    """Largest value over a bound, smooth and never below the true one: at most one is demanded."""
+    """Return a smooth upper bound of the largest value divided by the bound; at most one keeps the limit."""
     values = (limit.quantity(trajectory) / bound).ravel()
     top = jnp.max(values)
     return top + jnp.log(jnp.sum(jnp.exp(SHARPNESS * (values - top)))) / SHARPNESS
@@ -138,7 +141,10 @@ def _joint_limits(robot: Robot) -> Sequence[Limit]:
 
 
 def _power_within(band: tuple[float, float]) -> Callable[[Trajectory], Array]:
-    """Part of the power of the base's angular acceleration (times 1 m) and acceleration in a band."""
+    """Return the function that computes the fraction of the power of the base's motion in a band [Hz].
+
+    The power is that of the angular acceleration (times 1 m) and of the acceleration of the base origin.
+    """
 
     def quantity(trajectory: Trajectory) -> Array:
         times = np.asarray(trajectory.time)

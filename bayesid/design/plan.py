@@ -1,4 +1,4 @@
-"""A manoeuvre as planned: what the robot does, and what its sensors would tell, as functions JAX differentiates."""
+"""Planned manoeuvres: motion of the robot and information of its sensors, as functions that JAX differentiates."""
 
 from __future__ import annotations
 
@@ -27,12 +27,23 @@ __all__ = ["Plan", "PlannedOutcome", "Trajectory"]
 
 
 class Trajectory(NamedTuple):
-    """What the robot does, at T instants.
+    """Motion of the robot at T instants.
 
-    position, velocity (T, joints); tip_speed [m/s] and tip_rate [rad/s] (T,), each the larger of those relative to the
-    base and to inertial space; rotation (T,) of the base since the start [rad]; excursion (T, 6): displacement of the
-    base origin [m] and Cardan angles x, y, z [rad] of the base, in the axes of the start; rate, rate_change and
-    acceleration (T, 3) of the base origin in base axes.
+    Attributes
+    ----------
+    time : (T,) array
+        Instants [s].
+    position, velocity : (T, joints) array
+        Positions [rad, m] and speeds [rad/s, m/s] of the joints.
+    tip_speed, tip_rate : (T,) array
+        Speed [m/s] and angular rate [rad/s] of the tip, the larger of those relative to base and inertial space.
+    rotation : (T,) array
+        Angle of the base's rotation since the start [rad].
+    excursion : (T, 6) array
+        Displacement of the base origin [m] and Cardan angles x, y, z of the base [rad], in the axes of the start.
+    rate, rate_change, acceleration : (T, 3) array
+        Angular velocity [rad/s] and acceleration [rad/s2] of the base, and acceleration of its origin [m/s2], base
+        axes.
     """
 
     time: Floats
@@ -48,17 +59,19 @@ class Trajectory(NamedTuple):
 
 
 class PlannedOutcome(NamedTuple):
-    """What criteria judge.
+    """Predicted outcome of a plan, which the criteria evaluate.
 
     Attributes
     ----------
     trajectory : Trajectory
+        Motion of the robot.
     information : (n, n) array
         Fisher information of the unknowns' coordinates, without their prior.
     regressor : (6 T, b) array
-        Force balance of the base against the bodies' coordinates; torques are over the radius of gyration [N].
+        Derivative of the base's balance with respect to the coordinates of the bodies to identify; torques are divided
+        by the radius of gyration [N].
     prior : (n, n) array, optional
-        Precision of the unknowns' coordinates before the manoeuvre; one where left out.
+        Precision of the unknowns' coordinates before the manoeuvre, by default the identity.
     """
 
     trajectory: Trajectory
@@ -69,25 +82,28 @@ class PlannedOutcome(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """A family of manoeuvres of a model's robot.
+    """Family of manoeuvres for the robot of a model.
 
     Parameters
     ----------
     model : Model
-    family : Parameterisation
+        Robot, sensors, effects and priors.
+    family : TrajectoryFamily
+        Family of joint motions.
     interval : float
-        Between samples of all sensors [s].
+        Interval between samples of all sensors [s].
     tip : Tip
+        End-effector whose motion is limited.
     attitude : (4,) array
-        Base to orbit axes at time 0.
+        Initial attitude, a quaternion x, y, z, w from base to orbit axes.
     attitude_sigma : float
-        Its standard deviation per axis [rad].
-    latitude : float
+        Standard deviation of the initial attitude per axis [rad].
+    argument_of_latitude : float
         Argument of latitude at time 0 [rad].
     step : float
-        Of the integration [s]; limits are looked at every half step.
+        Step of the integration [s]; limits are evaluated every half step.
     thinning : int
-        Only every n-th sample is simulated, and counts as n.
+        Number of samples that one simulated sample stands for.
     """
 
     model: Model
@@ -102,7 +118,7 @@ class Plan:
 
     @cached_property
     def unknowns(self) -> Unknowns:
-        """The unknowns of an identification from this one manoeuvre."""
+        """Unknowns of an identification from this one manoeuvre."""
         return Unknowns(
             bodies=self.model.priors,
             effects=self.model.effects,
@@ -114,12 +130,12 @@ class Plan:
 
     @cached_property
     def simulator(self) -> Simulator:
-        """Return the forward model."""
+        """Simulator of the model."""
         return Simulator.of(self.model)
 
     @cached_property
     def constants(self) -> ModelConstants:
-        """Numbers of the model."""
+        """Numerical constants of the model."""
         return ModelConstants.of(self.model)
 
     @cached_property
@@ -130,7 +146,7 @@ class Plan:
 
     @cached_property
     def sigma(self) -> Floats:
-        """Noise of each sensor's axes, one after the other, shape (3 sensors,)."""
+        """Standard deviations of a simulated sample, axis by axis of each sensor, shape (3 sensors,)."""
         weight = np.sqrt((self.family.duration / self.interval + 1.0) / len(self.samples))
         return np.concatenate([sensor.noise.sigma(self.interval) for sensor in self.model.sensors]) / weight
 
@@ -142,19 +158,19 @@ class Plan:
         """Return the indices of an effect's coordinates."""
         return self.unknowns.effect_indices(label)
 
-    # ---- functions of the parameters of the motion and of the unknowns, both traced ----
+    # ---- functions of the motion's parameters and of the unknowns, both of which JAX may trace ----
 
     def trajectory(self, parameters: Array, z: Array) -> Trajectory:
-        """Return what the robot does."""
+        """Return the motion of the robot, for parameters of the family and coordinates ``z`` of the unknowns."""
         node, _, _ = self._traced(z, self._grid(parameters))
         return self._trajectory(parameters, node)
 
     def slopes(self, parameters: Array, z: Array) -> Array:
-        """Return derivatives of what the sensors read in sigmas of a sample, (T, 3 sensors, n)."""
+        """Return derivatives of the readings, in standard deviations of a sample, shape (T, 3 sensors, n)."""
         return self._judged(parameters, z)[1]
 
     def outcome(self, parameters: Array, z: Array, prior: Array | None = None) -> PlannedOutcome:
-        """Return what criteria judge; ``prior`` is the precision (n, n) of the coordinates, one where left out."""
+        """Return the predicted outcome; ``prior`` is the coordinates' precision (n, n), by default the identity."""
         grid, slope, node = self._judged(parameters, z)
         flat = slope.reshape(-1, slope.shape[-1])
         trajectory = self._trajectory(parameters, node)
@@ -167,7 +183,7 @@ class Plan:
         return PlannedOutcome(trajectory, flat.T @ flat, regressor, prior)
 
     def _judged(self, parameters: Array, z: Array) -> tuple[Grid, Array, Instant]:
-        """Return the grid, the whitened derivatives of what the sensors read and the motion, from one simulation."""
+        """Return the grid, the whitened derivatives of the readings and the motion, all from one simulation."""
         grid = self._grid(parameters)
 
         def read(z: Array) -> tuple[Array, Instant]:
@@ -201,17 +217,17 @@ class Plan:
         return jax.tree.map(lambda x: x[None], grid)
 
     def _trajectory(self, parameters: Array, node: Instant) -> Trajectory:
-        """Return the trajectory at the stages of the integration."""
+        """Return the trajectory at the integration nodes."""
         instant = jax.tree.map(lambda x: x[0], node)
-        # the instants, known beforehand: half steps
+        # the nodes are the half steps, so their times need not be traced
         times = np.linspace(0.0, self.family.duration, instant.rate.shape[0])
         motion = self.family.motion(parameters)
         state = motion.evaluate(times)
         pose, flow = self.tip.motion(self.model.robot, state)
         turning = jnp.asarray(flow[:, :3, :3] @ jnp.swapaxes(pose[:, :3, :3], 1, 2))
-        own_rate = jnp.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
+        relative_rate = jnp.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
         body = instant.body
-        drift = -body.com_rate - jnp.cross(instant.rate, body.com)  # of the base origin, the centre of mass resting
+        drift = -body.com_rate - jnp.cross(instant.rate, body.com)  # velocity of the base origin
         speed = drift + jnp.cross(instant.rate, pose[:, :3, 3]) + flow[:, :3, 3]
         turned = jnp.einsum("ji,tjk->tik", instant.attitude[0], instant.attitude)
         displaced = body.com[0] - jnp.einsum("tij,tj->ti", turned, body.com)
@@ -220,7 +236,7 @@ class Plan:
             position=jnp.asarray(state.position),
             velocity=jnp.asarray(state.velocity),
             tip_speed=jnp.maximum(_norm(speed), _norm(flow[:, :3, 3])),
-            tip_rate=jnp.maximum(_norm(own_rate + instant.rate), _norm(own_rate)),
+            tip_rate=jnp.maximum(_norm(relative_rate + instant.rate), _norm(relative_rate)),
             rotation=_angle(turned),
             excursion=jnp.concatenate([displaced, _cardan(turned)], axis=1),
             rate=instant.rate,
@@ -230,12 +246,12 @@ class Plan:
 
 
 def _norm(vectors: Array | Floats) -> Array:
-    """Length of vectors (T, 3); smooth at zero."""
+    """Return the lengths of vectors (T, 3), smooth at zero."""
     return jnp.sqrt(jnp.sum(jnp.asarray(vectors) ** 2, axis=1) + 1e-24)
 
 
 def _angle(turned: Array) -> Array:
-    """Angle of rotation matrices (T, 3, 3); smooth at zero."""
+    """Return the angles of rotation matrices (T, 3, 3), smooth at zero."""
     vector = jnp.stack(
         [turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]],
         axis=1,
@@ -244,7 +260,7 @@ def _angle(turned: Array) -> Array:
 
 
 def _cardan(turned: Array) -> Array:
-    """Angles x, y, z of rotation matrices Rx Ry Rz (T, 3, 3)."""
+    """Return the Cardan angles x, y, z, shape (T, 3), of rotation matrices Rx Ry Rz, shape (T, 3, 3)."""
     y = jnp.arcsin(jnp.clip(turned[:, 0, 2], -1.0 + 1e-12, 1.0 - 1e-12))
     x = jnp.arctan2(-turned[:, 1, 2], turned[:, 2, 2])
     z = jnp.arctan2(-turned[:, 0, 1], turned[:, 0, 0])

@@ -1,4 +1,4 @@
-"""Draws of a pose: mean, standard deviation and 95 % region of its position and of its rotation."""
+"""Mean, standard deviation and 95 % region of the position and of the rotation of a pose, from draws."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from bayesid._math.arrays import Floats
 __all__ = ["CONTENT", "Pose", "Region"]
 
 CONTENT = 0.95
-"""Probability that a region holds."""
+"""Probability content of a region, the usual one for intervals."""
 
 REACH = float(np.sqrt(chi2.ppf(CONTENT, 3)))
-"""Standard deviations from the mean to the surface of a region in three dimensions."""
+"""Distance from the mean to the surface of a region in three dimensions, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,9 @@ class Region:
     Parameters
     ----------
     mean : (3,) array
+        Mean of the draws, in their unit.
     covariance : (3, 3) array
+        Covariance of the draws, in the square of their unit.
     """
 
     mean: Floats
@@ -35,7 +37,7 @@ class Region:
 
     @classmethod
     def of(cls, draws: Floats) -> Region:
-        """Fit draws, shape (n, 3)."""
+        """Return the region that fits draws, shape (n, 3)."""
         return cls(draws.mean(axis=0), np.cov(draws.T))
 
     @property
@@ -54,12 +56,12 @@ class Region:
         return np.linalg.eigh(self.covariance)[1].T[::-1]
 
     def distance(self, points: Floats) -> Floats:
-        """Mahalanobis distance from the mean, shape (..., 3) -> (...,); at the surface it is `REACH`."""
+        """Return the Mahalanobis distances (...,) of points (..., 3) from the mean; it is `REACH` at the surface."""
         offset = points - self.mean
         return np.sqrt(np.einsum("...i,ij,...j", offset, np.linalg.pinv(self.covariance, hermitian=True), offset))
 
     def holds(self, points: Floats) -> NDArray[np.bool_]:
-        """Whether points lie inside, shape (..., 3) -> (...,)."""
+        """Return whether points, shape (..., 3), lie inside the region, shape (...,)."""
         return self.distance(points) <= REACH
 
 
@@ -70,11 +72,11 @@ class Pose:
     Parameters
     ----------
     position : (n, 3) array
-        [m]
+        Positions in orbit axes [m].
     attitude : (n, 4) array
-        Quaternion x, y, z, w, body axes to orbit axes.
+        Quaternions x, y, z, w from body axes to orbit axes.
     start : (4,) array
-        Mean attitude from which the rotation is counted.
+        Mean attitude at the start, from which the rotation is counted.
     """
 
     position: Floats
@@ -93,20 +95,20 @@ class Pose:
 
     @property
     def degrees(self) -> Region:
-        """Region of the rotation since the start [degrees], a rotation vector in orbit axes.
+        """Region of the rotation vector since the start, orbit axes [degrees].
 
-        Its covariance is that of the small rotation from the mean attitude to each draw.
+        Its covariance is that of the small rotations from the mean attitude to the draws.
         """
         mean = Rotation.from_quat(self.mean_attitude)
         rotation = np.degrees((mean * Rotation.from_quat(self.start).inv()).as_rotvec())
         return Region(rotation, np.cov(self.turns(self.attitude).T))
 
     def turns(self, attitude: Floats) -> Floats:
-        """Small rotations from the mean to given attitudes, orbit axes [degrees], shape (..., 4) -> (..., 3)."""
+        """Return the rotation vectors (..., 3) from the mean to attitudes (..., 4), orbit axes [degrees]."""
         mean = Rotation.from_quat(self.mean_attitude)
         return np.degrees((Rotation.from_quat(attitude) * mean.inv()).as_rotvec())
 
     def holds(self, position: Floats, attitude: Floats) -> tuple[bool, bool]:
-        """Whether the regions of position [m] and rotation hold a pose."""
+        """Return whether the region of the position contains a position [m], and that of the rotation an attitude."""
         rotation = Region(np.zeros(3), self.degrees.covariance)
         return bool(self.millimetres.holds(1e3 * position)), bool(rotation.holds(self.turns(attitude)))

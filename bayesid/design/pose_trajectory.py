@@ -1,4 +1,4 @@
-"""Draws of the course of one body along a manoeuvre, and what is reported of them."""
+"""Draws of the trajectory of one body along a manoeuvre, and the summary of them that is reported."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ __all__ = ["PoseTrajectory"]
 
 @dataclass(frozen=True)
 class PoseTrajectory:
-    """Draws of the pose of one body along the manoeuvre, orbit axes, from where the base started.
+    """Draws of the pose of one body along a manoeuvre, in orbit axes.
 
     Parameters
     ----------
     time : (T,) array
-        [s]
+        Instants [s].
     position : (n, T, 3) array
-        [m]
+        Positions relative to the base origin at the start [m].
     attitude : (n, T, 4) array
-        Quaternion x, y, z, w, body axes to orbit axes.
+        Quaternions x, y, z, w from body axes to orbit axes.
     """
 
     time: Floats
@@ -34,12 +34,12 @@ class PoseTrajectory:
     attitude: Floats
 
     def pose(self, index: int = -1) -> Pose:
-        """Return the pose at one instant; the final one where left out."""
+        """Return the pose at one instant, by default the last."""
         start = Rotation.from_quat(self.attitude[:, 0]).mean().as_quat()
         return Pose(self.position[:, index], self.attitude[:, index], start)
 
     def to_dict(self) -> dict[str, Any]:
-        """Content of one body in prediction.json."""
+        """Return the entry of the body in prediction.json."""
         final = self.pose()
         poses = [self.pose(index) for index in range(len(self.time))]
         regions: Mapping[str, list[Region]] = {

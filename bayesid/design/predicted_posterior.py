@@ -1,4 +1,4 @@
-"""The posterior that planned manoeuvres would lead to, with the noise of all sensors and encoders."""
+"""Posterior that planned manoeuvres would lead to, with the noise of all sensors and encoders."""
 
 from __future__ import annotations
 
@@ -19,22 +19,23 @@ from bayesid.simulation.model import Manoeuvre, Model
 __all__ = ["Encoder", "Predicted", "describe", "planned_manoeuvre", "planned_posterior", "predict", "simulated"]
 
 Encoder = Mapping[int, float | Mapping[str, float | None] | None]
-"""Noise of joint position (0), velocity (1) and acceleration (2), for all joints or by joint."""
+"""Standard deviation of joint position (0), velocity (1) and acceleration (2), for all joints or by joint."""
 
 
 @dataclass(frozen=True)
 class Predicted:
-    """Predicted posterior of the bodies to identify (Laplace, at the prior's centre).
+    """Predicted posterior of the bodies to identify, the Laplace approximation at a linearisation point.
 
     Attributes
     ----------
     names : tuple of str
-        Quantities as in identification.json.
+        Names of the n quantities, as in identification.json.
     mean : (n,) array
+        Values of the quantities at the linearisation point, in SI units.
     covariance : (n, n) array
-        Of these quantities, in their units.
+        Covariance of the quantities, in SI units.
     relative : (n, n) array
-        Of the bodies' log-Cholesky coordinates.
+        Covariance of the bodies' log-Cholesky coordinates, which are relative [1].
     """
 
     names: tuple[str, ...]
@@ -44,7 +45,7 @@ class Predicted:
 
     @property
     def sd(self) -> Floats:
-        """Standard deviations, shape (n,)."""
+        """Standard deviations of the quantities, shape (n,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
@@ -60,7 +61,7 @@ class Predicted:
 
     @property
     def geometric_mean(self) -> float:
-        """Geometric mean of the standard deviations; only ratios of it mean something."""
+        """Geometric mean of the standard deviations; it mixes units, so that only ratios of it have a meaning."""
         return float(np.exp(np.log(self.sd).mean()))
 
 
@@ -73,17 +74,24 @@ def planned_manoeuvre(
     attitude: Floats | None = None,
     **start: float,
 ) -> Manoeuvre:
-    """Return a manoeuvre with joints as they would be recorded without noise, and blanks for the sensors.
+    """Return a manoeuvre with joints as recorded without noise, and placeholder samples of the sensors.
 
     Parameters
     ----------
+    model : Model
+        Robot and sensors.
+    motion : Motion
+        Planned joint motion.
     time : (T,) array
-        Of all samples [s].
+        Times of all samples [s].
+    name : str
+        Name of the manoeuvre.
     encoder : Encoder
+        Noise of the joints' encoders, which the smoothing assumes.
     attitude : (4,) array, optional
-        Base to orbit axes at time 0.
-    **start
-        ``attitude_sigma`` and ``argument_of_latitude`` of `Manoeuvre`.
+        Initial attitude, a quaternion x, y, z, w from base to orbit axes; by default the two agree.
+    **start : float
+        Parameters ``attitude_sigma`` and ``argument_of_latitude`` of `Manoeuvre`.
     """
     recording = Recording(
         name,
@@ -103,32 +111,46 @@ def planned_posterior(
     z: Floats | None = None,
     step: float | None = None,
 ) -> Posterior:
-    """Return the posterior of planned manoeuvres if the sensors read what ``z``, or the prior's centre, predicts.
+    """Return the posterior of planned manoeuvres whose sensors read what a point of the unknowns predicts.
 
-    Compiled functions are shared with those of ``like``, where they fit.
+    Parameters
+    ----------
+    model : Model
+        Model of the posterior.
+    manoeuvres : sequence of Manoeuvre
+        Planned manoeuvres.
+    like : Posterior, optional
+        Earlier posterior of the same kind; it has no effect any more.
+    z : (n,) array, optional
+        Coordinates of the point, by default the prior's centre.
+    step : float, optional
+        Step of the integration [s], by default chosen from the accuracy of the sensors.
     """
     blank = Posterior.of(model, manoeuvres, step=step)
     return simulated(blank, np.zeros(blank.size) if z is None else z)
 
 
 def simulated(posterior: Posterior, z: Floats) -> Posterior:
-    """Return a posterior whose sensors read what ``z`` predicts."""
+    """Return the posterior with readings that the coordinates ``z`` predict, without noise."""
     recordings = simulate_recordings(posterior, z=z)
     return with_manoeuvres(
         posterior,
-        [replace(manoeuvre, recording=own) for manoeuvre, own in zip(posterior.manoeuvres, recordings, strict=True)],
+        [
+            replace(manoeuvre, recording=recording)
+            for manoeuvre, recording in zip(posterior.manoeuvres, recordings, strict=True)
+        ],
     )
 
 
 def predict(posterior: Posterior) -> Predicted:
-    """Return what manoeuvres lead to if the prior's centre is the truth."""
+    """Return the predicted posterior of planned manoeuvres if the prior's centre is the truth."""
     z = np.zeros(posterior.size)
     jacobian = relinearised(posterior, z).jacobian(z)
     return describe(posterior, z, np.linalg.inv(jacobian.T @ jacobian))
 
 
 def describe(posterior: Posterior, z: Floats, coordinates: Floats) -> Predicted:
-    """Carry a covariance of the coordinates over to the quantities that are reported."""
+    """Return the reported quantities at ``z`` with the covariance that follows from that of the coordinates."""
     names, values, slope = linearise(posterior, z)
     widths = np.asarray(posterior.unknowns.widths)[posterior.unknowns.body_indices()]
     count = widths.shape[1]

@@ -1,4 +1,4 @@
-"""What a search has come to so far, kept in a file that survives its interruption."""
+"""Results of a search so far, kept in a file that survives an interruption of the run."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ __all__ = ["Store"]
 
 @dataclass
 class Store:
-    """Results of the starts of searches.
+    """Results of several searches, each from several starts.
 
     Parameters
     ----------
-    file : Path, optional
-        JSON; nothing is kept where left out.
+    file : Path or None
+        JSON file of the results; None keeps them in memory only.
     key : str
-        Identifies the question: results of another key are forgotten.
+        Key of the design problem; results under another key are discarded.
+    results : dict
+        Parameters, cost and number of evaluations by search and start.
     """
 
     file: Path | None
@@ -31,12 +33,12 @@ class Store:
 
     @classmethod
     def forgetful(cls) -> Store:
-        """Return a store that keeps nothing beyond the run."""
+        """Return a store that keeps the results in memory only."""
         return cls(None, "")
 
     @classmethod
     def open(cls, file: Path, key: str) -> Store:
-        """Read what an interrupted run with the same key left, if anything.
+        """Read the results of an interrupted run with the same key, if there are any.
 
         Raises
         ------
@@ -46,36 +48,36 @@ class Store:
         return cls(file, key, _kept(file, key).read("results") or {})
 
     def of(self, search: str) -> Starts:
-        """Return the part of one search."""
+        """Return the results of one search, by its name."""
         return Starts(self, search)
 
     def write(self) -> None:
-        """Write the file, all or nothing."""
+        """Write the file, whole or not at all."""
         if self.file is not None:
             _kept(self.file, self.key).write(results=self.results)
 
     def remove(self) -> None:
-        """Delete the file when it has served."""
+        """Delete the file once the results are no longer needed."""
         if self.file is not None:
             self.file.unlink(missing_ok=True)
 
 
 @dataclass(frozen=True)
 class Starts:
-    """The starts of one search."""
+    """Results of one search, by the number of the start."""
 
     store: Store
     search: str
 
     def known(self, start: int) -> tuple[Floats, float, int] | None:
-        """Return the result of a start: parameters, cost and evaluations."""
+        """Return parameters, cost and number of evaluations of a start, None where there are none."""
         entry = self.store.results.get(self.search, {}).get(str(start))
         return None if entry is None else (np.array(entry[0]), float(entry[1]), int(entry[2]))
 
     def keep(self, start: int, parameters: Floats, cost: float, evaluations: int) -> None:
-        """Keep the result of a start."""
-        own = self.store.results.setdefault(self.search, {})
-        own[str(start)] = ([float(value) for value in parameters], float(cost), evaluations)
+        """Add the result of a start, and write the file."""
+        results = self.store.results.setdefault(self.search, {})
+        results[str(start)] = ([float(value) for value in parameters], float(cost), evaluations)
         self.store.write()
 
 

@@ -1,4 +1,4 @@
-"""Who executes a planned manoeuvre: the one interface of the loop, and a simulated spacecraft behind it.
+"""Spacecraft that execute planned manoeuvres: the interface to the loop, and a simulated implementation.
 
 A plan is a recording with position, velocity and acceleration of every joint at the samples' times, and nothing else.
 """
@@ -24,40 +24,43 @@ from bayesid.simulation.model import Model
 __all__ = ["PlannedMotion", "SimulatedSpacecraft", "Spacecraft", "plan_recording"]
 
 FAMILIES = ("position", "velocity", "acceleration")
+"""Families of columns in a plan, in the order of `JointState`."""
 
 
 class Spacecraft(Protocol):
-    """What a robot, or a simulator of one, must offer to the loop."""
+    """Interface of a robot, or of a simulator of one, to the loop."""
 
     def execute(self, plan: Recording) -> Recording:
-        """Move the joints as planned and return what was recorded.
+        """Move the joints as planned, and return the recording.
 
         Parameters
         ----------
         plan : Recording
-            ``position.``, ``velocity.`` and ``acceleration.<joint>`` of every joint at the samples' times, named after
-            the step. Whoever draws noise draws it from that name, so that a repeated step gives the same recording.
+            Columns ``position.``, ``velocity.`` and ``acceleration.<joint>`` of every joint at the samples' times. The
+            plan is named after the step; simulated noise must follow from that name, so that a repeated step gives the
+            same recording.
 
         Returns
         -------
         Recording
-            Channels of the model's sensors and of all joints.
+            Recording with the channels of the model's sensors and of all joints.
         """
         ...
 
 
 @dataclass(frozen=True)
 class PlannedMotion:
-    """The motion between the samples of a plan: the quintic spline through its positions.
+    """Motion between the samples of a plan, a quintic spline through the positions.
 
-    Its third and fourth derivatives are continuous, so that samples of it can be smoothed well. Velocity and
-    acceleration of the plan are met exactly at its ends.
+    Its third and fourth derivatives are continuous, so that samples of it can be smoothed well. At its ends the spline
+    meets velocity and acceleration of the plan exactly.
 
     Parameters
     ----------
     plan : Recording
+        Plan of the loop.
     joints : sequence of str
-        In the order wanted of `evaluate`.
+        Names of the joints in the order in which `evaluate` returns them.
     """
 
     plan: Recording
@@ -76,7 +79,7 @@ class PlannedMotion:
         object.__setattr__(self, "_splines", [spline, spline.derivative(1), spline.derivative(2)])
 
     def evaluate(self, time: Floats) -> JointState:
-        """Return the joint state at the times, shape (T,); at rest before and after."""
+        """Return the joint state at the times, shape (T,); before and after the plan it is that at its ends."""
         splines: Sequence[BSpline] = self._splines  # type: ignore[attr-defined]
         inside = np.clip(time, self.plan.time[0], self.plan.time[-1])
         return JointState(*(np.asarray(spline(inside)) for spline in splines))
@@ -95,21 +98,21 @@ def plan_recording(motion: Motion, robot: Robot, time: Floats, name: str) -> Rec
 
 @dataclass(frozen=True)
 class SimulatedSpacecraft:
-    """A spacecraft simulated by the package itself, at rest before every manoeuvre.
+    """Spacecraft simulated by the package, at rest before every manoeuvre.
 
     Parameters
     ----------
     truth : Model
-        The robot as it truly is, with its effects and sensors; bodies under ``priors`` are at their prior's centre.
+        Model of the true robot with its effects and sensors; bodies under ``priors`` are at their prior's centre.
     encoder_sigma : float
-        Noise of the recorded joint positions [rad or m].
+        Standard deviation of the noise of the recorded joint positions [rad or m].
     seed : int
-        Of all noise, together with the name of the plan.
+        Seed of all noise, together with the name of the plan.
     noise : bool
-        Whether sensors and encoders have any.
+        True if sensors and encoders have noise.
     attitude : (4,) array
-        Base to orbit axes at time 0.
-    latitude : float
+        Initial attitude, a quaternion x, y, z, w from base to orbit axes.
+    argument_of_latitude : float
         Argument of latitude at time 0 [rad].
     """
 
@@ -121,7 +124,7 @@ class SimulatedSpacecraft:
     argument_of_latitude: float = 0.0
 
     def execute(self, plan: Recording) -> Recording:
-        """Simulate a plan."""
+        """Return the recording of a simulated plan."""
         joints = [joint.name for joint in self.truth.robot.joints]
         return simulate_manoeuvre(
             self.truth,

@@ -1,8 +1,8 @@
-"""Joint motions with free parameters, to be designed: the paper's (27), finite Fourier series, B-splines, your own.
+"""Families of joint motions to design: the paper's (27), finite Fourier series, B-splines, or a user's class.
 
-A parameterisation is one small class: the names of its parameters, its length in time and the joint positions at one
-instant, as a function that JAX can differentiate. Velocities and accelerations follow from that function. Motions that
-are linear in their parameters, as all three below, give matrices instead.
+A family is one small class with the names of its parameters, its duration, and the joint positions at one instant as a
+function that JAX can differentiate. Velocities and accelerations follow from that function. Families that are linear
+in their parameters, such as the three below, provide matrices instead.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ __all__ = ["BSplines", "Fourier", "Linear", "PaperExcitation", "ParameterisedMot
 
 
 class TrajectoryFamily:
-    """A family of joint motions. Subclass it, set the attributes and override `position`.
+    """Family of joint motions; a subclass sets the attributes and overrides `position`.
 
     Attributes
     ----------
     name : str
-        For reports and file names.
+        Name of the family in reports and file names.
     names : tuple of str
-        One per parameter.
+        Names of the n parameters.
     duration : float
-        Of the whole manoeuvre [s].
+        Duration of the whole manoeuvre [s].
     scale : (n,) array
         Typical size of each parameter, for random starts and for the optimiser's steps.
     centre : (n,) array
-        About which random starts are drawn; a motion with these parameters should be slow.
+        Parameters about which random starts are drawn; the motion with these parameters should be slow.
     """
 
     name: str
@@ -50,7 +50,7 @@ class TrajectoryFamily:
     centre: Floats
 
     def position(self, parameters: Array, time: Array) -> Array:
-        """Return positions of all joints at one instant, shape (joints,) [rad or m], in JAX."""
+        """Return the positions of all joints at one instant, shape (joints,) [rad or m], computed in JAX."""
         raise NotImplementedError
 
     def state(self, parameters: Array, time: Floats) -> JointState:
@@ -72,29 +72,37 @@ class TrajectoryFamily:
         return len(self.names)
 
     def motion(self, parameters: Floats | Array) -> ParameterisedMotion:
-        """Return the motion with some parameters."""
+        """Return the motion with given parameters, shape (n,)."""
         return ParameterisedMotion(self, parameters)
 
 
 @dataclass(frozen=True)
 class ParameterisedMotion:
-    """One motion of a family; a `bayesid.recording.joint_motion.Motion` whose parameters may be traced by JAX."""
+    """One motion of a family, a `bayesid.recording.joint_motion.Motion` whose parameters JAX may trace.
+
+    Parameters
+    ----------
+    family : TrajectoryFamily
+        Family of the motion.
+    parameters : (n,) array
+        Parameters of the motion.
+    """
 
     family: TrajectoryFamily
     parameters: Floats | Array
 
     def evaluate(self, time: Floats) -> JointState:
-        """Return the joint state at the times, shape (T,): as NumPy arrays unless the parameters are traced."""
+        """Return the joint state at the times, shape (T,), as NumPy arrays unless the parameters are traced."""
         state = self.family.state(jnp.asarray(self.parameters), np.asarray(time, dtype=float))
         traced = isinstance(self.parameters, jax.core.Tracer)
         return state if traced else JointState(*(np.array(part) for part in state))
 
 
 class Linear(TrajectoryFamily):
-    """A family of motions linear in its parameters: ``rest(t) + basis(t) parameters``."""
+    """Family of motions linear in its parameters, ``rest(t) + basis(t) parameters``."""
 
     def matrices(self, time: Floats) -> tuple[Floats, Floats]:
-        """Return rest (3, T, joints) and basis (3, T, joints, n): position, velocity, acceleration."""
+        """Return rest (3, T, joints) and basis (3, T, joints, n), each for position, velocity and acceleration."""
         raise NotImplementedError
 
     def state(self, parameters: Array, time: Floats) -> JointState:
@@ -105,7 +113,7 @@ class Linear(TrajectoryFamily):
 
 
 class _PerJoint(Linear):
-    """The same basis functions for every moving joint, each zero with two derivatives at both ends."""
+    """Family with the same basis functions for every moving joint, zero with two derivatives at both ends."""
 
     def __init__(self, start: Sequence[float] | Floats, moving: Sequence[int], duration: float, labels: Sequence[str]):
         self.start = np.array(start, dtype=float)
@@ -118,7 +126,7 @@ class _PerJoint(Linear):
         self.centre = np.zeros(len(self.names))
 
     def functions(self, time: Floats) -> Floats:
-        """Return the basis functions and two derivatives, shape (3, T, m)."""
+        """Return the m basis functions and their first two derivatives, shape (3, T, m)."""
         raise NotImplementedError
 
     def matrices(self, time: Floats) -> tuple[Floats, Floats]:
@@ -136,17 +144,19 @@ class _PerJoint(Linear):
 class Fourier(_PerJoint):
     """Finite Fourier series (Swevers et al. 1997), at rest at both ends.
 
+    The basis functions of a joint are those combinations of a constant, sines and cosines that have zero position,
+    velocity and acceleration at both ends.
+
     Parameters
     ----------
     start : (joints,) array_like
-        Positions before and after [rad or m].
+        Positions of the joints before and after the manoeuvre [rad or m].
     moving : sequence of int
         Indices of the joints that move.
     duration : float
-        Of the manoeuvre, one period of the series [s].
+        Duration of the manoeuvre, which is one period of the series [s].
     harmonics : int
-        Of every joint. Of its constant, sines and cosines the combinations are kept that leave the joint where it was,
-        at rest and without acceleration, at both ends.
+        Number of harmonics of every joint, at least 2.
     """
 
     name = "fourier"
@@ -158,13 +168,13 @@ class Fourier(_PerJoint):
             raise InputError(f"{harmonics} harmonics cannot start at rest", remedy="Give at least 2")
         self.orders = np.arange(1, harmonics + 1)
         ones, none = np.ones(harmonics), np.zeros(harmonics)
-        # of constant, sines, cosines: position, velocity and acceleration at the ends
+        # position, velocity and acceleration at the ends; columns are constant, sines, cosines
         ends = np.array([[1.0, *none, *ones], [0.0, *self.orders, *none], [0.0, *none, *self.orders**2]])
         self.combinations = null_space(ends)
         super().__init__(start, moving, duration, [f"c{k + 1}" for k in range(self.combinations.shape[1])])
 
     def functions(self, time: Floats) -> Floats:
-        """Return the combinations and two derivatives, shape (3, T, m)."""
+        """Return the m combinations and their first two derivatives, shape (3, T, m)."""
         inside = np.clip(time, 0.0, self.duration)
         w = 2.0 * np.pi / self.duration * self.orders
         sine, cosine = np.sin(w * inside[:, None]), np.cos(w * inside[:, None])
@@ -180,18 +190,19 @@ class Fourier(_PerJoint):
 
 
 class BSplines(_PerJoint):
-    """Quintic B-splines on even knots whose first and last three control points stand at the start.
+    """Quintic B-splines on even knots whose first and last three control points are the start position.
 
     Parameters
     ----------
     start, moving, duration
-        As for `Fourier`.
+        Parameters of `Fourier`.
     points : int
-        Free control points of every joint.
+        Number of free control points of every joint.
     """
 
     name = "b-splines"
     DEGREE = 5
+    """Degree of the splines, for which the accelerations are twice continuously differentiable."""
 
     def __init__(
         self, start: Sequence[float] | Floats, moving: Sequence[int], duration: float, points: int = 8
@@ -205,7 +216,7 @@ class BSplines(_PerJoint):
         self.points = points
 
     def functions(self, time: Floats) -> Floats:
-        """Return the free splines and two derivatives, shape (3, T, m)."""
+        """Return the m free splines and their first two derivatives, shape (3, T, m)."""
         inside = np.clip(time, 0.0, self.duration)
         values = np.zeros((3, len(time), self.points))
         for k in range(self.points):
@@ -218,22 +229,22 @@ class BSplines(_PerJoint):
 
 
 class PaperExcitation(Linear):
-    """The paper's (27) with its connecting splines (`bayesid.recording.joint_motion.Excitation`).
+    """Family of the paper's (27) with its connecting splines (`bayesid.recording.joint_motion.Excitation`).
 
-    Three joints oscillate, ``q1 + q2 cos(omega t)``; the others rest, the arm extended.
+    Three joints oscillate as ``q1 + q2 cos(omega t)``; the others rest with the arm extended.
 
     Parameters
     ----------
     posture : (joints,) array_like
-        Positions before and after; the joints that do not oscillate stay there [rad or m].
-    moving : sequence of int
-        The joints that oscillate; the first three where left out.
+        Positions of the joints before and after; joints that do not oscillate stay there [rad or m].
     duration : float
-        Of the whole manoeuvre [s].
+        Duration of the whole manoeuvre [s].
+    moving : sequence of int, optional
+        Indices of the joints that oscillate, by default the first three.
     periods : int
-        Of the oscillation, which the paper does not state.
+        Number of periods of the oscillation, which the paper does not state.
     ramp : float
-        Part of the duration that each connecting spline takes.
+        Fraction of the duration that each connecting spline takes.
     """
 
     name = "paper"
@@ -251,15 +262,15 @@ class PaperExcitation(Linear):
         self.moving = tuple(range(min(3, len(self.posture)))) if moving is None else tuple(moving)
         self.names = tuple(f"joint{joint + 1}.{key}" for joint in self.moving for key in ("q1", "q2"))
         self.scale = np.full(len(self.names), 0.5)
-        self.centre = np.ravel([(self.posture[joint], 0.0) for joint in self.moving])  # it rests
+        self.centre = np.ravel([(self.posture[joint], 0.0) for joint in self.moving])  # the arm at rest
 
     @property
     def frequency(self) -> float:
-        """The oscillation's omega [rad/s]."""
+        """Angular frequency omega of the oscillation [rad/s]."""
         return 2.0 * np.pi * self.periods / (self.duration - 2.0 * self.ramp)
 
     def excitation(self, parameters: Floats) -> Excitation:
-        """Return the excitation with q1, q2 of the first joint, of the second, of the third."""
+        """Return the excitation with the parameters q1 and q2 of the first moving joint, then of the next ones."""
         offset, amplitude = self.posture.copy(), np.zeros(len(self.posture))
         offset[list(self.moving)], amplitude[list(self.moving)] = parameters[0::2], parameters[1::2]
         return Excitation(offset, amplitude, self.frequency, self.periods, self.ramp, self.posture)

@@ -19,13 +19,13 @@ __all__ = ["Found", "Search", "optimise"]
 
 
 FILLED = 0.8
-"""Part of the tightest limit that random starts use."""
+"""Fraction of the tightest limit that random starts use, so that they begin inside the limits."""
 
 SHRUNK = 12
-"""Times that a random start is shrunk at most."""
+"""Largest number of times that a random start is shrunk."""
 
 SLACK = 1e-6
-"""Part of a limit by which the optimiser may overshoot: the smooth maximum is larger than the true one."""
+"""Fraction of a limit by which the optimiser may exceed it, since the smooth maximum lies above the true one."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class Search:
     Parameters
     ----------
     starts : int
-        Random starts.
+        Number of random starts.
     iterations : int
-        Of SLSQP from each.
+        Largest number of iterations of SLSQP from each start.
     tolerance : float
-        Of the cost, relative to that of the start, at which SLSQP stops.
+        Tolerance of the cost, relative to that of the start, at which SLSQP stops.
     """
 
     starts: int = 4
@@ -54,10 +54,13 @@ class Found:
     Attributes
     ----------
     parameters : (n,) array
+        Parameters of the best motion.
     cost : float
+        Cost of the best motion.
     costs : tuple of float
-        Of every start, the best first; not a number where none was feasible.
+        Costs of the feasible starts, the best first.
     evaluations : int
+        Number of evaluations of the cost over all starts.
     """
 
     parameters: Floats
@@ -81,17 +84,28 @@ def optimise(
 
     Parameters
     ----------
+    problem : Problem
+        Family of motions and limits.
+    criterion : Criterion
+        Criterion to minimise, one of the problem's.
+    rng : numpy.random.Generator
+        Source of the random starts.
+    search : Search
+        Effort of the search.
     first : (n,) array, optional
         Parameters to start from in place of the first random start.
     known : callable
-        Number of a start -> parameters, cost and evaluations of an earlier run there; None if nothing.
+        Function of the number of a start that returns parameters, cost and evaluations of an earlier run from it, or
+        None.
     keep : callable
-        Handed the same of every start as it is found.
+        Function that receives number, parameters, cost and evaluations of every start when it is done.
+    progress : Progress
+        Receiver of the fraction done.
 
     Raises
     ------
     InputError
-        Where no start leads to a manoeuvre within the limits; it names those that are broken.
+        If no start leads to a manoeuvre within the limits; the message names the broken limits.
     """
     points = problem.points(criterion, rng)
     results: list[tuple[float, Floats]] = []
@@ -126,7 +140,7 @@ def optimise(
 
 
 class _Run:
-    """One run of SLSQP, with its best point that keeps the limits."""
+    """One run of SLSQP, with the best point so far that keeps the limits."""
 
     def __init__(
         self,
@@ -149,7 +163,7 @@ class _Run:
         constraints: Any = {"type": "ineq", "fun": self.margin, "jac": self.margin_slope}
         report: Any = self.report
         options: Any = {"maxiter": self.search.iterations, "ftol": self.search.tolerance}
-        for tighter in (1.0, 0.99, 0.97, 0.9):  # where the fine grid shows more than the coarse one
+        for tighter in (1.0, 0.99, 0.97, 0.9):  # in case the fine grid shows larger values
             self.bound = tighter
             end = minimize(
                 self.cost,
@@ -160,7 +174,7 @@ class _Run:
                 callback=report,
                 options=options,
             )
-            # SLSQP's iterates lie a little outside until it has converged
+            # SLSQP's iterates lie slightly outside the limits until it has converged
             self.consider(_repaired(self.problem, family.centre + family.scale * end.x, tighter))
             if all(reached.kept for reached in self.problem.reached(self.best)):
                 return
@@ -168,7 +182,7 @@ class _Run:
             self.best_cost = self.problem.cost(self.criterion, self.best, self.points)[0]
 
     def consider(self, parameters: Floats) -> None:
-        """Keep parameters that are better than the best so far and break no limit."""
+        """Keep the parameters if they are better than the best so far and break no limit."""
         value = self.problem.cost(self.criterion, parameters, self.points)[0]
         if value < self.best_cost and self.problem.fractions(parameters)[0].max() <= self.bound + SLACK:
             self.best, self.best_cost = parameters, value
@@ -199,7 +213,10 @@ class _Run:
 
 
 def _random_start(problem: Problem, rng: np.random.Generator) -> Floats:
-    """Draw parameters; shrink them towards the centre until the tightest limit that this helps is filled to a part."""
+    """Draw parameters and shrink them towards the centre until they use at most `FILLED` of the tightest limit.
+
+    Only limits that a smaller motion helps to keep are considered.
+    """
     family = problem.plan.family
     direction = family.scale * rng.normal(size=family.size)
     helped = [limit.shrinks for limit in problem.applied]
@@ -210,7 +227,7 @@ def _random_start(problem: Problem, rng: np.random.Generator) -> Floats:
 
 
 def _repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) -> Floats:
-    """Nearest parameters downhill that break no limit; the same where none is broken."""
+    """Return parameters that keep the limits, by descent from given ones; the same parameters where none is broken."""
     family = problem.plan.family
 
     def excess(x: Floats) -> tuple[float, Floats]:
@@ -221,7 +238,7 @@ def _repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) -
     x = (parameters - family.centre) / family.scale
     if excess(x)[0] == 0.0:
         return parameters
-    # a little less, so that the end lies inside
+    # a slightly lower bound, so that the result lies inside the limits
     bound -= 2e-3
     return family.centre + family.scale * minimize(excess, x, jac=True, method="L-BFGS-B").x
 

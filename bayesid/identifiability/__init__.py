@@ -1,4 +1,4 @@
-"""What can be identified: by the structure of the robot, and by a study's manoeuvres, sensors and priors."""
+"""Identifiability: what the robot's structure allows, and what a study's manoeuvres, sensors and priors allow."""
 
 from bayesid.identifiability.base_parameters import BaseParameters, base_parameters, standard_names
 from bayesid.identifiability.mass_scale import Determined, consistent_accelerations, determined, rates_at_rest

@@ -1,4 +1,4 @@
-"""What could be measured, known or moved besides: each candidate makes one experiment of another."""
+"""Candidates for what could be measured, known or moved in addition; each turns one experiment into another."""
 
 from __future__ import annotations
 
@@ -32,40 +32,40 @@ from bayesid.simulation.sensors import Kind, Sensor
 __all__ = ["AddedMeasurement", "NotEvaluated", "Swung", "candidates"]
 
 KNOWN_MASS = 0.01
-"""Relative standard deviation of a mass that is known."""
+"""Relative standard deviation of a mass that counts as known."""
 
 PUSH, TURN = 1e-3, 1e-4
-"""Of a pulse of thrust and of torque: acceleration of the whole robot [m/s2] and of its rate [rad/s2]."""
+"""Acceleration [m/s2] and angular acceleration [rad/s2] of the whole robot by a pulse of thrust and of torque."""
 
 SPIN = 2e-3
-"""Change of rate by a wheel pulse [rad/s]."""
+"""Change of the robot's angular velocity by a pulse of the wheels [rad/s]."""
 
 SWING = {"rad": 0.5, "m": 0.2}
-"""Amplitude of an added swing of a joint."""
+"""Amplitude of an added swing of a revolute joint [rad] and of a prismatic one [m]."""
 
 SHARE = 0.9
-"""Of a joint's largest speed that an added swing may reach."""
+"""Largest fraction of a joint's speed limit that an added swing may reach, so that it keeps a margin."""
 
 PARTS = (0.35, 0.45, 0.55, 0.65)
-"""Ends of the three parts of a pulse, one for each axis, as fractions of the manoeuvre."""
+"""Bounds of the three parts of a pulse, one part for each axis, as fractions of the manoeuvre's duration."""
 
 
 class NotEvaluated(Exception):  # noqa: N818 - a verdict, not an error
-    """A candidate does not apply; the message says why."""
+    """Verdict that a candidate does not apply; the message says why."""
 
 
 @dataclass(frozen=True)
 class AddedMeasurement:
-    """One thing to do besides.
+    """One candidate for a measurement, a motion or knowledge to add to an experiment.
 
     Attributes
     ----------
     name : str
-        Short and unique.
+        Short, unique name.
     text : str
-        What it means, with its figures.
+        Description with the candidate's figures.
     change : callable
-        Experiment to experiment; raises `NotEvaluated` where it does not apply.
+        Function that returns the changed experiment; it raises `NotEvaluated` where the candidate does not apply.
     """
 
     name: str
@@ -79,13 +79,13 @@ def candidates(model: Model) -> list[AddedMeasurement]:
     force, torque, spin = _round(PUSH * mass), _round(TURN * inertia), _round(SPIN * inertia)
     declared = {sensor.kind: sensor for sensor in model.sensors}
     each = "x, y and z in turn, each for a tenth of the manoeuvre"
-    found = [
+    additions = [
         AddedMeasurement(
             f"better-{kind.value}", f"{kind.value} sensor with a tenth of its noise", partial(_better, kind)
         )
         for kind in declared
     ]
-    found += [
+    additions += [
         AddedMeasurement(
             f"add-{kind.value}",
             f"added {kind.value} sensor of {float(sensor.noise.sigma(1.0)[0]):g} {kind.unit} per sample"
@@ -97,16 +97,16 @@ def candidates(model: Model) -> list[AddedMeasurement]:
     ]
     if model.torque is not None:
         text = "torque sensors with a tenth of their noise"
-        found.append(AddedMeasurement("better-torque", text, partial(_torqued, rescaled(model.torque, FINEST))))
+        additions.append(AddedMeasurement("better-torque", text, partial(_torqued, rescaled(model.torque, FINEST))))
     elif (torques := typical_torque(model)) is not None:
         text = f"added torque sensors of {torques.sigma[0]:g} N m per sample in all joints, their friction known"
-        found.append(AddedMeasurement("add-torque", text, partial(_torqued, torques)))
-    found += [
+        additions.append(AddedMeasurement("add-torque", text, partial(_torqued, torques)))
+    additions += [
         AddedMeasurement(f"known-mass:{body.name}", f"mass of {body.name} known to 1 %", partial(_weighed, body.name))
         for body in model.bodies
     ]
     return [
-        *found,
+        *additions,
         AddedMeasurement(
             "thrust", f"known thrust of {force:g} N along {each}", partial(_pushed, np.array([force, 0.0]))
         ),
@@ -150,7 +150,7 @@ def _weighed(body: str, experiment: Experiment) -> Experiment:
 
 
 def _pushed(size: Floats, experiment: Experiment) -> Experiment:
-    """Push with a force and a torque of given sizes."""
+    """Return the experiment with pulses of force and torque of the two sizes [N, N m] in every manoeuvre."""
     return replace(experiment, manoeuvres=tuple(_with_wrench(item, size) for item in experiment.manoeuvres))
 
 
@@ -160,10 +160,9 @@ def _with_wrench(manoeuvre: Manoeuvre, size: Floats) -> Manoeuvre:
     pulse = np.stack([part == number for number in (1, 2, 3)], axis=1).astype(float)
     wrench = Actions.from_recording(recording).zero_order_hold(recording.time)
     wrench = wrench + np.concatenate([size[0] * pulse, size[1] * pulse], axis=1)
-    zero_order_hold = np.concatenate([[True], np.any(np.diff(wrench, axis=0) != 0.0, axis=1)])
-    rows = np.where(
-        zero_order_hold[:, None], wrench, np.nan
-    )  # a value holds until the next, and every change ends a step
+    # a value holds until the next one, so only changes are recorded; each of them ends an integration step
+    changes = np.concatenate([[True], np.any(np.diff(wrench, axis=0) != 0.0, axis=1)])
+    rows = np.where(changes[:, None], wrench, np.nan)
     return _with_channels(manoeuvre, {"base_force": rows[:, :3], "base_torque": rows[:, 3:]})
 
 
@@ -181,13 +180,14 @@ def _with_wheels(manoeuvre: Manoeuvre, size: float) -> Manoeuvre:
 
 
 def _with_channels(manoeuvre: Manoeuvre, families: dict[str, Floats]) -> Manoeuvre:
-    own = manoeuvre.recording
-    more = {
+    recording = manoeuvre.recording
+    added = {
         f"{family}.{axis}": values[:, column]
         for family, values in families.items()
         for column, axis in enumerate("xyz")
     }
-    return replace(manoeuvre, recording=Recording(own.name, own.file, own.time, {**own.channels, **more}))
+    channels = {**recording.channels, **added}
+    return replace(manoeuvre, recording=Recording(recording.name, recording.file, recording.time, channels))
 
 
 # ---- joint motion ----
@@ -195,7 +195,17 @@ def _with_channels(manoeuvre: Manoeuvre, families: dict[str, Floats]) -> Manoeuv
 
 @dataclass(frozen=True)
 class Swung(MeasuredMotion):
-    """A measured motion with a swing of one joint added: ``amplitude sin^4(pi t / duration)``."""
+    """Measured motion with an added swing ``amplitude sin^4(pi t / duration)`` of one joint.
+
+    Parameters
+    ----------
+    index : int
+        Index of the joint that swings.
+    amplitude : float
+        Amplitude of the swing [rad, m].
+    duration : float
+        Duration of the swing [s].
+    """
 
     index: int = 0
     amplitude: float = 0.0
@@ -217,7 +227,7 @@ def _swung(robot: Robot, index: int, experiment: Experiment) -> Experiment:
 
 
 def _with_swing(robot: Robot, index: int, manoeuvre: Manoeuvre) -> Manoeuvre:
-    """Swing to whichever side the joint's range allows."""
+    """Return the manoeuvre with an added swing of a joint, to whichever side the joint's range allows."""
     motion, joint, time = manoeuvre.motion, robot.joints[index], manoeuvre.recording.time
     if not isinstance(motion, MeasuredMotion):
         raise NotEvaluated("the joints' motion is not that of a recording")
@@ -234,7 +244,7 @@ def _with_swing(robot: Robot, index: int, manoeuvre: Manoeuvre) -> Manoeuvre:
 
 
 def _whole(robot: Robot) -> tuple[float, float]:
-    """Mass [kg] and mean moment of inertia about the centre of mass [kg m2] of the robot with its joints at zero."""
+    """Return the robot's mass [kg] and mean moment of inertia about its centre of mass [kg m2], joints at zero."""
     still = JointState(*np.zeros((3, 1, len(robot.joints))))
     row = composite_rows(robot, kinematics(robot, still))[0]
     mass, first, second = float(row[0]), row[1:4], row[10:13]

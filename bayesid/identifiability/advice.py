@@ -1,4 +1,4 @@
-"""What to measure or to move so that the worst known becomes known: candidates, ranked by what they would tell."""
+"""Advice on what to measure or to move next: candidates, ranked by what they would tell of the worst directions."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from bayesid.identifiability.local_knowledge import Knowledge
 __all__ = ["WORST", "Advice", "advise"]
 
 WORST = 3
-"""Directions, from the worst, of which the advice speaks."""
+"""Number of directions, from the worst known, that the advice evaluates."""
 
 
 @dataclass(frozen=True)
 class Advice:
-    """What a candidate would tell.
+    """Predicted effect of one candidate.
 
     Attributes
     ----------
     name, text : str
-        Of the candidate.
+        Name and description of the candidate.
     directions : tuple of float
-        Standard deviations of the presently worst directions over those of the prior.
+        Ratios of posterior to prior standard deviation in the presently worst directions.
     parameter : str
-        The presently worst known quantity.
+        Name of the presently worst known quantity.
     sd : float
-        Its standard deviation, in its unit.
+        Standard deviation that the quantity would have, in its unit.
     shrinkage : float
-        Of that quantity.
+        Shrinkage that the quantity would have, one minus the ratio of posterior to prior standard deviation.
     information : float
-        Gained on all quantities beyond what is known now [nats].
+        Information gained on all quantities beyond what is known now [nats].
     reason : str
-        Why it was not evaluated; empty if it was.
+        Reason why the candidate was not evaluated; empty if it was.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Advice:
     reason: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Form in JSON."""
+        """Return the advice as it stands in identifiability.json."""
         if self.reason:
             return {"name": self.name, "text": self.text, "evaluated": False, "reason": self.reason}
         return {
@@ -73,24 +73,33 @@ def advise(
     now: Knowledge,
     progress: Progress,
 ) -> list[Advice]:
-    """Evaluate candidates at the point of the predictor, the most telling of the worst direction first.
+    """Evaluate candidates at the predictor's linearisation point, and return the most informative first.
+
+    Candidates are ranked by the predicted width of the presently worst direction, then by the information gained.
 
     Parameters
     ----------
+    predictor : InformationPredictor
+        Predictor of what an experiment tells.
+    candidates : sequence of AddedMeasurement
+        Candidates to evaluate, each alone.
     worst : sequence of Direction
-        As known now, the worst first.
+        Directions as known now, the worst first.
     now : Knowledge
+        Present knowledge of the bodies' quantities.
+    progress : Progress
+        Receiver of the fraction done.
     """
-    found = []
+    advice = []
     for number, candidate in enumerate(candidates):
         progress(number / len(candidates), candidate.text)
         try:
             known = predictor.knowledge(candidate.change(predictor.flown))
         except (NotEvaluated, InputError) as error:
-            found.append(Advice(candidate.name, candidate.text, reason=str(error)))
+            advice.append(Advice(candidate.name, candidate.text, reason=str(error)))
             continue
-        found.append(_of(candidate, known, worst, now))
-    return sorted(found, key=lambda item: (bool(item.reason), item.directions[:1], -item.information))
+        advice.append(_of(candidate, known, worst, now))
+    return sorted(advice, key=lambda item: (bool(item.reason), item.directions[:1], -item.information))
 
 
 def _of(candidate: AddedMeasurement, known: Knowledge, worst: Sequence[Direction], now: Knowledge) -> Advice:
@@ -108,6 +117,6 @@ def _of(candidate: AddedMeasurement, known: Knowledge, worst: Sequence[Direction
 
 
 def _half_log_det(knowledge: Knowledge) -> float:
-    """Half the logarithm of the determinant of the covariance, relative to that of the prior."""
-    own = np.linalg.solve(knowledge.prior_factor, knowledge.factor)
-    return float(np.log(np.linalg.svd(own, compute_uv=False)).sum())
+    """Return half the logarithm of the determinant of the covariance relative to that of the prior."""
+    relative = np.linalg.solve(knowledge.prior_factor, knowledge.factor)
+    return float(np.log(np.linalg.svd(relative, compute_uv=False)).sum())

@@ -1,15 +1,16 @@
 """Base inertial parameters: the smallest set that the equations of motion depend on (section 3.1 of the paper).
 
-Whatever is measured of motion and joint torques depends on the ten parameters of every body only through ``K_B = K_1 +
-beta K_2``, the paper's (24). A body behind a revolute joint can take over, unseen, what does not change as the joint
-turns: a mass on the joint axis (mass, and first moment along the axis), and a thin rod along the axis, whose inertia
-about the axis is zero. So every revolute joint makes three parameters dependent. Across a prismatic joint both bodies
-turn alike, and the six moments of inertia regroup; mass and first moment do not, as they are displaced. A body that is
-fixed on another one regroups with all ten. These regroupings do not depend on how the base is held; but a fixed base
-also hides what never moves: a free flyer has no parameters without effect, a fixed robot has (Mayeda, Yoshida and
-Osuka, IEEE Trans. Robotics and Automation 1990; Khalil and Dombre 2002, section 9.4).
+All measurements of motion and joint torques depend on the ten parameters of every body only through ``K_B = K_1 +
+beta K_2``, the paper's (24). Between the two bodies of a revolute joint, what does not change as the joint turns can be
+exchanged without any effect: a mass on the joint axis (mass, and first moment along the axis), and a thin rod along the
+axis, whose inertia about the axis is zero. Every revolute joint therefore makes three parameters dependent. Across a
+prismatic joint both bodies rotate alike, and the six moments of inertia regroup; mass and first moment do not, because
+the joint displaces them. A body that is fixed to another one regroups with all ten. These regroupings do not depend on
+how the base is held, but a fixed base also hides what never moves: a free flyer has no parameters without effect, while
+a fixed robot has some (Mayeda, Yoshida and Osuka, IEEE Trans. Robotics and Automation 1990; Khalil and Dombre 2002,
+section 9.4).
 
-The method is Gautier's (J. Robotic Systems 1991): QR decompositions of the regressor in random states
+The method is that of Gautier (J. Robotic Systems 1991): QR decompositions of the regressor in random states
 (`bayesid.identifiability.rank_decomposition`).
 """
 
@@ -35,27 +36,27 @@ LINEAR = (
     *("mass", "first.x", "first.y", "first.z"),
     *("inertia.xx", "inertia.xy", "inertia.yy", "inertia.xz", "inertia.yz", "inertia.zz"),
 )
-"""Names of `InertialParameters.vector`: first moment of mass and inertia are about the link's origin, in its axes."""
+"""Names of `InertialParameters.vector`; first moment of mass and inertia are about the link's origin, in its axes."""
 
 SEED = 1991
-"""Of the random states where no generator is given."""
+"""Seed of the random states where no generator is given, so that results repeat."""
 
 
 @dataclass(frozen=True)
 class BaseParameters:
-    """Which standard parameters are independent, and how the others regroup into them.
+    """Independent standard parameters of a robot, and how the others regroup into them.
 
     Attributes
     ----------
     standard : tuple of str
-        All parameters, ten of every link with mass and of every load, such as ``link1.first.x`` (`LINEAR`).
+        All parameters, ten for every link with mass and for every load, such as ``link1.first.x`` (`LINEAR`).
     independent, dependent, without_effect : tuples of str
-        K_1, K_2, and on a fixed base what moves nothing; together they are `standard`.
+        Parameters K_1, parameters K_2, and those that a fixed base leaves without effect; together they are `standard`.
     regrouping : (independent, dependent) array
-        beta of (24): ``K_B = K_1 + beta K_2``.
+        Matrix beta of (24), ``K_B = K_1 + beta K_2``.
     gap : tuple of float
-        Smallest singular value kept and largest one dropped, of the regressor with columns of unit length, relative to
-        the largest one.
+        Smallest singular value kept and largest one dropped, relative to the largest, for the regressor with columns
+        of unit length.
     """
 
     standard: tuple[str, ...]
@@ -72,7 +73,7 @@ class BaseParameters:
 
     @property
     def projection(self) -> Floats:
-        """Matrix that takes standard to base parameters, shape (count, standard)."""
+        """Matrix from standard to base parameters, shape (count, standard)."""
         matrix = np.zeros((self.count, len(self.standard)))
         matrix[np.arange(self.count), self._index(self.independent)] = 1.0
         matrix[:, self._index(self.dependent)] = self.regrouping
@@ -88,18 +89,18 @@ class BaseParameters:
         return matrix
 
     def project(self, p: ArrayLike) -> Floats:
-        """Return the base parameters K_B of standard parameters, (..., standard) -> (..., count)."""
+        """Return the base parameters K_B, shape (..., count), of standard parameters, shape (..., standard)."""
         return np.asarray(p, dtype=float) @ self.projection.T
 
     def recover(self, base: ArrayLike, dependent: ArrayLike, without_effect: ArrayLike = 0.0) -> Floats:
-        """Return the standard parameters that have given base parameters: K_1 follows once K_2 is known.
+        """Return the standard parameters (standard,) that have given base parameters, by ``K_1 = K_B - beta K_2``.
 
         Parameters
         ----------
         base : (count,) array_like
-            K_B.
+            Base parameters K_B.
         dependent : (dependent,) array_like
-            K_2.
+            Dependent parameters K_2.
         without_effect : array_like
             Values of the parameters without effect.
         """
@@ -123,27 +124,29 @@ def base_parameters(
     keep: Sequence[str] = (),
     gravity: ArrayLike = GRAVITY,
 ) -> BaseParameters:
-    """Find the base parameters of a robot.
+    """Compute the base parameters of a robot.
 
-    The convention is the usual one: a parameter depends on those of the bodies nearer the base. Of a link behind a
-    revolute joint about z mass, first.z and inertia.yy are dependent, of one behind a prismatic joint its inertia.
+    By the usual convention the parameters of a body depend on those of the bodies nearer the base. For a link behind a
+    revolute joint about z, mass, first.z and inertia.yy are dependent; for one behind a prismatic joint, the inertia.
 
     Parameters
     ----------
     robot : Robot
-        Its inertial values do not matter, but a link without mass is left out.
+        Robot whose inertial values do not matter, except that links without mass are left out.
     base : Base
+        Support of the base, which decides the equations.
     rng : numpy.random.Generator, optional
-        For the states in which the equations are looked at; left out, a fixed seed gives the same states every time.
+        Source of the random states in which the equations are evaluated; by default a fixed seed gives the same states
+        every time.
     keep : sequence of str
-        Standard parameters to be independent rather than others, as far as the structure allows, in this order.
+        Standard parameters that are preferred as independent ones, in this order, as far as the structure allows.
     gravity : (3,) array_like
-        On a fixed base, base axes [m/s2]; its direction matters to what is seen.
+        Acceleration of gravity on a fixed base, base axes [m/s2]; its direction affects which parameters act.
 
     Raises
     ------
     InputError
-        If a name in ``keep`` is unknown, or the rank cannot be told from rounding.
+        If a name in ``keep`` is unknown, or rounding errors leave the rank unclear.
     """
     bodies = massive_bodies(robot)
     names = standard_names(bodies)
@@ -170,12 +173,12 @@ def base_parameters(
 
 
 def standard_names(bodies: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of the ten linear parameters of every body."""
+    """Return the names of the ten linear parameters of every body, body after body."""
     return tuple(f"{body}.{key}" for body in bodies for key in LINEAR)
 
 
 def _preferred(robot: Robot, bodies: Sequence[str]) -> list[str]:
-    """Names from the base outwards; of each body, those that its joint makes dependent come last."""
+    """Return the names from the base outwards; for each body, those that its joint makes dependent come last."""
     order = []
     for body in bodies:
         link = robot.link(body)
@@ -188,8 +191,11 @@ def _preferred(robot: Robot, bodies: Sequence[str]) -> list[str]:
 
 
 def _about(axis: Floats) -> tuple[str, ...]:
-    """Mass, first moment along a revolute joint's axis, and a moment of inertia that a rod along the axis has."""
+    """Return the names that a revolute joint about an axis makes dependent.
+
+    They are the mass, the first moment along the axis, and a moment of inertia that a rod along the axis has.
+    """
     along, across = int(np.argmax(np.abs(axis))), np.abs(axis)
-    # of equals the textbook's: yy behind a joint about z
+    # among equal candidates the textbook's choice, which is yy behind a joint about z
     rod = min((1, 2, 0), key=lambda index: round(float(across[index]), 6))
     return (f"first.{'xyz'[along]}", f"inertia.{'xyz'[rod] * 2}", "mass")

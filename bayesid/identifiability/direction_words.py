@@ -1,4 +1,4 @@
-"""A direction in words: the pattern that its numbers show, and no more."""
+"""Description of a direction in words: the pattern that its numbers show, and no more."""
 
 from __future__ import annotations
 
@@ -14,33 +14,36 @@ from bayesid.inference.contraction import ContractionVerdict
 __all__ = ["Part", "describe", "parts_of", "subject"]
 
 ALIKE = 0.95
-"""Cosine, in units of the prior's standard deviations, from which on a displacement counts as a pattern."""
+"""Cosine between displacement and pattern, in prior standard deviations, above which the pattern is named."""
 
 NEGLIGIBLE = 0.25
-"""Share of the largest part below which a part is left out of the words."""
+"""Size relative to the largest part below which a part is left out of the words."""
 
 NAMED = 3
-"""Parts that are named at most."""
+"""Largest number of parts named, so that the words remain readable."""
 
 NOUNS = {"mass": "mass", "com": "centre of mass", "inertia": "inertia"}
+"""Nouns in sentences by the first part of a quantity's name."""
 
 
 class Part(Enum):
-    """Which way a part moves."""
+    """Sign of a part's change relative to the largest part."""
 
     WITH = "with"
     AGAINST = "against"
 
 
 def describe(direction: Direction, values: Floats, prior_sd: Floats, whole: bool = True) -> str:
-    """Say what a direction is, and what is known of it.
+    """Describe a direction, and how much of the prior's width the data left in it.
 
     Parameters
     ----------
+    direction : Direction
+        Direction over n quantities.
     values, prior_sd : (n,) array
-        Of the direction's quantities.
+        Values and prior standard deviations of these quantities, each in its unit.
     whole : bool
-        Whether these are the quantities of all bodies that are not known exactly.
+        True if the quantities are those of all bodies that are not known exactly.
     """
     what, ratio = subject(direction, values, prior_sd, whole), direction.sd / direction.prior_sd
     verdict = direction.verdict
@@ -53,7 +56,7 @@ def describe(direction: Direction, values: Floats, prior_sd: Floats, whole: bool
 
 
 def subject(direction: Direction, values: Floats, prior_sd: Floats, whole: bool = True) -> str:
-    """Say which quantities a direction moves."""
+    """Name the quantities that a direction moves."""
     moved = direction.displacement / prior_sd
     bodies = list(dict.fromkeys(name.split(".")[0] for name in direction.names))
     owner = np.array([bodies.index(name.split(".")[0]) for name in direction.names])
@@ -71,7 +74,7 @@ def subject(direction: Direction, values: Floats, prior_sd: Floats, whole: bool 
 
 
 def parts_of(direction: Direction, prior_sd: Floats) -> list[tuple[Part, str]]:
-    """Return the largest parts of a displacement relative to the prior's widths, as against the first of them."""
+    """Return the largest parts of a displacement in units of the prior's widths, with signs relative to the first."""
     moved = direction.displacement / prior_sd
     order = np.argsort(-np.abs(moved))[:NAMED]
     kept = [k for k in order if abs(moved[k]) >= NEGLIGIBLE * abs(moved[order[0]])]

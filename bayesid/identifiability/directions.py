@@ -1,9 +1,9 @@
 """Directions of the parameter space, from worst to best known relative to the prior.
 
-In coordinates in which the prior is standard normal the posterior covariance of the bodies has orthogonal eigenvectors:
-in one direction the data tell most, in another least or nothing. Carried over to physical quantities each is a
-combination ``v`` of them, with standard deviation ``sqrt(v' C v)``, and a displacement: the change of all of them by
-one standard deviation of that combination, all other combinations unchanged.
+In coordinates in which the prior is standard normal, the posterior covariance of the bodies has orthogonal
+eigenvectors: along one of them the data tell most, along another least or nothing. In physical quantities each
+eigenvector is a combination ``v`` with standard deviation ``sqrt(v' C v)``, and a displacement: the change of all
+quantities by one standard deviation of that combination, with all other combinations unchanged.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from bayesid.inference.contraction import ContractionVerdict
 __all__ = ["Direction", "common_factor", "directions"]
 
 UNTOLD = 0.01
-"""Directions of less shrinkage are all the same to the data, and any basis of their space is as good."""
+"""Shrinkage below which the data do not distinguish directions, so that any basis of their space is as good."""
 
 TURNS = 200
-"""Iterations of the rotation of that basis, at most."""
+"""Largest number of iterations in the rotation of that basis; it usually converges much earlier."""
 
 
 @dataclass(frozen=True)
@@ -34,16 +34,16 @@ class Direction:
     Attributes
     ----------
     names : tuple of str
-        n quantities.
+        Names of the n quantities.
     weights : (n,) array
-        The combination, scaled so that the largest weight times the prior sd of its quantity is one; so the
-        combination itself is a pure number.
+        Weights of the quantities in the combination, scaled so that the largest product of a weight and the prior
+        standard deviation of its quantity is one; the combination is therefore a pure number.
     displacement : (n,) array
-        Change of every quantity, in its unit, by one posterior sd of the combination.
+        Change of every quantity, in its unit, when the combination changes by one posterior standard deviation.
     prior_sd : float
-        Of the combination.
+        Prior standard deviation of the combination [1].
     sd : float
-        Of the combination.
+        Posterior standard deviation of the combination [1].
     """
 
     names: tuple[str, ...]
@@ -59,11 +59,11 @@ class Direction:
 
     @property
     def verdict(self) -> ContractionVerdict:
-        """Whether the data told of it."""
+        """Verdict on how far the data contracted the prior of the combination."""
         return ContractionVerdict.of(self.shrinkage)
 
     def to_dict(self) -> dict[str, Any]:
-        """Form in JSON."""
+        """Return the direction as it stands in identifiability.json."""
         return {
             "sd": self.sd,
             "prior_sd": self.prior_sd,
@@ -77,33 +77,34 @@ class Direction:
 def directions(knowledge: Knowledge) -> list[Direction]:
     """Return n directions, from the worst known to the best relative to the prior.
 
-    Those of which the data tell less than 1 % have no order of their own. The common factor of all bodies comes first
-    if it is among them; the others are turned so that each moves few quantities (varimax, Kaiser 1958).
+    Directions in which the data contract the prior by less than 1 % cannot be ordered by the data. If the common
+    factor of all bodies lies among them, it comes first; the others are rotated so that each moves few quantities
+    (varimax, Kaiser 1958).
     """
-    # rows of D = L Q with orthonormal Q are the prior's own axes: z along them is standard normal
+    # with the slope D = L Q and orthonormal rows of Q, z along these rows is standard normal under the prior
     lower = knowledge.prior_factor
-    own = np.linalg.solve(lower, knowledge.factor)
-    axes, ratios, _ = np.linalg.svd(own, full_matrices=False)
+    factor = np.linalg.solve(lower, knowledge.factor)
+    axes, ratios, _ = np.linalg.svd(factor, full_matrices=False)
     axes = _readable(axes, ratios, knowledge)
     scale = knowledge.prior_sd
-    found = []
+    result = []
     for axis in axes.T:
-        weights, sd = np.linalg.solve(lower.T, axis), float(np.linalg.norm(axis @ own))
-        displacement = lower @ (own @ (axis @ own)) / sd
+        weights, sd = np.linalg.solve(lower.T, axis), float(np.linalg.norm(axis @ factor))
+        displacement = lower @ (factor @ (axis @ factor)) / sd
         sign = np.sign(displacement[np.argmax(np.abs(displacement) / scale)])
         unit = float(np.abs(weights * scale).max())
-        found.append(Direction(knowledge.names, sign * weights / unit, sign * displacement, 1.0 / unit, sd / unit))
-    return found
+        result.append(Direction(knowledge.names, sign * weights / unit, sign * displacement, 1.0 / unit, sd / unit))
+    return result
 
 
 def common_factor(names: tuple[str, ...], values: Floats) -> Floats:
-    """Return the change of all quantities as masses and inertias grow in proportion, shape (n,)."""
+    """Return the change of all quantities when masses and inertias grow in proportion, shape (n,)."""
     fixed = np.array([name.split(".")[-2] == "com" for name in names])
     return np.where(fixed, 0.0, values)
 
 
 def _readable(axes: Floats, ratios: Floats, knowledge: Knowledge) -> Floats:
-    """Turn the basis of what the data do not tell."""
+    """Rotate the axes along which the data tell nothing, so that each of them moves few quantities."""
     count = int((ratios > 1.0 - UNTOLD).sum())
     if count == 0:
         return axes
@@ -120,7 +121,7 @@ def _readable(axes: Floats, ratios: Floats, knowledge: Knowledge) -> Floats:
 
 
 def _varimax(loadings: Floats) -> Floats:
-    """Return the rotation that makes the squares in each column of loadings (n, k) as unequal as possible, (k, k)."""
+    """Return the rotation (k, k) that makes the squares in each column of the loadings (n, k) most unequal."""
     turn = np.eye(loadings.shape[1])
     before = 0.0
     for _ in range(TURNS if loadings.shape[1] > 1 else 0):

@@ -1,4 +1,4 @@
-"""An experiment that could be made: manoeuvres, sensors and what else is known; and what it would tell."""
+"""Prediction of what an experiment would tell, given its manoeuvres, its sensors and what else is known."""
 
 from __future__ import annotations
 
@@ -25,30 +25,31 @@ TYPICAL: dict[Kind, Sensor] = {
     Kind.ACCEL: Sensor(Kind.ACCEL, White(1e-5)),
     Kind.ATTITUDE: Sensor(Kind.ATTITUDE, White(2.4e-5)),
 }
-"""Sensors that could be added: a gyro of 1e-5 rad/s, 1e-5 m/s2 (1 micro-g) at the base origin, 5 arcsec, per sample."""
+"""Sensors that could be added, with typical noise per sample: 1e-5 rad/s, 1e-5 m/s2 (1 micro-g) and 5 arcsec."""
 
 TYPICAL_TORQUE = 0.1
-"""Noise per sample of torque sensors that could be added to all joints [N m, N]."""
+"""Typical noise per sample of torque sensors that could be added to all joints [N m, N]."""
 
 ABSENT, FINEST = 1e6, 0.1
-"""Factors on the noise of a sensor that is not there, and of the best that is asked for."""
+"""Factors on the noise of a sensor that stand for an absent sensor, and for the best sensor that is considered."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """What a candidate may change.
+    """Properties of an experiment that a candidate may change.
 
     Attributes
     ----------
     manoeuvres : tuple of Manoeuvre
+        Manoeuvres of the experiment.
     sensors : tuple of Sensor
-        Those that are there.
+        Sensors that are present.
     torque : TorqueSensor, optional
-        Of the joints, if there is one.
-    weighed : mapping of str to float
-        Relative standard deviation of bodies whose mass is known beyond the prior.
+        Torque sensor of the joints, None where there is none.
+    weighed : tuple of (str, float)
+        Names of bodies whose mass is known beyond the prior, with the relative standard deviations of their masses.
     times : int
-        How often every manoeuvre is flown.
+        Number of times that every manoeuvre is flown.
     """
 
     manoeuvres: tuple[Manoeuvre, ...]
@@ -59,27 +60,28 @@ class Experiment:
 
 
 class InformationPredictor:
-    """Predict what experiments tell about a model at one point.
+    """Predictor of what experiments tell about a model, linearised at one point.
 
-    All sensors are simulated in all experiments, those that are absent with enormous noise, so that experiments share
-    one compiled Jacobian.
+    All sensors are simulated in all experiments, absent ones with enormous noise, so that experiments share one
+    compiled Jacobian.
 
     Parameters
     ----------
     model : Model
+        Model with the sensors that are present.
     manoeuvres : sequence of Manoeuvre
-        As flown or planned; sensors that are not recorded are read as often as the first that is.
+        Manoeuvres as flown or planned; sensors that are not recorded are sampled as often as the first that is.
     z : (N,) array
-        Coordinates of the model's posterior.
+        Coordinates of the linearisation point in the model's posterior.
     step : float
-        Of the integration [s].
+        Step of the integration [s].
     """
 
     def __init__(self, model: Model, manoeuvres: tuple[Manoeuvre, ...], z: Floats, step: float) -> None:
         declared = {sensor.kind for sensor in model.sensors}
         self.z, self.step, self.flown = z, step, Experiment(manoeuvres, model.sensors, model.torque)
         everything = (*model.sensors, *(sensor for kind, sensor in TYPICAL.items() if kind not in declared))
-        # the best sensors show most of the encoders' correlated noise and so set the length of the whitening
+        # the best sensors are the most sensitive to the encoders' correlated noise, so they set the whitening's length
         self._torque = typical_torque(model) if model.torque is None else model.torque
         finest = None if self._torque is None else rescaled(self._torque, FINEST)
         self.model = replace(model, sensors=tuple(scaled(sensor, FINEST) for sensor in everything), torque=finest)
@@ -87,15 +89,15 @@ class InformationPredictor:
 
     @cached_property
     def posterior(self) -> Posterior:
-        """Of the manoeuvres as flown, read by all sensors at their best."""
+        """Posterior of the manoeuvres as flown, measured by all sensors with their lowest noise."""
         return planned_posterior(self.model, self._read(self.flown.manoeuvres), z=self.z, step=self.step)
 
     def knowledge(self, experiment: Experiment) -> Knowledge:
-        """Return what an experiment would tell."""
+        """Return the knowledge that an experiment would give."""
         posterior, there = self.posterior, {sensor.kind: sensor for sensor in experiment.sensors}
         if experiment.manoeuvres is not self.flown.manoeuvres:
             blank = with_manoeuvres(self.posterior, self._read(experiment.manoeuvres))
-            # what is read changes the Jacobian of attitudes only
+            # the Jacobian depends on the readings only for attitudes
             posterior = blank if Kind.ATTITUDE not in there else simulated(blank, self.z)
         sensors = [there.get(kind) or scaled(sensor, ABSENT) for kind, sensor in self._plain.items()]
         torque = experiment.torque
@@ -114,7 +116,7 @@ class InformationPredictor:
 
 
 def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...], torque: TorqueSensor | None = None) -> Manoeuvre:
-    """Return a manoeuvre with blanks to be simulated for the sensors that its recording lacks."""
+    """Return a manoeuvre with placeholder samples for the sensors that its recording lacks, to be simulated."""
     recording = manoeuvre.recording
     present = [sensor.kind for sensor in sensors if has(recording, sensor.kind)]
     when = np.ones(len(recording.time), dtype=bool)
@@ -131,18 +133,18 @@ def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...], torque: TorqueSen
 
 
 def has(recording: Recording, kind: Kind) -> bool:
-    """Whether a recording holds a sensor's channels."""
+    """Return whether a recording holds the channels of a kind of sensor."""
     return kind.columns[0] in recording.channels
 
 
 def scaled(sensor: Sensor, factor: float) -> Sensor:
-    """Return a sensor with its noise multiplied."""
+    """Return a sensor with its noise multiplied by a factor."""
     noise: Noise = Scaled(sensor.noise, (factor, factor, factor))
     return replace(sensor, noise=noise)
 
 
 def typical_torque(model: Model) -> TorqueSensor | None:
-    """Return the torque sensor that could be added; None where there are no joints or the model cannot follow it."""
+    """Return the torque sensor that could be added, None without joints or where the model cannot predict torques."""
     joints = tuple(joint.name for joint in model.robot.joints)
     if not joints or any(effect.uses("table") and effect.link is None for effect in model.effects):
         return None
@@ -150,21 +152,24 @@ def typical_torque(model: Model) -> TorqueSensor | None:
 
 
 def rescaled(sensor: TorqueSensor, factor: float) -> TorqueSensor:
-    """Return a torque sensor with its noise multiplied."""
+    """Return a torque sensor with its noise multiplied by a factor."""
     return replace(sensor, sigma=tuple(factor * sigma for sigma in sensor.sigma))
 
 
 def _repeated(known: Knowledge, names: tuple[str, ...], times: int) -> Knowledge:
-    """Let everything happen again, with initial values and effects of each recording unknown anew."""
-    own = np.array(["[" in name for name in names])
-    data, count = known.jacobian[: -len(names)], int(own.sum())
+    """Return the knowledge after every manoeuvre is flown ``times`` times.
+
+    Initial values and effects of each recording are new unknowns in every repetition.
+    """
+    local = np.array(["[" in name for name in names])  # unknowns of one recording carry its name in brackets
+    data, count = known.jacobian[: -len(names)], int(local.sum())
     shared = known.jacobian.shape[1] - count
     size = shared + times * count
     blocks = []
     for number in range(times):
         block = np.zeros((len(data), size))
-        block[:, :shared] = data[:, ~own]
-        block[:, shared + number * count : shared + (number + 1) * count] = data[:, own]
+        block[:, :shared] = data[:, ~local]
+        block[:, shared + number * count : shared + (number + 1) * count] = data[:, local]
         blocks.append(block)
-    slope = np.concatenate([known.slope[:, ~own], np.zeros((len(known.slope), times * count))], axis=1)
+    slope = np.concatenate([known.slope[:, ~local], np.zeros((len(known.slope), times * count))], axis=1)
     return Knowledge(known.names, known.values, slope, np.concatenate([*blocks, np.eye(size)]))

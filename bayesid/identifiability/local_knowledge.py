@@ -1,8 +1,9 @@
-"""What a posterior knows of its bodies' quantities, linearised at one point, beside what the prior knew.
+"""Posterior and prior knowledge of the bodies' quantities, linearised at one point.
 
-With ``J`` the Jacobian of the whitened residuals and of the prior, which is standard normal in ``z``, the coordinates
-have the covariance ``(J'J)^-1``; quantities with the derivative ``D`` by ``z`` have ``C = D (J'J)^-1 D'`` and had
-``C0 = D D'``. Whatever else is unknown (rates, effects, links known to a few percent) is marginalised by the inverse.
+Let ``J`` be the stacked Jacobian of the whitened residuals and of the prior, which is standard normal in the
+coordinates ``z``. The coordinates then have the posterior covariance ``(J'J)^-1``. Quantities with the derivative ``D``
+with respect to ``z`` have the posterior covariance ``C = D (J'J)^-1 D'`` and the prior covariance ``C0 = D D'``. The
+inverse marginalises all other unknowns (rates, effects, links known to a few percent).
 """
 
 from __future__ import annotations
@@ -23,18 +24,18 @@ __all__ = ["Knowledge", "marginalised"]
 
 @dataclass(frozen=True)
 class Knowledge:
-    """Quantities of bodies as known before and after the data.
+    """Knowledge of the bodies' quantities before and after the data.
 
     Parameters
     ----------
     names : tuple of str
-        As in identification.json, n of them.
+        Names of the n quantities, as in identification.json.
     values : (n,) array
-        At the point of linearisation, in SI units.
+        Values of the quantities at the linearisation point, in SI units.
     slope : (n, N) array
-        Derivative by the N coordinates, of full row rank.
+        Derivative of the quantities with respect to the N coordinates, of full row rank.
     jacobian : (m, N) array
-        Of whitened residuals and prior, of full column rank.
+        Derivative of the whitened residuals and of the prior's, of full column rank.
     """
 
     names: tuple[str, ...]
@@ -44,11 +45,11 @@ class Knowledge:
 
     @classmethod
     def at(cls, posterior: Posterior, z: Floats) -> Knowledge:
-        """Linearise a posterior at a point."""
+        """Return the knowledge of a posterior linearised at the coordinates ``z``, shape (N,)."""
         return cls(*linearise(posterior, z), posterior.jacobian(z))
 
     def having(self, rows: Floats) -> Knowledge:
-        """Return what is known with further whitened measurements of the coordinates, shape (k, N)."""
+        """Return the knowledge after further whitened measurements of the coordinates, rows (k, N)."""
         return Knowledge(self.names, self.values, self.slope, np.concatenate([self.jacobian, rows]))
 
     def fixing(self, coordinates: Sequence[int]) -> Knowledge:
@@ -58,18 +59,18 @@ class Knowledge:
 
     @cached_property
     def coordinates(self) -> Floats:
-        """Covariance of the coordinates, shape (N, N)."""
+        """Posterior covariance of the coordinates, shape (N, N)."""
         inverse = self._inverse_root
         return inverse @ inverse.T
 
     @cached_property
     def factor(self) -> Floats:
-        """Return F with F F' the covariance of the quantities, shape (n, N)."""
+        """Factor F of the posterior covariance F F' of the quantities, shape (n, N)."""
         return self.slope @ self._inverse_root
 
     @cached_property
     def prior_factor(self) -> Floats:
-        """Lower-triangular L with L L' the prior covariance of the quantities, shape (n, n)."""
+        """Lower-triangular factor L of the prior covariance L L' of the quantities, shape (n, n)."""
         upper = _upper(self.slope.T)
         return (upper * np.where(np.diag(upper) < 0.0, -1.0, 1.0)[:, None]).T
 
@@ -85,7 +86,7 @@ class Knowledge:
 
     @property
     def sd(self) -> Floats:
-        """Posterior standard deviations, whatever the other quantities are, shape (n,)."""
+        """Marginal posterior standard deviations, shape (n,)."""
         return np.linalg.norm(self.factor, axis=1)
 
     @property
@@ -97,7 +98,7 @@ class Knowledge:
     def conditional_sd(self) -> Floats:
         """Posterior standard deviations if all other quantities of the bodies were known exactly, shape (n,)."""
         scaled = self.factor / self.sd[:, None]
-        inverse = np.linalg.inv(_upper(scaled.T))  # of C = R'R in units of sd
+        inverse = np.linalg.inv(_upper(scaled.T))  # inverse of R, where R'R is the correlation matrix
         return self.sd / np.linalg.norm(inverse, axis=1)
 
     @property
@@ -113,7 +114,7 @@ class Knowledge:
 
     @cached_property
     def _inverse_root(self) -> Floats:
-        """Inverse of R of J = QR: exact where some directions are known a million times better than others."""
+        """Inverse of R in J = QR, which stays accurate where some directions are known a million times better."""
         upper = _upper(self.jacobian)
         return np.asarray(sla.solve_triangular(upper, np.eye(len(upper))))
 
@@ -138,5 +139,5 @@ def marginalised(jacobian: Floats, nuisance: Sequence[int]) -> Floats:
 
 
 def _upper(matrix: Floats) -> Floats:
-    """R of matrix = QR."""
+    """Return the upper-triangular R of the decomposition matrix = QR."""
     return np.asarray(np.linalg.qr(matrix, mode="r"))

@@ -1,8 +1,8 @@
-"""Which base parameters given data determine, and the scale of the masses, which motion alone does not.
+"""Base parameters that given data determine, and the scale of the masses, which motion alone does not determine.
 
-With no external wrench the balance (19) reads ``Phi p = 0``: whoever multiplies all inertial parameters by the same
-factor multiplies both sides, and sees the same motion. The gravity gradient does not help, as it is linear in the
-same parameters (equivalence principle); what helps is an equation with a right side that is known and not zero.
+Without an external wrench the balance (19) reads ``Phi p = 0``. Multiplying all inertial parameters by the same factor
+changes neither side, so the motion stays the same. The gravity gradient does not help, because it is linear in the same
+parameters (equivalence principle). Only an equation whose right side is known and not zero determines the scale.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ __all__ = ["Determined", "consistent_accelerations", "determined", "rates_at_res
 
 
 SEEN = 1e-7
-"""Relative size from which on a part along the base parameters is more than rounding."""
+"""Relative size above which a component along the base parameters is more than rounding."""
 
 
 @dataclass(frozen=True)
 class Determined:
-    """What linear equations in the standard parameters tell of the base parameters.
+    """Base parameters that linear equations in the standard parameters determine.
 
     Attributes
     ----------
     rank : int
-        Independent combinations of base parameters that the equations determine.
+        Number of independent combinations of base parameters that the equations determine.
     undetermined : (count, count - rank) array
         Orthonormal directions of the base parameters that satisfy the equations with zero on the right.
     gap : tuple of float
-        Smallest singular value kept and largest one dropped, of the equations, with columns of unit length, relative to
-        the largest one.
+        Smallest singular value kept and largest one dropped, relative to the largest, for the equations with columns
+        of unit length.
     """
 
     rank: int
@@ -50,7 +50,7 @@ class Determined:
     def leaves_open(self, direction: Floats) -> bool:
         """Return whether the equations allow any multiple of a direction of the base parameters, shape (count,).
 
-        Of the base parameters themselves: whether their common scale is undetermined.
+        Given the base parameters themselves, the method returns whether their common scale is undetermined.
         """
         rest = direction - self.undetermined @ (self.undetermined.T @ direction)
         return bool(np.linalg.norm(rest) < SEEN * np.linalg.norm(direction))
@@ -58,16 +58,17 @@ class Determined:
 
 @threadpool_limits.wrap(limits=1)  # small factorisations: threads only get in each other's way
 def determined(base: BaseParameters, equations: Floats) -> Determined:
-    """Return which base parameters the solution of linear equations tells.
+    """Return which base parameters linear equations in the standard parameters determine.
 
     Parameters
     ----------
     base : BaseParameters
+        Base parameters of the robot.
     equations : (rows, standard) array
-        What multiplies the standard parameters; the right sides do not matter.
+        Matrix that multiplies the standard parameters; the right sides do not matter.
     """
     scaled, length = equilibrated(equations)
-    square = np.concatenate([scaled, np.zeros((equations.shape[1], equations.shape[1]))])  # at least as many rows
+    square = np.concatenate([scaled, np.zeros((equations.shape[1], equations.shape[1]))])  # as many rows as columns
     _, values, rows = np.linalg.svd(np.linalg.qr(square, mode="r"))
     values = values / values.max(initial=1e-300)
     kept = int(np.sum(values > ZERO))
@@ -86,24 +87,27 @@ def consistent_accelerations(
     zenith: Floats | None = None,
     gradient: float = 0.0,
 ) -> tuple[Floats, Floats]:
-    """Return how the base moves under an external wrench, by its six equations of motion.
+    """Return the accelerations of the base under an external wrench, by its six equations of motion.
 
     Parameters
     ----------
     robot : Robot
+        Robot with its inertial parameters.
     motion : Kinematics
-        Of its joints at T instants.
+        Motion of its joints at T instants.
     rate : (T, 3) array
         Angular velocity of the base, base axes [rad/s].
     wrench : (T, 6) array
         External force and torque on the base about its origin, base axes [N, N m].
     zenith : (T, 3) array, optional
-        Unit vector in base axes, where the gravity gradient ``gradient`` [1/s2] acts (`gradient_regressor`).
+        Unit vector from the Earth's centre to the robot, base axes; by default there is no gravity gradient.
+    gradient : float
+        Size of the gravity gradient [1/s2] (`gradient_regressor`).
 
     Returns
     -------
     rate_change, acceleration : (T, 3) arrays
-        Of the base's angular velocity, and non-gravitational, of its origin, base axes [rad/s2, m/s2].
+        Angular acceleration of the base and non-gravitational acceleration of its origin, base axes [rad/s2, m/s2].
     """
     table = composite_rows(robot, motion)[:, :, None]
     if zenith is not None:
@@ -119,7 +123,7 @@ def rates_at_rest(robot: Robot, motion: Kinematics) -> Floats:
 
 
 def _solved(affine: Callable[[Floats, Floats], Floats], target: Floats) -> tuple[Floats, Floats]:
-    """Solve ``affine(x, y) = target`` for two vectors (T, 3) each, at every instant; target is (T, 6)."""
+    """Solve ``affine(x, y) = target`` at every instant for x and y of shape (T, 3); the target has shape (T, 6)."""
     zero = np.zeros((len(target), 3))
     offset = affine(zero, zero)
     units = np.eye(6)

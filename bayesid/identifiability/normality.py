@@ -1,4 +1,4 @@
-"""Whether the normal approximation describes the posterior of each quantity, by draws of the posterior itself."""
+"""Test of the normal approximation of each quantity's posterior against draws from the posterior itself."""
 
 from __future__ import annotations
 
@@ -19,20 +19,17 @@ from bayesid.inference.posterior import Posterior
 __all__ = ["Draws", "Method", "draw", "shape_errors", "weighted_quantile"]
 
 LEVELS = {0.025: -1.959963984540054, 0.16: -0.994457883209753, 0.84: 0.994457883209753, 0.975: 1.959963984540054}
-"""Quantiles compared, and where a standard normal distribution has them."""
+"""Probabilities at which quantiles are compared, and the quantiles of a standard normal distribution there."""
 
 NORMAL = 0.3
-"""Largest difference of a quantile from the normal one that passes for normal, in standard deviations."""
+"""Largest difference between a quantile and the normal one at which a posterior counts as normal, in its sd."""
 
 STEPS, LARGEST = 2000, 40
-"""Of the ensembles where importance sampling may not be trusted: most steps, and most unknowns.
-
-With more unknowns tied together sharply, ensembles need more time than the question is worth.
-"""
+"""Largest numbers of steps and of unknowns for emcee, which takes too long with many strongly correlated unknowns."""
 
 
 class Method(Enum):
-    """Where draws come from."""
+    """Method that produced the draws."""
 
     IMPORTANCE = "importance sampling"
     ENSEMBLE = "emcee"
@@ -45,13 +42,16 @@ class Draws:
     Attributes
     ----------
     method : Method
+        Method that produced the draws.
     values : (m, n) array
+        Draws of the n quantities, in their units.
     weights : (m,) array
-        Of sum one.
+        Weights of the draws, whose sum is one.
     trusted : bool
-        Whether Pareto k-hat (importance sampling) or R-hat and the number of effective samples (emcee) allow their use.
+        True if Pareto k-hat (importance sampling), or R-hat and the number of effective samples (emcee), are good
+        enough to use the draws.
     pareto_k : float
-        Of importance sampling, whether it was used or not.
+        Pareto k-hat of importance sampling, even where emcee produced the draws.
     """
 
     method: Method
@@ -79,7 +79,21 @@ def draw(
     effective_samples: float,
     progress: Progress,
 ) -> Draws:
-    """Draw from a posterior: by importance sampling, or by emcee where that may not be trusted and can be afforded."""
+    """Draw from a posterior by importance sampling, or by emcee where that is not trusted and there are few unknowns.
+
+    Parameters
+    ----------
+    posterior : Posterior
+        Posterior to draw from.
+    optimum : Optimum
+        Mode of the posterior, with its normal approximation.
+    seed : numpy.random.SeedSequence
+        Source of all random numbers.
+    effective_samples : float
+        Number of effective samples at which emcee stops.
+    progress : Progress
+        Receiver of the fraction done.
+    """
     weigh, walk = seed.spawn(2)
     rng = np.random.default_rng(weigh)
     parameterisation = choose_parameterisation(posterior, optimum, rng)
@@ -97,7 +111,10 @@ def draw(
 
 
 def shape_errors(draws: Draws, knowledge: Knowledge) -> Floats:
-    """Return how far the draws' quantiles are from those of the normal approximation at most, in its sd, shape (n,)."""
+    """Return the largest differences between quantiles of the draws and of the normal approximation.
+
+    They are in standard deviations of the normal approximation, shape (n,).
+    """
     errors = [
         np.abs((weighted_quantile(draws.values, draws.weights, level) - knowledge.values) / knowledge.sd - normal)
         for level, normal in LEVELS.items()
@@ -106,7 +123,7 @@ def shape_errors(draws: Draws, knowledge: Knowledge) -> Floats:
 
 
 def weighted_quantile(values: Floats, weights: Floats, level: float) -> Floats:
-    """Quantile of weighted draws (m, n), shape (n,)."""
+    """Return the quantiles (n,) of weighted draws (m, n) at a probability ``level``."""
     order = np.argsort(values, axis=0)
     below = np.cumsum(weights[order], axis=0) - 0.5 * weights[order]
     columns = range(values.shape[1])

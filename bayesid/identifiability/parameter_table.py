@@ -1,4 +1,4 @@
-"""What is known of each quantity: widths, what it is confused with and, where it is not normal, a profile."""
+"""Table of what is known of each quantity: widths, correlations and, where it is not normal, a profile."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from bayesid.inference.posterior import Posterior
 __all__ = ["ParameterRow", "profiled", "quantity_of", "tabulate"]
 
 CORRELATED = 0.9
-"""Correlation from which on a quantity is named as one that another is confused with."""
+"""Absolute correlation above which the table names two quantities as confused with each other."""
 
 
 @dataclass(frozen=True)
@@ -30,18 +30,19 @@ class ParameterRow:
     Attributes
     ----------
     name, unit : str
+        Name and unit of the quantity.
     mean, sd, prior_sd : float
-        Of the normal approximation.
+        Mean, posterior and prior standard deviation of the normal approximation, in the unit.
     conditional_sd : float
-        If all other quantities of the bodies were known.
+        Posterior standard deviation if all other quantities of the bodies were known, in the unit.
     correlated_with : tuple of (str, float)
-        Quantities with which it is confused, and the correlation, the strongest first.
+        Names and correlations of the quantities most strongly correlated with this one, the strongest first.
     sampled : (float, float) or None
-        Mean and sd of draws; None where draws may not be trusted.
+        Mean and standard deviation of the draws; None where the draws may not be trusted.
     normal : bool or None
-        Whether the posterior is normal; None where that is not known.
+        True where the posterior is nearly normal, None where that is not known.
     profile : Profile or None
-        Where the posterior is not normal and the profile was asked for.
+        Profile of the quantity, None where it was not computed.
     """
 
     name: str
@@ -62,11 +63,11 @@ class ParameterRow:
 
     @property
     def verdict(self) -> ContractionVerdict:
-        """Whether the data told of it."""
+        """Verdict on how far the data contracted the prior of the quantity."""
         return ContractionVerdict.of(self.shrinkage)
 
     def to_dict(self) -> dict[str, Any]:
-        """Form in JSON."""
+        """Return the row as it stands in identifiability.json."""
         interval: Any = None if self.normal else "not evaluated"
         return {
             "name": self.name,
@@ -85,14 +86,14 @@ class ParameterRow:
 
 
 def tabulate(knowledge: Knowledge, draws: Draws) -> list[ParameterRow]:
-    """Return what is known of every quantity, not profiled yet."""
+    """Return the row of every quantity, without profiles."""
     errors, correlation, conditional = shape_errors(draws, knowledge), knowledge.correlation, knowledge.conditional_sd
     mean, sd = draws.mean, np.sqrt(np.diag(draws.covariance))
     units = list(BODY_QUANTITIES.values())
-    found = []
+    rows = []
     for k, name in enumerate(knowledge.names):
         order = [i for i in np.argsort(-np.abs(correlation[k])) if i != k and abs(correlation[k, i]) > CORRELATED]
-        found.append(
+        rows.append(
             ParameterRow(
                 name=name,
                 unit=units[k % len(units)],
@@ -105,7 +106,7 @@ def tabulate(knowledge: Knowledge, draws: Draws) -> list[ParameterRow]:
                 normal=bool(errors[k] <= NORMAL) if draws.trusted else None,
             )
         )
-    return found
+    return rows
 
 
 def profiled(
@@ -117,9 +118,12 @@ def profiled(
     most: int,
     progress: Progress,
 ) -> list[ParameterRow]:
-    """Profile the least normal quantities; where draws do not tell, the worst known of which something was learnt."""
+    """Return the rows with profiles of at most ``most`` quantities, the least normal ones.
+
+    Where the draws may not be trusted, the worst known of the learnt quantities are profiled.
+    """
     errors = shape_errors(draws, knowledge)
-    if not draws.trusted:  # the profile of what was not learnt is the prior
+    if not draws.trusted:  # the profile of an unlearnt quantity is the prior
         told = np.array([item.verdict is not ContractionVerdict.NOT for item in parameters])
         errors = told - knowledge.shrinkage
     order = [int(k) for k in np.argsort(-errors) if not parameters[int(k)].normal][:most]
@@ -134,7 +138,7 @@ def profiled(
 
 
 def quantity_of(posterior: Posterior, index: int) -> Target:
-    """Return one reported quantity of the bodies as a function of the coordinates."""
+    """Return one reported quantity of the bodies, by its index, as a function of the coordinates."""
     quantities = quantities_of(posterior.unknowns)
     value = jax.jit(lambda z: quantities(z)[index])
     gradient = jax.jit(jax.grad(value))

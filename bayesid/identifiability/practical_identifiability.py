@@ -1,4 +1,4 @@
-"""Practical identifiability: what manoeuvres, sensors and priors of a study tell of its bodies."""
+"""Practical identifiability: what the manoeuvres, sensors and priors of a study tell of its bodies."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["Basis", "Practical", "covers_all", "practical"]
 
 
 class Basis(Enum):
-    """What a statement rests on."""
+    """Basis of the statements: a fit to recorded data, or a prediction before the flight."""
 
     FIT = "fit"
     PREDICTION = "prediction"
@@ -37,17 +37,23 @@ class Practical:
     Attributes
     ----------
     basis : Basis
+        Basis of the statements.
     posterior : Posterior
+        Posterior that was examined.
     optimum : Optimum
+        Mode of the posterior.
     knowledge : Knowledge
+        Posterior and prior knowledge, linearised at the mode.
     directions : tuple of Direction
-        From the worst known to the best.
+        Directions from the worst known to the best.
     words : tuple of str
-        Of each direction.
-    parameters : tuple of Parameter
+        Description of each direction.
+    parameters : tuple of ParameterRow
+        Table of what is known of each quantity.
     draws : Draws
+        Draws from the posterior.
     advice : tuple of Advice
-        The most telling first.
+        Advice on what to measure, the most informative first.
     """
 
     basis: Basis
@@ -61,7 +67,7 @@ class Practical:
     advice: tuple[Advice, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """Keys of identifiability.json that are about the posterior."""
+        """Return the entries of identifiability.json that concern the posterior."""
         spread = self.draws.covariance if self.draws.trusted else None
         return {
             "basis": self.basis.value,
@@ -100,33 +106,38 @@ def practical(
     profiles: int = 6,
     progress: Progress = silent,
 ) -> Practical:
-    """Say what a posterior knows of its bodies, and what would tell more.
+    """Determine what a posterior knows of its bodies, and which further measurements would tell more.
 
     Parameters
     ----------
     posterior : Posterior
-        With at least one body to identify; its noise linearised at the mode.
+        Posterior with at least one body to identify and with its noise linearised at the mode.
     optimum : Optimum
+        Mode of the posterior.
+    basis : Basis
+        Basis of the statements.
     seed : int
-        Every random number follows from it.
+        Seed of all random numbers.
     effective_samples : float
-        Wanted of emcee where importance sampling may not be trusted.
+        Number of effective samples at which emcee stops, where importance sampling may not be trusted.
     profiles : int
-        Quantities that are profiled at most, the least normal first.
+        Largest number of quantities to profile, the least normal first.
+    progress : Progress
+        Receiver of the fraction done.
     """
     knowledge = Knowledge.at(posterior, optimum.z)
-    found = tuple(directions(knowledge))
+    ordered = tuple(directions(knowledge))
     whole = covers_all(posterior)
-    words = tuple(describe(item, knowledge.values, knowledge.prior_sd, whole) for item in found)
+    words = tuple(describe(item, knowledge.values, knowledge.prior_sd, whole) for item in ordered)
     draws = draw(posterior, optimum, np.random.SeedSequence(seed), effective_samples, part_of(progress, 0.1, 0.4))
     parameters = tabulate(knowledge, draws)
     parameters = profiled(posterior, optimum, parameters, draws, knowledge, profiles, part_of(progress, 0.4, 0.6))
     predictor = InformationPredictor(posterior.model, posterior.manoeuvres, optimum.z, posterior.step)
-    advice = advise(predictor, candidates(posterior.model), found, knowledge, part_of(progress, 0.6, 1.0))
-    return Practical(basis, posterior, optimum, knowledge, found, words, tuple(parameters), draws, tuple(advice))
+    advice = advise(predictor, candidates(posterior.model), ordered, knowledge, part_of(progress, 0.6, 1.0))
+    return Practical(basis, posterior, optimum, knowledge, ordered, words, tuple(parameters), draws, tuple(advice))
 
 
 def covers_all(posterior: Posterior) -> bool:
-    """Whether every body of the robot that has mass is to be identified."""
+    """Return whether every body of the robot that has mass is to be identified."""
     named = {body.name for body in posterior.model.bodies}
     return {name for name, link in posterior.model.robot.links.items() if link.inertial.mass > 0.0} <= named

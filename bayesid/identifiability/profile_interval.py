@@ -1,9 +1,9 @@
-"""Profile intervals: how far one quantity can go if all other unknowns follow it.
+"""Profile intervals: how far one quantity can move when all other unknowns adapt to it.
 
-The posterior is maximised over everything else with the quantity held (Raue et al., Bioinformatics 2009; the prior
-counts as a measurement). An interval holds the values whose maximum is less than half a chi-square quantile below the
-mode. A quantity is held by a strong penalty: where the penalised fit ends it has some value, and for that value this is
-the constrained optimum, however strong the penalty was.
+The posterior is maximised over all other unknowns while the quantity is held (Raue et al., Bioinformatics 2009; the
+prior counts as a measurement). An interval contains the values whose maximum log density is less than half a chi-square
+quantile below that of the mode. A strong penalty holds the quantity. Whatever the strength of the penalty, the result
+of the penalised fit is the constrained optimum for the value that the quantity has there.
 """
 
 from __future__ import annotations
@@ -21,27 +21,28 @@ from bayesid._math.least_squares import levenberg_marquardt
 __all__ = ["Profile", "Target", "profile"]
 
 Vector = Callable[[Floats], Floats]
+"""Function of the coordinates (n,) that returns an array."""
 
 LEVELS = {"68 %": 1.0, "95 %": 1.959963984540054}
-"""Square roots of the chi-square quantiles of one degree of freedom."""
+"""Square roots of the chi-square quantiles of one degree of freedom, by the level of the interval."""
 
 STEP = 0.5
-"""Between points of a profile, in that square root."""
+"""Intended change of that square root from one point of a profile to the next."""
 
 STIFF = 30.0
-"""Of the penalty, per standard deviation of the quantity."""
+"""Residual that the penalty adds per standard deviation between the quantity and the value at which it is held."""
 
 MOST = 24
-"""Refits on each side."""
+"""Largest number of refits on each side of the mode, which bounds the run time."""
 
 TOLERANCE = 1e-8
-"""Relative tolerance of a refit."""
+"""Relative tolerance of a refit on its cost, coordinates and gradient."""
 
 SHORTEST = 1e-3
-"""Step, in standard deviations, below which a jump of the profile counts as one."""
+"""Step, in standard deviations, below which a jump of the profile is accepted instead of refined further."""
 
 GROWTH = 3.0
-"""By which a step at most grows or shrinks from one point to the next."""
+"""Largest factor by which the expected step grows from one point to the next."""
 
 
 class Target(NamedTuple):
@@ -58,46 +59,49 @@ class Profile:
     Attributes
     ----------
     values : (k,) array
-        Of the quantity, increasing.
+        Values of the quantity, increasing.
     roots : (k,) array
-        Signed square root of twice the loss of log posterior density; minus and plus one are the ends of the 68 %
-        interval, and for a normal posterior it is linear.
+        Signed square roots of twice the loss of log posterior density; they are -1 and 1 at the ends of the 68 %
+        interval, and linear in the values for a normal posterior.
     """
 
     values: Floats
     roots: Floats
 
     def interval(self, root: float) -> tuple[float | None, float | None]:
-        """Return the ends of the interval at a root, None where the profile does not reach it."""
+        """Return the ends of the interval between minus and plus a root, None where the profile does not reach it."""
         curve = PchipInterpolator(self.roots, self.values)
         return tuple(  # type: ignore[return-value]
             float(curve(end)) if self.roots[0] <= end <= self.roots[-1] else None for end in (-root, root)
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Intervals, as in JSON."""
+        """Return the intervals by level as they stand in identifiability.json."""
         return {level: list(self.interval(root)) for level, root in LEVELS.items()}
 
 
 def profile(residual: Vector, jacobian: Vector, mode: Floats, covariance: Floats, target: Target) -> Profile:
-    """Profile a quantity about the mode.
+    """Compute the profile of a quantity about the mode.
 
     Parameters
     ----------
     residual : callable
-        Coordinates (n,) to residuals whose half square sum is minus the log posterior density, up to a constant.
+        Function of the coordinates (n,) that returns residuals (m,); half their sum of squares is minus the log
+        posterior density, up to a constant.
     jacobian : callable
-        Its derivative.
+        Function of the coordinates that returns the derivative of the residuals, shape (m, n).
     mode : (n,) array
+        Coordinates of the mode.
     covariance : (n, n) array
-        Of the normal approximation; for the first step and the strength of the penalty.
+        Covariance of the normal approximation, which sets the first step and the strength of the penalty.
     target : Target
+        Quantity to profile.
     """
     fit = _Held(residual, jacobian, mode, covariance, target)
     points = [*fit.march(-1.0)[::-1], _Point(target.value(mode), 0.0, mode), *fit.march(1.0)]
     for root in (sign * level for level in LEVELS.values() for sign in (-1.0, 1.0)):
         curve = _curve(_increasing(points))
-        if curve.x[0] < root < curve.x[-1]:  # once more, where the interval ends
+        if curve.x[0] < root < curve.x[-1]:  # one more fit where the interval ends, to place the end accurately
             nearest = points[int(np.argmin([abs(point.root - root) for point in points]))]
             points = sorted([*points, fit.at(float(curve(root)), nearest.z)], key=lambda point: point.value)
     values, roots, _ = zip(*_increasing(points), strict=True)
@@ -111,7 +115,7 @@ class _Point(NamedTuple):
 
 
 class _Held:
-    """The posterior maximised with a quantity held."""
+    """Maximisation of the posterior with a quantity held by a penalty."""
 
     def __init__(self, residual: Vector, jacobian: Vector, mode: Floats, covariance: Floats, target: Target) -> None:
         self.residual, self.jacobian, self.mode, self.target = residual, jacobian, mode, target
@@ -121,7 +125,7 @@ class _Held:
         self.centre, self.best = target.value(mode), float((residual(mode) ** 2).sum())
 
     def at(self, wanted: float, start: Floats) -> _Point:
-        """Fit with the quantity held near a value."""
+        """Return the fit with the quantity held near a value."""
         stiffness = STIFF / self.sd
 
         def held(z: Floats) -> Floats:
@@ -135,9 +139,9 @@ class _Held:
         return _Point(value, float(np.sign(value - self.centre) * np.sqrt(max(loss, 0.0))), z)
 
     def march(self, sign: float) -> list[_Point]:
-        """Go from the mode to one side until the 95 % interval ends."""
+        """Return the points from the mode to one side, up to the first one beyond the 95 % interval."""
         last, step = _Point(self.centre, 0.0, self.mode), STEP * self.sd
-        found: list[_Point] = []
+        points: list[_Point] = []
         for _ in range(MOST):
             start = last.z + sign * step * self.along
             point = self.at(last.value + sign * step, start)
@@ -147,16 +151,16 @@ class _Held:
             if gained > 2.0 * STEP and step > SHORTEST * self.sd:
                 step *= 0.5
                 continue
-            found.append(point)
+            points.append(point)
             if abs(point.root) >= max(LEVELS.values()):
                 break
             step = abs(point.value - last.value) * min(STEP / max(gained, STEP / GROWTH), GROWTH)
             last = point
-        return found
+        return points
 
 
 def _increasing(points: Sequence[_Point]) -> list[_Point]:
-    """Leave out points of refits that ended in rounding."""
+    """Return the points without those that do not increase, whose refits ended at the level of rounding."""
     kept = [points[0]]
     for point in points[1:]:
         if point.value > kept[-1].value and point.root > kept[-1].root:

@@ -1,6 +1,6 @@
-"""Rank and dependence of a regressor's columns, told apart from rounding.
+"""Rank and linear dependence of a regressor's columns, distinguished from rounding errors.
 
-QR decompositions as in Gautier (J. Robotic Systems 1991), checked by singular values.
+The QR decompositions follow Gautier (J. Robotic Systems 1991); singular values check them.
 """
 
 from __future__ import annotations
@@ -16,19 +16,23 @@ from bayesid._math.arrays import Floats
 __all__ = ["ZERO", "checked_rank", "equilibrated", "regrouping", "spanning"]
 
 ZERO = 1e-10
-"""Relative size below which a singular value, or the part of a column that no other column explains, is rounding."""
+"""Relative size up to which a singular value, or the part of a column that no other column explains, is rounding."""
 
 FAINT = 1e-3
-"""Relative length below which a column is not stretched to unit length, as that would stretch its rounding."""
+"""Relative length below which a column is not scaled to unit length, because that would amplify its rounding errors."""
 
 GAP = 1e3
-"""Ratio of the smallest singular value kept to the largest dropped below which the rank is not told."""
+"""Smallest ratio of the last singular value kept to the first dropped at which the rank counts as determined."""
 
 REMEDY = "Look for joints that are almost, but not quite, parallel or on one axis"
+"""Remedy in the errors of this module: nearly dependent columns come from nearly degenerate geometry."""
 
 
 def equilibrated(matrix: Floats) -> tuple[Floats, Floats]:
-    """Return a matrix with its columns divided by their lengths, but for faint ones, and what they were divided by."""
+    """Return a matrix with its columns scaled to unit length, and the divisors of the columns.
+
+    Faint columns are divided by the length at which a column starts to count as faint, and zero columns by one.
+    """
     length = np.linalg.norm(matrix, axis=0)
     length = np.maximum(length, FAINT * length.max(initial=0.0))
     length = np.where(length > 0.0, length, 1.0)
@@ -36,7 +40,7 @@ def equilibrated(matrix: Floats) -> tuple[Floats, Floats]:
 
 
 def spanning(matrix: Floats, order: Sequence[int]) -> list[int]:
-    """Return the columns, taken in order, that the ones before do not span."""
+    """Return the indices of the columns, taken in the given order, that the columns before them do not span."""
     basis = np.zeros((len(matrix), 0))
     chosen: list[int] = []
     for index in order:
@@ -49,21 +53,21 @@ def spanning(matrix: Floats, order: Sequence[int]) -> list[int]:
     return chosen
 
 
-def checked_rank(matrix: Floats, found: int) -> tuple[float, float]:
-    """Return the relative singular values on both sides of a rank.
+def checked_rank(matrix: Floats, rank: int) -> tuple[float, float]:
+    """Check a rank, and return the last singular value kept and the first dropped, relative to the largest.
 
     Raises
     ------
     InputError
-        If QR with column pivoting or the singular values give another rank, or there is no gap.
+        If QR with column pivoting or the singular values give another rank, or the two values are too close.
     """
     if not matrix.size:
         return 1.0, 0.0
     values = np.linalg.svd(matrix, compute_uv=False)
     diagonal = np.abs(np.diag(qr(matrix, mode="r", pivoting=True)[0]))
-    ranks = {found, int(np.sum(diagonal > ZERO)), int(np.sum(values > ZERO))}
-    kept = float(values[found - 1] / values[0])
-    dropped = float(values[found] / values[0]) if found < len(values) else 0.0
+    ranks = {rank, int(np.sum(diagonal > ZERO)), int(np.sum(values > ZERO))}
+    kept = float(values[rank - 1] / values[0])
+    dropped = float(values[rank] / values[0]) if rank < len(values) else 0.0
     if len(ranks) > 1 or kept < GAP * dropped:
         raise InputError(
             f"the number of base parameters cannot be told: {' or '.join(map(str, sorted(ranks)))}, with relative "
@@ -74,12 +78,12 @@ def checked_rank(matrix: Floats, found: int) -> tuple[float, float]:
 
 
 def regrouping(matrix: Floats, independent: Sequence[int], dependent: Sequence[int]) -> Floats:
-    """Solve ``matrix[dependent] = matrix[independent] beta``, once refined, and drop what is rounding.
+    """Solve ``matrix[:, dependent] = matrix[:, independent] beta`` with one refinement, and set rounding to zero.
 
     Raises
     ------
     InputError
-        If the solution leaves a rest.
+        If the solution leaves a residual larger than rounding.
     """
     first, second = matrix[:, independent], matrix[:, dependent]
     beta = np.linalg.lstsq(first, second)[0]

@@ -1,4 +1,4 @@
-"""The equations of motion of a robot in random states, as a regressor: structure is what no state contradicts."""
+"""Regressor of a robot's equations of motion in random states; structure is what holds in every state."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 
 class Base(Enum):
-    """How the base body is held."""
+    """Support of the base body."""
 
     FREE = "free-flying"
-    """It moves freely: the equations are its force balance and the joint torques, without gravity."""
+    """The base moves freely: the equations are its force and torque balance and the joint torques, without gravity."""
     FIXED = "fixed"
-    """It is bolted to the ground: the equations are the joint torques, with gravity."""
+    """The base is bolted to the ground: the equations are the joint torques, with gravity."""
 
 
 def massive_bodies(robot: Robot) -> tuple[str, ...]:
@@ -36,7 +36,10 @@ def massive_bodies(robot: Robot) -> tuple[str, ...]:
 
 
 def random_motion(robot: Robot, count: int, rng: np.random.Generator) -> Kinematics:
-    """Draw states of the joints: anywhere on the circle or within a metre of zero, at unit speeds and accelerations."""
+    """Draw random joint states with unit standard deviations of speed and acceleration.
+
+    Revolute joints are drawn anywhere on the circle, prismatic joints with a standard deviation of 1 m about zero.
+    """
     position, velocity, acceleration = rng.normal(size=(3, count, len(robot.joints)))
     turning = np.array([joint.kind != "prismatic" for joint in robot.joints], dtype=bool)
     position[:, turning] = rng.uniform(-np.pi, np.pi, size=(count, int(turning.sum())))
@@ -52,24 +55,27 @@ def stacked_regressor(
     gravity: ArrayLike = GRAVITY,
     surplus: float = 3.0,
 ) -> Floats:
-    """Regressor of all equations of motion in random states, one after the other, the paper's (23).
+    """Return the regressor of all equations of motion in random states, stacked as in the paper's (23).
 
     Parameters
     ----------
     robot : Robot
+        Robot with its joints and links.
     bodies : sequence of str
-        Whose parameters the columns are, ten each.
+        Bodies whose parameters multiply the columns, ten for each body.
     base : Base
+        Support of the base, which decides the equations.
     rng : numpy.random.Generator
+        Source of the random states.
     gravity : (3,) array_like
         Acceleration of gravity on a fixed base, base axes [m/s2].
     surplus : float
-        Rows per column, at least.
+        Smallest number of rows per column.
 
     Returns
     -------
     (rows, 10 bodies) array
-        Without rows where a fixed base has no joints.
+        Stacked regressor; it has no rows where a fixed base has no joints.
     """
     free = base is Base.FREE
     per_state = len(robot.joints) + (6 if free else 0)

@@ -1,4 +1,4 @@
-"""What an identification did not learn, in sentences: it must not pass the prior for knowledge."""
+"""Sentences on what an identification did not learn, so that the prior does not pass for knowledge."""
 
 from __future__ import annotations
 
@@ -14,17 +14,20 @@ __all__ = ["unidentifiable_sentences"]
 
 
 def unidentifiable_sentences(result: Identification) -> list[str]:
-    """Name the quantities and the directions of which the posterior is nearly the prior; empty if there are none."""
+    """Return sentences that name the quantities and directions in which the posterior is nearly the prior.
+
+    The list is empty where there are none.
+    """
     if not result.bodies:
         return []
-    found = []
+    sentences = []
     for verdict, text in (
         (ContractionVerdict.NOT, "is the prior"),
         (ContractionVerdict.WEAKLY, "owes more to the prior than to the data"),
     ):
         names = [name for name, item in result.contraction.items() if item.verdict is verdict]
         if names:
-            found.append(f"What is said of {abridged(names)} {text}.")
+            sentences.append(f"What is said of {abridged(names)} {text}.")
     knowledge = Knowledge.at(result.posterior, result.optimum.z)
     subjects = [
         subject(item, knowledge.values, knowledge.prior_sd, covers_all(result.posterior))
@@ -32,5 +35,5 @@ def unidentifiable_sentences(result: Identification) -> list[str]:
         if item.verdict is ContractionVerdict.NOT
     ]
     if subjects:
-        found.append(f"The data do not tell of these directions: {abridged(subjects, separator='; ')}.")
-    return found
+        sentences.append(f"The data do not tell of these directions: {abridged(subjects, separator='; ')}.")
+    return sentences

@@ -1,9 +1,9 @@
-"""Studies: the TOML file that says what was recorded, with which sensors, and what is to be found out.
+"""Schema of a study, the TOML file that names recordings, sensors and the unknowns to identify.
 
-A study is data only: typed, immutable, checked when it is loaded. SI units, radians, quaternions x, y, z, w. Each class
-is a table of the file and each of its fields a key, so that an unknown key is an error. Tables within (joint to number)
-are plain mappings and not to be changed. The schema imports nothing that takes long, not even NumPy before a body needs
-it, so that an error in the file is told at once.
+A study is data only: typed, immutable, and checked when it is loaded. Values are in SI units and radians, quaternions
+in the order x, y, z, w. Each class is a table of the file and each of its fields a key, so that an unknown key is an
+error. Inner tables (joint to number) are plain mappings and must not be changed. The schema imports no slow package,
+not even NumPy before a body needs it, so that errors in the file are reported at once.
 """
 
 from bayesid.app.schema.design_section import DesignLimits, DesignSection

@@ -24,7 +24,7 @@ from bayesid.app.schema.value_types import (
 )
 
 FEWEST_SAMPLES = 16
-"""Of a manoeuvre; fewer do not determine a motion."""
+"""Smallest number of samples of a manoeuvre, since fewer do not determine a motion."""
 
 CriterionName = Literal[
     "paper-26",
@@ -36,6 +36,7 @@ CriterionName = Literal[
     "information-gain",
     "separation",
 ]
+"""Names of all criteria."""
 
 USUAL: tuple[CriterionName, ...] = (
     "paper-26",
@@ -45,22 +46,22 @@ USUAL: tuple[CriterionName, ...] = (
     "e-optimal",
     "information-gain",
 )
-"""Criteria where a study names none."""
+"""Names of the default criteria."""
 
 
 class DesignLimits(Section):
-    """What a designed manoeuvre must respect, ``[design.limits]``; a limit left out does not apply.
+    """Section ``[design.limits]``, the limits of a designed manoeuvre; only those given apply.
 
     Parameters
     ----------
     tip_speed, tip_rate : float, optional
-        [m/s], [rad/s]
+        Largest speed [m/s] and angular rate [rad/s] of the tip frame.
     joint_speed : float, optional
-        [rad/s or m/s]
+        Largest speed of any joint [rad/s or m/s].
     base_rotation : float, optional
-        [rad]
+        Largest rotation of the base since the start [rad].
     quiet_band : (2,), optional
-        Frequencies between which the motion must not excite anything [Hz].
+        Frequencies between which the motion must not excite the base [Hz].
     """
 
     tip_speed: Positive | None = None
@@ -78,36 +79,37 @@ class DesignLimits(Section):
 
 
 class DesignSection(Section):
-    """The manoeuvre to design, ``[design]``.
+    """Section ``[design]``, the manoeuvre to design.
 
     Parameters
     ----------
     duration : float, optional
-        [s]
+        Duration of the manoeuvre [s].
     tip_frame : str, optional
-        The frame of the URDF whose motion is limited; the last link where left out.
+        Frame of the URDF whose motion is limited, by default the last link.
     joints : sequence of str, optional
-        Joints that move; all where left out.
+        Names of the joints that move, by default all.
     limits : DesignLimits
-        What the manoeuvre must respect.
+        Limits of the manoeuvre.
     interval : float, optional
-        Between samples of all sensors [s].
+        Interval between samples of all sensors [s].
     start : table of joint to float, optional
-        Position before and after [rad or m]; where left out zero, or the end of the joint's range nearest to it.
+        Positions before and after the manoeuvre, by default zero or the end of the joint's range nearest to it
+        [rad or m].
     parameterisation : {"b-splines", "fourier", "paper"}, optional
         Family of joint motions.
     functions : int, optional
-        Free functions of every joint, 8 where left out; the paper's family has none.
+        Number of free functions of every joint, by default 8; the paper's family has none.
     criteria : sequence of str, optional
-        What to design by, one manoeuvre each.
+        Names of the criteria, each of which designs one manoeuvre.
     rivals : sequence of str, optional
-        Labels of effects to tell apart, for the criterion "separation".
+        Labels of the effects to distinguish, for the criterion "separation".
     attitude : (4,), optional
-        Quaternion, base to orbit axes at time 0.
+        Initial attitude, a quaternion from base to orbit axes.
     attitude_sigma : float, optional
-        Its uncertainty [rad]; 0 = exact.
+        Standard deviation of the initial attitude per axis [rad], by default 0, which means exact.
     argument_of_latitude : float, optional
-        At time 0 [rad].
+        Argument of latitude at time 0 [rad].
     """
 
     duration: Positive = 120.0
@@ -126,7 +128,7 @@ class DesignSection(Section):
 
     @property
     def chosen_criteria(self) -> tuple[str, ...]:
-        """The criteria, those of `USUAL` where none is named; with rivals also their separation."""
+        """Names of the criteria, by default those of `USUAL` and, if there are rivals, their separation."""
         return self.criteria or (*USUAL, *(("separation",) if self.rivals else ()))
 
     @model_validator(mode="after")

@@ -28,10 +28,10 @@ if TYPE_CHECKING:
     from bayesid.robot.inertial_parameters import InertialParameters
 
 LOWEST_ORBIT = 6.3e6
-"""Radii below this are inside the Earth [m]."""
+"""Radius below which an orbit is inside the Earth [m]."""
 
 HIGHEST_ORBIT = 1.5e9
-"""Radii above this are outside the Earth's sphere of influence [m]."""
+"""Radius above which an orbit is outside the Earth's sphere of influence [m]."""
 
 
 class BodySection(Section):
@@ -40,11 +40,11 @@ class BodySection(Section):
     Parameters
     ----------
     mass : float
-        [kg]
+        Mass [kg].
     com : (3,)
         Centre of mass [m].
     inertia : (6,)
-        About the centre of mass, xx yy zz xy xz yz [kg m2].
+        Inertia about the centre of mass, xx yy zz xy xz yz [kg m2].
     """
 
     mass: Positive
@@ -58,7 +58,7 @@ class BodySection(Section):
 
     @property
     def parameters(self) -> InertialParameters:
-        """The same as `InertialParameters`, whose triangle inequality and the like have been checked."""
+        """Inertial parameters as `InertialParameters`, which checks that they are physically possible."""
         from bayesid.robot.inertial_parameters import InertialParameters
 
         xx, yy, zz, xy, xz, yz = self.inertia
@@ -66,12 +66,12 @@ class BodySection(Section):
 
 
 class LoadSection(BodySection):
-    """A rigid body fixed on a link and not in the URDF, ``[[robot.loads]]``.
+    """Section ``[[robot.loads]]``, a rigid body that is fixed to a link and is not in the URDF.
 
     Parameters
     ----------
     name, link : str
-        Its own name, and the link's that carries it; for the rest see `BodySection`.
+        Name of the load and of the link that carries it; the other parameters are those of `BodySection`.
     """
 
     name: Name
@@ -79,16 +79,16 @@ class LoadSection(BodySection):
 
 
 class RobotSection(Section):
-    """The robot, ``[robot]``.
+    """Section ``[robot]``, the robot and its loads.
 
     Parameters
     ----------
     urdf : Path
-        The root link is the base body.
+        URDF of the robot, whose root link is the base body.
     link_spread : float, optional
-        Relative uncertainty of all links that are not unknowns; 0 = known exactly.
+        Relative uncertainty of all links that are not unknowns, by default 0, which means known exactly.
     loads : sequence of LoadSection, optional
-        Bodies on links.
+        Bodies that are fixed to links.
     """
 
     urdf: File
@@ -103,20 +103,20 @@ class RobotSection(Section):
 
 
 class OrbitSection(Section):
-    """The orbit about the Earth, ``[orbit]``.
+    """Section ``[orbit]``, the orbit about the Earth.
 
     Parameters
     ----------
     radius : float
-        [m]; the semi-major axis if there is an eccentricity.
+        Radius, or the semi-major axis if there is an eccentricity [m].
     eccentricity : float, optional
-        In [0, 1).
+        Eccentricity, in [0, 1).
     inclination : float, optional
-        [rad]
+        Inclination [rad].
     argument_of_perigee : float, optional
-        [rad]
+        Argument of perigee [rad].
     sun : (3,), optional
-        Unit vector to the Sun, Earth-centred: node, along-orbit, normal.
+        Unit vector from the Earth to the Sun, in the axes of node, along-orbit direction and orbit normal.
     """
 
     radius: Number

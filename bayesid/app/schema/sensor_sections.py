@@ -34,24 +34,28 @@ def _exactly_one(section: BaseModel, keys: Sequence[str]) -> None:
 
 
 class RateSensor(Section):
-    """Angular velocity of the base, ``[sensors.rate]``. Exactly one of the first three keys says how noisy it is.
+    """Section ``[sensors.rate]``, a sensor of the base's angular velocity.
+
+    Exactly one of the first three keys gives the noise.
 
     Parameters
     ----------
     sigma : float or (3,)
-        White noise per sample [rad/s].
+        Standard deviation of white noise per sample [rad/s].
     angle_random_walk : float
-        From a gyro's data sheet [rad/sqrt(s)]; per sample it is divided by the square root of the sample interval.
-        1 deg/sqrt(h) is 2.909e-4 rad/sqrt(s).
+        Angle random walk from a gyro's data sheet [rad/sqrt(s)]; divided by the square root of the sample interval it
+        gives the noise per sample. 1 deg/sqrt(h) is 2.909e-4 rad/sqrt(s).
     attitude_arcsec : float
-        Accuracy per sample [arcsec] of a star sensor whose attitude was differenced to give the rate: two samples
-        enter, so that sigma is sqrt(2) times the angle over the sample interval.
+        Accuracy per sample of a star sensor whose attitude was differenced to give the rate [arcsec]; as two samples
+        enter, the noise is sqrt(2) times the angle divided by the sample interval.
     mounting : (4,), optional
-        Quaternion, sensor to base axes.
+        Quaternion from sensor to base axes.
     bias_sigma : float or (3,), optional
-        Prior standard deviation of a constant bias [rad/s]; left out, the model has none.
-    low_pass, decimate : optional
-        Filter cut-off [Hz], and every how many samples one is kept; both apply to samples and prediction alike.
+        Prior standard deviation of a constant bias [rad/s]; by default the model has no bias.
+    low_pass : float, optional
+        Cut-off frequency of a low-pass filter, applied to samples and prediction alike [Hz].
+    decimate : int, optional
+        Decimation factor n, by which every n-th sample is kept, in samples and prediction alike.
     """
 
     sigma: Annotated[PerAxis, no_more_than(0.1, "rad/s, not arcsec/s or degrees/s?")] | None = None
@@ -84,23 +88,27 @@ class RateSensor(Section):
 
 
 class AccelSensor(Section):
-    """Non-gravitational acceleration at one point of the base, ``[sensors.accel]``. Give one of the first two keys.
+    """Section ``[sensors.accel]``, a sensor of the non-gravitational acceleration at one point of the base.
+
+    Exactly one of the first two keys gives the noise.
 
     Parameters
     ----------
     sigma : float or (3,)
-        White noise per sample [m/s2].
+        Standard deviation of white noise per sample [m/s2].
     noise_density : float
-        From a data sheet, one-sided [m/s2/sqrt(Hz)]; per sample it is multiplied by the square root of the Nyquist
-        frequency. 1 micro-g/sqrt(Hz) is 9.80665e-6 m/s2/sqrt(Hz).
+        One-sided noise density from a data sheet [m/s2/sqrt(Hz)]; multiplied by the square root of the Nyquist
+        frequency it gives the noise per sample. 1 micro-g/sqrt(Hz) is 9.80665e-6 m/s2/sqrt(Hz).
     position : (3,)
-        Base axes, from the base origin [m].
+        Position from the base origin, base axes [m].
     mounting : (4,), optional
-        Quaternion, sensor to base axes.
+        Quaternion from sensor to base axes.
     bias_sigma : float or (3,), optional
-        Prior standard deviation of a constant bias [m/s2]; left out, the model has none.
-    low_pass, decimate : optional
-        Filter cut-off [Hz], and every how many samples one is kept; both apply to samples and prediction alike.
+        Prior standard deviation of a constant bias [m/s2]; by default the model has no bias.
+    low_pass : float, optional
+        Cut-off frequency of a low-pass filter, applied to samples and prediction alike [Hz].
+    decimate : int, optional
+        Decimation factor n, by which every n-th sample is kept, in samples and prediction alike.
     """
 
     sigma: Annotated[PerAxis, no_more_than(1.0, "m/s2, not milli-g or micro-g?")] | None = None
@@ -128,16 +136,20 @@ class AccelSensor(Section):
 
 
 class AttitudeSensor(Section):
-    """Star sensor, base to orbit axes, ``[sensors.attitude]``. Exactly one of the first two keys is given.
+    """Section ``[sensors.attitude]``, a star sensor that measures the attitude from base to orbit axes.
+
+    Exactly one of the first two keys gives the noise.
 
     Parameters
     ----------
     sigma : float or (3,)
-        White noise per sample, a small rotation in base axes [rad].
+        Standard deviation of white noise per sample, as a small rotation in base axes [rad].
     arcsec : float
-        The same in seconds of arc.
-    low_pass, decimate : optional
-        Filter cut-off [Hz], and every how many samples one is kept; both apply to samples and prediction alike.
+        Standard deviation of white noise per sample [arcsec].
+    low_pass : float, optional
+        Cut-off frequency of a low-pass filter, applied to samples and prediction alike [Hz].
+    decimate : int, optional
+        Decimation factor n, by which every n-th sample is kept, in samples and prediction alike.
     """
 
     sigma: Annotated[PerAxis, ANGLE_SIGMA] | None = None
@@ -161,12 +173,13 @@ class AttitudeSensor(Section):
 
 
 class EncoderSensor(Section):
-    """Joint measurements, ``[sensors.encoder]``. A noise left out is estimated from the data.
+    """Section ``[sensors.encoder]``, the measurements of the joints.
 
     Parameters
     ----------
     sigma, velocity_sigma, acceleration_sigma : float or table of joint to float, optional
-        White noise per sample of position [rad, or m for prismatic], velocity and acceleration.
+        Standard deviations of white noise per sample of position [rad, or m for prismatic joints], velocity and
+        acceleration, by default estimated from the data.
     """
 
     sigma: Annotated[PerName, ANGLE_SIGMA] | None = None
@@ -174,7 +187,7 @@ class EncoderSensor(Section):
     acceleration_sigma: PerName | None = None
 
     def sigma_of(self, family: Literal["position", "velocity", "acceleration"], joint: str) -> float | None:
-        """Noise per sample of one joint's position, velocity or acceleration; None where it is to be estimated."""
+        """Return the noise per sample of one joint's position, velocity or acceleration, None if not given."""
         given = {
             "position": self.sigma,
             "velocity": self.velocity_sigma,
@@ -184,29 +197,29 @@ class EncoderSensor(Section):
 
 
 class TorqueSection(Section):
-    """Joint torque sensors, ``[sensors.torque]``.
+    """Section ``[sensors.torque]``, the sensors of the joint torques.
 
     Parameters
     ----------
     sigma : float or table of joint to float
-        White noise per sample [N m, or N for prismatic]. One number is for every moving joint; a table names the joints
-        that have a sensor.
+        Standard deviation of white noise per sample [N m, or N for prismatic joints]. One number applies to every
+        moving joint; a table names the joints that have a sensor.
     """
 
     sigma: Annotated[PerName, no_more_than(1e4, "N m")]
 
 
 class SensorsSection(Section):
-    """The sensors, ``[sensors]``; of rate, accel and attitude at least one.
+    """Section ``[sensors]``, all sensors, with at least one of rate, accel and attitude.
 
     Parameters
     ----------
     rate, accel, attitude : optional
-        Sensors of the base; one that is left out is not used, even if it was recorded.
+        Sensors of the base; a sensor that is not given is not used, even if it was recorded.
     torque : optional
-        Sensors of the joint torques; left out, recorded torques are not used.
+        Sensors of the joint torques; by default recorded torques are not used.
     encoder : EncoderSensor
-        Sensors of the joints.
+        Sensors of the joint motion.
     """
 
     rate: RateSensor | None = None

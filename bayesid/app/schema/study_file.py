@@ -1,4 +1,4 @@
-"""The study file as a whole."""
+"""Study file as a whole."""
 
 from __future__ import annotations
 
@@ -19,22 +19,26 @@ from bayesid.app.schema.value_types import Section, array_of_tables
 
 
 class Study(Section):
-    """A study file.
+    """Content of a study file.
 
     Parameters
     ----------
     title : str, optional
-        The file's stem if left out.
-    robot, sensors, unknowns : sections
-        Required.
+        Title in reports, by default the stem of the file.
+    robot : RobotSection
+        Robot and its loads.
     orbit : OrbitSection or None
-        None away from orbit; then no environment effect applies.
+        Orbit about the Earth; None away from it, where no environment effect applies.
+    sensors : SensorsSection
+        Sensors and their noise.
     recordings : sequence of RecordingSection
-        May be empty for commands that only design.
-    model : ModelSection
-        Optional.
+        Recordings; commands that only design need none.
+    unknowns : UnknownsSection
+        Bodies to identify and their priors.
+    model : ModelSection, optional
+        Contents of the simulation.
     design : DesignSection or None
-        Optional.
+        Manoeuvre to design.
     """
 
     title: str = ""
@@ -45,17 +49,17 @@ class Study(Section):
     unknowns: UnknownsSection
     model: ModelSection = ModelSection()
     design: DesignSection | None = None
-    # not a key of the file
+    # a private attribute, because it is not a key of the file
     _file: Path | None = PrivateAttr(default=None)
 
     @classmethod
     def load(cls, path: str | Path) -> Study:
-        """Read and check a study file; its paths come out relative to the file's folder.
+        """Read and check a study file; its paths are resolved relative to the file's folder.
 
         Raises
         ------
         InputError
-            If the file is absent, is no TOML, or breaks a rule; the message names the key, the value and the remedy.
+            If the file is absent, is not TOML, or breaks a rule; the message names the key, the value and the remedy.
         """
         file = Path(path)
         if not file.is_file():
@@ -70,7 +74,7 @@ class Study(Section):
 
     @classmethod
     def from_mapping(cls, data: Mapping[str, Any], file: Path | None = None) -> Study:
-        """Check the content of a study file, already parsed; without a file its paths are left as they are."""
+        """Check the parsed content of a study file; without a file its paths stay as they are."""
         try:
             study = cls.model_validate(data, context={"folder": None if file is None else file.parent})
         except ValidationError as error:
@@ -80,11 +84,11 @@ class Study(Section):
 
     @property
     def file(self) -> Path | None:
-        """The file it was loaded from."""
+        """File from which the study was loaded, None for a study made from a mapping."""
         return self._file
 
     def with_posterior(self, posterior: Path) -> Study:
-        """Return the study with the posterior of an earlier one as its prior, whatever it states itself."""
+        """Return the study with the posterior of an earlier one as prior, in place of any prior that it states."""
         unknowns = self.unknowns.model_copy(update={"posterior": posterior, "prior": {}})
         return self.model_copy(update={"unknowns": unknowns})
 

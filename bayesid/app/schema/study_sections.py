@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 def check_extended(body: BodySection, place: str) -> None:
-    """Reject a body without extent as the centre of a prior."""
+    """Reject a point, rod or plate as the centre of a prior."""
     if not body.parameters.is_extended:
         raise InputError(
             "the body is a point, a rod or a plate, about which no relative prior can be centred",
@@ -44,20 +44,20 @@ def check_extended(body: BodySection, place: str) -> None:
 
 
 class RecordingSection(Section):
-    """One recording, ``[[recordings]]``.
+    """Section ``[[recordings]]``, one recording.
 
     Parameters
     ----------
     file : Path
-        CSV or Parquet, see `bayesid.recording.recording`.
+        CSV or Parquet file, see `bayesid.recording.recording`.
     attitude : (4,)
-        Quaternion, base to orbit axes at time 0.
+        Initial attitude, a quaternion from base to orbit axes.
     attitude_sigma : float, optional
-        Its uncertainty [rad]; 0 = exact.
+        Standard deviation of the initial attitude per axis [rad], by default 0, which means exact.
     argument_of_latitude : float, optional
-        At time 0 [rad]; needed by effects that know where they are on the orbit.
+        Argument of latitude at time 0 [rad], needed by effects that depend on the position in the orbit.
     start : table of joint to float, optional
-        Position at time 0 [rad or m] of joints recorded by speed alone; a joint left out starts from its zero.
+        Positions at time 0 of joints recorded by speed alone, by default zero [rad or m].
     """
 
     file: File
@@ -68,20 +68,20 @@ class RecordingSection(Section):
 
 
 class ChangeSection(Section):
-    """What was added to a body, or taken from it, since the posterior that is its prior, ``[[unknowns.changes]]``.
+    """Section ``[[unknowns.changes]]``, a mass-property change since the posterior that is the prior.
 
     Parameters
     ----------
     body : str
-        One of the unknown bodies.
+        Name of the unknown body that changed.
     mass : float
-        [kg]; negative if it was taken away, as fuel that was burnt.
+        Mass that was added [kg]; negative for mass that was removed, such as burnt fuel.
     mass_sigma : float, optional
-        Its standard deviation [kg].
+        Standard deviation of the mass, by default 0 [kg].
     com : (3,)
-        Its centre of mass in the body's axes [m].
+        Centre of the added mass in the body's axes [m].
     inertia : (6,), optional
-        About its own centre of mass, xx yy zz xy xz yz [kg m2]; a point mass where left out.
+        Inertia of the added mass about its centre, xx yy zz xy xz yz, by default that of a point mass [kg m2].
     """
 
     body: Name
@@ -97,7 +97,7 @@ class ChangeSection(Section):
 
     @property
     def change(self) -> BodyChange:
-        """The same as `BodyChange`, which has checked it."""
+        """Mass-property change as a `BodyChange`, which validates it."""
         from bayesid.robot.mass_property_change import BodyChange
 
         xx, yy, zz, xy, xz, yz = self.inertia
@@ -106,20 +106,20 @@ class ChangeSection(Section):
 
 
 class UnknownsSection(Section):
-    """What is to be identified, ``[unknowns]``.
+    """Section ``[unknowns]``, the bodies to identify and their priors.
 
     Parameters
     ----------
     bodies : sequence of str
-        Links or loads whose ten inertial parameters are estimated; may be empty if only effects are.
+        Links or loads whose ten inertial parameters are estimated; it is empty if only effects are.
     spread : float or table of body to float, optional
-        Relative width of the prior in log-Cholesky coordinates; 1 for a body that the table leaves out.
+        Relative width of the prior in log-Cholesky coordinates, by default 1.
     prior : table of body to BodySection, optional
-        Centre of the prior where it is not the URDF's or the load's values.
+        Centres of the priors, by default the values of the URDF or of the load.
     posterior : Path, optional
-        The ``posterior.nc`` of an earlier study of these bodies, which is then their prior.
+        File ``posterior.nc`` of an earlier study of these bodies, whose posterior is used as prior.
     changes : sequence of ChangeSection, optional
-        What was added to them or taken from them since.
+        Mass-property changes since that posterior.
     """
 
     bodies: Names
@@ -162,25 +162,25 @@ class UnknownsSection(Section):
         return self
 
     def spread_of(self, body: str) -> float:
-        """Relative width of one body's prior."""
+        """Return the relative width of one body's prior."""
         return self.spread.get(body, 1.0) if isinstance(self.spread, Mapping) else self.spread
 
 
 class ModelSection(Section):
-    """What the simulation contains, ``[model]``.
+    """Section ``[model]``, the contents of the simulation.
 
     Parameters
     ----------
     effects : sequence of str, optional
-        Names of the catalogue; ``payload:LINK`` and the like say where.
+        Names of effects in the catalogue, with their place where they need one, such as ``payload:LINK``.
     initial_rate : {"unknown", "zero"}, optional
-        Whether each recording's initial rate is estimated.
+        Initial rate of each recording, which is estimated or zero.
     initial_rate_sigma : float, optional
-        Prior standard deviation of an unknown initial rate [rad/s]; left out, the default of the model applies.
+        Prior standard deviation of an unknown initial rate, by default that of the model [rad/s].
     plugins : sequence of Path, optional
-        Python files with effects of one's own.
+        Python files with effects of the user.
     priors : table of effect to table of key to float, optional
-        Prior standard deviations that replace an effect's own, in the unit of the key.
+        Prior standard deviations in place of an effect's defaults, in the unit of the key.
     """
 
     effects: Names = ()

@@ -1,4 +1,4 @@
-"""What is wrong with a study file, in the user's terms."""
+"""Errors in a study file, explained in the user's terms."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ _WANTED = {
     "path_type": "a path in quotes",
     "string_too_short": "a name",
 }
-"""What to give instead, by pydantic's type of error; for the others its own message serves."""
+"""Required values by pydantic's type of error; other types use pydantic's message."""
 
 
 def suggest(name: str, known: Sequence[str]) -> str | None:
-    """Return a hint at the nearest known name, if one is near."""
+    """Return a hint at the most similar known name, None if there is no similar one."""
     near = difflib.get_close_matches(name, known, n=1)
     return f"Did you mean '{near[0]}'?" if near else None
 
 
 def syntax_error(error: tomllib.TOMLDecodeError, file: Path) -> InputError:
-    """Return the parser's complaint with the line as the place."""
+    """Return the parser's message as an error whose place is the line."""
     text = str(error)
-    found = re.search(r"\s*\(at (line \d+, column \d+|end of document)\)", text)
-    place = found.group(1) if found else None
-    problem = text.replace(found.group(0), "") if found else text
+    match = re.search(r"\s*\(at (line \d+, column \d+|end of document)\)", text)
+    place = match.group(1) if match else None
+    problem = text.replace(match.group(0), "") if match else text
     return InputError(f"not valid TOML: {problem}", file=file, place=place, remedy="Correct the syntax there")
 
 
 def explain(error: ValidationError, data: Mapping[str, Any], study: type[BaseModel]) -> InputError:
-    """Return the first error in the user's terms, and the number of the others.
+    """Return the first error in the user's terms, with the number of further errors in its remedy.
 
-    A misspelt key comes first: it is usually why another one is missing.
+    A misspelt key comes first, because it is usually the reason why another key is missing.
     """
     faults = sorted(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden")
     first = _one_error(faults[0], data, study)
-    # one number that stands for three axes is one error
+    # an error in one number that stands for three axes counts once
     others = len({_path_of(fault, data) for fault in faults}) - 1
     if not others:
         return first
@@ -59,7 +59,7 @@ def explain(error: ValidationError, data: Mapping[str, Any], study: type[BaseMod
 
 
 def _path_of(fault: ErrorDetails, data: Any) -> tuple[str | int, ...]:
-    """Return the part of pydantic's location that is in the file: it names union branches and "[key]" as well."""
+    """Return pydantic's location without the parts that are not in the file, such as union branches and "[key]"."""
     path: list[str | int] = []
     last = len(fault["loc"]) - 1
     for position, part in enumerate(fault["loc"]):
@@ -96,7 +96,7 @@ def _one_error(fault: ErrorDetails, data: Mapping[str, Any], study: type[BaseMod
 
 
 def _place(path: Sequence[str | int]) -> str:
-    """Write a path as a reader counts: entries of lists from 1."""
+    """Return a path as text, with the entries of lists counted from 1."""
     text = ""
     for part in path:
         text += f" #{part + 1}" if isinstance(part, int) else f".{part}" if text else part
@@ -104,7 +104,7 @@ def _place(path: Sequence[str | int]) -> str:
 
 
 def _table_at(section: type[BaseModel], path: Sequence[str | int]) -> type[BaseModel]:
-    """Return the class of the table at a path, below the class of another table."""
+    """Return the class of the table at a path, relative to the class of another table."""
     for part in path:
         if isinstance(part, str) and part in section.model_fields:
             section = _section_in(section.model_fields[part].annotation) or section

@@ -1,4 +1,4 @@
-"""Values of a study file: types that check range, length and unit as they are read."""
+"""Types of the values in a study file, which check range, length and unit."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pydantic import (
 from bayesid._io.errors import InputError
 
 UNIT_TOLERANCE = 1e-3
-"""How far the norm of a unit vector or quaternion may be from one before it is taken for an error."""
+"""Largest deviation from one of the norm of a unit vector or quaternion, for values rounded to some digits."""
 
 
 def _numbers(value: Any) -> Iterable[float]:
@@ -36,7 +36,7 @@ def _numbers(value: Any) -> Iterable[float]:
 
 
 def no_more_than(limit: float, remedy: str) -> AfterValidator:
-    """Reject magnitudes that only a wrong unit explains."""
+    """Return a validator that rejects magnitudes so large that only a wrong unit explains them."""
 
     def check(value: Any) -> Any:
         largest = max(map(abs, _numbers(value)), default=0.0)
@@ -48,7 +48,7 @@ def no_more_than(limit: float, remedy: str) -> AfterValidator:
 
 
 def no_less_than(limit: float, remedy: str) -> AfterValidator:
-    """Reject values so small that only a wrong unit explains them."""
+    """Return a validator that rejects values so small that only a wrong unit explains them."""
 
     def check(value: float) -> float:
         if value < limit:
@@ -59,7 +59,7 @@ def no_less_than(limit: float, remedy: str) -> AfterValidator:
 
 
 def list_of(size: int, *, or_number: bool = False) -> BeforeValidator:
-    """Require a list of ``size``; with ``or_number``, one number stands for all."""
+    """Return a validator that requires a list of ``size`` numbers, or with ``or_number`` one number for all of them."""
 
     def check(value: Any) -> Any:
         if or_number and isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -75,7 +75,7 @@ def list_of(size: int, *, or_number: bool = False) -> BeforeValidator:
 
 
 def _unit(value: tuple[float, ...]) -> tuple[float, ...]:
-    """Normalise; an error where the norm is not one."""
+    """Normalise a vector, and reject one whose norm is not nearly one."""
     norm = math.hypot(*value)
     if abs(norm - 1.0) > UNIT_TOLERANCE:
         kind = "quaternion (x, y, z, w)" if len(value) == 4 else "vector"
@@ -84,7 +84,7 @@ def _unit(value: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def distinct(values: tuple[str, ...]) -> tuple[str, ...]:
-    """Reject a name that appears twice."""
+    """Reject names of which one appears twice."""
     for index, value in enumerate(values):
         if value in values[:index]:
             raise InputError(f"'{value}' appears twice", remedy="Name each once")
@@ -92,7 +92,7 @@ def distinct(values: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _resolve(path: Path, info: ValidationInfo) -> Path:
-    """Make a path relative to the study's folder, not to where the command runs."""
+    """Resolve a path relative to the study's folder, not to the folder in which the command runs."""
     if path == Path():
         raise InputError("the path is empty", remedy="Name a file")
     folder = (info.context or {}).get("folder")
@@ -121,15 +121,18 @@ Decimation = Annotated[int, Strict(), Field(ge=1)]
 Table = Mapping[Name, Positive]
 PerName = Annotated[
     Annotated[Positive, Tag("number")] | Annotated[Table, Tag("table")],
-    # without it both branches would complain about the same value
+    # without the discriminator both branches would report an error about the same value
     Discriminator(lambda value: "table" if isinstance(value, Mapping) else "number"),
 ]
 
 FULL_TURN = no_more_than(2.0 * math.pi, "Radians, not degrees?")
+"""Validator of angles, which are at most one turn [rad]."""
+
 ANGLE_SIGMA = no_more_than(0.1, "Radians, not arcsec or degrees?")
+"""Validator of the noise of angles, which no sensor exceeds [rad]."""
 
 
 class Section(BaseModel):
-    """A table of the study file."""
+    """Table of the study file; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
