@@ -19,7 +19,7 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.posterior import Posterior
 
-__all__ = ["Knowledge", "marginalised"]
+__all__ = ["Knowledge", "marginalised", "triangular"]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Knowledge:
     @cached_property
     def prior_factor(self) -> Floats:
         """Lower-triangular factor L of the prior covariance L L' of the quantities, shape (n, n)."""
-        upper = _upper(self.slope.T)
+        upper = triangular(self.slope.T)
         return (upper * np.where(np.diag(upper) < 0.0, -1.0, 1.0)[:, None]).T
 
     @property
@@ -98,7 +98,7 @@ class Knowledge:
     def conditional_sd(self) -> Floats:
         """Posterior standard deviations if all other quantities of the bodies were known exactly, shape (n,)."""
         scaled = self.factor / self.sd[:, None]
-        inverse = np.linalg.inv(_upper(scaled.T))  # inverse of R, where R'R is the correlation matrix
+        inverse = np.linalg.inv(triangular(scaled.T))  # inverse of R, where R'R is the correlation matrix
         return self.sd / np.linalg.norm(inverse, axis=1)
 
     @property
@@ -115,7 +115,7 @@ class Knowledge:
     @cached_property
     def _inverse_root(self) -> Floats:
         """Inverse of R in J = QR, which stays accurate where some directions are known a million times better."""
-        upper = _upper(self.jacobian)
+        upper = triangular(self.jacobian)
         return np.asarray(sla.solve_triangular(upper, np.eye(len(upper))))
 
 
@@ -135,9 +135,9 @@ def marginalised(jacobian: Floats, nuisance: Sequence[int]) -> Floats:
         Upper triangular; its Gram matrix is the Schur complement of the Fisher information.
     """
     others = np.delete(np.arange(jacobian.shape[1]), nuisance)
-    return _upper(jacobian[:, [*nuisance, *others]])[len(nuisance) :, len(nuisance) :]
+    return triangular(jacobian[:, [*nuisance, *others]])[len(nuisance) :, len(nuisance) :]
 
 
-def _upper(matrix: Floats) -> Floats:
+def triangular(matrix: Floats) -> Floats:
     """Return the upper-triangular R of the decomposition matrix = QR."""
     return np.asarray(np.linalg.qr(matrix, mode="r"))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid.identifiability.local_knowledge import Knowledge
+from bayesid.identifiability.local_knowledge import Knowledge, triangular
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
@@ -99,10 +99,7 @@ class Information:
         recording = simulate_recordings(simulator, z=z)[0]
         posterior = with_manoeuvres(simulator, [replace(planned, recording=recording)])
         jacobian = posterior.jacobian(z).reshape(-1, len(KINDS), 3, posterior.size)
-        rows = {
-            kind: np.linalg.qr(jacobian[:, index].reshape(-1, posterior.size), mode="r")
-            for index, kind in enumerate(KINDS)
-        }
+        rows = {kind: triangular(jacobian[:, index].reshape(-1, posterior.size)) for index, kind in enumerate(KINDS)}
         prior = Knowledge(*linearise(posterior, z), np.eye(posterior.size))
         return cls(rows, prior, posterior.unknowns.names, truth)
 

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from bayesid import Kind, Sensor, White
 from bayesid.design import planned_manoeuvre, planned_posterior
 from bayesid.design.designed import sample_times
-from bayesid.identifiability.local_knowledge import Knowledge, marginalised
+from bayesid.identifiability.local_knowledge import Knowledge, marginalised, triangular
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.noise_changes import with_sensors
 from bayesid.inference.posterior import Posterior
@@ -114,7 +114,7 @@ class Asked:
             sensors = (Sensor(Kind.RATE, grade.rate), Sensor(Kind.ACCEL, White(accel), position=ACCELEROMETER))
             z = np.zeros(self.posterior.size)
             jacobian = with_sensors(self.posterior, sensors, z).jacobian(z)[: -self.posterior.size]
-            self._kept[grade.rate, accel] = np.linalg.qr(jacobian, mode="r")
+            self._kept[grade.rate, accel] = triangular(jacobian)
         return self._kept[grade.rate, accel]
 
     @cached_property
