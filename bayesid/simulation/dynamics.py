@@ -221,9 +221,9 @@ def _integrate(
 
     def step(state: Array, given: tuple) -> tuple[Array, tuple[Array, Array, Array]]:
         size, hold, here, half, there = given
-        new, slope, _ = runge_kutta_step(partial(system.derivative, hold=hold), state, size, here, half, there)
-        # the slope at the end differs from that at the next start where the held wrench jumps
-        return new, (state, size * slope, size * system.derivative(new, there, hold))
+        new, first, last = runge_kutta_step(partial(system.derivative, hold=hold), state, size, here, half, there)
+        # the last slope differs from the next step's first one where the held wrench jumps
+        return new, (state, size * first, size * last)
 
     final, (states, slopes, end_slopes) = jax.lax.scan(
         step, initial, (grid.step, grid.zero_order_hold, first, middle, last)
