@@ -56,7 +56,7 @@ CASES = {
 }
 
 
-LONG = ("ets7", "known thrust")
+LONG = ("ets7", "four joints, other rates and a gap", "known thrust", "wheel in the model")
 """Cases left to ``--slow``."""
 
 
@@ -86,6 +86,7 @@ def test_truth_lies_inside_the_posterior_and_noise_is_all_that_is_left(name: str
     assert integration_error_at(posterior, optimum.z) < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not EXAMPLES.is_dir(), reason="the examples that come with the file contract are absent")
 def test_the_contracts_example_is_identified() -> None:
     """Frames, signs and units against recordings made by somebody else's simulator."""

@@ -243,6 +243,7 @@ def test_laplace_importance_and_ensemble_agree_on_a_nearly_normal_posterior(plan
     assert error @ np.linalg.solve(optimum.covariance[:10, :10], error) < chi2_distribution(10).ppf(0.9999)
 
 
+@pytest.mark.slow
 def test_the_optimum_is_reached_from_random_starts(planar_posterior, request):
     """From draws of a prior of relative width one, at least 95 % reach the lowest cost found to 1e-3."""
     posterior = planar_posterior(np.random.default_rng(2), spread=1.0, step=0.5)

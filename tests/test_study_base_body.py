@@ -22,6 +22,9 @@ REFERENCE_STEP = 0.125
 """With twice that the reference's own error already reaches 3e-6 of a parameter [s]."""
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def result() -> base_body.BaseBody:
     return base_body.run()

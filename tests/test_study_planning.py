@@ -14,6 +14,7 @@ DURATION = 20.0
 REACHED = START + np.array([0.4, -0.3, 0.2, 0.1, -0.2, 0.2])
 
 
+@pytest.mark.slow
 def test_a_plan_hits_with_the_true_base_and_misses_with_a_wrong_one():
     target = fly(Swing(START, REACHED, DURATION), DURATION).tip
     truth = Robot.shipped("ets7").link(BASE).inertial

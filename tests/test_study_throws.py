@@ -21,6 +21,7 @@ def result():
     return run(throws=3)
 
 
+@pytest.mark.slow
 def test_the_wheel_and_the_bodies_jointly(result):
     analysis = result.extended
     assert analysis.converged
@@ -30,6 +31,7 @@ def test_the_wheel_and_the_bodies_jointly(result):
         assert np.abs(body.joint_distance).max() < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("body", "mean", "largest"), [("Empty", 1.9, 6.0), ("A", 1.0, 3.0)])
 def test_single_throws(result, body, mean, largest):
     found = result.extended.bodies[body]
@@ -38,6 +40,7 @@ def test_single_throws(result, body, mean, largest):
     assert found.largest_error <= largest
 
 
+@pytest.mark.slow
 def test_the_rigid_model_is_overconfident_and_the_extended_one_hardly(result):
     for body in ("Empty", "A"):
         plain, extended = result.plain.bodies[body], result.extended.bodies[body]
@@ -47,11 +50,13 @@ def test_the_rigid_model_is_overconfident_and_the_extended_one_hardly(result):
         assert extended.coverage(0.95, with_truth=True) >= 0.9
 
 
+@pytest.mark.slow
 def test_the_blocks_need_no_cad(result):
     analysis = result.extended
     np.testing.assert_allclose(analysis.blocks, analysis.blocks_truth, rtol=0.04)
 
 
+@pytest.mark.slow
 def test_the_report_is_written(result, tmp_path):
     write_report(result, tmp_path / "throws.pdf")
     assert (tmp_path / "throws.pdf").read_bytes().startswith(b"%PDF")

@@ -114,6 +114,7 @@ def test_the_uncertainty_from_motion_alone_holds_the_truth(compiled, tmp_path):
     check_distances(compiled(False), tmp_path)
 
 
+@pytest.mark.slow
 def test_the_uncertainty_from_motion_and_torques_holds_the_truth(compiled, tmp_path):
     check_distances(compiled(True), tmp_path)
 
