@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 
 from bayesid._io.errors import InputError
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_model, load_posterior
 from bayesid.inference.mode import maximise
 from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.posterior import Posterior
@@ -24,6 +27,7 @@ from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Coloured, Kind, Sensor, White
+from tests.conftest import PLANAR
 
 SUN = (0.6, 0.64, 0.48)
 TIME = np.arange(0.0, 60.1, 0.5)
@@ -153,6 +157,72 @@ def test_other_recordings_and_noise_draws(flown):
     drawn = noisy(posterior, 0, predicted, np.random.default_rng(1))
     off = drawn.gyro2 - predicted.gyro2
     assert 0.7e-6 < off.std() < 1.3e-6
+
+
+PLUGIN = """
+from bayesid import Kind
+
+@Kind.register
+class MagneticField(Kind):
+    value, unit = "field", "1"
+    axes, rest, size, mounted = ("a", "b"), (0.0, 0.0), 2, False
+    frame = "angular velocity about base x and z, in place of a field"
+
+    def read(self, sensed):
+        return sensed.instant.rate[::2]
+"""
+
+STUDY = """
+title = "A sensor of one's own"
+[robot]
+urdf = "{urdf}"
+[sensors.other.field]
+sigma = {sigma}
+decimate = 2
+[sensors.encoder]
+sigma = 1e-6
+[[recordings]]
+file = "one.csv"
+attitude = [0.0, 0.0, 0.0, 1.0]
+[unknowns]
+bodies = ["base_link"]
+[model]
+effects = []
+plugins = [{plugin}]
+"""
+
+
+def study_of(folder: Path, sigma: str = "[1e-5, 2e-5]", plugin: str = '"field.py"') -> Study:
+    (folder / "field.py").write_text(PLUGIN)
+    (folder / "study.toml").write_text(STUDY.format(urdf=PLANAR, sigma=sigma, plugin=plugin))
+    return Study.load(folder / "study.toml")
+
+
+def test_a_study_file_names_it_by_its_plugin(tmp_path, monkeypatch):
+    monkeypatch.setattr(Kind, "_known", dict(Kind._known))
+    with pytest.raises(InputError, match="unknown sensor 'field'") as unknown:
+        load_posterior(study_of(tmp_path, plugin=""))
+    assert unknown.value.place == "sensors.other.field"
+    study = study_of(tmp_path)
+    load_model(study)  # runs the plugin, which makes the columns known
+    motion = Excitation(offset=[0.4, -0.3], amplitude=[0.3, 0.4], frequency=0.3, periods=1, ramp=15.0)
+    channels = {**sample_joints(motion, Robot.shipped("planar"), TIME)}
+    rng = np.random.default_rng(8)
+    Recording("one", None, TIME, {**channels, **{f"field.{k}": 1e-5 * rng.normal(size=len(TIME)) for k in "ab"}}).write(
+        tmp_path / "one.csv"
+    )
+    posterior = load_posterior(study)
+    (sensor,) = posterior.model.sensors
+    assert (sensor.kind.value, sensor.filter.decimate) == ("field", 2)
+    np.testing.assert_array_equal(sensor.noise.sigma(0.5), [1e-5, 2e-5])
+    assert posterior.samples == 2 * len(TIME[::2])
+
+
+def test_the_noise_of_every_column_is_given(tmp_path, monkeypatch):
+    monkeypatch.setattr(Kind, "_known", dict(Kind._known))
+    with pytest.raises(InputError, match="got 3 numbers for 2 columns") as wrong:
+        load_posterior(study_of(tmp_path, sigma="[1e-5, 1e-5, 1e-5]"))
+    assert wrong.value.place == "sensors.other.field.sigma"
 
 
 def test_two_kinds_of_one_name_are_an_error():

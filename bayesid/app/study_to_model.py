@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bayesid._io.errors import InputError
-from bayesid.app.schema import RecordingSection, Study
+from bayesid.app.schema import OtherSensor, RecordingSection, Study
 from bayesid.app.study_to_encoders import encoder_noise
 from bayesid.app.user_files import run_user_file
 from bayesid.inference.posterior import Posterior
@@ -22,7 +22,7 @@ from bayesid.simulation.effects import AccelBias, Effect, RateBias, create
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Filter, Kind, Sensor
+from bayesid.simulation.sensors import Filter, Kind, Sensor, White
 
 __all__ = ["load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
 
@@ -169,7 +169,22 @@ def _sensors(study: Study) -> tuple[Sensor, ...]:
         )
     if attitude is not None:
         sensors.append(Sensor(Kind.ATTITUDE, attitude.noise, filter=Filter(attitude.low_pass, attitude.decimate)))
-    return tuple(sensors)
+    return (*sensors, *(_other_sensor(name, section) for name, section in study.sensors.other.items()))
+
+
+def _other_sensor(name: str, section: OtherSensor) -> Sensor:
+    """Return a sensor of a kind that a plugin has registered."""
+    place = f"sensors.other.{name}"
+    try:
+        kind = Kind.of(name)
+    except InputError as error:
+        raise error.within(place=place) from None
+    sigma = section.sigma if isinstance(section.sigma, tuple) else (section.sigma,) * kind.size
+    if len(sigma) != kind.size:
+        remedy = f"Give one number, or one for each of {', '.join(kind.axes)}"
+        raise InputError(f"got {len(sigma)} numbers for {kind.size} columns", place=f"{place}.sigma", remedy=remedy)
+    fitted = Filter(section.low_pass, section.decimate)
+    return Sensor(kind, White(sigma), mounting=section.mounting, position=section.position, filter=fitted)
 
 
 def _torque(study: Study, robot: Robot) -> TorqueSensor | None:

@@ -43,11 +43,12 @@ class Noise(Protocol):
 class White:
     """Noise whose standard deviation is given per sample."""
 
-    value: float | tuple[float, float, float]
+    value: float | tuple[float, ...]
 
     def sigma(self, interval: float) -> Floats:
-        """Return the given value, which does not depend on the interval."""
-        return np.broadcast_to(np.asarray(self.value, dtype=float), (3,)).copy()
+        """Return the given values, which do not depend on the interval; one number stands for three axes."""
+        given = np.asarray(self.value, dtype=float)
+        return given.copy() if given.ndim else np.full(3, given)
 
 
 @dataclass(frozen=True)

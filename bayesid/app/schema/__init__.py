@@ -8,7 +8,14 @@ not even NumPy before a body needs it, so that errors in the file are reported a
 
 from bayesid.app.schema.design_section import DesignLimits, DesignSection
 from bayesid.app.schema.robot_section import BodySection, LoadSection, OrbitSection, RobotSection
-from bayesid.app.schema.sensor_sections import AccelSensor, AttitudeSensor, EncoderSensor, RateSensor, SensorsSection
+from bayesid.app.schema.sensor_sections import (
+    AccelSensor,
+    AttitudeSensor,
+    EncoderSensor,
+    OtherSensor,
+    RateSensor,
+    SensorsSection,
+)
 from bayesid.app.schema.study_file import Study
 from bayesid.app.schema.study_sections import ModelSection, RecordingSection, UnknownsSection
 
@@ -22,6 +29,7 @@ __all__ = [
     "LoadSection",
     "ModelSection",
     "OrbitSection",
+    "OtherSensor",
     "RateSensor",
     "RecordingSection",
     "RobotSection",

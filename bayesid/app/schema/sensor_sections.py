@@ -12,6 +12,7 @@ from bayesid._io.errors import InputError
 from bayesid.app.schema.value_types import (
     ANGLE_SIGMA,
     Decimation,
+    Name,
     PerAxis,
     PerName,
     Position,
@@ -209,8 +210,32 @@ class TorqueSection(Section):
     sigma: Annotated[PerName, no_more_than(1e4, "N m")]
 
 
+class OtherSensor(Section):
+    """Section ``[sensors.other.NAME]``, a sensor of a kind that a plugin registers under that name (`Kind.register`).
+
+    Parameters
+    ----------
+    sigma : float or list of float
+        Standard deviation of white noise per sample, of all columns or of each, in the kind's unit.
+    position : (3,)
+        Position from the base origin, base axes [m].
+    mounting : (4,), optional
+        Quaternion from sensor to base axes.
+    low_pass : float, optional
+        Cut-off frequency of a low-pass filter, applied to samples and prediction alike [Hz].
+    decimate : int, optional
+        Decimation factor n, by which every n-th sample is kept, in samples and prediction alike.
+    """
+
+    sigma: Positive | tuple[Positive, ...]
+    position: Position = (0.0, 0.0, 0.0)
+    mounting: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    low_pass: Positive | None = None
+    decimate: Decimation = 1
+
+
 class SensorsSection(Section):
-    """Section ``[sensors]``, all sensors, with at least one of rate, accel and attitude.
+    """Section ``[sensors]``, all sensors, with at least one of the base.
 
     Parameters
     ----------
@@ -220,6 +245,8 @@ class SensorsSection(Section):
         Sensors of the joint torques; by default recorded torques are not used.
     encoder : EncoderSensor
         Sensors of the joint motion.
+    other : table of OtherSensor
+        Further sensors of the base by the names of their kinds.
     """
 
     rate: RateSensor | None = None
@@ -227,10 +254,11 @@ class SensorsSection(Section):
     attitude: AttitudeSensor | None = None
     torque: TorqueSection | None = None
     encoder: EncoderSensor = EncoderSensor()
+    other: Mapping[Name, OtherSensor] = {}
 
     @model_validator(mode="after")
     def _check_information(self) -> SensorsSection:
-        if self.rate is None and self.accel is None and self.attitude is None:
+        if self.rate is None and self.accel is None and self.attitude is None and not self.other:
             raise InputError(
                 "no sensor of the base is declared",
                 remedy="Add at least one of [sensors.rate], [sensors.accel], [sensors.attitude]",
