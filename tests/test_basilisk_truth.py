@@ -113,6 +113,7 @@ def test_basilisk_and_mujoco_agree(hidden: BasiliskHidden, tolerance: float) -> 
     np.testing.assert_allclose(truth.torque[1:-1], other.torque[1:-1], rtol=0.0, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_nothing_hidden_leaves_noise_and_finds_the_base(tmp_path: Path) -> None:
     file = write_basilisk_study(tmp_path, 10, manoeuvres=SHORT)
     posterior, optimum = maximise(load_posterior(Study.load(file)), np.random.default_rng(0))

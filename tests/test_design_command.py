@@ -98,7 +98,7 @@ def made(shared_problem, tmp_path_factory: pytest.TempPathFactory):
         interrupted.setattr(_Run, "minimise", stop)
         status, text = run("design", file, "--output", folder / "out", *EFFORT)
     assert status == 130
-    assert "goes on" in text
+    assert "continues" in text
     assert [item.name for item in (folder / "out").iterdir()] == ["search.json"]
     status, text = run("design", file, "--output", folder / "out", *EFFORT)
     assert status == 0, text

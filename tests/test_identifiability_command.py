@@ -61,6 +61,7 @@ def made(study: Path) -> tuple[dict, str, PdfText]:
     )
 
 
+@pytest.mark.slow
 def test_the_json_is_that_of_the_contract(made: tuple[dict, str, PdfText]) -> None:
     content = made[0]
     assert (content["standard_parameters"], content["base_parameters"], content["basis"]) == (30, 24, "fit")
@@ -114,6 +115,7 @@ def test_identify_agrees_on_every_direction_and_says_what_it_learnt(
         assert 1.0 - contraction["shrinkage"] == pytest.approx(1.0 - parameter["shrinkage"], rel=0.5)
 
 
+@pytest.mark.slow
 def test_the_report_holds_directions_parameters_and_structure(made: tuple[dict, str, PdfText]) -> None:
     content, text, report = made
     worst = content["directions"][0]["words"]

@@ -260,6 +260,7 @@ def test_the_optimum_is_reached_from_random_starts(planar_posterior, request):
     assert reached >= 0.95 * count
 
 
+@pytest.mark.slow
 def test_the_truth_is_covered_as_often_as_stated(planar_case, noisy):
     """Chi-square of the true base over 40 noises of one MuJoCo motion follows chi2(10).
 
