@@ -293,6 +293,21 @@ def check_in_amplitudes(effect: Effect, hook: str) -> None:
     np.testing.assert_array_equal(effect.amplitudes(jnp.asarray(effect.absent)), 0.0)
 
 
+def check_physical_bounds(effect: Effect, hook: str) -> None:
+    """One bound for each unit of the amplitudes, also of the linear form; tests/test_bounds.py looks at the sizes."""
+    bounds = effect.physical_bounds(PLAIN)
+    assert tuple(bound.unit for bound in bounds) == effect.amplitude_units
+    assert all(0.0 < bound.largest < np.inf for bound in bounds)
+    assert effect.in_amplitudes().physical_bounds(PLAIN) == bounds
+
+
+def check_amplitude_quantities(effect: Effect, hook: str) -> None:
+    """They are what `loads` returns, if not parameters, and vanish with the effect."""
+    quantities = effect.amplitude_quantities
+    assert len({name for name, _ in quantities}) == len(quantities)
+    assert effect.loads(jnp.asarray(effect.absent)).shape == (len(quantities),)
+
+
 def check_absent(effect: Effect, hook: str) -> None:
     assert effect.absent.shape == (len(effect.parameters),)
 
@@ -376,6 +391,8 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "instances": check_places,
     "longest_step": check_step,
     "quantities": check_quantities,
+    "amplitude_quantities": check_amplitude_quantities,
+    "physical_bounds": check_physical_bounds,
     "attach": check_attach,
     "starts": check_starts,
     "absent": check_absent,
@@ -387,7 +404,7 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "table": check_table,
     "body_tables": check_body_tables,
 }
-FRAMEWORK = {"uses", "constants", "bound"}
+FRAMEWORK = {"uses", "constants", "bound", "amplitude_units"}
 """What the simulation asks of an effect and no effect overrides."""
 
 PER_RECORDING = {"per_recording"}

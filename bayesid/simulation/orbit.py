@@ -15,10 +15,13 @@ from numpy.typing import ArrayLike
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 
-__all__ = ["EARTH", "Orbit", "OrbitState"]
+__all__ = ["EARTH", "EARTH_RADIUS", "Orbit", "OrbitState"]
 
 EARTH = 3.986004418e14
 """Earth's gravitational parameter [m3/s2]."""
+
+EARTH_RADIUS = 6.378137e6
+"""Earth's radius at the equator [m], where the ground is nearest to an orbit."""
 
 
 class OrbitState(NamedTuple):
@@ -85,6 +88,16 @@ class Orbit:
     def mean_motion(self) -> float:
         """Mean angular rate [rad/s]."""
         return float(np.sqrt(EARTH / self.radius**3))
+
+    @property
+    def perigee_altitude(self) -> float:
+        """Smallest altitude above the equatorial radius [m]."""
+        return self.radius * (1.0 - self.eccentricity) - EARTH_RADIUS
+
+    @property
+    def perigee_speed(self) -> float:
+        """Largest speed along the orbit [m/s]."""
+        return float(np.sqrt(EARTH / self.radius * (1.0 + self.eccentricity) / (1.0 - self.eccentricity)))
 
     def state(self, time: ArrayLike, argument_of_latitude: float = 0.0) -> OrbitState:
         """Return the state of the orbit.

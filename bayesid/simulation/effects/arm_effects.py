@@ -16,8 +16,10 @@ from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.log_cholesky import LOG_CHOLESKY, upper_cholesky, vector_from_factor
 from bayesid.robot.robot import Robot
+from bayesid.robot.robot_size import RobotSize, link_radius
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Quantity
+from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.placed import Placed
 from bayesid.simulation.effects.register import register
 
@@ -32,6 +34,17 @@ CHANGES = (
     *(Quantity(f"inertia.{axes}", "kg m2") for axes in ("xx", "yy", "zz", "xy", "xz", "yz")),
 )
 """Reported changes of a link, with the inertia about the centre of mass in link axes."""
+
+LINEAR_CHANGES = (
+    Quantity("mass", "kg"),
+    *(Quantity(f"first.{axis}", "kg m") for axis in "xyz"),
+    *(Quantity(f"second.{axes}", "kg m2") for axes in ("xx", "xy", "yy", "xz", "yz", "zz")),
+)
+"""Changes in which the motion is linear, in the order of `InertialParameters.vector`: mass, first moment, and inertia
+about the link's origin, link axes."""
+
+LINK_ERROR = 0.5
+"""Largest error of a link's mass relative to it; assumed, for harness and covers that a drawing leaves out."""
 
 
 class _OnLink(Placed):
@@ -80,6 +93,11 @@ class _OnLink(Placed):
         """Reported changes of mass, centre of mass and inertia."""
         return CHANGES
 
+    @property
+    def amplitude_quantities(self) -> Sequence[Quantity]:
+        """Changes of the ten linear parameters, which are the coefficients that `loads` returns."""
+        return LINEAR_CHANGES
+
     def report(self, values: Array) -> Array:
         """Return the differences of the link from the nominal link."""
         factor, nominal = self._attached
@@ -116,6 +134,13 @@ class Payload(_OnLink):
         "in another posture, so that mass, centre of mass and inertia act apart."
     )
 
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the moments of a body as heavy and as large as the robot without it, fixed at the end of the link."""
+        size = RobotSize.of(model.robot)
+        reach = link_radius(model.robot, self.place) + size.radius
+        body = f"A captured body is at most as heavy as the robot, {three_digits(size.mass)} kg"
+        return _moment_bounds(size.mass, reach, body, f"within {three_digits(reach)} m of the link's origin")
+
 
 @register
 class LinkInertia(_OnLink):
@@ -128,3 +153,20 @@ class LinkInertia(_OnLink):
         "links act apart only if the joint between them moves alone."
     )
     spread = 0.1
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the moments of half of the link's mass, misplaced by the link's own extent."""
+        mass = LINK_ERROR * model.robot.link(self.place).inertial.mass
+        radius = link_radius(model.robot, self.place)
+        share = f"{100.0 * LINK_ERROR:g} % of the link's mass, {three_digits(mass)} kg"
+        error = f"A drawing misses or misplaces at most {share}"
+        return _moment_bounds(mass, radius, error, f"within the link's extent of {three_digits(radius)} m")
+
+
+def _moment_bounds(mass: float, reach: float, what: str, where: str) -> tuple[PhysicalBound, ...]:
+    """Return the bounds of mass, first moment and inertia about the link's origin of a mass within a reach of it."""
+    return (
+        PhysicalBound("kg", mass, f"{what}."),
+        PhysicalBound("kg m", mass * reach, f"{what}, {where}."),
+        PhysicalBound("kg m2", mass * reach**2, f"{what}, {where}."),
+    )

@@ -19,6 +19,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.displaced_motion import Displaced, DisplacedMotion
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior
+from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.effects.register import register
 
@@ -26,6 +27,15 @@ if TYPE_CHECKING:
     from bayesid.simulation.model import Model
 
 __all__ = ["EncoderOffset", "JointFlexibility", "JointLatency"]
+
+LARGEST_OFFSET, LARGEST_OFFSET_OF_SLIDE = 0.1, 0.05
+"""Largest plausible error of a joint's zero [rad, m]; assumed, since the eye would see more."""
+
+LARGEST_DELAY = 1.0
+"""Largest plausible delay of a time stamp [s], a cycle of slow telemetry."""
+
+SOFTEST, STRONGEST_DAMPING = 0.1, 0.2
+"""Lowest plausible frequency of a joint with what hangs on it [Hz], and largest damping ratio; assumed."""
 
 OFFSET_STEP = 0.02
 """Joint offset at which the tables are sampled for a quadratic [rad or m], with an error below 1e-5 at 0.03 rad."""
@@ -48,6 +58,14 @@ class EncoderOffset(DisplacedMotion, OnJoint):
     def __init__(self, place: str = "", sigma: float = 0.02) -> None:
         super().__init__(place)
         self.parameters = (Parameter("offset", "rad", sigma),)
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return an error of the zero that the eye would see; that of a slide is in metres."""
+        if model.robot.joints[self.index_in(model.robot)].kind == "prismatic":
+            reason = f"A slide whose zero is wrong by more than {LARGEST_OFFSET_OF_SLIDE:g} m is seen with the eye."
+            return (PhysicalBound("rad", LARGEST_OFFSET_OF_SLIDE, reason),)
+        reason = f"A joint whose zero is wrong by more than {LARGEST_OFFSET:g} rad, six degrees, is seen with the eye."
+        return (PhysicalBound("rad", LARGEST_OFFSET, reason),)
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
         """Return the first and second differences in the position of the joint."""
@@ -91,6 +109,10 @@ class JointLatency(DisplacedMotion):
 
     def __init__(self, sigma: float = 0.2) -> None:
         self.parameters = (Parameter("delay", "s", sigma),)
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return a cycle of slow telemetry."""
+        return (PhysicalBound("s", LARGEST_DELAY, "A slow telemetry stamps its samples once in a second."),)
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
         """Return the coefficients of the quartic through five samples in time."""
@@ -143,6 +165,15 @@ class JointFlexibility(DisplacedMotion, OnJoint):
         """Return the compliance and the lag, each times the inertia beyond the joint at zero."""
         omega = 2.0 * jnp.pi * values[0]
         return jnp.stack([omega**-2, 2.0 * values[1] * omega**-3])
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the compliance of the softest joints, and the lag of strong damping in them."""
+        omega = 2.0 * float(np.pi) * SOFTEST
+        soft = f"Only the longest arms with heavy payloads swing as slowly as {SOFTEST:g} Hz"
+        return (
+            PhysicalBound("s2", omega**-2, f"{soft}."),
+            PhysicalBound("s3", 2.0 * STRONGEST_DAMPING * omega**-3, f"{soft}, with {STRONGEST_DAMPING:g} of damping."),
+        )
 
     def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
         """Return the displacements by the deflection under the joint's torque, and by its derivatives."""

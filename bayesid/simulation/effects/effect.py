@@ -20,6 +20,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.simulation.effects.effect_parameters import Parameter, Quantity
 from bayesid.simulation.effects.instant import Instant, Modes, Readings, Resonance, Wrench
+from bayesid.simulation.effects.physical_bound import PhysicalBound, bounds_of_priors
 
 if TYPE_CHECKING:
     from bayesid.recording.joint_motion import Motion
@@ -119,6 +120,34 @@ class Effect:
     def amplitudes(self, values: Array) -> Array:
         """Return the parameters of `in_amplitudes` for values of the parameters."""
         return values
+
+    @property
+    def amplitude_quantities(self) -> Sequence[Quantity]:
+        """Amplitudes that vanish with the effect, in which it is linear where it is small.
+
+        By default they are the parameters of `in_amplitudes` that are zero only where the effect is absent; the others
+        are shapes, such as a frequency or a place.
+        """
+        return [Quantity(parameter.name, parameter.unit) for parameter in self._amplitudes]
+
+    @property
+    def amplitude_units(self) -> tuple[str, ...]:
+        """Units of `amplitude_quantities`, each once; the amplitudes of one unit share a scale."""
+        return tuple(dict.fromkeys(quantity.unit for quantity in self.amplitude_quantities))
+
+    @property
+    def _amplitudes(self) -> list[Parameter]:
+        linear = self.in_amplitudes()
+        pairs = zip(linear.parameters, linear.absent, strict=True)
+        return [parameter for parameter, absent in pairs if parameter.is_amplitude or absent != parameter.mean]
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the largest size of the amplitudes that is plausible, one bound for each of `amplitude_units`.
+
+        By default it is the size at three standard deviations of the priors. An effect overrides this where the robot's
+        mass and size, the orbit or the class of instrument says more.
+        """
+        return bounds_of_priors(self._amplitudes)
 
     def starts_near(self, resonances: Sequence[Resonance], alone: bool) -> Sequence[Floats]:
         """Return the starting points of a fit of a vibration, by default `starts`.

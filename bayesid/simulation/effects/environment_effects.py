@@ -9,10 +9,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.robot.robot_size import RobotSize
+from bayesid.simulation.atmosphere import largest_density
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior
 from bayesid.simulation.effects.instant import Instant, Wrench
+from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.register import register
 
 if TYPE_CHECKING:
@@ -25,6 +29,30 @@ EARTH_FIELD = 3.12e-5 * 6371.2e3**3 / 3.986004418e14
 
 REACH = 2.0
 """Largest distance of a centre of pressure from the base origin along each axis [m]."""
+
+DRAG_COEFFICIENT = 2.2
+"""Drag coefficient of a spacecraft in free molecular flow, the value in general use (Vallado 2013, chapter 8)."""
+
+SUNLIGHT = 4.56e-6
+"""Pressure of sunlight on an absorbing surface at the Earth's distance [Pa] (Montenbruck and Gill 2000, 3.4)."""
+
+MIRROR = 2.0
+"""Factor of that pressure on a perfect mirror that faces the Sun, which is one plus the reflectivity."""
+
+DIPOLE = 1.0e-2
+"""Residual dipole per mass of a spacecraft that does not spin and was built without regard to magnetism [A m2/kg].
+
+It is that of class III of NASA SP-8018, Spacecraft Magnetic Torques, 1969.
+"""
+
+THRUST = 0.01
+"""Acceleration that a spacecraft's thruster for attitude control gives it [m/s2]; assumed, as of 20 N on 2 t."""
+
+LEAK = 0.01
+"""Largest leak of a valve relative to its thrust; assumed, since a larger one would soon empty the tank."""
+
+BRAKING_TIME = 10.0
+"""Shortest time within which a base that is called free may lose its rotation [s]."""
 
 
 @register
@@ -85,6 +113,15 @@ class _Pressure(Effect):
         """Return the force and its product with the lever."""
         return jnp.concatenate([values[:1], values[0] * values[1:]])
 
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the pressure on all of the robot's area, and on its area times the distance from the base origin."""
+        return _pressure_bounds(type(self), model)
+
+    @staticmethod
+    def largest_pressure(model: Model) -> tuple[float, str]:
+        """Return the largest pressure on a surface that faces it [Pa], and the start of a sentence that names it."""
+        raise NotImplementedError
+
     @staticmethod
     def direction(instant: Instant) -> Array:
         """Return the direction of the force in orbit axes."""
@@ -118,10 +155,28 @@ class _LinearPressure(Effect):
         """Name of the pressure effect."""
         return self.kind.name
 
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the bounds of the pressure effect."""
+        return _pressure_bounds(self.kind, model)
+
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the force and its torque about the base origin."""
         unit = instant.to_base(self.kind.direction(instant))
         return Wrench(values[0] * unit, jnp.cross(values[1:], unit))
+
+
+def _pressure_bounds(kind: type[_Pressure], model: Model) -> tuple[PhysicalBound, ...]:
+    """Return the largest force, and the largest torque about the base origin, of a pressure on the whole robot."""
+    pressure, reason = kind.largest_pressure(model)
+    size = RobotSize.of(model.robot)
+    lever = size.area_moment / size.area
+    presses = f"{reason} presses on {three_digits(size.area)} m2"
+    return (
+        PhysicalBound("N", pressure * size.area, f"{presses}."),
+        PhysicalBound(
+            "N m", pressure * size.area_moment, f"{presses} at {three_digits(lever)} m from the base origin."
+        ),
+    )
 
 
 @register
@@ -141,6 +196,19 @@ class AerodynamicDrag(_Pressure):
 
     def __init__(self, force: float = 5.0e-3, spread: float = 1.5) -> None:
         super().__init__(force, spread)
+
+    @staticmethod
+    def largest_pressure(model: Model) -> tuple[float, str]:
+        """Return the drag per area at the lowest point of the orbit in the densest air there."""
+        if model.orbit is None:
+            raise InputError("drag of the upper atmosphere exists only in orbit", remedy="Give the orbit")
+        altitude, speed = model.orbit.perigee_altitude, model.orbit.perigee_speed
+        density = largest_density(altitude)
+        return (
+            0.5 * density * speed**2 * DRAG_COEFFICIENT,
+            f"Air of {density:.2g} kg/m3, the densest at {1e-3 * altitude:.0f} km at solar maximum, met at "
+            f"{1e-3 * speed:.2f} km/s with a drag coefficient of {DRAG_COEFFICIENT:g},",
+        )
 
     @staticmethod
     def direction(instant: Instant) -> Array:
@@ -176,6 +244,11 @@ class SolarPressure(_Pressure):
         super().__init__(force, spread)
 
     @staticmethod
+    def largest_pressure(model: Model) -> tuple[float, str]:
+        """Return the pressure of sunlight on a mirror that faces the Sun."""
+        return MIRROR * SUNLIGHT, f"Sunlight of {1e6 * SUNLIGHT:.3g} micropascal, which a mirror reflects back,"
+
+    @staticmethod
     def direction(instant: Instant) -> Array:
         """Return the direction away from the Sun."""
         return -instant.environment.sun
@@ -204,6 +277,15 @@ class MagneticDipole(Effect):
 
     def __init__(self, sigma: float = 10.0) -> None:
         self.parameters = tuple(Parameter(axis, "A m2", sigma) for axis in "xyz")
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the dipole of a spacecraft of the robot's mass that was built without regard to magnetism."""
+        mass = model.robot.mass
+        reason = (
+            "A spacecraft that was built without regard to magnetism keeps 1 A m2 per 100 kg (NASA SP-8018, class "
+            f"III); the robot has {three_digits(mass)} kg."
+        )
+        return (PhysicalBound("A m2", DIPOLE * mass, reason),)
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the torque mu x B, with B = -B0 (Re/r)^3 (3 (n.u) u - n)."""
@@ -234,6 +316,19 @@ class ThrusterLeak(Effect):
             for axis in "xyz"
         )
 
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return one per cent of the thrust for a robot of this mass, and its torque at the edge of the base."""
+        size = RobotSize.of(model.robot)
+        force = LEAK * THRUST * size.mass
+        thrust = f"{three_digits(THRUST * size.mass)} N, which accelerates the robot by {THRUST:g} m/s2"
+        leak = f"A valve leaks at most {100.0 * LEAK:g} % of {thrust}"
+        return (
+            PhysicalBound("N", force, f"{leak}."),
+            PhysicalBound(
+                "N m", force * size.radius, f"{leak}, at the base's radius of {three_digits(size.radius)} m."
+            ),
+        )
+
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the parameters, which are force and torque."""
         return Wrench(values[:3], values[3:])
@@ -252,6 +347,19 @@ class RotationalDrag(Effect):
 
     def __init__(self, sigma: float = 0.1) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the coefficient that stops the base within ten seconds.
+
+        In orbit, air and eddy currents brake some million times less; what may act like this there is a control of the
+        rate that was taken to be off.
+        """
+        inertia = RobotSize.of(model.robot).inertia
+        reason = (
+            f"A base of {three_digits(inertia)} kg m2 that loses its rotation within less than {BRAKING_TIME:g} s "
+            "would not be called free."
+        )
+        return (PhysicalBound("N m s", inertia / BRAKING_TIME, reason),)
 
     def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
         """Return the torque, the negative product of rates and coefficients."""

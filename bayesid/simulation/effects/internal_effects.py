@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -11,10 +11,15 @@ from jax import Array
 
 from bayesid._math.arrays import Floats
 from bayesid.robot.robot import Robot
+from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity, coordinates_of
 from bayesid.simulation.effects.instant import Instant, Modes, Resonance
+from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.register import register
+
+if TYPE_CHECKING:
+    from bayesid.simulation.model import Model
 
 __all__ = ["FlexibleAppendage", "FuelSlosh", "WheelMomentum"]
 
@@ -42,6 +47,19 @@ TANK_DISTANCE = 0.4
 TANK_CORNERS = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, -1.0, 1.0]])
 """Directions of these positions, which are the corners of a tetrahedron."""
 
+ROTORS, RIM_SPEED, RIM_RADIUS = 0.01, 100.0, 0.05
+"""Mass of all rotors relative to the robot's, speed of their rims [m/s], and radius relative to the base's length.
+
+They are assumed: for a base of 3 t and 5 m they give more than twice what four large wheels of 68 N m s hold, for one
+of 4 kg and 0.3 m what four small ones of 15 mN m s do.
+"""
+
+APPENDAGES = 0.1
+"""Mass of all panels, booms and antennas that swing, relative to the robot's; assumed."""
+
+FUEL = 0.3
+"""Mass of fuel that sloshes relative to the base's; assumed, if half of the base is fuel and 60 % of that sloshes."""
+
 
 @register
 class WheelMomentum(Effect):
@@ -61,6 +79,16 @@ class WheelMomentum(Effect):
 
     def __init__(self, sigma: float = 1.0) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the momentum of all wheels that a robot of this mass and size carries, at full speed."""
+        size = RobotSize.of(model.robot)
+        radius = RIM_RADIUS * size.length
+        reason = (
+            f"Wheels whose rotors are {100.0 * ROTORS:g} % of {three_digits(size.mass)} kg run with {RIM_SPEED:g} m/s "
+            f"at their rims of {radius:.2g} m radius."
+        )
+        return (PhysicalBound("N m s", ROTORS * size.mass * RIM_SPEED * radius, reason),)
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return the momentum of the wheels, and a zero derivative."""
@@ -123,6 +151,18 @@ class FlexibleAppendage(_Vibration):
         sign = jnp.sign(coupling[3 + jnp.argmax(jnp.abs(coupling[3:]))])
         return jnp.concatenate([values[:2], jnp.linalg.norm(coupling[3:])[None], sign * coupling])
 
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the roots of the mass that swings and of its inertia at the edge of the base about the base origin."""
+        size = RobotSize.of(model.robot)
+        root = float(np.sqrt(APPENDAGES * size.mass))
+        swings = f"Panels and booms that swing are at most {100.0 * APPENDAGES:g} % of {three_digits(size.mass)} kg"
+        return (
+            PhysicalBound("sqrt(kg)", root, f"{swings}."),
+            PhysicalBound(
+                "sqrt(kg) m", root * size.radius, f"{swings}, at the base's radius of {three_digits(size.radius)} m."
+            ),
+        )
+
     def modes(self, values: Array) -> Modes:
         """Return the single mode."""
         return Modes(2.0 * jnp.pi * values[:1], values[1:2], values[None, 2:5], values[None, 5:8], jnp.zeros((1, 3, 3)))
@@ -161,6 +201,12 @@ class FuelSlosh(_Vibration):
     def absent(self) -> Floats:
         """Values with zero mass and all others at the middle of the prior."""
         return np.array([0.0, *(parameter.mean for parameter in self.parameters[1:])])
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the fuel that can slosh in a base of this mass."""
+        mass = RobotSize.of(model.robot).base_mass
+        reason = f"At most half of a base of {three_digits(mass)} kg is fuel, of which at most 60 % sloshes."
+        return (PhysicalBound("kg", FUEL * mass, reason),)
 
     def attach(self, robot: Robot) -> Self:
         """Return the effect with the position of the tank bounded by the spacecraft."""

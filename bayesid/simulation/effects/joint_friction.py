@@ -9,8 +9,10 @@ import jax.numpy as jnp
 from jax import Array
 
 from bayesid.robot.robot import Robot
+from bayesid.robot.robot_size import beyond_joint
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter
+from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.effects.register import register
 
@@ -24,6 +26,15 @@ STANDSTILL = 5e-4
 
 REVERSAL = 1e-4
 """Joint speed over which the formula reverses dry friction [rad/s, m/s], well below `STANDSTILL`."""
+
+DRIVE = 1.0
+"""Acceleration that the strongest drives give to what a joint carries, stretched out [rad/s2, m/s2]; assumed."""
+
+SPEED = 0.1
+"""Joint speed at which viscous friction may take all of the drive's torque [rad/s, m/s]; assumed."""
+
+SENSOR_ERROR = 0.1
+"""Largest constant error of a torque sensor, relative to the drive's torque; assumed."""
 
 
 class _OnTorque(OnJoint):
@@ -45,6 +56,19 @@ class _OnTorque(OnJoint):
     def friction(self, values: Array, velocity: Array) -> Array:
         """Return the torque of the effect in the column of its joint, and zero in all others."""
         return jnp.zeros_like(velocity).at[:, self.index].set(self.extra(values, velocity[:, self.index]))
+
+    def drive(self, robot: Robot) -> tuple[float, str]:
+        """Return the largest torque [N m], or force [N], of the joint's drive, and words that say where it is from."""
+        index = self.index_in(robot)
+        mass, inertia = beyond_joint(robot, index)
+        if robot.joints[index].kind == "prismatic":
+            force = three_digits(DRIVE * mass)
+            return (
+                DRIVE * mass,
+                f"the {force} N that accelerate the {three_digits(mass)} kg beyond it by {DRIVE:g} m/s2",
+            )
+        torque, load = three_digits(DRIVE * inertia), three_digits(inertia)
+        return DRIVE * inertia, f"the {torque} N m that accelerate the {load} kg m2 beyond it by {DRIVE:g} rad/s2"
 
     def extra(self, values: Array, velocity: Array) -> Array:
         """Return the additional reading of the sensor at joint speeds (T,), shape (T,)."""
@@ -70,6 +94,15 @@ class JointFriction(_OnTorque):
         super().__init__(place)
         self.parameters = (Parameter("coulomb", "N m", coulomb), Parameter("viscous", "N m s", viscous))
 
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the torque of the joint's drive, which could move nothing against more friction."""
+        torque, drive = self.drive(model.robot)
+        moves = f"A joint moves only if its friction takes less than {drive}"
+        return (
+            PhysicalBound("N m", torque, f"{moves}."),
+            PhysicalBound("N m s", torque / SPEED, f"{moves}, and does so at a speed of {SPEED:g}."),
+        )
+
     def extra(self, values: Array, velocity: Array) -> Array:
         """Return the motor torque that overcomes friction."""
         return values[0] * jnp.tanh(velocity / REVERSAL) + values[1] * velocity
@@ -88,6 +121,12 @@ class TorqueBias(_OnTorque):
     def __init__(self, place: str = "", sigma: float = 2.0) -> None:
         super().__init__(place)
         self.parameters = (Parameter("offset", "N m", sigma),)
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return a tenth of the torque of the joint's drive."""
+        torque, drive = self.drive(model.robot)
+        reason = f"The zero of a torque sensor is wrong by at most {100.0 * SENSOR_ERROR:g} % of {drive}."
+        return (PhysicalBound("N m", SENSOR_ERROR * torque, reason),)
 
     def extra(self, values: Array, velocity: Array) -> Array:
         """Return the constant error."""

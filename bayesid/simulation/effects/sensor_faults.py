@@ -13,9 +13,11 @@ import jax.numpy as jnp
 from jax import Array
 
 from bayesid._math.hermite import hermite
+from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter
 from bayesid.simulation.effects.instant import Instant, Readings
+from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.register import register
 from bayesid.simulation.sensors import Kind
 
@@ -36,6 +38,17 @@ __all__ = [
     "RateScale",
     "SensorFault",
 ]
+
+
+RATE_BIAS, ACCEL_BIAS = 1.745e-3, 0.049
+"""Constant errors of the poorest instruments [rad/s, m/s2]: 0.1 degree per second and 5 milli-g.
+
+They are the largest of the grades in El-Sheimy and Youssef, Inertial sensors technologies for navigation applications,
+Satellite Navigation 1:2, 2020, table 1.
+"""
+
+WARM_UP = 600.0
+"""Time within which an instrument that warms up changes by all of its constant error [s]; assumed."""
 
 
 class SensorFault(Effect):
@@ -69,6 +82,8 @@ class _Axes(SensorFault):
 
     unit: ClassVar[str]
     sigma: ClassVar[float]
+    largest: ClassVar[float]
+    reason: ClassVar[str]
 
     def __init__(self, sigma: float | tuple[float, float, float] | None = None) -> None:
         given = self.sigma if sigma is None else sigma
@@ -76,6 +91,10 @@ class _Axes(SensorFault):
         self.parameters = tuple(
             Parameter(axis, self.unit, float(value)) for axis, value in zip("xyz", values, strict=True)
         )
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the bound that the class states for instruments of the poorest grade."""
+        return (PhysicalBound(self.unit, self.largest, self.reason),)
 
 
 class _Bias(_Axes):
@@ -100,6 +119,7 @@ class _Drift(_Axes):
 
 class _Scale(_Axes):
     unit = "1"
+    largest, reason = 0.1, "The scale of a sensor without calibration is within a tenth of its nominal value."
     separated_by = (
         "It grows with the reading: move the other way and faster, with larger readings about each axis in turn."
     )
@@ -110,6 +130,7 @@ class _Scale(_Axes):
 
 class _Misalignment(_Axes):
     unit = "rad"
+    largest, reason = 0.1, "A sensor that was mounted without a measurement of its axes is within six degrees of them."
     separated_by = "It mixes the axes: turn about one axis at a time, with large readings."
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
@@ -125,6 +146,10 @@ class _Latency(SensorFault):
     def __init__(self, sigma: float = 0.2) -> None:
         self.parameters = (Parameter("delay", "s", sigma),)
 
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return a cycle of slow telemetry."""
+        return (PhysicalBound("s", 1.0, "A slow telemetry stamps its samples once in a second."),)
+
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         # written as a change of the reading
         return reading + _interpolate(time - values[0], time, reading) - reading
@@ -137,6 +162,7 @@ class RateBias(_Bias):
     name = "rate-bias"
     summary = "The rate sensor reads a constant when the base is at rest."
     sensor, unit, sigma = Kind.RATE, "rad/s", 5.0e-5
+    largest, reason = RATE_BIAS, "Gyroscopes of the poorest grade are wrong by 0.1 degree per second."
 
 
 @register
@@ -146,6 +172,7 @@ class AccelBias(_Bias):
     name = "accel-bias"
     summary = "The accelerometer reads a constant in free fall."
     sensor, unit, sigma = Kind.ACCEL, "m/s2", 1.0e-4
+    largest, reason = ACCEL_BIAS, "Accelerometers of the poorest grade are wrong by 5 milli-g."
 
 
 @register
@@ -155,6 +182,8 @@ class RateDrift(_Drift):
     name = "rate-drift"
     summary = "The rate sensor's zero wanders steadily, as when it warms up."
     sensor, unit, sigma = Kind.RATE, "rad/s2", 1.0e-6
+    largest = RATE_BIAS / WARM_UP
+    reason = "Gyroscopes of the poorest grade gain 0.1 degree per second within ten minutes of warming up."
 
 
 @register
@@ -164,6 +193,8 @@ class AccelDrift(_Drift):
     name = "accel-drift"
     summary = "The accelerometer's zero wanders steadily, as when it warms up."
     sensor, unit, sigma = Kind.ACCEL, "m/s3", 2.0e-6
+    largest = ACCEL_BIAS / WARM_UP
+    reason = "Accelerometers of the poorest grade gain 5 milli-g within ten minutes of warming up."
 
 
 @register
@@ -215,6 +246,12 @@ class AccelPosition(_Axes):
         "It grows with the base's rate squared and angular acceleration: turn the base faster about each axis in turn."
     )
     sensor, unit, sigma = Kind.ACCEL, "m", 0.05
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the radius of the base, somewhere within which the accelerometer is."""
+        radius = RobotSize.of(model.robot).radius
+        reason = f"An accelerometer of the base is somewhere within its radius of {three_digits(radius)} m."
+        return (PhysicalBound(self.unit, radius, reason),)
 
     def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
         """Return the acceleration by rotation over the error of position."""
