@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bayesid.app.compilation_cache import keep_compiled
-from studies.common.command import Command
+from studies.common.command import TRIALS, Command
 from studies.sensors.report import write_report
 from studies.sensors.result import REALISTIC, Effort, Result, compute
 
@@ -30,7 +30,7 @@ def run(
     full: bool = False,
     seed: int = 1,
     effort: Effort | None = None,
-    store: Path | None = None,
+    trials: Path | None = None,
     workers: int = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
@@ -44,12 +44,12 @@ def run(
         Seed of all random numbers.
     effort : Effort, optional
         Effort in place of what ``full`` says.
-    store, workers
+    trials, workers
         File and number of processes of the nonlinear fits; see `studies.common.monte_carlo.run_trials`.
     progress : callable
         Receives a line on what is being done.
     """
-    return compute(effort or (FULL if full else SMALL), seed, store, workers, progress)
+    return compute(effort or (FULL if full else SMALL), seed, trials, workers, progress)
 
 
 COMMAND = Command(
@@ -57,10 +57,7 @@ COMMAND = Command(
     "Verify what the paper expects of noise and sensors.",
     full="take all levels of noise, enough draws, and nonlinear fits: minutes",
     seed=1,
-    extra={
-        "--store": {"type": Path, "help": "file that keeps the nonlinear fits, for an interrupted run"},
-        "--workers": {"type": int, "default": 1, "help": "number of processes of the nonlinear fits"},
-    },
+    extra=TRIALS,
 )
 
 
@@ -68,5 +65,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     options = COMMAND.parse(arguments)
     keep_compiled()
-    result = run(full=options.full, seed=options.seed, store=options.store, workers=options.workers, progress=print)
+    result = run(full=options.full, seed=options.seed, trials=options.trials, workers=options.workers, progress=print)
     write_report(result, options.output)

@@ -90,7 +90,7 @@ class Result:
     seconds: float
 
 
-def compute(effort: Effort, seed: int, store: Path | None, workers: int, progress: Callable[[str], None]) -> Result:
+def compute(effort: Effort, seed: int, trials: Path | None, workers: int, progress: Callable[[str], None]) -> Result:
     """Fly, treat and estimate; see `studies.sensors.run`."""
     began = time.perf_counter()
     progress("flights of the independent simulator, Jacobian")
@@ -111,7 +111,7 @@ def compute(effort: Effort, seed: int, store: Path | None, workers: int, progres
     elsewhere = draws.over(free)
     regressions = {name: regress(elsewhere, chosen[name]) for name in regressed}
     fits = {LIKELIHOOD: effort.likelihood_fits, PAPER: effort.paper_fits}
-    refits = refit_all(regressed, fits, seed, store, workers, lambda text: progress(f"nonlinear fits: {text}"))
+    refits = refit_all(regressed, fits, seed, trials, workers, lambda text: progress(f"nonlinear fits: {text}"))
     standard = chosen.get(REALISTIC, next(iter(chosen.values())))
     return Result(
         flight,
