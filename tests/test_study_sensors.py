@@ -17,7 +17,7 @@ from studies.sensors.report import write_report
 from studies.sensors.result import REALISTIC
 from studies.sensors.setting import Noise, fly, levels, motion
 from studies.sensors.treatments import Differences, LowPass, Polynomial, SavitzkyGolay, SmoothingSpline, Wiener
-from studies.sensors.weights import alternating, as_read, constant, integral, integrated, integrated_whole
+from studies.sensors.weights import as_read, constant, integral, integrated, integrated_whole
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def test_the_rule_is_exact_for_lines_and_blind_to_alternation_alone():
     time = INTERVAL * np.arange(41)
     rule = integral(time)
     np.testing.assert_allclose(rule @ (2.0 + time), 2.0 * time[1:] + 0.5 * time[1:] ** 2)
-    blind = alternating(41)
+    blind = np.where(np.arange(41) % 2, -1.0, 1.0) / np.sqrt(41)
     np.testing.assert_allclose(rule @ blind, 0.0, atol=1e-15)
     # the whole covariance undoes the sum: all information but the blind direction's
     kept = rule.T @ np.linalg.solve(rule @ rule.T, rule)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.report.figures import corner
 from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_legend, styled, wide_figure
 from studies.base_body import paper
@@ -15,8 +15,6 @@ from studies.common.ets7 import BASE
 from studies.common.quantities import LABELS, MASS, MOMENTS
 
 __all__ = ["draw"]
-
-Floats = NDArray[np.floating]
 
 
 def draw(result: BaseBody) -> dict[str, Figure]:

@@ -11,8 +11,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge, triangular
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.noise_changes import with_manoeuvres
@@ -27,8 +27,6 @@ from studies.base_body.setting import planned
 from studies.common.models import ARM_SPREAD, base_model
 
 __all__ = ["ACCEL_BIAS", "ARM", "INITIAL_RATE", "STAR", "TILT", "Information"]
-
-Floats = NDArray[np.floating]
 
 KINDS = (Kind.RATE, Kind.ACCEL, Kind.ATTITUDE)
 """Sensors whose information is computed."""

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference.mode import fit
 from bayesid.inference.noise_changes import with_manoeuvres
@@ -24,8 +24,6 @@ from studies.common.ets7 import ets7, excitation
 from studies.common.models import base_model
 
 __all__ = ["NoiseFree", "guess_model", "identify_exact", "run_noise_free"]
-
-Floats = NDArray[np.floating]
 
 WEIGHT = 1e-5
 """Standard deviation that weights a rate [rad/s] and an acceleration [m/s2]; the paper weights its SI units alike."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.inference import Identification
 from bayesid.simulation.sensors import Kind, StarTracker
 from studies.base_body import paper
@@ -22,8 +22,6 @@ from studies.common.models import ARM_SPREAD
 from studies.common.quantities import MASS
 
 __all__ = ["GRADES", "BaseBody", "compute"]
-
-Floats = NDArray[np.float64]
 
 GRADES = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 """Noise per sample of the accelerometers of section 4.3 [m/s2]; its "10e-5" is read as 1e-5."""

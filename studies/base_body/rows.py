@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_quantity, format_unit
 from bayesid.simulation.sensors import Kind
@@ -19,7 +19,6 @@ from studies.common.quantities import HEADINGS, MASS, MOMENTS
 __all__ = ["arm_table", "case_table", "goal_rows", "grade_table", "gradient_numbers", "poor_numbers"]
 __all__ += ["posterior_table", "printed_table", "reading_sentences", "reading_table", "sampler_sentences"]
 
-Floats = NDArray[np.float64]
 Table = tuple[list[str], list[list[str]]]
 
 GOAL = 1e-6
@@ -35,8 +34,8 @@ def goal_rows(result: BaseBody) -> list[list[str]]:
     arm_exact, arm_known = result.grades["exact"], result.grades["5 %"]
     rows = [
         [
-            f"Is every parameter within {format_number(GOAL)} of the truth without noise? The paper's results are "
-            "within 10⁻⁴ to 6 × 10⁻², and within 0.5 with the poorly exciting manoeuvre.",
+            f"Is every parameter within {format_number(GOAL)} of the truth without noise? The paper's errors are "
+            "10⁻⁴ to 6 × 10⁻², and up to 0.5 with the poorly exciting manoeuvre.",
             f"{'Yes' if worst < GOAL else 'No'}: the worst error of {len(exact)} cases is {format_number(worst, 2)}.",
         ],
         [

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference import Identification
 from bayesid.inference.identification import identify
@@ -26,8 +26,6 @@ from studies.common.flight import smoothed
 from studies.common.models import base_model
 
 __all__ = ["encoder_grades", "sample_posterior"]
-
-Floats = NDArray[np.float64]
 
 LONGEST = 500
 """Largest number of steps of the ensembles."""

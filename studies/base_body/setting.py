@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.design.designed import sample_times
 from bayesid.inference.simulated_recordings import blank_channels
 from bayesid.recording.joint_motion import Excitation
@@ -17,8 +17,6 @@ from studies.base_body import paper
 from studies.common.ets7 import BASE, INTERVAL, TIP_RATE, TIP_SPEED, ets7, excitation, tip_of
 
 __all__ = ["POOR", "heavy_arm", "limits_broken", "planned", "slowest", "tip_speed"]
-
-Floats = NDArray[np.float64]
 
 POOR = np.array([0.68, -0.03, 1.04, -0.53, 1.17, -0.37])
 """Excitation that hardly turns the base about z, since joint 1, which turns about z, almost rests [rad].

@@ -48,8 +48,8 @@ GRADIENT = (
     "Leaving the gravity gradient out of the model biases products of inertia most, by a percent and more. The errors "
     "that the paper prints for its identification have the same size, and its statement is confirmed that including "
     "the gradient is very important. The misfit that is left is {misfit} of a noise of 10⁻⁵ per sample, which cannot "
-    "be seen in a plot of the residuals; the sum over all samples, chi² = {chi2}, reveals it. With noise of that size "
-    "the bias is up to {bias} standard deviations after one manoeuvre, and more manoeuvres do not remove it."
+    "be seen in a plot of the residuals, but over all samples it adds up to chi² = {chi2}. With noise of that size the "
+    "bias is up to {bias} standard deviations after one manoeuvre, and more manoeuvres do not remove it."
 )
 
 SAMPLED = (

@@ -6,17 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import MeasuredMotion, Recording
+from bayesid._math.arrays import Floats
 from studies.common.ets7 import ets7
 from studies.sensors.linear import recording_of
 from studies.sensors.setting import Flight, Noise, motion
 from studies.sensors.treatments import Treatment
 
 __all__ = ["Draws"]
-
-Floats = NDArray[np.floating]
 
 FAMILIES = ("rate", "accel", "position")
 """Noisy signals, which `Flight` and `Noise` name alike."""

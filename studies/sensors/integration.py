@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from studies.base_body import paper
 from studies.common.ets7 import BIAS
 from studies.sensors.linear import Linear
@@ -23,8 +23,6 @@ from studies.sensors.setting import Flight, Noise
 from studies.sensors.weights import integral
 
 __all__ = ["Falsified", "Scalar", "falsified", "scalars"]
-
-Floats = NDArray[np.floating]
 
 PERIODS = 2
 """Number of periods of the cosine."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Kind, Manoeuvre, MeasuredMotion, Posterior, Recording
+from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
 from bayesid.inference.whitening import NoiseChannel, NoiseModel, build
@@ -24,8 +25,6 @@ from studies.sensors.setting import Noise, fly, model_of, motion
 from studies.truth.recordings import by_axis
 
 __all__ = ["STEP", "Estimator", "Linear", "Solved", "linearised", "raw_posterior", "recording_of"]
-
-Floats = NDArray[np.floating]
 
 Solved = tuple[Floats, Floats, Floats]
 """Errors (N, 10), stated standard deviations (N, 10) and chi-square per degree of freedom (N,) of N estimates."""

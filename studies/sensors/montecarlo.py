@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from studies.base_body import paper
 from studies.common.quantities import MOMENTS
 from studies.sensors.draws import Draws
@@ -26,8 +26,6 @@ from studies.sensors.weights import as_read, constant, integrated, integrated_wh
 
 __all__ = ["EXACT", "LIKELIHOOD", "PAPER", "PIECES", "TREATMENTS", "WITHOUT_JUNCTIONS", "Spread", "accelerometers"]
 __all__ += ["EQUAL", "VELOCITY", "WEIGHTED", "WHOLE", "joints", "rates", "velocity_estimators"]
-
-Floats = NDArray[np.floating]
 
 PIECES = Polynomial(junctions())
 """Polynomials over the pieces of (27) between its junctions."""

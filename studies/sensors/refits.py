@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from bayesid import Manoeuvre, Posterior
+from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference import maximise
 from bayesid.inference.body_quantities import linearise
@@ -27,8 +28,6 @@ from studies.sensors.treatments import LowPass, Wiener
 from studies.sensors.weights import integrated
 
 __all__ = ["Refits", "refit_all"]
-
-Floats = NDArray[np.floating]
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.robot.composite_tables import composite_rows, link_table
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.robot.joint_state import JointState
@@ -33,8 +33,6 @@ from studies.sensors.setting import Flight, Noise, motion
 from studies.sensors.treatments import Differences, LowPass, Treatment, Wiener
 
 __all__ = ["TREATED", "Balance", "Regression", "attenuation", "regress", "solve_balance"]
-
-Floats = NDArray[np.floating]
 
 TREATED: tuple[Treatment, ...] = (Differences(), LowPass(), PIECES, Wiener())
 """Treatments of joints, rates and accelerations alike."""

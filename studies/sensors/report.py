@@ -100,17 +100,21 @@ def _findings(result: Result) -> list[str]:
 def _plane_finding(result: Result, level: str) -> str:
     likelihood, procedure = result.joints[level][WITHOUT_JUNCTIONS], result.accelerometers[level][PAPER]
 
-    def times(spread: Spread, power: int) -> str:
-        return format_number(float(max(1.0, (spread.rms[spread.worst()] / PLANE)) ** power), 2)
+    def times(spread: Spread) -> float:
+        return float(spread.rms[spread.worst()] / PLANE)
+
+    def manoeuvres(spread: Spread) -> str:
+        return format_number(max(1.0, times(spread) ** 2), 2)
 
     text = (
         "The paper writes 'A similar error can be expected in three dimensions', which is 2 % for sigma 0.04. At "
         f"{level}, one manoeuvre gives the mass with an error of {rms_of(likelihood, MASS)} % and the worst moment "
         f"with {rms_of(likelihood, likelihood.worst())} % if the accelerometer is used as it reads, "
-        f"{times(likelihood, 1)} times the error in the plane. The paper's procedure, as read here, gives "
-        f"{rms_of(procedure, MASS)} % and {rms_of(procedure, procedure.worst())} %, {times(procedure, 1)} times the "
-        f"error in the plane. Noise averages: 2 % need about {times(likelihood, 2)} such manoeuvres (or as many times "
-        f"the samples) in the former case, and {times(procedure, 2)} in the latter, as far as its error is not bias."
+        f"{format_number(times(likelihood), 2)} times the error in the plane. The paper's procedure, as this study "
+        f"reads it, gives {rms_of(procedure, MASS)} % and {rms_of(procedure, procedure.worst())} %, "
+        f"{format_number(times(procedure), 2)} times the error in the plane. Noise averages: 2 % need about "
+        f"{manoeuvres(likelihood)} such manoeuvres (or as many times the samples) in the former case, and "
+        f"{manoeuvres(procedure)} in the latter, as far as its error is not bias."
     )
     if level not in result.refits:
         return text

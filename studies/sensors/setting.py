@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_simpson
 
 from bayesid import Kind, Model
+from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Excitation
 from bayesid.simulation.sensors import StarTracker
 from studies.base_body import paper
@@ -18,8 +19,6 @@ from studies.common.ets7 import BIAS, INTERVAL, ets7, excitation
 from studies.common.models import base_model
 
 __all__ = ["Flight", "Noise", "fly", "junctions", "levels", "model_of", "motion", "near_junctions"]
-
-Floats = NDArray[np.floating]
 
 NEAR = 2.0
 """Distance from a junction of (27) within which samples of the base's sensors may be left out [s].

@@ -11,15 +11,13 @@ from typing import Protocol
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 from scipy import signal
 from scipy.interpolate import make_smoothing_spline
 
+from bayesid._math.arrays import Floats
 from bayesid.recording.smoothing import JointSamples, smooth
 
 __all__ = ["Differences", "LowPass", "Polynomial", "SavitzkyGolay", "SmoothingSpline", "Treatment", "Wiener"]
-
-Floats = NDArray[np.floating]
 
 
 class Treatment(Protocol):

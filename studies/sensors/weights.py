@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from studies.sensors.setting import Noise
 
-__all__ = ["alternating", "as_read", "constant", "integral", "integrated", "integrated_whole"]
-
-Floats = NDArray[np.floating]
+__all__ = ["as_read", "constant", "integral", "integrated", "integrated_whole"]
 
 
 def integral(time: Floats) -> Floats:
     """Return the trapezoidal rule from the start as a matrix, shape (T - 1, T)."""
     step, samples = np.diff(time), np.eye(len(time))
     return np.cumsum(0.5 * step[:, None] * (samples[1:] + samples[:-1]), axis=0)
-
-
-def alternating(count: int) -> Floats:
-    """Return the unit signal whose integral by the trapezoidal rule is zero, shape (count,)."""
-    return np.where(np.arange(count) % 2, -1.0, 1.0) / np.sqrt(count)
 
 
 def as_read(time: Floats, noise: Noise | None) -> Floats:
