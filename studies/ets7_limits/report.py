@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bayesid._io.words import counted
 from bayesid.report import Document
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_signed, format_vector
 from studies.common.ets7 import ACCEL, ACCELEROMETER, BIAS, CORNER, ENCODER, EXCURSION, INTERVAL, RAMPS, RATE, START
@@ -98,8 +99,8 @@ def write_report(result: Result, output: Path) -> None:
 def _findings(result: Result) -> list[str]:
     texts = [
         f"With {SENSORS} and the arm known exactly, one designed manoeuvre leaves "
-        f"{format_percent(result.after_designed.worst)}, the flight's manoeuvre "
-        f"{format_percent(result.after_flight.worst)}."
+        f"{format_percent(result.after_designed.worst, 2)}, the flight's manoeuvre "
+        f"{format_percent(result.after_flight.worst, 2)}."
     ]
     floors = [
         answer.floor
@@ -110,8 +111,8 @@ def _findings(result: Result) -> list[str]:
     if floors:
         texts.append(
             "With the arm's masses known to 5 % no time is enough. Nothing but the mass of the arm sets the scale of "
-            f"the base's mass, since no external force of known size acts. {format_percent(min(floors))} or more are "
-            "left, whatever the sensors."
+            f"the base's mass, since no external force of known size acts. {format_percent(min(floors), 2)} or more "
+            "are left, whatever the sensors."
         )
     return texts
 
@@ -149,12 +150,13 @@ def _manoeuvre(document: Document, result: Result) -> None:
     document.section("The designed manoeuvre")
     costs = result.designed.optimum.costs
     limits = "; ".join(
-        f"the {item.name} reaches {format_number(item.largest)} of {format_number(item.limit)} {item.unit}"
+        f"the {item.name.replace('_', ' ')} reaches {format_number(item.largest)} of {format_number(item.limit)} "
+        f"{item.unit}"
         for item in result.designed.reached
         if item.name.startswith("tip")
     )
     document.paragraph(
-        f"SLSQP from {len(costs)} random starts ended at half log-determinants of "
+        f"SLSQP from {counted(len(costs), 'random start')} ended at half log-determinants of "
         f"{', '.join(format_fixed(cost, 2) for cost in costs)}, so better manoeuvres may exist. Limits: {limits}."
     )
     document.figure(
