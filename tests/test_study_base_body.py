@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bayesid.design.designed import sample_times
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.recording import Recording
 from bayesid.simulation.model import Manoeuvre
@@ -14,7 +15,7 @@ from bayesid.simulation.sensors import Kind
 from studies import base_body
 from studies.base_body import noise_free, paper, setting
 from studies.base_body.report import write
-from studies.common.ets7 import BASE, RADIUS, ets7, excitation
+from studies.common.ets7 import ACCELEROMETER, BASE, RADIUS, ets7, excitation
 from studies.truth import stepwise as reference
 
 GOAL = 1e-6
@@ -30,7 +31,7 @@ def result() -> base_body.BaseBody:
     return base_body.run()
 
 
-def test_every_parameter_is_found_without_noise(result):
+def test_every_parameter_is_identified_without_noise(result):
     for name in ("well", "poor"):
         assert result.noise_free[name].worst < GOAL, name
     assert np.abs(paper.RESULT_WELL / paper.TRUTH - 1.0).max() > 1e4 * result.noise_free["well"].worst
@@ -39,20 +40,20 @@ def test_every_parameter_is_found_without_noise(result):
 def test_data_of_an_independent_simulator_give_the_same(tmp_path: Path):
     robot, motion = ets7(), excitation(paper.EXCITATION)
     robot.write_urdf(tmp_path / "ets7.urdf")
-    planned = setting.blank(motion, noise_free.KINDS, interval=2.0)
+    time = sample_times(motion.duration, 2.0)
 
     half = 0.5 * REFERENCE_STEP
     states = np.array(motion.evaluate(np.arange(0.0, motion.duration + half, half)))
 
-    def at(time: float):
-        return states[:, round(time / half)]
+    def at(instant: float):
+        return states[:, round(instant / half)]
 
     truth = reference.simulate(
         tmp_path / "ets7.urdf",
         at,
-        planned.time,
+        time,
         REFERENCE_STEP,
-        accel_position=noise_free.ACCELEROMETER,
+        accel_position=ACCELEROMETER,
         zenith=reference.circular_zenith(RADIUS),
     )
     channels = {
@@ -60,7 +61,7 @@ def test_data_of_an_independent_simulator_give_the_same(tmp_path: Path):
         for kind, values in (("rate", truth.rate), ("accel", truth.accel))
         for index, axis in enumerate("xyz")
     }
-    recording = Recording("reference", None, planned.time, channels)
+    recording = Recording("reference", None, time, channels)
     posterior = Posterior.of(noise_free.guess_model(), [Manoeuvre(recording, motion)], step=0.5, flat_prior=True)
     assert noise_free.identify_exact(posterior).worst < GOAL
 

@@ -25,9 +25,9 @@ def test_the_papers_counts_stand_out_of_rounding(result):
         assert one.base.count == count
         assert one.singular[count - 1] > 0.05
         assert one.singular[count] < 1e-14
-    np.testing.assert_allclose(result.equations.ours, result.equations.pinocchio, atol=1e-12)
-    np.testing.assert_allclose(result.equations.ours[:6], 0.0, atol=1e-12)
-    assert np.abs(result.equations.ours[6:]).min() > 0.1
+    np.testing.assert_allclose(result.equations.regressor, result.equations.pinocchio, atol=1e-12)
+    np.testing.assert_allclose(result.equations.regressor[:6], 0.0, atol=1e-12)
+    assert np.abs(result.equations.regressor[6:]).min() > 0.1
 
 
 def test_only_known_things_that_nothing_else_explains_tell_the_scale(result):
@@ -44,10 +44,10 @@ def test_only_known_things_that_nothing_else_explains_tell_the_scale(result):
     assert {name for name, case in cases.items() if case.open_scale} == left_open
     assert "motion, mass of the whole robot known" in cases
     for name, case in cases.items():
-        assert case.found.rank == (51 if name in left_open else 52), name
-        assert case.found.gap[1] < 1e-13 < 1e-7 < case.found.gap[0], name
-    links = [cases[f"motion, link{index} known"].found.gap[0] for index in range(1, 7)]
-    assert max(links) < 1e-3 * cases["motion, base_link known"].found.gap[0]
+        assert case.determined.rank == (51 if name in left_open else 52), name
+        assert case.determined.gap[1] < 1e-13 < 1e-7 < case.determined.gap[0], name
+    links = [cases[f"motion, link{index} known"].determined.gap[0] for index in range(1, 7)]
+    assert max(links) < 1e-3 * cases["motion, base_link known"].determined.gap[0]
 
 
 def test_the_standard_parameters_follow_from_the_dependent_ones(result):
@@ -61,17 +61,17 @@ def test_the_standard_parameters_follow_from_the_dependent_ones(result):
 
 
 def test_formulas():
-    found = base_parameters(Robot.shipped("ets7"))
-    rows = dict(regrouping_rows(found))
+    base = base_parameters(Robot.shipped("ets7"))
+    rows = dict(regrouping_rows(base))
     assert rows["base_link.mass"] == "m₀ + m₁₋₆"
     assert rows["link2.inertia.xx"] == "Ixx₂ + 0.7569 m₃₋₆ − Iyy₂"
     assert rows["link5.first.x"] == "hx₅ − hz₆"
-    assert len(rows) + len(unchanged(found)) == found.count
+    assert len(rows) + len(unchanged(base)) == base.count
     assert symbol("link3.first.z", ["base_link", "link1", "link2", "link3"]) == "hz₃"
 
 
 def test_pinocchios_rank_agrees_without_the_other_tool(result):
-    assert [(case.ours, case.rank) for case in (*result.peers, result.tilted)] == [(4, 4), (36, 36), (38, 38)]
+    assert [(case.count, case.rank) for case in (*result.peers, result.tilted)] == [(4, 4), (36, 36), (38, 38)]
 
 
 def test_the_report_is_written(result, tmp_path):
@@ -80,8 +80,8 @@ def test_the_report_is_written(result, tmp_path):
 
 
 @pytest.mark.skipif(importlib.util.find_spec("figaroh") is None, reason="FIGAROH is in the extra peers only")
-def test_figaroh_finds_the_same_space():
-    found = compare(Robot.shipped("ets7"), np.random.default_rng(4), gravity=(3.0, 2.0, -9.0))
-    assert found.peer == found.ours == found.rank
-    assert found.angle is not None
-    assert found.angle < 1e-8
+def test_figaroh_gives_the_same_space():
+    comparison = compare(Robot.shipped("ets7"), np.random.default_rng(4), gravity=(3.0, 2.0, -9.0))
+    assert comparison.peer == comparison.count == comparison.rank
+    assert comparison.angle is not None
+    assert comparison.angle < 1e-8

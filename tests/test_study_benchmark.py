@@ -1,4 +1,4 @@
-"""The benchmark's own arithmetic, on its smallest cases; nothing here is timed against a limit."""
+"""The arithmetic of the benchmark on its smallest cases; no time is compared with a limit."""
 
 from __future__ import annotations
 

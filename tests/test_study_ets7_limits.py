@@ -17,7 +17,7 @@ TRUTH = np.ones(10)
 def repeated(rows: np.ndarray) -> Repeated:
     """Return what is known of ten quantities that are the coordinates themselves."""
     prior = Knowledge(tuple(map(str, range(10))), TRUTH, np.eye(10), np.eye(10))
-    return Repeated(prior, rows, 240.0)
+    return Repeated(prior, rows)
 
 
 def test_the_flight_ramps_at_constant_speed_between_rounded_corners():
@@ -32,9 +32,9 @@ def test_the_flight_ramps_at_constant_speed_between_rounded_corners():
 
 
 def test_repetitions_add_information():
-    found = repeated(5.0 * np.eye(10))
-    np.testing.assert_allclose(found.sd(4.0), 1.0 / np.sqrt(101.0))
-    assert found.needed() == pytest.approx(9999.0 / 25.0)
+    information = repeated(5.0 * np.eye(10))
+    np.testing.assert_allclose(information.sd(4.0), 1.0 / np.sqrt(101.0))
+    assert information.needed() == pytest.approx(9999.0 / 25.0)
     assert repeated(1e2 * np.eye(10)).needed() == 1.0
 
 
@@ -43,10 +43,10 @@ def test_what_is_not_seen_sets_a_floor():
     # mass and moment in one combination only
     rows[0, 0] = rows[0, 4] = 5.0 / np.sqrt(2.0)
     rows[4] = 0.0
-    found = repeated(rows)
-    assert found.needed() == np.inf
-    assert found.floored
-    assert found.worst(1e6) == pytest.approx(np.sqrt(0.5), rel=1e-4)
+    information = repeated(rows)
+    assert information.needed() == np.inf
+    assert information.floored
+    assert information.worst(1e6) == pytest.approx(np.sqrt(0.5), rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -5,17 +5,19 @@ import pytest
 
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.base_body import paper
+from studies.common.ets7 import INTERVAL
+from studies.common.quantities import JUDGED
 from studies.sensors import Effort, run
 from studies.sensors.draws import Draws
 from studies.sensors.integration import scalars
 from studies.sensors.linear import Estimator, Linear
-from studies.sensors.montecarlo import ALIKE, OURS, PAPER, PIECES, TREATMENTS, WEIGHTED, WHOLE, Spread
+from studies.sensors.montecarlo import EQUAL, LIKELIHOOD, PAPER, PIECES, TREATMENTS, WEIGHTED, WHOLE, Spread
 from studies.sensors.regressor import Balance, attenuation, regress, solve_balance
 from studies.sensors.report import write_report
 from studies.sensors.result import REALISTIC
-from studies.sensors.setting import INTERVAL, Noise, fly, levels, motion
+from studies.sensors.setting import Noise, fly, levels, motion
 from studies.sensors.treatments import Differences, LowPass, Polynomial, SavitzkyGolay, SmoothingSpline, Wiener
-from studies.sensors.weights import alternating, as_read, constant, integral, integrated, integrated_whole
+from studies.sensors.weights import as_read, constant, integral, integrated, integrated_whole
 
 
 @pytest.fixture(scope="module")
@@ -43,10 +45,10 @@ def test_treatments_follow_a_slow_wave_and_its_derivatives(treatment):
     w, phase = 2.0 * np.pi / 60.0, np.array([0.3, 1.4])
     angle = w * time[:, None] + phase
     inner = slice(60, -60)  # the low-pass swings longest after the ends
-    found = treatment(time, np.sin(angle), 1e-8)[:, inner]
+    treated = treatment(time, np.sin(angle), 1e-8)[:, inner]
     true = np.stack([np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)])[:, inner]
     # central differences err by (w h)^2 / 6 and / 12; the others by no more
-    error = np.abs(found - true).max(axis=(1, 2)) / [1.0, w, w**2]
+    error = np.abs(treated - true).max(axis=(1, 2)) / [1.0, w, w**2]
     assert (error < (w * INTERVAL) ** 2 / 6.0 * 1.01 + 1e-6).all()
 
 
@@ -96,7 +98,7 @@ def test_the_rule_is_exact_for_lines_and_blind_to_alternation_alone():
     time = INTERVAL * np.arange(41)
     rule = integral(time)
     np.testing.assert_allclose(rule @ (2.0 + time), 2.0 * time[1:] + 0.5 * time[1:] ** 2)
-    blind = alternating(41)
+    blind = np.where(np.arange(41) % 2, -1.0, 1.0) / np.sqrt(41)
     np.testing.assert_allclose(rule @ blind, 0.0, atol=1e-15)
     # the whole covariance undoes the sum: all information but the blind direction's
     kept = rule.T @ np.linalg.solve(rule @ rule.T, rule)
@@ -139,38 +141,38 @@ def test_monte_carlo_errors_are_those_of_normal_numbers():
     rng = np.random.default_rng(2)
     spreads = [Spread(0.3 + rng.normal(size=(50, 10)), np.ones((50, 10)), np.ones(50)) for _ in range(60)]
     for name in ("bias", "sd", "rms"):
-        values = np.concatenate([getattr(own, name) for own in spreads])
-        errors = np.concatenate([getattr(own, f"{name}_error") for own in spreads])
+        values = np.concatenate([getattr(spread, name) for spread in spreads])
+        errors = np.concatenate([getattr(spread, f"{name}_error") for spread in spreads])
         assert errors.mean() == pytest.approx(values.std(), rel=0.15)
 
 
 def test_linear_method_is_exact_without_noise(free):
     balance = Balance(np.stack(motion().evaluate(free.time)))
-    found = mass_com_inertia(solve_balance(*balance(free.rate, free.rate_change, free.accel)))
+    quantities = mass_com_inertia(solve_balance(*balance(free.rate, free.rate_change, free.accel)))
     # the rates' derivative is by differences of samples 0.1 s apart
-    np.testing.assert_allclose(found[:7], paper.TRUTH[:7], rtol=2e-3)
+    np.testing.assert_allclose(quantities[:7], paper.TRUTH[:7], rtol=2e-3)
 
 
 def test_linear_method_is_attenuated_as_predicted(free):
     noise = levels(free)["0.04 deg/s"]
-    errors = regress(free, Draws(free, 6, seed=4), noise, (Differences(),))["differences"].errors
+    errors = regress(Draws.of(free, 6, np.random.default_rng(4)), noise, (Differences(),))["differences"].errors
     predicted = attenuation(free, noise)
     assert predicted[0] < -0.5
-    np.testing.assert_allclose(errors.mean(axis=0)[[0, 4, 5, 6]], predicted[[0, 4, 5, 6]], atol=0.02)
+    np.testing.assert_allclose(errors.mean(axis=0)[JUDGED], predicted[JUDGED], atol=0.02)
 
 
 @pytest.mark.usefixtures("slow")
 def test_the_study(tmp_path):
-    result = run(effort=Effort(draws=12, ours=3, theirs=3, levels=("0.04 deg/s", REALISTIC)))
+    result = run(effort=Effort(12, likelihood_fits=3, paper_fits=3, levels=("0.04 deg/s", REALISTIC)))
     for level, refits in result.refits.items():
-        assert refits[OURS].apart[[0, 4, 5, 6]].max() < (0.3 if level == "0.04 deg/s" else 0.05)
+        assert refits[LIKELIHOOD].difference[JUDGED].max() < (0.3 if level == "0.04 deg/s" else 0.05)
         assert np.isfinite(refits[PAPER].nonlinear.errors).all()
     for uses in result.accelerometers.values():
         np.testing.assert_allclose(
             uses[WHOLE].errors, uses[WEIGHTED].errors, rtol=0.0, atol=2e-3 * uses[WEIGHTED].sd.max()
         )
-        assert (uses[ALIKE].sd[[0, 4, 5, 6]] > 2.0 * uses[WEIGHTED].sd[[0, 4, 5, 6]]).all()
-    honest = result.joints[REALISTIC][OURS]
+        assert (uses[EQUAL].sd[JUDGED] > 2.0 * uses[WEIGHTED].sd[JUDGED]).all()
+    honest = result.joints[REALISTIC][LIKELIHOOD]
     assert 0.7 < honest.honesty.mean() < 1.3
     assert PIECES.title in result.rates[REALISTIC]
     write_report(result, tmp_path / "sensors.pdf")

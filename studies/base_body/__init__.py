@@ -18,9 +18,9 @@ def run(*, full: bool = False, seed: int = 0) -> BaseBody:
     Parameters
     ----------
     full : bool
-        Add what takes minutes: samples by emcee, measured joints, the slow manoeuvre, the heavier arm.
+        Whether to add what takes minutes: samples by emcee, measured joints, the slow manoeuvre, the heavier arm.
     seed : int
-        Every random number follows from it.
+        Seed of all random numbers.
     """
     result = compute(full=full, seed=seed)
     result.figures.update(draw(result))

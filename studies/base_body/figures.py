@@ -5,24 +5,20 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from bayesid.inference.body_quantities import BODY_QUANTITIES
+from bayesid._math.arrays import Floats
 from bayesid.report.figures import corner
-from bayesid.report.figures.figure_style import COLOURS, curve_style, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_legend, styled, wide_figure
 from studies.base_body import paper
 from studies.base_body.result import GRADES, BaseBody
 from studies.common.ets7 import BASE
+from studies.common.quantities import LABELS, MASS, MOMENTS
 
 __all__ = ["draw"]
 
-Floats = NDArray[np.floating]
-
-LABELS = [key.replace("inertia.", "I ").replace("com.", "c ") for key in BODY_QUANTITIES]
-
 
 def draw(result: BaseBody) -> dict[str, Figure]:
-    """Return all figures the numbers allow."""
+    """Return all figures that the numbers allow."""
     figures = {"motion": motion(result), "errors": errors(result), "grades": grades(result)}
     if result.sampled:
         figures["posterior"] = posterior(result)
@@ -32,29 +28,27 @@ def draw(result: BaseBody) -> dict[str, Figure]:
 
 @styled
 def motion(result: BaseBody) -> Figure:
-    """Draw the base's motion, the paper's figure 4."""
+    """Draw the base's motion as in the paper's figure 4."""
     figure = wide_figure(4.6)
     panels = figure.subplots(2, 2)
-    fast = result.fast.truth
-    limit = 1.1e3 * max(case.peak.max() for case in (result.noise_free["well"], result.noise_free["poor"]))
-    for axes, name, title in zip(
-        panels[0], ("well", "poor"), ("rate, the paper's manoeuvre", "rate, poor manoeuvre"), strict=True
-    ):
+    limit = 1.1e3 * max(result.noise_free[name].peak.max() for name in ("well", "poor"))
+    for axes, name, title in zip(panels[0], ("well", "poor"), ("the paper's", "poorly exciting"), strict=True):
         time, rate = result.noise_free[name].recording.vector("rate")
-        _curves(axes, time, 1e3 * rate, title, "mrad/s")
+        _curves(axes, time, 1e3 * rate, f"rate, {title} manoeuvre", "mrad/s")
         axes.set_ylim(-limit, limit)
+    fast = result.fast.truth
     turned = np.degrees(2.0 * fast.attitude[:, :3])
     _curves(panels[1, 0], fast.time, turned, "rotation since the start, the paper's manoeuvre", "deg")
     _curves(panels[1, 1], fast.time, 1e3 * fast.accel, "accelerometer, the paper's manoeuvre", "mm/s²")
     for axes in panels[1]:
         axes.set_xlabel("time [s]")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=3)
+    shared_legend(figure, panels[0, 0], 3)
     return figure
 
 
 @styled
 def errors(result: BaseBody) -> Figure:
-    """Draw relative errors of the ten quantities: the paper's and ours."""
+    """Draw the relative errors of the ten quantities, the paper's and those of this study."""
     figure = wide_figure(3.4)
     axes = figure.subplots()
     series = {
@@ -68,8 +62,7 @@ def errors(result: BaseBody) -> Figure:
         axes.plot(place, np.abs(error), marker, color=COLOURS[index % len(COLOURS)], label=name, markersize=4)
     axes.axhline(1e-6, color="black", linewidth=0.8, linestyle="--")
     axes.text(place[-1] + 0.4, 1.2e-6, "goal", ha="right", va="bottom")
-    axes.set_yscale("log")
-    axes.set_ylabel("relative error")
+    axes.set(yscale="log", ylabel="relative error")
     axes.set_xticks(place, LABELS)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.1), ncols=4)
     return figure
@@ -80,16 +73,10 @@ def grades(result: BaseBody) -> Figure:
     """Draw the posterior's width against the accelerometer's grade."""
     figure = wide_figure(2.8)
     panels = figure.subplots(1, 2, sharey=True)
-    for axes, pick, title in ((panels[0], [0], "mass"), (panels[1], [4, 5, 6], "worst moment of inertia")):
+    for axes, pick, title in ((panels[0], [MASS], "mass"), (panels[1], MOMENTS, "worst moment of inertia")):
         for index, (name, rows) in enumerate(result.grades.items()):
-            axes.plot(
-                GRADES,
-                100.0 * rows[:, pick].max(axis=1),
-                marker="o",
-                markersize=3,
-                label=f"arm {name}",
-                **curve_style(index),
-            )
+            worst = 100.0 * rows[:, pick].max(axis=1)
+            axes.plot(GRADES, worst, marker="o", markersize=3, label=f"arm {name}", **curve_style(index))
         axes.set(xscale="log", yscale="log", title=title, xlabel="accelerometer's noise [m/s²]")
         axes.invert_xaxis()
     panels[0].set_ylabel("relative sd [%]")
@@ -104,13 +91,12 @@ def posterior(result: BaseBody) -> Figure:
     panels = figure.subplots(1, 2, width_ratios=(7, 3))
     for axes, pick in ((panels[0], slice(0, 7)), (panels[1], slice(7, 10))):
         place = np.arange(10)[pick]
-        for index, (name, found) in enumerate(result.sampled.items()):
-            body = found.bodies[BASE]
-            error, width = body.mean / paper.TRUTH - 1.0, body.sd / np.abs(paper.TRUTH)
+        for index, (name, identified) in enumerate(result.sampled.items()):
+            body = identified.bodies[BASE]
             axes.errorbar(
                 place + 0.15 * (2 * index - 1),
-                100.0 * error[pick],
-                100.0 * width[pick],
+                100.0 * (body.mean / paper.TRUTH - 1.0)[pick],
+                100.0 * (body.sd / np.abs(paper.TRUTH))[pick],
                 fmt="o",
                 markersize=3,
                 capsize=2,
@@ -118,13 +104,11 @@ def posterior(result: BaseBody) -> Figure:
                 label=f"posterior, arm {name}",
             )
         for printed, marker, name in ((paper.RESULT_WELL, "x", "paper, well"), (paper.RESULT_POOR, "+", "paper, poor")):
-            axes.plot(
-                place, 100.0 * (printed / paper.TRUTH - 1.0)[pick], marker, color="black", label=name, markersize=5
-            )
+            error = 100.0 * (printed / paper.TRUTH - 1.0)[pick]
+            axes.plot(place, error, marker, color="black", label=name, markersize=5)
         axes.axhline(0.0, color="black", linewidth=0.6)
         axes.set_xticks(place, LABELS[pick])
-    panels[0].set_ylabel("from the truth [%]")
-    panels[0].set_ylim(-7.0, 7.0)
+    panels[0].set(ylabel="difference from the truth [%]", ylim=(-7.0, 7.0))
     panels[0].legend(ncols=2, loc="lower left")
     return figure
 
@@ -132,5 +116,4 @@ def posterior(result: BaseBody) -> Figure:
 def _curves(axes: Axes, time: Floats, values: Floats, title: str, unit: str) -> None:
     for index, axis in enumerate("xyz"):
         axes.plot(time, values[:, index], label=axis, **curve_style(index))
-    axes.set_title(title)
-    axes.set_ylabel(f"[{unit}]")
+    axes.set(title=title, ylabel=f"[{unit}]")

@@ -1,30 +1,25 @@
-"""What the paper prints on problem 1 (section 4.1), and the order in which the study reports ten parameters."""
+"""What the paper prints on problem 1 (section 4.1); the ten quantities are in the order of `BODY_QUANTITIES`."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesid.robot.inertial_parameters import InertialParameters
+from studies.common.quantities import body_of as body
 
 __all__ = ["EXCITATION", "GUESS", "LIMIT", "RESULT_POOR", "RESULT_WELL", "TRUTH", "body"]
 
-Floats = NDArray[np.float64]
-
-# mass, centre of mass, inertia xx yy zz xy xz yz: the order of `bayesid.inference.identification.BODY_QUANTITIES`
 TRUTH = np.array([2645.9, -0.532, -0.281, 1.499, 5665.5, 3033.0, 7067.2, 54.2, 145.1, -123.2])
+"""True mass [kg], centre of mass [m] and inertia xx, yy, zz, xy, xz, yz [kg m2]."""
+
 GUESS = np.array([1000.0, 0.5, 0.5, 0.5, 1000.0, 1000.0, 1000.0, 10.0, 10.0, 10.0])
+"""Initial guess of the identification."""
+
 RESULT_WELL = np.array([2645.7, -0.53, -0.28, 1.50, 5667.25, 3037.73, 7075.85, 50.98, 148.39, -124.13])
 RESULT_POOR = np.array([2655.99, -0.54, -0.23, 1.53, 5539.09, 3007.88, 7070.54, 42.70, 161.246, -57.47])
+"""Results from the well exciting and from the poorly exciting manoeuvre."""
 
 EXCITATION = np.array([0.63, -1.87, -2.18, -0.15, 5.3e-2, -0.56])
-"""The optimum of (26): q1 and q2 of joint 1, of joint 2, of joint 3 [rad]."""
+"""Optimum of (26): q1 and q2 of joint 1, of joint 2, of joint 3 [rad]."""
 
 LIMIT = np.pi / 2.0
-"""Joint limit the paper states [rad]."""
-
-
-def body(quantities: Floats) -> InertialParameters:
-    """Return the body of ten quantities, the inertia taken about the centre of mass."""
-    xx, yy, zz, xy, xz, yz = quantities[4:]
-    return InertialParameters(quantities[0], quantities[1:4], [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+"""Joint limit that the paper states [rad]."""

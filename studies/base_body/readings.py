@@ -5,17 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid.simulation.sensors import Kind
 from studies.base_body.information import ACCEL_BIAS, ARM, TILT, UNIT, Information
+from studies.common.quantities import MASS, MOMENTS
 
-__all__ = ["SIGMAS", "Reading", "read_sigmas"]
-
-Floats = NDArray[np.float64]
+__all__ = ["CLAIM", "Reading", "read_sigmas"]
 
 SIGMAS = (0.04, 0.009)
-"""Introduced into the simulated signals of the paper's reference [16], and found on the data of ETS-VII."""
+"""Sigma of the noise added to the simulated signals of the paper's reference [16], and of the data of ETS-VII."""
 
 CLAIM = 0.02
 """Error of the solution that the paper reports for sigma 0.04."""
@@ -27,21 +25,23 @@ UNITS = (
     ("rad, of attitude", Kind.ATTITUDE, 1.0),
     ("deg, of attitude", Kind.ATTITUDE, np.pi / 180.0),
 )
+"""Units that a sigma may have: name, sensor, and size in the SI unit."""
 
 
 @dataclass(frozen=True)
 class Reading:
-    """One unit that a sigma may have.
+    """Consequences of one unit that a sigma may have.
 
     Attributes
     ----------
     sigma : float
-        As printed.
+        Sigma as printed.
     unit : str
+        Unit that is assumed.
     fraction : float
-        Of the signal's peak that the noise of one sample is.
+        Noise of one sample as a fraction of the signal's peak.
     mass, moment : float
-        Relative sd of mass and of the worst principal moment without prior, from one manoeuvre.
+        Relative standard deviation of the mass and of the worst moment of inertia, without prior, from one manoeuvre.
     """
 
     sigma: float
@@ -52,25 +52,25 @@ class Reading:
 
     @property
     def manoeuvres(self) -> float:
-        """How many manoeuvres would have to be averaged for an error of 2 % in all of them."""
+        """Number of manoeuvres to average for an error of 2 % in the mass and all moments."""
         return float(max(1.0, (max(self.mass, self.moment) / CLAIM) ** 2))
 
 
 def read_sigmas(information: Information) -> list[Reading]:
-    """Evaluate every reading; all sensors used get noise of the same fraction of their signals' peaks."""
-    found = []
+    """Evaluate every unit; all sensors used get noise of the same fraction of their signals' peaks."""
+    readings = []
     for sigma in SIGMAS:
         for unit, kind, scale in UNITS:
-            found.append(_reading(information, sigma, unit, sigma * scale / information.peak[kind], kind))
-        found.append(_reading(information, sigma, "of the peak", sigma, Kind.RATE))
-    return found
+            readings.append(_reading(information, sigma, unit, sigma * scale / information.peak[kind], kind))
+        readings.append(_reading(information, sigma, "of the peak", sigma, Kind.RATE))
+    return readings
 
 
 def _reading(information: Information, sigma: float, unit: str, fraction: float, kind: Kind) -> Reading:
     motion = Kind.ATTITUDE if kind is Kind.ATTITUDE else Kind.RATE
     peak = information.peak
-    # computed where the prior does not matter, then scaled: widths are proportional to the noise
+    # computed where the prior does not matter, then scaled: standard deviations are proportional to the noise
     small = UNIT / peak[motion]
     noise = {motion: small * peak[motion], Kind.ACCEL: small * peak[Kind.ACCEL]}
     width = information.relative_sd(noise, (ARM, TILT, ACCEL_BIAS)) * fraction / small
-    return Reading(sigma, unit, fraction, float(width[0]), float(width[4:7].max()))
+    return Reading(sigma, unit, fraction, float(width[MASS]), float(width[MOMENTS].max()))

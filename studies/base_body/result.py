@@ -1,4 +1,4 @@
-"""What the study computes: numbers of all its parts in one place."""
+"""The computation of all numbers of the study."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.inference import Identification
 from bayesid.simulation.sensors import Kind, StarTracker
 from studies.base_body import paper
-from studies.base_body.information import ARM, ARM_SPREAD, STAR, Information
+from studies.base_body.information import ARM, STAR, Information
 from studies.base_body.noise_free import NoiseFree, run_noise_free
 from studies.base_body.readings import Reading, read_sigmas
 from studies.base_body.sampled import encoder_grades, sample_posterior
-from studies.base_body.setting import INTERVAL, slowest
-from studies.common.ets7 import excitation
+from studies.base_body.setting import slowest
+from studies.common.ets7 import INTERVAL, excitation
+from studies.common.models import ARM_SPREAD
+from studies.common.quantities import MASS
 
 __all__ = ["GRADES", "BaseBody", "compute"]
 
-Floats = NDArray[np.float64]
-
 GRADES = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-"""Accelerometers of section 4.3 [m/s2]; its "10e-5" is read as 1e-5."""
+"""Noise per sample of the accelerometers of section 4.3 [m/s2]; its "10e-5" is read as 1e-5."""
 
 DIFFERENCED = float(StarTracker(2.0).sigma(INTERVAL)[0])
-"""Rate noise from differencing the star sensor [rad/s]."""
+"""Noise of the rate that is differenced from the star sensor's attitude [rad/s]."""
 
 
 @dataclass(frozen=True)
@@ -37,18 +37,22 @@ class BaseBody:
     Attributes
     ----------
     noise_free : mapping of str to NoiseFree
-        ``well``, ``poor``, ``well, no gradient`` and, in the full study, more.
+        Identifications without noise: ``well``, ``poor``, ``well, no gradient`` and, in the full study, more.
     fast, slow : Information
-        Of the paper's manoeuvre, and of the same within the limits of ETS-VII; the latter in the full study only.
+        Information from the paper's manoeuvre, and from the same within the flight rules of ETS-VII; the latter in the
+        full study only.
     grades : mapping of str to (5, 10) array
-        Relative sd per accelerometer of `GRADES` and quantity: ``exact``, ``5 %`` (the arm), each with the star
-        sensor's attitude; ``exact, differenced`` with the rate instead; ``exact, encoders`` with measured joints.
+        Relative standard deviations per accelerometer of `GRADES` and quantity. ``exact`` and ``5 %`` say how the arm
+        is known, with the star sensor's attitude; ``exact, differenced`` has the differenced rate instead, and
+        ``exact, encoders`` has measured joints.
     readings : list of Reading
+        Units that the paper's noise sigmas may have.
     slowness : float
-        How many times slower the paper's manoeuvre must be for ETS-VII.
+        Factor by which the paper's manoeuvre must be slowed down for ETS-VII.
     sampled : mapping of str to Identification
-        ``exact`` and ``5 %``, full study only.
+        Sampled posteriors ``exact`` and ``5 %``, in the full study only.
     figures : mapping of str to Figure
+        Figures of the report.
     """
 
     noise_free: Mapping[str, NoiseFree]
@@ -62,8 +66,11 @@ class BaseBody:
 
     @property
     def arm_ratio(self) -> float:
-        """Sd of the base's mass with the arm known to 5 % over that with the arm exact, coarsest accelerometer."""
-        return float(self.grades["5 %"][0, 0] / self.grades["exact"][0, 0])
+        """Ratio of the mass's standard deviation with the arm known to 5 % to that with the arm known exactly.
+
+        Both are with the coarsest accelerometer.
+        """
+        return float(self.grades["5 %"][0, MASS] / self.grades["exact"][0, MASS])
 
 
 def compute(*, full: bool, seed: int) -> BaseBody:
@@ -78,10 +85,7 @@ def compute(*, full: bool, seed: int) -> BaseBody:
     sampled = {}
     if full:
         grades["exact, encoders"] = np.array(encoder_grades(GRADES, seed))
-        sampled = {
-            "exact": sample_posterior(0.0, seed),
-            "5 %": sample_posterior(ARM_SPREAD, seed),
-        }
+        sampled = {"exact": sample_posterior(0.0, seed), "5 %": sample_posterior(ARM_SPREAD, seed)}
     return BaseBody(
         noise_free=run_noise_free(full=full),
         fast=fast,

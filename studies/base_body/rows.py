@@ -1,14 +1,12 @@
-"""Rows of the report's tables."""
+"""Tables of the report, each as its header and its rows, and numbers for its sentences."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES
-from bayesid.report.numbers import format_number, format_quantity, format_unit
+from bayesid.report.numbers import format_fixed, format_number, format_percent, format_quantity, format_unit
 from bayesid.simulation.sensors import Kind
 from studies.base_body import paper
 from studies.base_body.information import ARM, STAR
@@ -16,51 +14,15 @@ from studies.base_body.noise_free import NoiseFree
 from studies.base_body.readings import CLAIM
 from studies.base_body.result import GRADES, BaseBody
 from studies.common.ets7 import BASE
+from studies.common.quantities import HEADINGS, MASS, MOMENTS
 
-__all__ = ["arm_table", "case_table", "goal_rows", "grade_table", "posterior_table", "printed_table", "reading_table"]
+__all__ = ["arm_table", "case_table", "goal_rows", "grade_table", "gradient_numbers", "poor_numbers"]
+__all__ += ["posterior_table", "printed_table", "reading_sentences", "reading_table", "sampler_sentences"]
 
-Floats = NDArray[np.float64]
-Table = tuple[Sequence[str], list[list[str]]]
+Table = tuple[list[str], list[list[str]]]
 
 GOAL = 1e-6
-PRINTED = ["left", *["right"] * 6]
-CASES = ["left", *["right"] * 5]
-POSTERIOR = ["left", *["right"] * 3]
-READINGS = ["right", "left", *["right"] * 4]
-
-
-def printed_table(case: NoiseFree, printed: Floats) -> Table:
-    """Every quantity: truth, the paper's guess and result, ours, and both errors."""
-    rows = []
-    for index, (name, unit) in enumerate(BODY_QUANTITIES.items()):
-        truth = paper.TRUTH[index]
-        values = (truth, paper.GUESS[index], printed[index])
-        rows.append(
-            [
-                f"{name} [{format_unit(unit)}]",
-                *(format_number(value, 6) for value in values),
-                f"{case.estimate[index]:.7g}".replace("-", "−"),
-                format_number(abs(printed[index] / truth - 1.0), 1),
-                format_number(abs(case.error[index]), 1),
-            ]
-        )
-    return ["", "truth", "guess", "paper", "here", "error, paper", "error, here"], rows
-
-
-def case_table(result: BaseBody) -> Table:
-    """Every noise-free case: worst errors, misfit and evaluations."""
-    rows = [
-        [
-            name,
-            format_number(abs(case.error[0]), 1),
-            format_number(float(np.abs(case.error[1:4]).max()), 1),
-            format_number(float(np.abs(case.error[4:7]).max()), 1),
-            format_number(float(np.abs(case.error[7:]).max()), 1),
-            format_number(case.misfit, 2),
-        ]
-        for name, case in result.noise_free.items()
-    ]
-    return ["manoeuvre, model", "mass", "centre of mass", "moments", "products", "misfit"], rows
+"""Largest relative error that is allowed without noise; the integration allows no smaller one."""
 
 
 def goal_rows(result: BaseBody) -> list[list[str]]:
@@ -69,51 +31,92 @@ def goal_rows(result: BaseBody) -> list[list[str]]:
     exact = [name for name in cases if "gradient" not in name]
     worst = max(cases[name].worst for name in exact)
     loss = poor.uncertainty / well.uncertainty
+    arm_exact, arm_known = result.grades["exact"], result.grades["5 %"]
     rows = [
         [
-            f"noise-free, every parameter within {format_number(GOAL)} (paper: 10⁻⁴ to 6 × 10⁻²; poor: to 0.5)",
-            f"{'reached' if worst < GOAL else 'missed'}: worst of {len(exact)} cases {format_number(worst, 2)}",
+            f"Is every parameter within {format_number(GOAL)} of the truth without noise? The paper's errors are "
+            "10⁻⁴ to 6 × 10⁻², and up to 0.5 with the poorly exciting manoeuvre.",
+            f"{'Yes' if worst < GOAL else 'No'}: the worst error of {len(exact)} cases is {format_number(worst, 2)}.",
         ],
         [
-            "poorly exciting manoeuvre",
-            f"still exact without noise; with noise izz is {loss[6]:.1f} and ixy {loss[7]:.1f} times more uncertain",
+            "What does the poorly exciting manoeuvre cost?",
+            f"Nothing without noise; with noise izz is {format_fixed(loss[6], 1)} and ixy {format_fixed(loss[7], 1)} "
+            "times more uncertain.",
         ],
         [
-            "gravity gradient left out of the model",
-            f"worst error {_percent(cases['well, no gradient'].worst)} instead of {format_number(well.worst, 1)}",
+            "What does it cost to leave the gravity gradient out of the model?",
+            f"The worst error is {format_percent(cases['well, no gradient'].worst)} instead of "
+            f"{format_number(well.worst, 1)}.",
         ],
         [
-            f"realistic sensors, arm exact (2″ star sensor, {format_number(GRADES[0])} m/s²)",
-            f"sd of mass {_percent(result.grades['exact'][0, 0])}, of moments up to "
-            f"{_percent(result.grades['exact'][0, 4:7].max())}",
+            "What do realistic sensors give with an exact arm (a star sensor of 2″ and an accelerometer of "
+            f"{format_number(GRADES[0])} m/s²)?",
+            f"The mass has a standard deviation of {format_percent(arm_exact[0, MASS])}, the moments of up to "
+            f"{format_percent(arm_exact[0, MOMENTS].max())}.",
         ],
         [
-            "the same, arm known to 5 %",
-            f"sd of mass {_percent(result.grades['5 %'][0, 0])}: {result.arm_ratio:.0f} times wider",
+            "What do the same sensors give with the arm known to 5 %?",
+            f"The mass has a standard deviation of {format_percent(arm_known[0, MASS])}, {result.arm_ratio:.0f} times "
+            "as much.",
         ],
         [
-            f"best accelerometer, {format_number(GRADES[-1])} m/s²",
-            f"sd of mass {_percent(result.grades['exact'][-1, 0])} if everything else is exact, "
-            f"{_percent(result.grades['5 %'][-1, 0])} with the arm known to 5 %",
+            f"What does the best accelerometer give, {format_number(GRADES[-1])} m/s²?",
+            f"The mass has a standard deviation of {format_percent(arm_exact[-1, MASS])} if everything else is exact, "
+            f"and of {format_percent(arm_known[-1, MASS])} with the arm known to 5 %.",
         ],
-        ["sigma 0.04 in rad/s", f"{result.readings[0].fraction:.0f} times the peak rate: cannot be what was meant"],
+        [
+            "Can the paper's sigma of 0.04 be in rad/s?",
+            f"No: it would be {result.readings[0].fraction:.0f} times the peak rate.",
+        ],
     ]
     if "well, arm 1/7" in cases:
-        error = format_number(cases["well, arm 1/7"].worst, 1)
-        rows.insert(3, ["mass ratio 1/7 instead of 1/25", f"as exact: worst error {error}"])
+        answer = f"It is as exact: the worst error is {format_number(cases['well, arm 1/7'].worst, 1)}."
+        rows.insert(3, ["What does a mass ratio of 1/7 change, instead of 1/25?", answer])
     return rows
 
 
-def widths(result: BaseBody) -> dict[str, str]:
-    """Return widths that noise would give the two manoeuvres, for the text."""
-    well, poor = result.noise_free["well"].uncertainty, result.noise_free["poor"].uncertainty
+def printed_table(case: NoiseFree, printed: Floats) -> Table:
+    """Return for every quantity the truth, the paper's guess and result, this study's result, and both errors."""
+    rows = [
+        [
+            heading,
+            *(format_number(values[index], 6) for values in (paper.TRUTH, paper.GUESS, printed)),
+            format_number(case.estimate[index], 7),
+            format_number(abs(printed[index] / paper.TRUTH[index] - 1.0), 1),
+            format_number(abs(case.error[index]), 1),
+        ]
+        for index, heading in enumerate(HEADINGS)
+    ]
+    return ["quantity", "truth", "guess", "paper", "here", "error, paper", "error, here"], rows
+
+
+def case_table(result: BaseBody) -> Table:
+    """Return the worst errors and the misfit of every noise-free case."""
+    groups = (slice(0, 1), slice(1, 4), slice(4, 7), slice(7, 10))
+    rows = [
+        [
+            name,
+            *(format_number(float(np.abs(case.error[group]).max()), 1) for group in groups),
+            format_number(case.misfit, 2),
+        ]
+        for name, case in result.noise_free.items()
+    ]
+    return ["manoeuvre, model", "mass", "centre of mass", "moments", "products", "misfit"], rows
+
+
+def poor_numbers(result: BaseBody) -> dict[str, str]:
+    """Return the peak rates of the poorly exciting manoeuvre, and what noise makes of both manoeuvres."""
+    well, poor = result.noise_free["well"], result.noise_free["poor"]
     picked = {"mass": 0, "izz": 6, "ixz": 8}
-    texts = {name: _percent(float(poor[index])) for name, index in picked.items()}
-    return texts | {"well": ", ".join(_percent(float(well[index])) for index in picked.values())}
+    return {
+        "peak": ", ".join(format_fixed(1e3 * value, 2) for value in poor.peak),
+        "well": ", ".join(format_percent(well.uncertainty[index], 2) for index in picked.values()),
+        **{name: format_percent(poor.uncertainty[index], 2) for name, index in picked.items()},
+    }
 
 
-def blindness(result: BaseBody) -> dict[str, str]:
-    """Return what leaving the gradient out does to the fit, for the text."""
+def gradient_numbers(result: BaseBody) -> dict[str, str]:
+    """Return what leaving the gravity gradient out does to the fit."""
     case = result.noise_free["well, no gradient"]
     samples = 6 * len(case.recording.time)
     return {
@@ -124,41 +127,47 @@ def blindness(result: BaseBody) -> dict[str, str]:
 
 
 def posterior_table(result: BaseBody) -> Table:
-    """Every quantity with both arms."""
-    rows = []
-    for index, (name, unit) in enumerate(BODY_QUANTITIES.items()):
-        cells = []
-        for found in result.sampled.values():
-            body = found.bodies[BASE]
-            cells.append(format_quantity(float(body.mean[index]), float(body.sd[index])))
-        rows.append([f"{name} [{format_unit(unit)}]", format_number(paper.TRUTH[index], 6), *cells])
-    return ["", "truth", *(f"arm {name}" for name in result.sampled)], rows
+    """Return the sampled posterior of every quantity with both arms."""
+    bodies = [identified.bodies[BASE] for identified in result.sampled.values()]
+    rows = [
+        [
+            heading,
+            format_number(paper.TRUTH[index], 6),
+            *(format_quantity(float(body.mean[index]), float(body.sd[index])) for body in bodies),
+        ]
+        for index, heading in enumerate(HEADINGS)
+    ]
+    return ["quantity", "truth", *(f"arm {name}" for name in result.sampled)], rows
 
 
 def sampler_sentences(result: BaseBody) -> list[str]:
     """Return how the samplers did and how far the truth is from their mean."""
     sentences = []
-    for name, found in result.sampled.items():
-        body, chains = found.bodies[BASE], found.chains
+    for name, identified in result.sampled.items():
+        body, chains = identified.bodies[BASE], identified.chains
         miss = body.mean - paper.TRUTH
         distance = float(miss @ np.linalg.solve(np.cov(body.values.T), miss))
         sentences.append(
-            f"Arm {name}: {found.posterior.size} unknowns, {chains.effective_samples:.0f} effective samples of "
-            f"{chains.evaluations} evaluations, R-hat {chains.r_hat:.4f}, acceptance {chains.acceptance:.2f}, "
-            f"{'converged' if chains.converged else 'not converged'}; chi² {found.optimum.chi2:.0f} of "
-            f"{found.posterior.samples} samples. Squared distance of the truth from the mean, in the posterior's "
-            f"metric: {distance:.1f}, expected 10 ± 4.5. "
-            + (" ".join(found.disagreements) or "Mode, importance sampling and ensembles agree.")
+            f"Arm {name}: the posterior has {identified.posterior.size} unknowns. The ensembles gave "
+            f"{chains.effective_samples:.0f} effective samples from {chains.evaluations} evaluations, with R-hat "
+            f"{chains.r_hat:.4f} and acceptance {chains.acceptance:.2f}, and have "
+            f"{'' if chains.converged else 'not '}converged. Chi² is {identified.optimum.chi2:.0f} for "
+            f"{identified.posterior.samples} samples. The squared distance of the truth from the mean, in the "
+            f"posterior's metric, is {distance:.1f}; 10 ± 4.5 is expected. "
+            + (" ".join(identified.disagreements) or "Mode, importance sampling and ensembles agree.")
         )
     return sentences
 
 
 def grade_table(result: BaseBody) -> Table:
-    """Every accelerometer and what it gives, by knowledge of the rest."""
+    """Return the standard deviations that every accelerometer leaves, by knowledge of the rest."""
     rows = [
         [
             format_number(grade),
-            *(f"{_percent(own[index, 0])} / {_percent(own[index, 4:7].max())}" for own in result.grades.values()),
+            *(
+                f"{format_percent(widths[index, MASS], 2)} / {format_percent(widths[index, MOMENTS].max(), 2)}"
+                for widths in result.grades.values()
+            ),
         ]
         for index, grade in enumerate(GRADES)
     ]
@@ -166,58 +175,44 @@ def grade_table(result: BaseBody) -> Table:
 
 
 def reading_table(result: BaseBody) -> Table:
-    """Every unit the sigmas may have."""
+    """Return what every unit would mean that the sigmas may have."""
     rows = [
         [
-            f"{reading.sigma:g}",
-            format_unit(reading.unit),
-            f"{format_number(100.0 * reading.fraction, 2)} %",
-            _percent(reading.mass),
-            _percent(reading.moment),
-            f"{reading.manoeuvres:,.0f}".replace(",", " "),
+            f"{reading.sigma:g} {format_unit(reading.unit)}",
+            *(format_percent(value, 2) for value in (reading.fraction, reading.mass, reading.moment)),
+            format_number(reading.manoeuvres),
         ]
         for reading in result.readings
     ]
-    return ["sigma", "unit", "noise / peak", "mass", "worst moment", "manoeuvres for 2 %"], rows
+    return ["sigma", "noise / peak", "mass", "worst moment", "manoeuvres for 2 %"], rows
 
 
 def reading_sentences(result: BaseBody) -> list[str]:
-    """Return which readings one manoeuvre's error of 2 % allows."""
+    """Return in which units one manoeuvre can have an error of 2 %."""
     sentences, fitting = [], []
     for sigma in dict.fromkeys(reading.sigma for reading in result.readings):
-        own = [reading for reading in result.readings if reading.sigma == sigma]
-        able = [reading.unit for reading in own if max(reading.mass, reading.moment) <= CLAIM]
-        buried = [format_unit(reading.unit) for reading in own if reading.fraction > 1.0]
+        chosen = [reading for reading in result.readings if reading.sigma == sigma]
+        fitting.append([format_unit(item.unit) for item in chosen if max(item.mass, item.moment) <= CLAIM])
+        buried = [format_unit(reading.unit) for reading in chosen if reading.fraction > 1.0]
         sentences.append(
-            f"{sigma:g}: in {' or '.join(buried) or 'no unit'} it exceeds the whole signal. An error of 2 % from one "
-            f"manoeuvre of this kind would allow {'; '.join(map(format_unit, able)) or 'none of these readings'}."
+            f"Sigma {sigma:g} exceeds the whole signal in {' and in '.join(buried) or 'no unit'}. One manoeuvre could "
+            f"have an error of 2 % with {'; '.join(fitting[-1]) or 'none of these units'}."
         )
-        fitting.append(set(able))
-    both = [
-        unit
-        for unit in dict.fromkeys(reading.unit for reading in result.readings)
-        if all(unit in own for own in fitting)
-    ]
-    sentences.append(f"Readings that fit both: {'; '.join(map(format_unit, both)) or 'none'}.")
-    return sentences
+    both = [unit for unit in fitting[0] if all(unit in units for units in fitting)]
+    return [*sentences, f"Units that fit both values: {'; '.join(both) or 'none'}."]
 
 
 def arm_table(result: BaseBody) -> Table:
-    """Every quantity with the arm exact and known to 5 %, fast and, if computed, slow."""
+    """Return every quantity with the arm exact and known to 5 %, fast and, if computed, slow."""
     sigma = {Kind.ATTITUDE: STAR, Kind.ACCEL: GRADES[0]}
     cases = {"fast": result.fast} | ({} if result.slow is None else {"slow": result.slow})
     columns = {
-        f"{name}, arm {arm}": information.relative_sd(sigma, known)
+        f"{name}, arm {arm}": 100.0 * information.relative_sd(sigma, known)
         for name, information in cases.items()
         for arm, known in (("exact", (ARM,)), ("5 %", ()))
     }
-    header = ["", *columns]
     rows = [
-        [name, *(format_number(100.0 * column[index], 2) for column in columns.values())]
+        [name, *(format_number(column[index], 2) for column in columns.values())]
         for index, name in enumerate(BODY_QUANTITIES)
     ]
-    return header, rows
-
-
-def _percent(value: float) -> str:
-    return f"{format_number(100.0 * value, 2)} %"
+    return ["quantity", *columns], rows

@@ -1,7 +1,7 @@
 """Section 3.1 of the paper: which combinations of the inertial parameters can be identified at all.
 
-The paper's two-joint example is worked through, then ETS-VII: base parameters, what regroups into what, the standard
-parameters that follow once the dependent ones are known, and which data tell the scale of the masses.
+The paper's two-joint example is worked through, then ETS-VII: the base parameters as sums of standard parameters, those
+that follow once the dependent ones are known, and the data that show the scale of the masses.
 ``python -m studies.base_parameters`` writes ``reports/base_parameters.pdf``.
 """
 
@@ -25,9 +25,9 @@ from studies.common.ets7 import ets7
 __all__ = ["Result", "main", "run"]
 
 
-@threadpool_limits.wrap(limits=1)  # small factorisations: threads only get in each other's way
+@threadpool_limits.wrap(limits=1)  # threads would slow the many small factorisations down
 def run(*, seed: int = 1) -> Result:
-    """Run the study; every random state follows from the seed."""
+    """Run the study with random states that follow from the seed."""
     planar, arm = Robot.shipped("planar"), ets7()
     rngs = [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(5)]
     return Result(

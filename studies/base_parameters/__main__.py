@@ -1,4 +1,4 @@
-"""Write the report: ``python -m studies.base_parameters``."""
+"""``python -m studies.base_parameters``."""
 
 from studies.base_parameters import main
 

@@ -10,20 +10,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.linalg import subspace_angles
 
 from bayesid import Robot
+from bayesid._math.arrays import Floats
 from bayesid.identifiability import Base, base_parameters, standard_names
 from bayesid.identifiability.stacked_regressor import GRAVITY
 
 __all__ = ["Comparison", "compare"]
 
-Floats = NDArray[np.floating]
-
 STATES = 80
+"""Number of random states, many more than the parameters need."""
 
-ABSENT = "not evaluated: FIGAROH is not installed (the extra peers brings it)"
+ABSENT = "is not evaluated, since it is not installed (the extra peers brings it)"
+"""Statement in place of FIGAROH's version."""
 
 
 @dataclass(frozen=True)
@@ -33,19 +33,20 @@ class Comparison:
     Attributes
     ----------
     robot : str
+        Name of the robot.
     gravity : tuple of float
-        On the fixed base, base axes [m/s2].
-    ours, rank, peer : int
-        Number by this package, rank of Pinocchio's own regressor, and number by FIGAROH.
+        Gravity on the fixed base, base axes [m/s2].
+    count, rank, peer : int
+        Number by this package, rank of Pinocchio's regressor, and number by FIGAROH.
     tool : str
         FIGAROH and its version, or why it was not run.
     angle : float
-        Largest angle between the rows that take standard to base parameters, ours and FIGAROH's [rad].
+        Largest angle between the rows that take standard to base parameters, this package's and FIGAROH's [rad].
     """
 
     robot: str
     gravity: tuple[float, float, float]
-    ours: int
+    count: int
     rank: int
     peer: int | None
     tool: str
@@ -53,8 +54,8 @@ class Comparison:
 
 
 def compare(robot: Robot, rng: np.random.Generator, gravity: tuple[float, float, float] = GRAVITY) -> Comparison:
-    """Compare the base parameters of an arm bolted to the ground; each link is fixed on a joint of its own."""
-    found = base_parameters(robot, base=Base.FIXED, gravity=gravity)
+    """Compare the base parameters of an arm bolted to the ground; each link is fixed on a separate joint."""
+    base = base_parameters(robot, base=Base.FIXED, gravity=gravity)
     model = pin.buildModelFromXML(robot.urdf)
     model.gravity.linear = np.array(gravity)
     q = rng.uniform(-np.pi, np.pi, size=(STATES, model.nq))
@@ -69,14 +70,13 @@ def compare(robot: Robot, rng: np.random.Generator, gravity: tuple[float, float,
     length = np.linalg.norm(rows, axis=0)
     rank = int(np.linalg.matrix_rank(rows / np.where(length > 0.0, length, 1.0), tol=1e-9))
     if importlib.util.find_spec("figaroh") is None:
-        return Comparison(robot.name, gravity, found.count, rank, None, ABSENT, None)
+        return Comparison(robot.name, gravity, base.count, rank, None, ABSENT, None)
     links = [next(name for name, link in robot.links.items() if link.joint == k) for k in range(len(robot.joints))]
     names = standard_names(links)
     peer = _figaroh(model, q, v, a, names)
-    own = found.projection[:, [found.standard.index(name) for name in names]]
-    same = peer.shape == own.shape
-    angle = float(subspace_angles(peer.T, own.T).max()) if same else None
-    return Comparison(robot.name, gravity, found.count, rank, len(peer), f"FIGAROH {version('figaroh')}", angle)
+    projection = base.projection[:, [base.standard.index(name) for name in names]]
+    angle = float(subspace_angles(peer.T, projection.T).max()) if peer.shape == projection.shape else None
+    return Comparison(robot.name, gravity, base.count, rank, len(peer), f"FIGAROH {version('figaroh')}", angle)
 
 
 def _figaroh(model: pin.Model, q: Floats, v: Floats, a: Floats, names: tuple[str, ...]) -> Floats:

@@ -1,4 +1,4 @@
-"""Identify K_B of (24) from motion and joint torques, and K_1 from it once K_2 is known."""
+"""Identification of K_B of (24) from motion and joint torques, and of K_1 from it once K_2 is known."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from bayesid import Robot
+from bayesid._math.arrays import Floats
 from bayesid.identifiability import base_parameters, consistent_accelerations
 from bayesid.identifiability.stacked_regressor import massive_bodies
 from bayesid.robot.joint_state import JointState
@@ -18,31 +18,29 @@ from studies.base_parameters.structure import standard_parameters
 
 __all__ = ["Recovery", "identify_by_torques"]
 
-Floats = NDArray[np.floating]
-
 STATES = 60
-"""Instants at which motion and torques are measured."""
+"""Number of instants at which motion and torques are measured."""
 
 WRONG = 1.05
-"""Factor of the wrong K_2."""
+"""Factor by which the wrong K_2 differs from the true one."""
 
 
 @dataclass(frozen=True)
 class Recovery:
-    """What came out of a least-squares identification with exact data.
+    """Result of a least-squares identification with exact data.
 
     Attributes
     ----------
     base_error : float
         Largest error of K_B relative to its largest entry of the same unit.
     standard_error : float
-        Likewise of all standard parameters, recovered with the true K_2.
+        Largest such error of all standard parameters, recovered with the true K_2.
     shifted : tuple
-        Name, true value, and value recovered with K_2 wrong by 5 %, of the parameters of K_1 that this moves most.
+        Name, true value, and value recovered with K_2 wrong by 5 %, of the parameters of K_1 that change most.
     untouched : int
-        Parameters of K_1 that do not move at all.
+        Number of parameters of K_1 that do not change at all.
     torque_error : float
-        Of the joint torques that the wrong set predicts, by Pinocchio, relative to the largest.
+        Largest error of the torques that the wrong set predicts, by Pinocchio, relative to the largest torque.
     """
 
     base_error: float
@@ -54,7 +52,7 @@ class Recovery:
 
 def identify_by_torques(robot: Robot, rng: np.random.Generator) -> Recovery:
     """Solve (23) for the base parameters, with the torques that Pinocchio gives, and recover the others."""
-    found, bodies, p = base_parameters(robot), massive_bodies(robot), standard_parameters(robot)
+    base, bodies, p = base_parameters(robot), massive_bodies(robot), standard_parameters(robot)
     state = JointState(*rng.normal(size=(3, STATES, len(robot.joints))))
     rate = 0.1 * rng.normal(size=(STATES, 3))
     motion = kinematics(robot, state)
@@ -73,21 +71,21 @@ def identify_by_torques(robot: Robot, rng: np.random.Generator) -> Recovery:
             rows.append(pin.rnea(model, data, configuration(robot, state.position[row]), v, a).copy())
         return np.concatenate(rows)
 
-    independent = regressor[:, [found.standard.index(name) for name in found.independent]]
+    independent = regressor[:, [base.standard.index(name) for name in base.independent]]
     measured = torques(p)
     grouped = np.linalg.lstsq(independent, measured)[0]
-    value = dict(zip(found.standard, p, strict=True))
-    second = np.array([value[name] for name in found.dependent])
-    recovered, wrong = found.recover(grouped, second), found.recover(grouped, WRONG * second)
+    value = dict(zip(base.standard, p, strict=True))
+    second = np.array([value[name] for name in base.dependent])
+    recovered, wrong = base.recover(grouped, second), base.recover(grouped, WRONG * second)
     moved = {
         name: (float(p[index]), float(wrong[index]))
-        for index, name in enumerate(found.standard)
-        if name in found.independent
+        for index, name in enumerate(base.standard)
+        if name in base.independent
     }
     order = sorted(moved, key=lambda name: -abs(moved[name][1] - moved[name][0]))
     return Recovery(
-        base_error=_relative(grouped, found.project(p), found.independent),
-        standard_error=_relative(recovered, p, found.standard),
+        base_error=_relative(grouped, base.project(p), base.independent),
+        standard_error=_relative(recovered, p, base.standard),
         shifted=tuple((name, *moved[name]) for name in order[:8]),
         untouched=sum(abs(new - old) < 1e-6 for old, new in moved.values()),
         torque_error=float(np.abs(torques(wrong) - measured).max() / np.abs(measured).max()),
@@ -95,6 +93,6 @@ def identify_by_torques(robot: Robot, rng: np.random.Generator) -> Recovery:
 
 
 def _relative(values: Floats, true: Floats, names: tuple[str, ...]) -> float:
-    """Largest error, relative to the largest value of the same kind: mass, first moment, inertia."""
+    """Return the largest error, relative to the largest value of the same kind: mass, first moment, inertia."""
     kinds = np.array([name.split(".")[1] for name in names])
     return max(float(np.abs((values - true)[kinds == k]).max() / np.abs(true[kinds == k]).max()) for k in set(kinds))

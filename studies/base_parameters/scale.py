@@ -1,13 +1,13 @@
-"""Which data tell the scale of the masses: the rank of the equations, with and without actions that are known."""
+"""Data that show the scale of the masses: the rank of the equations, with and without actions that are known."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Load, Robot
+from bayesid._math.arrays import Floats
 from bayesid.identifiability import (
     BaseParameters,
     Determined,
@@ -25,40 +25,37 @@ from studies.base_parameters.structure import standard_parameters
 
 __all__ = ["ScaleCase", "scale_cases"]
 
-Floats = NDArray[np.floating]
-
 STATES = 90
+"""Number of random states, many more than the parameters need."""
 
 GRADIENT = 1.0
-"""mu / R^3: time is counted such that the random states turn at about the mean motion."""
+"""Gravity gradient mu / R^3, in units of time in which the random states turn at about the mean motion."""
 
 ACTION = 1.0e3
-"""Size of known forces, torques and momenta in the same units, as large as what the arm's motion takes."""
+"""Size of known forces, torques and momenta in the same units, as large as those of the arm's motion."""
 
 
 @dataclass(frozen=True)
 class ScaleCase:
-    """What some data determine.
+    """Base parameters that some data determine.
 
     Attributes
     ----------
     data : str
-        What is measured and known.
-    found : Determined
-    count : int
-        Base parameters of the robot.
+        Description of what is measured and known.
+    determined : Determined
+        Number of determined base parameters, and singular values on both sides of the rank.
     open_scale : bool
         Whether the data allow any common factor of all base parameters.
     """
 
     data: str
-    found: Determined
-    count: int
+    determined: Determined
     open_scale: bool
 
 
 def scale_cases(robot: Robot, rng: np.random.Generator) -> tuple[ScaleCase, ...]:
-    """Return what motion alone determines, and what it does with each other known thing."""
+    """Return what motion alone determines, and what it determines together with further knowledge."""
     world = _World(robot, rng)
     wheel, thrust, torque = np.zeros((3, STATES, 6))
     momentum = ACTION * np.array([0.5, -0.8, 0.3])
@@ -105,7 +102,7 @@ class _World:
     def equations(
         self, wrench: Floats | None = None, *, rate: Floats | None = None, joints: bool = False, gradient: bool = False
     ) -> Floats:
-        """Left side of the equations in states that a known wrench leads to; the joints' only where measured."""
+        """Return the left side of the equations in states that a known wrench causes; with the joints' if measured."""
         rate = self.rate if rate is None else rate
         wrench = np.zeros((STATES, 6)) if wrench is None else wrench
         zenith = self.zenith if gradient else None
@@ -117,14 +114,13 @@ class _World:
         return left.reshape(-1, left.shape[-1])
 
     def known(self, body: str) -> Floats:
-        """Equations that give the parameters of a body."""
+        """Return the equations that state the ten parameters of a body."""
         return np.eye(10 * len(self.bodies))[10 * self.bodies.index(body) :][:10]
 
     def case(self, data: str, left: Floats, known: Floats | None = None) -> ScaleCase:
-        """Return what equations determine, with what is known counting as much as one of them."""
+        """Return what equations determine; known parameters weigh as much as one equation of motion."""
         if known is not None:
             weight = np.linalg.norm(known * np.linalg.norm(left, axis=0), axis=1, keepdims=True)
             left = np.concatenate([left, weight * known])
-        found = determined(self.base, left)
-        own = self.base.project(standard_parameters(self.robot))
-        return ScaleCase(data, found, self.base.count, found.leaves_open(own))
+        result = determined(self.base, left)
+        return ScaleCase(data, result, result.leaves_open(self.base.project(standard_parameters(self.robot))))

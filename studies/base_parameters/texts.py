@@ -25,34 +25,30 @@ def symbol(name: str, bodies: Sequence[str]) -> str:
     return f"{_LETTERS[kind]}{axes}{str(bodies.index(body)).translate(_LOWERED)}"
 
 
-def regrouping_rows(found: BaseParameters) -> list[list[str]]:
-    """Return every base parameter that more than one standard parameter makes up: its first one, and the sum."""
-    rows = []
-    for name, row in zip(found.independent, found.regrouping, strict=True):
-        if row.any():
-            own = symbol(name, _bodies(found))
-            rows.append([name, own + _sum(found, row)])
-    return rows
+def regrouping_rows(base: BaseParameters) -> list[list[str]]:
+    """Return every base parameter that is a sum of standard parameters: the name of its first one, and the sum."""
+    pairs = zip(base.independent, base.regrouping, strict=True)
+    return [[name, symbol(name, _bodies(base)) + _sum(base, row)] for name, row in pairs if row.any()]
 
 
-def unchanged(found: BaseParameters) -> list[str]:
+def unchanged(base: BaseParameters) -> list[str]:
     """Return the base parameters that are standard parameters."""
-    pairs = zip(found.independent, found.regrouping, strict=True)
-    return [symbol(name, _bodies(found)) for name, row in pairs if not row.any()]
+    pairs = zip(base.independent, base.regrouping, strict=True)
+    return [symbol(name, _bodies(base)) for name, row in pairs if not row.any()]
 
 
-def _bodies(found: BaseParameters) -> list[str]:
-    return list(dict.fromkeys(name.split(".", 1)[0] for name in found.standard))
+def _bodies(base: BaseParameters) -> list[str]:
+    return list(dict.fromkeys(name.split(".", 1)[0] for name in base.standard))
 
 
-def _sum(found: BaseParameters, row: NDArray[np.floating]) -> str:
-    """Terms with the same coefficient of the same quantity of successive bodies are drawn together: ``m₂₋₄``."""
-    bodies, text = _bodies(found), ""
-    letters = dict.fromkeys(name.split(".", 1)[1] for name in found.dependent)
+def _sum(base: BaseParameters, row: NDArray[np.floating]) -> str:
+    """Return the terms of a sum; equal ones of successive bodies are drawn together, such as ``m₂₋₄``."""
+    bodies, text = _bodies(base), ""
+    letters = dict.fromkeys(name.split(".", 1)[1] for name in base.dependent)
     for letter in letters:
         terms = [
             (bodies.index(name.split(".", 1)[0]), round(float(value), 9))
-            for name, value in zip(found.dependent, row, strict=True)
+            for name, value in zip(base.dependent, row, strict=True)
             if name.endswith(f".{letter}") and value
         ]
         for run in _runs(terms):

@@ -1,7 +1,8 @@
-"""Benchmark: what a simulation and an effective sample cost, as ratios measured in one run.
+"""Benchmark: cost of a simulation and of an effective sample, as ratios measured in one run.
 
-Absolute times depend on the machine and its load; ratios taken side by side do so much less. Comparisons are made at
-the same accuracy, a hundredth of the sensors' noise.
+Absolute times depend on the machine and its load; ratios measured side by side depend on them much less. Comparisons
+are made at the same accuracy, a hundredth of the sensors' noise. ``python -m studies.benchmark --full`` writes
+``reports/benchmark.pdf``.
 """
 
 from studies.benchmark.report import main, write_report

@@ -1,4 +1,4 @@
-"""Run the benchmark: ``python -m studies.benchmark [--full] [--output FILE]``."""
+"""``python -m studies.benchmark``."""
 
 from studies.benchmark.report import main
 

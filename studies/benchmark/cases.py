@@ -1,4 +1,4 @@
-"""The robots and manoeuvres that are timed."""
+"""Robots and manoeuvres that are timed."""
 
 from __future__ import annotations
 
@@ -17,14 +17,18 @@ from bayesid import (
     Sensor,
     White,
 )
+from bayesid.design.designed import sample_times
 from bayesid.inference.simulated_recordings import simulate_manoeuvre
 from bayesid.simulation.effects import GravityGradient
+from studies.common.ets7 import INTERVAL, RADIUS
+
+__all__ = ["DURATION", "SIGMA", "chain", "excitation", "posterior_of"]
 
 SIGMA = 1.0e-5
-"""Noise of rate [rad/s] and accelerometer [m/s2]."""
+"""Noise per sample of rate [rad/s] and accelerometer [m/s2]."""
 
-RADIUS = 6.916e6
 DURATION = 120.0
+"""Length of every manoeuvre [s]."""
 
 LINK = """
   <link name="link{n}"><inertial><origin xyz="{half} 0 0.01"/><mass value="{mass}"/>
@@ -32,10 +36,11 @@ LINK = """
   <joint name="joint{n}" type="revolute"><parent link="{parent}"/><child link="link{n}"/>
     <origin xyz="{length} 0 0" rpy="{turn} 0 0"/><axis xyz="0 0 1"/>
     <limit lower="-6.3" upper="6.3" effort="1" velocity="10"/></joint>"""
+"""Link and joint of the chain in URDF."""
 
 
 def chain(links: int) -> Robot:
-    """Return a servicer whose arm of 3 m and 60 kg is cut into equal links."""
+    """Return a robot whose arm of 3 m and 60 kg is cut into equal links."""
     length, mass = 3.0 / links, 60.0 / links
     thick = mass * (length**2 / 12.0 + 0.01)
     parts = [
@@ -64,7 +69,7 @@ def model_of(robot: Robot) -> Model:
 
 
 def excitation(joints: int, seed: int) -> Excitation:
-    """Return a manoeuvre of all joints that lasts `DURATION`."""
+    """Return a random manoeuvre of all joints that lasts `DURATION`."""
     rng = np.random.default_rng(seed)
     shrink = np.sqrt(6.0 / joints)
     return Excitation(
@@ -76,20 +81,30 @@ def excitation(joints: int, seed: int) -> Excitation:
     )
 
 
-def posterior_of(robot: Robot, *, recordings: int = 1, interval: float = 0.5, encoder_sigma: float = 0.0) -> Posterior:
-    """Return the posterior of simulated recordings; the joints' motion is exact where the encoder has no noise."""
+def posterior_of(
+    robot: Robot, *, recordings: int = 1, interval: float = INTERVAL, encoder_sigma: float = 0.0
+) -> Posterior:
+    """Return the posterior of simulated recordings.
+
+    Parameters
+    ----------
+    robot : Robot
+    recordings : int
+        Number of recordings of different manoeuvres.
+    interval : float
+        Time between samples [s].
+    encoder_sigma : float
+        Noise of the joint positions [rad]; the joints' motion is known exactly where it is 0.
+    """
     model = model_of(robot)
     manoeuvres = []
     for seed in range(recordings):
         rng = np.random.default_rng(seed)
         motion = excitation(len(robot.joints), seed)
-        time = np.arange(0.0, DURATION + 1e-9, interval)
-        recording = simulate_manoeuvre(
-            model, motion, time, name=f"manoeuvre-{seed}", rng=rng, encoder_sigma=encoder_sigma
+        time, name = sample_times(DURATION, interval), f"manoeuvre-{seed}"
+        recording = simulate_manoeuvre(model, motion, time, name=name, rng=rng, encoder_sigma=encoder_sigma)
+        measured = (
+            MeasuredMotion.from_recording(recording, robot, sigma={0: encoder_sigma}) if encoder_sigma else motion
         )
-        if encoder_sigma > 0.0:
-            measured = MeasuredMotion.from_recording(recording, robot, sigma={0: encoder_sigma})
-            manoeuvres.append(Manoeuvre(recording, measured))
-        else:
-            manoeuvres.append(Manoeuvre(recording, motion))
+        manoeuvres.append(Manoeuvre(recording, measured))
     return Posterior.of(model, manoeuvres)

@@ -1,4 +1,4 @@
-"""All measurements of the benchmark."""
+"""The measurements of the benchmark."""
 
 from __future__ import annotations
 
@@ -10,13 +10,29 @@ from studies.benchmark.sampling import Sampling, compare_moves
 from studies.benchmark.timing import Rival, rivals, seconds_per_evaluation
 from studies.common.ets7 import ets7
 
+__all__ = ["Benchmark", "run"]
+
 
 @dataclass(frozen=True)
 class Benchmark:
-    """What was measured; times in seconds.
+    """Measured times [s].
 
-    ``links`` and ``samples`` map their number to the time of one evaluation; ``whitening`` holds the time with white
-    noise, with an encoder whose noise is negligible, and with one whose noise matters.
+    Attributes
+    ----------
+    evaluation : float
+        Time of one evaluation of the log density of ETS-VII.
+    error : float
+        Integration error of that evaluation, in standard deviations of a sample.
+    rivals : list of Rival
+        Other simulators of the same manoeuvre.
+    links, samples : dict of int to float
+        Time of one evaluation by number of links, and by number of samples.
+    whitening : dict of str to float
+        Time with white noise, with an encoder whose noise is negligible, and with one whose noise matters.
+    windows : dict of str to int
+        Number of earlier sample times that each of these whitenings conditions on.
+    sampling : Sampling
+        Cost of an effective sample.
     """
 
     evaluation: float
@@ -30,7 +46,7 @@ class Benchmark:
 
     @property
     def speedups(self) -> dict[str, float]:
-        """How many times faster than each rival one evaluation is."""
+        """Time of each rival over that of one evaluation, by its name."""
         return {rival.name: rival.seconds / self.evaluation for rival in self.rivals}
 
 
@@ -40,9 +56,9 @@ def run(*, full: bool = False, seed: int = 0) -> Benchmark:
     Parameters
     ----------
     full : bool
-        Longer chains of the default move and more repeats.
+        Whether to take longer chains of the default move and more repeats.
     seed : int
-        Of the samplers.
+        Seed of the samplers.
     """
     robot = ets7()
     single = posterior_of(robot)

@@ -1,4 +1,4 @@
-"""Cost of an effective sample, with our moves and with emcee's default."""
+"""Cost of an effective sample with the package's moves and with emcee's default."""
 
 from __future__ import annotations
 
@@ -12,38 +12,65 @@ from emcee.autocorr import integrated_time
 from bayesid import Posterior
 from bayesid.inference import Chains, LogCholeskyParameterisation, maximise, sample
 
+__all__ = ["Sampling", "compare_moves"]
+
 
 class Sampling(NamedTuple):
-    """Evaluations and seconds per effective sample, and the time to the wanted number of them, compilation apart."""
+    """Cost of effective samples, without compilation.
 
-    ours: Chains
+    Attributes
+    ----------
+    chains : Chains
+        Samples by the package's moves.
+    seconds : float
+        Time that they took [s].
+    evaluations, default_evaluations : float
+        Evaluations per effective sample by the package's moves and by emcee's default move.
+    default_seconds : float
+        Time per effective sample by emcee's default move [s].
+    default_lengths : float
+        Number of autocorrelation times that the default move's chain covers.
+    """
+
+    chains: Chains
     seconds: float
     evaluations: float
     default_evaluations: float
     default_seconds: float
-    default_lengths: float  # autocorrelation times that the default move's chain covers
+    default_lengths: float
 
 
 def compare_moves(posterior: Posterior, *, wanted: float, default_steps: int, seed: int) -> Sampling:
-    """Sample one posterior with our moves and with emcee's default stretch move."""
+    """Sample one posterior with the package's moves and with emcee's default stretch move.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    wanted : float
+        Number of effective samples by the package's moves.
+    default_steps : int
+        Number of steps of the default move.
+    seed : int
+        Seed of the samplers.
+    """
     refined, optimum = maximise(posterior, np.random.default_rng(seed))
     parameterisation = LogCholeskyParameterisation(refined)
-    refined.log_density(optimum.z)  # compile
+    refined.log_density(optimum.z)  # compiles
     began = time.perf_counter()
-    ours = sample(parameterisation, optimum, seed, effective_samples=wanted)
+    chains = sample(parameterisation, optimum, seed, effective_samples=wanted)
     seconds = time.perf_counter() - began
-    sampler = emcee.EnsembleSampler(ours.walkers, refined.size, refined.log_density, vectorize=True)
+    sampler = emcee.EnsembleSampler(chains.walkers, refined.size, refined.log_density, vectorize=True)
     sampler.random_state = np.random.RandomState(seed).get_state()
-    start = parameterisation.proposal(optimum).draw(ours.walkers, np.random.default_rng(seed))
+    start = parameterisation.proposal(optimum).draw(chains.walkers, np.random.default_rng(seed))
     began = time.perf_counter()
     sampler.run_mcmc(start, default_steps, skip_initial_state_check=True)
     default_seconds = time.perf_counter() - began
     tau = float(np.max(integrated_time(sampler.get_chain()[default_steps // 5 :], tol=0, quiet=True)))
     return Sampling(
-        ours=ours,
+        chains=chains,
         seconds=seconds,
-        evaluations=ours.autocorrelation,  # of the walkers, each evaluated once per step
+        evaluations=chains.autocorrelation,  # each walker is evaluated once per step
         default_evaluations=tau,
-        default_seconds=default_seconds * tau / (default_steps * ours.walkers),
+        default_seconds=default_seconds * tau / (default_steps * chains.walkers),
         default_lengths=0.8 * default_steps / tau,
     )

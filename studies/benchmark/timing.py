@@ -1,4 +1,4 @@
-"""Timing of simulations, ours and others'."""
+"""Timing of simulations by this package and by others."""
 
 from __future__ import annotations
 
@@ -11,19 +11,33 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bayesid import Posterior, Robot
-from studies.benchmark.cases import DURATION, RADIUS, SIGMA, excitation
+from studies.benchmark.cases import DURATION, SIGMA, excitation
+from studies.common.ets7 import RADIUS
 from studies.truth import stepwise
 from studies.truth.mujoco import TruthModel, rollout
 
+__all__ = ["Rival", "rivals", "seconds_per_evaluation"]
+
 BATCH = 64
-"""Simulations evaluated per call."""
+"""Number of simulations that are evaluated per call."""
 
 STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)
 """Steps tried for MuJoCo, longest first [s]."""
 
 
 class Rival(NamedTuple):
-    """Another simulator: seconds per simulation, the step it needs, and its error in sigma."""
+    """Another simulator.
+
+    Attributes
+    ----------
+    name : str
+    seconds : float
+        Time per simulation [s].
+    step : float
+        Integration step that it needs [s].
+    error : float
+        Largest error of a rate, in standard deviations of a sample.
+    """
 
     name: str
     seconds: float
@@ -55,10 +69,7 @@ def rivals(robot: Robot, posterior: Posterior, repeats: int = 2) -> list[Rival]:
     with tempfile.TemporaryDirectory() as folder:
         urdf = Path(folder) / "robot.urdf"
         robot.write_urdf(urdf)
-        return [
-            _pinocchio(urdf, motion, samples, repeats),
-            _mujoco(urdf, motion, samples, repeats),
-        ]
+        return [_pinocchio(urdf, motion, samples, repeats), _mujoco(urdf, motion, samples, repeats)]
 
 
 def _state_at(motion: Any) -> Callable[[float], tuple[Any, Any, Any]]:
@@ -78,9 +89,8 @@ def _pinocchio(urdf: Path, motion: Any, samples: Any, repeats: int) -> Rival:
         )
 
     fine, coarse = simulate(0.25).rate, simulate(0.5).rate
-    return Rival(
-        "Pinocchio, step by step in Python", best_of(lambda: simulate(0.5), repeats), 0.5, _sigmas(coarse - fine)
-    )
+    seconds = best_of(lambda: simulate(0.5), repeats)
+    return Rival("Pinocchio, step by step in Python", seconds, 0.5, _sigmas(coarse - fine))
 
 
 def _mujoco(urdf: Path, motion: Any, samples: Any, repeats: int) -> Rival:

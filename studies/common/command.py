@@ -8,7 +8,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-__all__ = ["Command"]
+__all__ = ["TRIALS", "Command"]
+
+TRIALS: Mapping[str, Mapping[str, Any]] = {
+    "--trials": {"type": Path, "help": "file that keeps the Monte Carlo trials, for an interrupted run"},
+    "--workers": {"type": int, "default": 1, "help": "number of processes that run the trials"},
+}
+"""Options of a study with `studies.common.monte_carlo.run_trials`, for `Command.extra`."""
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,9 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 
-__all__ = ["ACCEL", "ACCELEROMETER", "BASE", "BIAS", "CORNER", "ENCODER", "EXCURSION", "LIMITS", "PERIOD", "PERIODS"]
-__all__ += ["RADIUS", "RAMP", "RAMPS", "RATE", "START", "TIP", "TIP_RATE", "TIP_SPEED", "FlightManoeuvre", "ets7"]
-__all__ += ["excitation", "extended_wrist", "tip_of"]
+__all__ = ["ACCEL", "ACCELEROMETER", "BASE", "BIAS", "CORNER", "ENCODER", "EXCURSION", "INTERVAL", "LIMITS"]
+__all__ += ["PERIOD", "PERIODS", "RADIUS", "RAMP", "RAMPS", "RATE", "START", "TIP", "TIP_RATE", "TIP_SPEED"]
+__all__ += ["FlightManoeuvre", "ets7", "excitation", "extended_wrist", "tip_of"]
 
 Floats = NDArray[np.floating]
 
@@ -39,6 +39,9 @@ ACCELEROMETER = (0.4, 0.3, 0.8)
 RATE, ACCEL, ENCODER = 1e-5, 1e-5, 1e-6
 """Noise per sample of rates, accelerations and joint positions: two seconds of arc per second, a good accelerometer,
 good encoders [rad/s, m/s2, rad]."""
+
+INTERVAL = 0.5
+"""Time between samples of all sensors [s]; assumed."""
 
 BIAS = 1e-4
 """Standard deviation of the accelerometer's constant error [m/s2]."""

@@ -1,8 +1,8 @@
 """What ETS-VII itself could have identified within its flight rules, in what time, and with which sensors.
 
-A manoeuvre of all six joints is designed within 50 mm/s and 5 degrees a second at the tip; its information is rescaled
-for other sensors, repeated, and held against an arm that is not known exactly. The flight's own manoeuvre is put beside
-it, and the predicted widths are checked with MuJoCo. ``python -m studies.ets7_limits`` writes
+A manoeuvre of all six joints is designed within 50 mm/s and 5 degrees a second at the tip. Its information is rescaled
+for other sensors, repeated, and evaluated with an arm that is not known exactly. It is compared with the flight's
+manoeuvre, and the predicted standard deviations are checked with MuJoCo. ``python -m studies.ets7_limits`` writes
 ``reports/ets7_limits.pdf``.
 """
 
@@ -13,16 +13,20 @@ from pathlib import Path
 
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import Search, Store
-from studies.common.command import Command
-from studies.ets7_limits.analysis import ACCELS, CHECKED, RATES, answers, design_manoeuvre, knowledge_of, tell
-from studies.ets7_limits.check import check
+from studies.common.command import TRIALS, Command
+from studies.common.models import ARM_SPREAD
+from studies.ets7_limits.analysis import ACCELS, CHECKED, RATES, answers, design_manoeuvre, information_of, widths
+from studies.ets7_limits.check import Planned, check
 from studies.ets7_limits.report import Result, write_report
-from studies.ets7_limits.setting import ARM_SPREAD, DURATION, POINTS, limits_problem
+from studies.ets7_limits.setting import DURATION, POINTS, limits_problem
 
 __all__ = ["Result", "main", "run"]
 
 SEARCH = Search(starts=2, iterations=60)
+"""Effort of the search."""
+
 REPETITIONS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5)
+"""Numbers of repetitions at which the accuracy is drawn."""
 
 
 def run(
@@ -36,6 +40,8 @@ def run(
     accels: Sequence[str] = tuple(ACCELS),
     arm_spread: float = ARM_SPREAD,
     store: Store | None = None,
+    trials: Path | None = None,
+    workers: int = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the study.
@@ -43,39 +49,49 @@ def run(
     Parameters
     ----------
     seed : int
-        Every random number follows from it.
+        Seed of all random numbers.
     duration : float
-        Of the designed manoeuvre [s].
+        Length of the designed manoeuvre [s].
     points : int
-        Free control points of every joint.
+        Number of free control points of every joint.
     search : Search
+        Effort of the search.
     noises : int
-        Recordings of the check.
+        Number of recordings of the check.
     rates, accels : sequence of str
-        Sensors, by their labels.
+        Labels of the sensors.
     arm_spread : float
         Relative width of the arm's priors where it is not known exactly; 0 where it always is.
     store : Store, optional
-        Keeps what the search found.
+        Store that keeps the starts of the search.
+    trials, workers
+        File and number of processes of the check's fits; see `studies.common.monte_carlo.run_trials`.
+    progress : callable
+        Receives a line on what is being done.
     """
     designed = design_manoeuvre(limits_problem(duration, points), seed, search, store or Store.forgetful(), progress)
-    own, flown = knowledge_of(designed, arm_spread)
-    table = answers(own, rates, {label: ACCELS[label] for label in accels}, progress)
+    both = dict(zip(("designed", "flight"), information_of(designed, arm_spread), strict=True))
+    table = answers(both["designed"], rates, {label: ACCELS[label] for label in accels}, progress)
     curves = {
-        (name, known): [knowledge.repeated(CHECKED, known).worst(count) for count in REPETITIONS]
-        for name, knowledge in (("designed", own), ("flight", flown))
+        (name, known): [information.repeated(CHECKED, known).worst(count) for count in REPETITIONS]
+        for name, information in both.items()
         for known in (True, False)
     }
     progress("flights of the independent simulator")
-    checked = check(designed.motion, duration, noises, seed, progress)
-    return Result(designed, table, tell(own), tell(flown), REPETITIONS, curves, checked, duration)
+    planned = Planned(tuple(map(float, designed.optimum.parameters)), duration, points)
+    checked = check(planned, noises, seed, trials, workers, progress)
+    after_one = {name: widths(information) for name, information in both.items()}
+    return Result(designed, table, after_one["designed"], after_one["flight"], REPETITIONS, curves, checked, duration)
 
 
 COMMAND = Command(
     "ets7_limits",
     "Say what ETS-VII could have identified within its rules.",
     seed=1,
-    extra={"--store": {"type": Path, "help": "file that keeps what the search found, for an interrupted run"}},
+    extra={
+        "--store": {"type": Path, "help": "file that keeps the starts of the search, for an interrupted run"},
+        **TRIALS,
+    },
 )
 
 
@@ -84,4 +100,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = COMMAND.parse(arguments)
     keep_compiled()
     store = None if options.store is None else Store.open(options.store, f"ets7-limits {options.seed} {SEARCH}")
-    write_report(run(seed=options.seed, store=store, progress=print), options.output)
+    result = run(seed=options.seed, store=store, trials=options.trials, workers=options.workers, progress=print)
+    write_report(result, options.output)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid.design.plan import Trajectory
-from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
 from studies.common.ets7 import LIMITS
 
 __all__ = ["manoeuvre_figure", "repetition_figure"]
@@ -29,7 +29,7 @@ def manoeuvre_figure(trajectory: Trajectory) -> Figure:
     right.set(ylabel="rotation of the base [deg]")
     for axes in (left, middle, right):
         axes.set_xlabel("time [s]")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=6)
+    shared_legend(figure, left, 6)
     return figure
 
 

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bayesid.design.designed import sample_times
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.model import Manoeuvre
 from studies.common import flight
-from studies.common.ets7 import ACCEL, ENCODER, RATE, ets7
-from studies.ets7_limits.setting import INTERVAL
+from studies.common.ets7 import ACCEL, ENCODER, INTERVAL, RATE, ets7
 from studies.truth.mujoco import Truth
 
 __all__ = ["fly", "record"]
@@ -21,9 +21,8 @@ STEP = 0.25
 
 
 def fly(motion: Motion, duration: float, rate: NDArray[np.floating], **hidden: Any) -> Truth:
-    """Fly a manoeuvre from a given rate [rad/s] and return what truly happened at the samples."""
-    times = np.arange(0.0, duration + 1e-9, INTERVAL)
-    return flight.fly(ets7(), motion, times, rate=rate, step=STEP, **hidden)
+    """Fly a manoeuvre from an initial rate [rad/s] and return the true motion at the samples."""
+    return flight.fly(ets7(), motion, sample_times(duration, INTERVAL), rate=rate, step=STEP, **hidden)
 
 
 def record(truth: Truth, name: str, rng: np.random.Generator) -> Manoeuvre:

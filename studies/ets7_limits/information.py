@@ -1,4 +1,4 @@
-"""What one manoeuvre tells of the base, for any sensors, any knowledge of the arm and any number of repetitions."""
+"""Information of one manoeuvre about the base, for any sensors, any knowledge of the arm and any repetitions."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from bayesid import Kind, Sensor, White
+from bayesid._math.arrays import Floats
 from bayesid.design import planned_manoeuvre, planned_posterior
 from bayesid.design.designed import sample_times
 from bayesid.identifiability.local_knowledge import Knowledge, marginalised, triangular
@@ -18,26 +18,33 @@ from bayesid.inference.noise_changes import with_sensors
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.sensors import Noise
-from studies.common.ets7 import ACCELEROMETER, ENCODER
-from studies.ets7_limits.setting import ARM_SPREAD, DURATION, INTERVAL, model_of
+from studies.common.ets7 import ACCELEROMETER, ENCODER, INTERVAL
+from studies.common.models import ARM_SPREAD
+from studies.common.quantities import JUDGED
+from studies.ets7_limits.setting import DURATION, model_of
 
-__all__ = ["LONGEST", "Asked", "Grade", "Repeated", "wide_posterior"]
-
-Floats = NDArray[np.floating]
+__all__ = ["LONGEST", "Grade", "ManoeuvreInformation", "Repeated", "wide_posterior"]
 
 ABSENT = 1e3
-"""Noise of an accelerometer that is not there [m/s2]."""
+"""Noise that stands for an accelerometer that is not there [m/s2]."""
 
 LONGEST = 1e6
-"""Repetitions beyond which nobody waits: years of moving without a pause."""
-
-JUDGED = (0, 4, 5, 6)
-"""Of the ten quantities, those that are to be known: mass and the three moments of inertia."""
+"""Largest number of repetitions, which take years of moving without a pause."""
 
 
 @dataclass(frozen=True)
 class Grade:
-    """Sensors: noise of the rate, noise of the accelerometer per sample [m/s2], None where there is none."""
+    """Grade of the sensors.
+
+    Parameters
+    ----------
+    rate : Noise
+        Noise of the rate sensor.
+    accel : float or None
+        Noise per sample of the accelerometer [m/s2]; None where there is none.
+    bias_known : bool
+        Whether the accelerometer's bias is known exactly.
+    """
 
     rate: Noise
     accel: float | None
@@ -46,37 +53,29 @@ class Grade:
 
 @dataclass(frozen=True)
 class Repeated:
-    """What n repetitions of a manoeuvre tell.
+    """Information of n repetitions of a manoeuvre.
 
     Attributes
     ----------
     prior : Knowledge
-        The base's quantities before any manoeuvre, by the c unknowns that all repetitions share.
+        Knowledge of the base's quantities before any manoeuvre, by the c unknowns that all repetitions share.
     rows : (c, c) array
         Rows equivalent to the whitened Jacobian of one repetition, its initial rate marginalised.
-    duration : float
-        Duration of one repetition [s].
     """
 
     prior: Knowledge
     rows: Floats
-    duration: float
 
     def sd(self, repetitions: float) -> Floats:
-        """Posterior standard deviation of the base's ten quantities, in their units."""
+        """Return the posterior standard deviations of the base's ten quantities, in their units."""
         return self.prior.having(np.sqrt(repetitions) * self.rows).sd
 
-    def relative(self, repetitions: float) -> Floats:
-        """Relative standard deviation of the base's mass and three moments of inertia, shape (4,)."""
-        judged = list(JUDGED)
-        return self.sd(repetitions)[judged] / self.prior.values[judged]
-
     def worst(self, repetitions: float) -> float:
-        """Return the largest of `relative`."""
-        return float(self.relative(repetitions).max())
+        """Return the largest relative standard deviation of the base's mass and three moments of inertia."""
+        return float((self.sd(repetitions)[JUDGED] / self.prior.values[JUDGED]).max())
 
     def needed(self, target: float = 0.01) -> float:
-        """Repetitions until the worst is down to the target, at least one; infinite where `LONGEST` is not enough."""
+        """Return how many repetitions, at least one, reach the target; infinite where `LONGEST` is not enough."""
         if self.worst(1.0) <= target:
             return 1.0
         if self.worst(LONGEST) > target:
@@ -85,30 +84,39 @@ class Repeated:
 
     @property
     def floored(self) -> bool:
-        """Whether more repetitions no longer help at the end."""
+        """Whether more repetitions no longer help in the end."""
         return self.worst(LONGEST) > 0.9 * self.worst(0.01 * LONGEST)
 
 
 @dataclass
-class Asked:
-    """A manoeuvre's posterior with everything unknown that a question may fix; see `wide_posterior`."""
+class ManoeuvreInformation:
+    """Information of a manoeuvre for any sensors.
+
+    Attributes
+    ----------
+    posterior : Posterior
+        Posterior with everything unknown that a question may take as known; see `wide_posterior`.
+    """
 
     posterior: Posterior
-    duration: float = DURATION
     _kept: dict[tuple[Noise, float], Floats] = field(default_factory=dict)
 
     def repeated(self, grade: Grade, arm_known: bool) -> Repeated:
-        """Return what repetitions tell with some sensors; without an accelerometer its bias does not matter."""
+        """Return the information of repetitions with some sensors."""
         size, names = self.posterior.size, self.posterior.unknowns.names
         rates = list(range(size))[self.posterior.unknowns.layout.all_rates]
-        exact = [index for index, name in enumerate(names) if _exact(name, grade, arm_known)]
+        known = ("link",) * arm_known + ("accel-bias",) * grade.bias_known
+        exact = [index for index, name in enumerate(names) if name.startswith(known)]
         once = np.concatenate([self.rows(grade), np.eye(size)[rates]])
         shared = np.delete(np.arange(size), rates)
         rows = np.delete(marginalised(once, rates), np.flatnonzero(np.isin(shared, exact)), axis=1)
-        return Repeated(self.prior.fixing([*rates, *exact]), rows, self.duration)
+        return Repeated(self.prior.fixing([*rates, *exact]), rows)
 
     def rows(self, grade: Grade) -> Floats:
-        """Whitened Jacobian of one manoeuvre, without prior, the encoders' noise carried into the sensors; kept."""
+        """Return rows equivalent to the whitened Jacobian of one manoeuvre, without prior; they are kept.
+
+        The noise of the encoders is carried into that of the sensors.
+        """
         accel = ABSENT if grade.accel is None else grade.accel
         if (grade.rate, accel) not in self._kept:
             sensors = (Sensor(Kind.RATE, grade.rate), Sensor(Kind.ACCEL, White(accel), position=ACCELEROMETER))
@@ -119,21 +127,27 @@ class Asked:
 
     @cached_property
     def prior(self) -> Knowledge:
-        """The base's quantities before any manoeuvre."""
+        """Knowledge of the base's quantities before any manoeuvre."""
         size = self.posterior.size
         return Knowledge(*linearise(self.posterior, np.zeros(size)), np.eye(size))
-
-
-def _exact(name: str, grade: Grade, arm_known: bool) -> bool:
-    """Whether an unknown that all repetitions share is taken for known exactly."""
-    return (arm_known and name.startswith("link")) or (grade.bias_known and name.startswith("accel-bias"))
 
 
 def wide_posterior(
     motion: Motion, like: Posterior | None = None, duration: float = DURATION, arm_spread: float = ARM_SPREAD
 ) -> Posterior:
-    """Return the posterior of a planned manoeuvre with the arm unknown too."""
+    """Return the posterior of a planned manoeuvre with the arm unknown too.
+
+    Parameters
+    ----------
+    motion : Motion
+        Planned motion of the joints.
+    like : Posterior, optional
+        Posterior whose model and whitening are taken.
+    duration : float
+        Length of the manoeuvre [s].
+    arm_spread : float
+        Relative width of the links' priors.
+    """
     model = model_of(arm_spread) if like is None else like.model
-    time = sample_times(duration, INTERVAL)
-    manoeuvre = planned_manoeuvre(model, motion, time, "manoeuvre", {0: ENCODER})
+    manoeuvre = planned_manoeuvre(model, motion, sample_times(duration, INTERVAL), "manoeuvre", {0: ENCODER})
     return planned_posterior(model, [manoeuvre], like)

@@ -1,44 +1,32 @@
-"""ETS-VII within its flight rules: the robot, what is unknown of it, and the manoeuvres to choose from."""
+"""ETS-VII within its flight rules: the robot, its unknowns, and the family of manoeuvres."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from bayesid import BodyPrior, Kind, Model, Orbit, Sensor, White
+from bayesid import Kind, Model
 from bayesid.design import BSplines, DOptimal, Plan, Problem, Tip
-from bayesid.simulation.effects import AccelBias, GravityGradient
-from bayesid.simulation.model import spread_links
-from studies.common.ets7 import ACCEL, ACCELEROMETER, BASE, BIAS, LIMITS, RADIUS, RATE, START, TIP, ets7
+from studies.common.ets7 import ACCEL, INTERVAL, LIMITS, RATE, START, TIP
+from studies.common.models import BASE_SPREAD, base_model
 
-__all__ = ["ARM_SPREAD", "DURATION", "INTERVAL", "POINTS", "SPREAD", "limits_problem", "model_of"]
+__all__ = ["DURATION", "INTERVAL", "POINTS", "limits_problem", "model_of"]
 
-DURATION, INTERVAL = 240.0, 0.5
-"""Length of a manoeuvre, and time between samples of all sensors [s]."""
-
-SPREAD = 1.0
-"""Relative width of the prior of the base: its mass is then uncertain by a factor of e^2."""
-
-ARM_SPREAD = 0.025
-"""Relative width of a link's prior where the arm is not known exactly: its mass is then known to 5 %."""
+DURATION = 240.0
+"""Length of a manoeuvre [s]."""
 
 POINTS = 6
-"""Free control points of every joint."""
+"""Number of free control points of every joint."""
 
 
-def model_of(arm_spread: float = 0.0, rate: float = RATE, accel: float = ACCEL, spread: float = SPREAD) -> Model:
+def model_of(arm_spread: float = 0.0, spread: float = BASE_SPREAD) -> Model:
     """Return the model: base, initial rate and accelerometer bias unknown, and the arm where it has a spread.
 
     Parameters
     ----------
     arm_spread, spread : float
-        Relative width of the priors of the links and of the base.
-    rate, accel : float
-        Noise per sample [rad/s, m/s2].
+        Relative widths of the priors of the links and of the base.
     """
-    robot = ets7()
-    sensors = (Sensor(Kind.RATE, White(rate)), Sensor(Kind.ACCEL, White(accel), position=ACCELEROMETER))
-    priors = (BodyPrior(BASE, robot.link(BASE).inertial, spread), *spread_links(robot, arm_spread, (BASE,)))
-    return Model(robot, sensors, priors, Orbit(RADIUS), (GravityGradient(), AccelBias(BIAS)))
+    return base_model({Kind.RATE: RATE, Kind.ACCEL: ACCEL}, arm_spread=arm_spread, base_spread=spread)
 
 
 def limits_problem(duration: float = DURATION, points: int = POINTS, thinning: int = 4) -> Problem:
@@ -47,11 +35,11 @@ def limits_problem(duration: float = DURATION, points: int = POINTS, thinning: i
     Parameters
     ----------
     duration : float
-        [s]
+        Length of the manoeuvre [s].
     points : int
-        Free control points of every joint.
+        Number of free control points of every joint.
     thinning : int
-        Of the samples that are simulated in the search.
+        Number of samples of which the search simulates one.
     """
     model = model_of()
     family = BSplines(START, range(len(START)), duration, points)

@@ -1,23 +1,28 @@
-"""Section 4.3 of the paper, treatment of noise and sensor precision: what it expected, verified in three dimensions.
+"""Section 4.3 of the paper, treatment of noise and sensor precision: its expectations, verified in three dimensions.
 
-Joints differentiated twice, filtered, fitted; rates filtered; the accelerometer integrated or not; the linear method
-and the integral one: bias and standard deviation of the base's ten parameters by Monte Carlo over data of an
-independent simulator. ``python -m studies.sensors --full`` writes ``reports/sensors.pdf``.
+Joints are differentiated twice, filtered or fitted; rates are filtered; the accelerometer is integrated or not; the
+linear method and the integral one are compared. Monte Carlo over data of an independent simulator gives the bias and
+the standard deviation of the base's ten parameters. ``python -m studies.sensors --full`` writes
+``reports/sensors.pdf``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from bayesid.app.compilation_cache import keep_compiled
-from studies.common.command import Command
+from studies.common.command import TRIALS, Command
 from studies.sensors.report import write_report
 from studies.sensors.result import REALISTIC, Effort, Result, compute
 
 __all__ = ["FULL", "SMALL", "Effort", "Result", "main", "run"]
 
-SMALL = Effort(draws=8, ours=0, theirs=0, levels=("0.04 deg/s", REALISTIC))
-FULL = Effort(draws=48, ours=5, theirs=32)
+SMALL = Effort(draws=8, levels=("0.04 deg/s", REALISTIC))
+"""Effort of the short study, which takes a minute."""
+
+FULL = Effort(draws=48, likelihood_fits=5, paper_fits=32)
+"""Effort of the full study, which takes minutes."""
 
 
 def run(
@@ -25,6 +30,8 @@ def run(
     full: bool = False,
     seed: int = 1,
     effort: Effort | None = None,
+    trials: Path | None = None,
+    workers: int = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the study.
@@ -32,22 +39,25 @@ def run(
     Parameters
     ----------
     full : bool
-        All levels of noise, enough draws, and nonlinear fits: minutes.
+        Whether to take all levels of noise, enough draws, and nonlinear fits.
     seed : int
-        Every random number follows from it.
+        Seed of all random numbers.
     effort : Effort, optional
-        In place of what ``full`` says.
+        Effort in place of what ``full`` says.
+    trials, workers
+        File and number of processes of the nonlinear fits; see `studies.common.monte_carlo.run_trials`.
     progress : callable
-        Told what is being done.
+        Receives a line on what is being done.
     """
-    return compute(effort or (FULL if full else SMALL), seed, progress)
+    return compute(effort or (FULL if full else SMALL), seed, trials, workers, progress)
 
 
 COMMAND = Command(
     "sensors",
     "Verify what the paper expects of noise and sensors.",
-    full="all levels of noise, enough draws: minutes",
+    full="take all levels of noise, enough draws, and nonlinear fits: minutes",
     seed=1,
+    extra=TRIALS,
 )
 
 
@@ -55,4 +65,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     options = COMMAND.parse(arguments)
     keep_compiled()
-    write_report(run(full=options.full, seed=options.seed, progress=print), options.output)
+    result = run(full=options.full, seed=options.seed, trials=options.trials, workers=options.workers, progress=print)
+    write_report(result, options.output)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import MeasuredMotion, Recording
+from bayesid._math.arrays import Floats
 from studies.common.ets7 import ets7
 from studies.sensors.linear import recording_of
 from studies.sensors.setting import Flight, Noise, motion
@@ -13,77 +16,79 @@ from studies.sensors.treatments import Treatment
 
 __all__ = ["Draws"]
 
-Floats = NDArray[np.floating]
+FAMILIES = ("rate", "accel", "position")
+"""Noisy signals, which `Flight` and `Noise` name alike."""
 
 
+@dataclass(frozen=True)
 class Draws:
-    """N sets of noise about one flight; what a treatment made of them is kept.
+    """N sets of noise about one flight.
 
     Parameters
     ----------
     flight : Flight
-    count : int
-        N.
-    seed : int
-        Levels of noise share the underlying unit noise, so that they differ by the level alone.
+        True motion.
+    unit : mapping of str to (N, T, n) array
+        Noise of unit standard deviation by family of signals. All levels of noise share it, so that they differ by the
+        level alone.
+    kept : dict
+        Signals that have been treated, by treatment, family and noise.
     """
 
-    def __init__(self, flight: Flight, count: int, seed: int) -> None:
-        self.flight, self.count = flight, count
-        self._truth = {"rate": flight.rate, "accel": flight.accel, "encoder": flight.position}
-        rngs = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3)]
-        self._unit = {
-            family: rng.standard_normal((count, *values.shape))
-            for rng, (family, values) in zip(rngs, self._truth.items(), strict=True)
+    flight: Flight
+    unit: Mapping[str, Floats]
+    kept: dict[tuple[str, str, float], Floats] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, flight: Flight, count: int, rng: np.random.Generator) -> Draws:
+        """Draw ``count`` sets of noise."""
+        unit = {
+            family: child.standard_normal((count, *getattr(flight, family).shape))
+            for family, child in zip(FAMILIES, rng.spawn(len(FAMILIES)), strict=True)
         }
-        self._kept: dict[tuple[str, str, float], Floats] = {}
+        return cls(flight, unit)
 
     def over(self, flight: Flight) -> Draws:
         """Return the same noise about another flight with the same joint motion."""
-        new = object.__new__(Draws)
-        new.__dict__.update(self.__dict__)
-        new.flight = flight
-        new._truth = {"rate": flight.rate, "accel": flight.accel, "encoder": flight.position}
-        new._kept = {key: value for key, value in self._kept.items() if key[1] == "encoder"}
-        return new
+        return replace(
+            self, flight=flight, kept={key: value for key, value in self.kept.items() if key[1] == "position"}
+        )
 
     def raw(self, family: str, noise: Noise) -> Floats:
-        """Return the errors of one field of `Noise`, shape (N, T, n)."""
-        errors: Floats = getattr(noise, family) * self._unit[family]
+        """Return the errors of one family of signals, shape (N, T, n)."""
+        errors: Floats = getattr(noise, family) * self.unit[family]
         return errors
 
-    def measured(self, family: str, noise: Noise) -> Floats:
-        """Return the samples of one field of `Noise`, shape (N, T, n)."""
-        samples: Floats = self._truth[family] + self.raw(family, noise)
-        return samples
-
     def treated(self, treatment: Treatment, family: str, noise: Noise) -> Floats:
-        """Return treated values less the true values, and two derivatives as treated, shape (N, 3, T, n)."""
+        """Return the errors of treated values, and their two derivatives as treated, shape (N, 3, T, n)."""
         sigma: float = getattr(noise, family)
         key = treatment.title, family, sigma
-        if key not in self._kept:
-            found = np.stack([treatment(self.flight.time, own, sigma) for own in self.measured(family, noise)])
-            found[:, 0] -= self._truth[family]
-            self._kept[key] = found
-        return self._kept[key]
+        if key not in self.kept:
+            truth = getattr(self.flight, family)
+            samples = truth + self.raw(family, noise)
+            treated = np.stack([treatment(self.flight.time, values, sigma) for values in samples])
+            treated[:, 0] -= truth
+            self.kept[key] = treated
+        return self.kept[key]
 
     def joints(self, treatment: Treatment, noise: Noise) -> Floats:
         """Return the errors of joint positions, velocities and accelerations after a treatment, (N, 3, T, joints)."""
-        errors = self.treated(treatment, "encoder", noise).copy()
+        errors = self.treated(treatment, "position", noise).copy()
         _, velocity, acceleration = motion().evaluate(self.flight.time)
         errors[:, 1] -= velocity
         errors[:, 2] -= acceleration
         return errors
 
     def exact_joints(self) -> Floats:
-        """Return the errors of joints that are known exactly."""
-        return np.zeros((self.count, 3, *self.flight.position.shape))
+        """Return the errors of joints that are known exactly, (N, 3, T, joints)."""
+        count, *shape = self.unit["position"].shape
+        return np.zeros((count, 3, *shape))
 
-    def measured_motion(self, noise: Noise, index: int = 0) -> MeasuredMotion:
-        """Return the package's smoothed joints of one draw."""
-        return MeasuredMotion.from_recording(self.recording(noise, index), ets7(), sigma={0: noise.encoder})
+    def recording(self, noise: Noise) -> Recording:
+        """Return the first set of noise as a recording."""
+        samples = (getattr(self.flight, family) + self.raw(family, noise)[0] for family in FAMILIES)
+        return recording_of(self.flight.time, *samples)
 
-    def recording(self, noise: Noise, index: int = 0) -> Recording:
-        """Return one draw as a recording."""
-        values = [self.measured(family, noise)[index] for family in ("rate", "accel", "encoder")]
-        return recording_of(self.flight.time, *values)
+    def measured_motion(self, noise: Noise) -> MeasuredMotion:
+        """Return the joints of the first set of noise as the package smooths them."""
+        return MeasuredMotion.from_recording(self.recording(noise), ets7(), sigma={0: noise.position})

@@ -8,12 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
+from studies.common.quantities import MASS, MOMENTS
 from studies.sensors.montecarlo import Spread
 
 __all__ = ["treatment_figure"]
-
-MASS, MOMENTS = 0, (4, 5, 6)
 
 
 @styled
@@ -23,32 +22,30 @@ def treatment_figure(tables: Mapping[str, Mapping[str, Spread]], without: Sequen
     Parameters
     ----------
     tables : mapping
-        By level, then by treatment; the same treatments in each.
+        Estimates by level, then by treatment, with the same treatments at each level.
     without : sequence of str
-        Treatments that would spoil the scale.
+        Treatments that are left out, since they would spoil the scale.
     """
     names = [name for name in next(iter(tables.values())) if name not in without]
     figure = wide_figure(0.75 + 0.27 * len(names))
     panels = figure.subplots(1, len(tables), sharey=True, squeeze=False)[0]
     for axes, (level, spreads) in zip(panels, tables.items(), strict=True):
-        for index, (label, chosen) in enumerate((("mass", (MASS,)), ("moment with the largest error", MOMENTS))):
+        for index, (label, chosen) in enumerate((("mass", [MASS]), ("moment with the largest error", MOMENTS))):
             _bars(axes, [spreads[name] for name in names], chosen, index, label)
         axes.axvline(0.0, color="#888888", linewidth=0.6)
-        axes.set_title(level)
-        axes.set_xlabel("error [%]")
+        axes.set(title=level, xlabel="error [%]")
     panels[0].set_yticks(range(len(names)), names)
     panels[0].set_ylim(len(names) - 0.5, -0.5)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+    shared_legend(figure, panels[0], 2)
     return figure
 
 
 def _bars(axes: Axes, spreads: Sequence[Spread], chosen: Sequence[int], index: int, label: str) -> None:
     place = np.arange(len(spreads)) + 0.26 * (index - 0.5)
-    worst = [max(chosen, key=lambda k, own=spread: own.rms[k]) for spread in spreads]  # type: ignore[misc]
-    bias, sd, error = (
-        np.array([100.0 * getattr(own, name)[k] for own, k in zip(spreads, worst, strict=True)])
-        for name in ("bias", "sd", "bias_error")
-    )
+    rows = [(spread, spread.worst(chosen)) for spread in spreads]
+    bias = np.array([100.0 * spread.bias[k] for spread, k in rows])
+    sd = np.array([100.0 * spread.sd[k] for spread, k in rows])
+    error = np.array([100.0 * spread.bias_error[k] for spread, k in rows])
     colour = COLOURS[index]
     axes.errorbar(bias, place, xerr=sd, fmt="o", markersize=2.5, color=colour, linewidth=0.8, capsize=2.0, label=label)
     axes.errorbar(bias, place, xerr=error, fmt="none", color=colour, linewidth=2.6)

@@ -1,11 +1,11 @@
-"""What integrating the accelerometer does, in closed form: one unknown, and errors that are not noise.
+"""The effect of integrating the accelerometer, in closed form: noise with one unknown, and errors that are not noise.
 
-The velocity of the samples' white noise is a random walk. Least squares that take it for white estimate the size A of
-an acceleration A s(t) from v = A S + W with S the integral of s and W the walk; with E[W(t) W(u)] = sigma^2 min(t, u)
-their variance is sigma^2 times the integral over t of (integral of S from t to the end)^2, over (integral of S^2)^2.
-The walk's whole covariance gives back sigma^2 over the integral of s^2: nothing is lost. For s = cos over whole periods
-the ratio is 3, for a constant s it is 6/5. A bias b becomes a ramp and falsifies the cosine's A by -2 b, while least
-squares on the acceleration itself do not feel it.
+The velocity of the samples' white noise is a random walk. Let S be the integral of s and W the walk. Least squares that
+take the walk for white noise estimate the size A of an acceleration A s(t) from v = A S + W. With
+E[W(t) W(u)] = sigma^2 min(t, u) their variance is sigma^2 times the integral over t of (integral of S from t to the
+end)^2, over (integral of S^2)^2. The full covariance of the walk gives sigma^2 over the integral of s^2, so nothing is
+lost. The ratio of both variances is 3 for s = cos over whole periods, and 6/5 for a constant s. A bias b becomes a ramp
+and changes the cosine's A by -2 b, while least squares on the acceleration itself are not affected.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from studies.base_body import paper
 from studies.common.ets7 import BIAS
 from studies.sensors.linear import Linear
@@ -24,19 +24,18 @@ from studies.sensors.weights import integral
 
 __all__ = ["Falsified", "Scalar", "falsified", "scalars"]
 
-Floats = NDArray[np.floating]
-
 PERIODS = 2
-"""Of the scalar signal."""
+"""Number of periods of the cosine."""
 
 
 @dataclass(frozen=True)
 class Scalar:
-    """One unknown size of an acceleration of known shape.
+    """Estimates of the unknown size of an acceleration of known shape.
 
     Attributes
     ----------
     name : str
+        Shape of the acceleration.
     closed : float
         Standard deviation with velocities taken as white over that with accelerations, in closed form.
     matrices : float
@@ -44,7 +43,7 @@ class Scalar:
     simulated, error : float
         The same by simulation, and its Monte-Carlo error.
     whole : float
-        With the velocities' whole covariance, from the matrices.
+        The same with the full covariance of the velocities, from the matrices.
     bias_closed, bias : float
         Error of the size per unit bias, in closed form and from the matrices.
     """
@@ -65,14 +64,16 @@ def scalars(draws: int, rng: np.random.Generator, samples: int = 2401) -> list[S
     Parameters
     ----------
     draws : int
-        Of the simulation.
+        Number of simulated sets of noise.
+    rng : numpy.random.Generator
+        Source of the noise.
     samples : int
-        So many that sums are integrals.
+        Number of samples, so large that sums are integrals.
     """
     phase = 2.0 * np.pi * PERIODS * np.linspace(0.0, 1.0, samples)
     rule = integral(phase)
     noise = rng.standard_normal((draws, samples))
-    found = []
+    results = []
     for name, shape, closed, bias in (
         ("cosine over whole periods", np.cos(phase), np.sqrt(3.0), -2.0),
         ("constant", np.ones(samples), np.sqrt(1.2), 1.0),
@@ -83,7 +84,7 @@ def scalars(draws: int, rng: np.random.Generator, samples: int = 2401) -> list[S
         simulated = (noise @ gain).std(ddof=1) / best
         factor = np.linalg.cholesky(rule @ rule.T)
         whole = 1.0 / np.linalg.norm(np.linalg.solve(factor, velocity))
-        found.append(
+        results.append(
             Scalar(
                 name,
                 float(closed),
@@ -95,17 +96,20 @@ def scalars(draws: int, rng: np.random.Generator, samples: int = 2401) -> list[S
                 float(gain.sum()),
             )
         )
-    return found
+    return results
 
 
 @dataclass(frozen=True)
 class Falsified:
-    """Relative errors of the ten quantities, each (10,), without any noise.
+    """Relative errors of the ten quantities without any noise.
 
     Attributes
     ----------
-    bias : of a constant error `BIAS` of the accelerometer on each axis.
-    rule : of integrating samples by the trapezoidal rule and comparing with the exact velocity; zero where it is not.
+    bias : (10,) array
+        Errors due to a constant error `BIAS` of the accelerometer on each axis.
+    rule : (10,) array
+        Errors due to integrating samples by the trapezoidal rule and comparing them with the exact velocity; zero where
+        the accelerometer is not integrated.
     """
 
     bias: Floats
@@ -113,14 +117,14 @@ class Falsified:
 
 
 def falsified(flight: Flight, linear: Linear, noise: Noise) -> dict[str, Falsified]:
-    """Return what a bias and the rule of integration do to every use of the accelerometer."""
+    """Return the errors that a bias and the rule of integration cause in every use of the accelerometer."""
     still, rule = np.zeros_like(flight.rate), integral(flight.time)
     # the acceleration errors whose trapezoidal integral is that of the rule
     missed = np.linalg.lstsq(rule, rule @ flight.accel - (flight.velocity[1:] - flight.velocity[0]))[0]
     exact = np.zeros((1, 3, *flight.position.shape))
-    errors = [linear.residual(still[None], own[None], exact) for own in (still + BIAS, missed)]
-    found = {}
+    errors = [linear.residual(still[None], accel[None], exact) for accel in (still + BIAS, missed)]
+    results = {}
     for name, estimator in velocity_estimators(linear, noise).items():
         bias, quadrature = (estimator.solve(residual)[0][0] / np.abs(paper.TRUTH) for residual in errors)
-        found[name] = Falsified(bias, quadrature if name.startswith("velocity") else 0.0 * quadrature)
-    return found
+        results[name] = Falsified(bias, quadrature if name.startswith("velocity") else 0.0 * quadrature)
+    return results

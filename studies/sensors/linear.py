@@ -1,50 +1,52 @@
-"""The identification to first order about the truth: residuals, how they answer to errors, and linear estimators.
+"""The identification to first order about the truth: residuals, their response to errors, and linear estimators.
 
-With J the exact Jacobian of what the sensors read in the unknowns and G that in the joints' motion, the residual of a
-recording at the truth is r = (errors of the sensors) - G (errors of the joints), and an estimator with weights W errs
-by (W J)^+ W r. Residuals are (T, 6): rates, then accelerations.
+Let J be the exact Jacobian of the sensors' readings with respect to the unknowns, and G that with respect to the
+joints' motion. The residual of a recording at the truth is r = (errors of the sensors) - G (errors of the joints), and
+an estimator with weights W has the error (W J)^+ W r. Residuals are (T, 6): rates, then accelerations.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import jax
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Kind, Manoeuvre, MeasuredMotion, Posterior, Recording
+from bayesid._math.arrays import Floats
+from bayesid.inference.body_quantities import linearise
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
 from bayesid.inference.whitening import NoiseChannel, NoiseModel, build
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.sensors import Filter
-from studies.base_body.physical import physical_slope
-from studies.sensors.setting import Flight, Noise, model_of, motion
+from studies.sensors.setting import Noise, fly, model_of, motion
+from studies.truth.recordings import by_axis
 
-__all__ = ["STEP", "Estimator", "Linear", "raw_posterior", "recording_of"]
+__all__ = ["STEP", "Estimator", "Linear", "Solved", "linearised", "raw_posterior", "recording_of"]
 
-Floats = NDArray[np.floating]
+Solved = tuple[Floats, Floats, Floats]
+"""Errors (N, 10), stated standard deviations (N, 10) and chi-square per degree of freedom (N,) of N estimates."""
 
 STEP = 1.0
-"""Integration step [s]: its nodes and midpoints are the samples."""
+"""Integration step [s], whose nodes and midpoints are the samples."""
 
 LAGS = 32
-"""Samples over which the joints' errors are correlated at most, those of `bayesid.inference.whitening`."""
+"""Largest number of samples over which the joints' errors are correlated, as in `bayesid.inference.whitening`."""
 
 
 def recording_of(time: Floats, rate: Floats, accel: Floats, position: Floats | None = None) -> Recording:
     """Return a recording of the base's sensors, and of the joints where given."""
-    families = {"rate": rate, "accel": accel}
-    channels = {f"{name}.{axis}": values[:, k] for name, values in families.items() for k, axis in enumerate("xyz")}
+    channels = by_axis("rate", "xyz", rate) | by_axis("accel", "xyz", accel)
     if position is not None:
-        channels |= {f"position.joint{k + 1}": column for k, column in enumerate(position.T)}
+        channels |= by_axis("position", [f"joint{k + 1}" for k in range(position.shape[1])], position)
     return Recording("manoeuvre", None, time, channels)
 
 
-def raw_posterior(flight: Flight, moved: Motion, *, gradient: bool = True) -> Posterior:
-    """Return a posterior without prior whose residuals are in SI units, by giving all sensors a sigma of one."""
-    recording = recording_of(flight.time, flight.rate, flight.accel)
-    model = model_of(Noise(1.0, 1.0, 0.0), gradient=gradient)
+def raw_posterior(recording: Recording, moved: Motion, *, biased: bool) -> Posterior:
+    """Return a posterior without prior whose residuals are in SI units, since all sensors have a sigma of one."""
+    model = model_of(Noise(1.0, 1.0, 0.0), biased=biased)
     return Posterior.of(model, [Manoeuvre(recording, moved)], step=STEP, flat_prior=True)
 
 
@@ -55,14 +57,15 @@ class Linear:
     Attributes
     ----------
     time : (T,) array
+        Sample times [s].
     readings : (6 T, n) array
-        Derivatives of what the sensors read in the n unknowns: ten of the base, initial rate, accelerometer bias.
+        Derivatives of the readings with respect to the n unknowns: ten of the base, initial rate, accelerometer bias.
     joints : (joints, 3, T, 6) array
-        In joint position, velocity and acceleration at that time.
+        Derivatives of the readings with respect to joint position, velocity and acceleration at the same time.
     slope : (10, n) array
-        Of the reported quantities.
+        Derivatives of the reported quantities with respect to the unknowns.
     names : tuple of str
-        Of the unknowns.
+        Names of the unknowns.
     """
 
     time: Floats
@@ -70,23 +73,6 @@ class Linear:
     joints: Floats
     slope: Floats
     names: tuple[str, ...]
-
-    @classmethod
-    def of(cls, flight: Flight, posterior: Posterior) -> Linear:
-        """Compute them from `raw_posterior`."""
-        z, count = np.zeros(posterior.size), len(flight.time)
-        environment = jax.tree.map(lambda x: np.asarray(x)[0, :count], posterior.data.arrays.grid.sample.environment)
-        seen = SampledMotion(np.tile([0.0, 0.0, 0.0, 1.0], (count, 1)), flight.rate, environment)  # no star sensor
-        response = joint_sensitivity(
-            posterior.model.robot, motion().evaluate(flight.time), seen, posterior.model.sensors
-        )
-        return cls(
-            flight.time,
-            -posterior.jacobian(z)[: 6 * count],  # what is left is padding
-            response,
-            physical_slope(posterior, z),
-            posterior.unknowns.names,
-        )
 
     def residual(self, rate: Floats, accel: Floats, joints: Floats) -> Floats:
         """Return residuals (N, 6 T) of N sets of errors: rate and accel (N, T, 3), joints (N, 3, T, joints)."""
@@ -97,17 +83,37 @@ class Linear:
         """Return the package's whitening as a matrix on residuals, some samples left out, shape (m, 6 T)."""
         count = len(self.time)
         rows = np.arange(count) if left_out is None else np.flatnonzero(~left_out)
-        own = np.arange(len(rows))
-        channels = [NoiseChannel(sigma, own, Filter()) for sigma in (noise.rate, noise.accel) for _ in range(3)]
+        samples = np.arange(len(rows))
+        channels = [NoiseChannel(sigma, samples, Filter()) for sigma in (noise.rate, noise.accel) for _ in range(3)]
         covariance = measured.lag_covariance(self.time[rows], LAGS)
-        found = build(NoiseModel(self.time[rows], channels, self.joints[:, :, rows], covariance))
-        dense = np.zeros((len(found.start), 6, len(rows), 6))
-        for block, start in enumerate(found.start):
-            reach = min(found.weights.shape[2], len(rows) - start)
-            dense[block, :, start : start + reach] = found.weights[block, :, :reach]
-        full = np.zeros((len(found.start), 6, count, 6))
+        banded = build(NoiseModel(self.time[rows], channels, self.joints[:, :, rows], covariance))
+        dense = np.zeros((len(banded.start), 6, len(rows), 6))
+        for block, start in enumerate(banded.start):
+            reach = min(banded.weights.shape[2], len(rows) - start)
+            dense[block, :, start : start + reach] = banded.weights[block, :, :reach]
+        full = np.zeros((len(banded.start), 6, count, 6))
         full[:, :, rows] = dense
         return full.reshape(-1, 6 * count)
+
+
+@cache
+def linearised() -> Linear:
+    """Return the derivatives along the manoeuvre as it is flown."""
+    flight, planned = fly(), motion()
+    posterior = raw_posterior(recording_of(flight.time, flight.rate, flight.accel), planned, biased=True)
+    z, count = np.zeros(posterior.size), len(flight.time)
+    environment = jax.tree.map(lambda x: np.asarray(x)[0, :count], posterior.data.arrays.grid.sample.environment)
+    attitude = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))  # there is no star sensor to which it matters
+    sampled = SampledMotion(attitude, flight.rate, environment)
+    return Linear(
+        time=flight.time,
+        readings=-posterior.jacobian(z)[: 6 * count],  # the other rows are padding
+        joints=joint_sensitivity(
+            posterior.model.robot, planned.evaluate(flight.time), sampled, posterior.model.sensors
+        ),
+        slope=linearise(posterior, z).slope,
+        names=posterior.unknowns.names,
+    )
 
 
 @dataclass(frozen=True)
@@ -117,14 +123,15 @@ class Estimator:
     Parameters
     ----------
     linear : Linear
+        Derivatives at the truth.
     weight : (m, 6 T) array
-        Applied to the residual.
+        Matrix that weights the residual.
     biased : bool
         Whether the accelerometer's constant error is among the unknowns.
     declared : bool
-        Whether the weighted residual has a declared standard deviation of one; else it is estimated from what is left.
+        Whether the weighted residual has a declared standard deviation of one; otherwise the misfit gives it.
     nuisance : (m, k) array, optional
-        Further unknowns of the weighted residual, such as a constant of integration.
+        Derivatives of the weighted residual by further unknowns, such as a constant of integration.
     """
 
     linear: Linear
@@ -133,8 +140,8 @@ class Estimator:
     declared: bool = True
     nuisance: Floats | None = None
 
-    def solve(self, residual: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return for residuals (N, 6 T): errors (N, 10), the standard deviations it states (N, 10), chi2 per d.o.f."""
+    def solve(self, residual: Floats) -> Solved:
+        """Estimate from each of N residuals (N, 6 T)."""
         keep = [self.biased or not name.startswith(Kind.ACCEL.value) for name in self.linear.names]
         slope, design = self.linear.slope[:, keep], self.weight @ self.linear.readings[:, keep]
         if self.nuisance is not None:

@@ -1,16 +1,18 @@
-"""Monte Carlo of the treatments: repeated noise, one linear estimator after the other, bias and standard deviation."""
+"""Monte Carlo of the treatments: bias and standard deviation of linear estimators over repeated noise."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from studies.base_body import paper
+from studies.common.quantities import MOMENTS
 from studies.sensors.draws import Draws
-from studies.sensors.linear import Estimator, Linear
-from studies.sensors.setting import Noise, joints_meet, unread
+from studies.sensors.linear import Estimator, Linear, Solved
+from studies.sensors.setting import Noise, junctions, near_junctions
 from studies.sensors.treatments import (
     Differences,
     LowPass,
@@ -22,13 +24,11 @@ from studies.sensors.treatments import (
 )
 from studies.sensors.weights import as_read, constant, integrated, integrated_whole
 
-__all__ = ["EXACT", "OURS", "OURS_READ", "PAPER", "PIECES", "TREATMENTS", "Spread", "accelerometers", "joints", "rates"]
-__all__ += ["ALIKE", "VELOCITY", "WEIGHTED", "WHOLE", "velocity_estimators"]
+__all__ = ["EXACT", "LIKELIHOOD", "PAPER", "PIECES", "TREATMENTS", "WITHOUT_JUNCTIONS", "Spread", "accelerometers"]
+__all__ += ["EQUAL", "VELOCITY", "WEIGHTED", "WHOLE", "joints", "rates", "velocity_estimators"]
 
-Floats = NDArray[np.floating]
-
-PIECES = Polynomial(joints_meet())
-"""Polynomials that know where (27) meets its splines."""
+PIECES = Polynomial(junctions())
+"""Polynomials over the pieces of (27) between its junctions."""
 
 TREATMENTS: tuple[Treatment, ...] = (
     Differences(),
@@ -39,30 +39,37 @@ TREATMENTS: tuple[Treatment, ...] = (
     SmoothingSpline(),
     Wiener(),
 )
+"""Treatments of joints, and but for the first of rates."""
 
-EXACT, OURS, OURS_READ, PAPER = "exact", "ours, carried", "ours, jolts unread", "filtered, fitted, (21)"
-"""Cases that are not a treatment alone: exact joints; the package's likelihood, which carries the joints' noise, and
-the same without the samples near the jolts of (27); the paper's procedure: base signals filtered, joints fitted by
-polynomials, accelerations integrated, (21) in SI units."""
+EXACT = "exact"
+"""Joints that are known exactly."""
 
+LIKELIHOOD = "likelihood"
+"""The package's likelihood, which holds the uncertainty of the smoothed joints."""
 
-WEIGHTED, ALIKE, VELOCITY = "acceleration, weighted", "velocity, SI alike: (21)", "velocity, weighted"
-WHOLE = "velocity, whole covariance"
+WITHOUT_JUNCTIONS = "likelihood, junctions left out"
+"""The same without the base's samples near the junctions of (27)."""
+
+PAPER = "the paper's procedure"
+"""Base signals filtered, joints fitted by polynomials, accelerations integrated, (21) in SI units."""
+
+WEIGHTED, EQUAL, VELOCITY = "acceleration, weighted", "velocity, equal weights (21)", "velocity, weighted"
+WHOLE = "velocity, full covariance"
 """Uses of the accelerometer that the report compares."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """What an estimator made of N sets of noise; all relative to the true quantities.
+    """Estimates from N sets of noise; all relative to the true quantities.
 
     Attributes
     ----------
     errors : (N, 10) array
-        Of mass, centre of mass and inertia, in the order of `paper.TRUTH`.
+        Errors of mass, centre of mass and inertia, in the order of `paper.TRUTH`.
     stated : (N, 10) array
-        The standard deviations that the estimator itself gives.
+        Standard deviations that the estimator itself states.
     chi2 : (N,) array
-        Per degree of freedom.
+        Chi-square per degree of freedom.
     """
 
     errors: Floats
@@ -70,10 +77,10 @@ class Spread:
     chi2: Floats
 
     @classmethod
-    def of(cls, solved: tuple[Floats, Floats, Floats]) -> Spread:
-        """Take what `Estimator.solve` returns."""
-        truth = np.abs(paper.TRUTH)
-        return cls(solved[0] / truth, solved[1] / truth, solved[2])
+    def of(cls, solved: Solved) -> Spread:
+        """Return the spread of estimates in their units."""
+        errors, stated, chi2 = solved
+        return cls(errors / np.abs(paper.TRUTH), stated / np.abs(paper.TRUTH), chi2)
 
     @property
     def bias(self) -> Floats:
@@ -111,30 +118,34 @@ class Spread:
         """Root mean square error over the root mean square of what was stated; one if honest, shape (10,)."""
         return self.rms / np.sqrt((self.stated**2).mean(axis=0))
 
+    def worst(self, chosen: Sequence[int] = tuple(MOMENTS)) -> int:
+        """Return which of some quantities has the largest root mean square error, by default of the moments."""
+        return max(chosen, key=lambda index: float(self.rms[index]))
+
 
 def joints(linear: Linear, draws: Draws, noise: Noise) -> dict[str, Spread]:
     """Treat the joints in every way; rates and accelerations as read and weighted by their sensors' noise."""
-    time = linear.time
-    plain, rate, accel = Estimator(linear, as_read(time, noise)), draws.raw("rate", noise), draws.raw("accel", noise)
-    found = {EXACT: Spread.of(plain.solve(linear.residual(rate, accel, draws.exact_joints())))}
+    plain = Estimator(linear, as_read(linear.time, noise))
+    rate, accel = draws.raw("rate", noise), draws.raw("accel", noise)
+    spreads = {EXACT: Spread.of(plain.solve(linear.residual(rate, accel, draws.exact_joints())))}
     for treatment in TREATMENTS:
         residual = linear.residual(rate, accel, draws.joints(treatment, noise))
-        found[treatment.title] = Spread.of(plain.solve(residual))
+        spreads[treatment.title] = Spread.of(plain.solve(residual))
+    # the last residual is that of the package's smoother
     measured = draws.measured_motion(noise)
-    for name, left_out in ((OURS, None), (OURS_READ, unread(time))):
-        found[name] = Spread.of(Estimator(linear, linear.whitening(noise, measured, left_out)).solve(residual))
-    return found
+    for name, left_out in ((LIKELIHOOD, None), (WITHOUT_JUNCTIONS, near_junctions(linear.time))):
+        whitened = Estimator(linear, linear.whitening(noise, measured, left_out))
+        spreads[name] = Spread.of(whitened.solve(residual))
+    return spreads
 
 
 def rates(linear: Linear, draws: Draws, noise: Noise) -> dict[str, Spread]:
     """Treat the rates in every way; joints smoothed by the package, accelerations as read."""
     plain = Estimator(linear, as_read(linear.time, noise))
     moved, accel = draws.joints(Wiener(), noise), draws.raw("accel", noise)
-    found = {"none": Spread.of(plain.solve(linear.residual(draws.raw("rate", noise), accel, moved)))}
-    for treatment in TREATMENTS[1:]:
-        residual = linear.residual(draws.treated(treatment, "rate", noise)[:, 0], accel, moved)
-        found[treatment.title] = Spread.of(plain.solve(residual))
-    return found
+    errors = {"none": draws.raw("rate", noise)}
+    errors |= {treatment.title: draws.treated(treatment, "rate", noise)[:, 0] for treatment in TREATMENTS[1:]}
+    return {name: Spread.of(plain.solve(linear.residual(rate, accel, moved))) for name, rate in errors.items()}
 
 
 def velocity_estimators(linear: Linear, noise: Noise) -> dict[str, Estimator]:
@@ -142,10 +153,10 @@ def velocity_estimators(linear: Linear, noise: Noise) -> dict[str, Estimator]:
     time = linear.time
     read, weighted = as_read(time, noise), integrated(time, noise)
     return {
-        "acceleration, SI alike": Estimator(linear, as_read(time, None), declared=False),
+        "acceleration, equal weights": Estimator(linear, as_read(time, None), declared=False),
         WEIGHTED: Estimator(linear, read),
         "acceleration, weighted, bias unknown": Estimator(linear, read, biased=True),
-        ALIKE: Estimator(linear, integrated(time, None), declared=False),
+        EQUAL: Estimator(linear, integrated(time, None), declared=False),
         VELOCITY: Estimator(linear, weighted),
         "velocity, weighted, constant unknown": Estimator(linear, weighted, nuisance=constant(weighted, time)),
         "velocity, weighted, bias unknown": Estimator(linear, weighted, biased=True),
@@ -154,11 +165,10 @@ def velocity_estimators(linear: Linear, noise: Noise) -> dict[str, Estimator]:
 
 
 def accelerometers(linear: Linear, draws: Draws, noise: Noise) -> dict[str, Spread]:
-    """Use the accelerometer in every way, joints exact; and the paper's procedure with everything measured."""
+    """Use the accelerometer in every way with exact joints; and the paper's procedure with everything measured."""
     residual = linear.residual(draws.raw("rate", noise), draws.raw("accel", noise), draws.exact_joints())
     uses = velocity_estimators(linear, noise)
-    found = {name: Spread.of(estimator.solve(residual)) for name, estimator in uses.items()}
+    spreads = {name: Spread.of(estimator.solve(residual)) for name, estimator in uses.items()}
     rate, accel = (draws.treated(LowPass(), family, noise)[:, 0] for family in ("rate", "accel"))
     residual = linear.residual(rate, accel, draws.joints(PIECES, noise))
-    found[PAPER] = Spread.of(uses[ALIKE].solve(residual))
-    return found
+    return spreads | {PAPER: Spread.of(uses[EQUAL].solve(residual))}

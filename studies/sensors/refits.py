@@ -1,39 +1,44 @@
-"""Whole nonlinear fits of some draws, beside what the linear estimators made of the same noise."""
+"""Complete nonlinear fits of some sets of noise, beside the linear estimates from the same noise."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from bayesid import Manoeuvre, Posterior
+from bayesid._math.arrays import Floats
+from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference import maximise
-from bayesid.inference.noise_changes import with_manoeuvres
-from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.inference.body_quantities import linearise
 from bayesid.robot.joint_state import JointState
 from studies.base_body import paper
-from studies.base_body.physical import physical_sd, physical_slope
+from studies.common.ets7 import INTERVAL
+from studies.common.monte_carlo import run_trials
+from studies.common.quantities import JUDGED
 from studies.sensors.draws import Draws
-from studies.sensors.linear import STEP, Estimator, Linear, recording_of
-from studies.sensors.montecarlo import OURS, PAPER, PIECES, Spread
-from studies.sensors.setting import INTERVAL, Noise, model_of
+from studies.sensors.linear import STEP, Estimator, Solved, linearised, raw_posterior, recording_of
+from studies.sensors.montecarlo import LIKELIHOOD, PIECES, Spread
+from studies.sensors.setting import Noise, fly, levels, model_of, motion
 from studies.sensors.treatments import LowPass, Wiener
 from studies.sensors.weights import integrated
 
-__all__ = ["Refits", "SampledMotion", "refit"]
-
-Floats = NDArray[np.floating]
-
-BODY = 13
-"""Unknowns of the base and the initial rate; the three of the accelerometer's bias come after them."""
+__all__ = ["Refits", "refit_all"]
 
 
 @dataclass(frozen=True)
-class SampledMotion:
-    """Joints known at the samples alone: position, velocity and acceleration, each (T, joints)."""
+class SampledJoints:
+    """Joint motion that is known at the samples alone.
+
+    Parameters
+    ----------
+    states : (3, T, joints) array
+        Positions, velocities and accelerations of the joints.
+    """
 
     states: Floats
 
@@ -49,98 +54,115 @@ class SampledMotion:
 
 @dataclass(frozen=True)
 class Refits:
-    """Nonlinear fits of N draws and the linear errors of the same draws."""
+    """Nonlinear fits of N sets of noise, and the linear estimates from the same sets."""
 
     nonlinear: Spread
     linear: Spread
 
     @property
-    def apart(self) -> Floats:
-        """Median absolute difference over the standard deviation, shape (10,)."""
+    def difference(self) -> Floats:
+        """Median absolute difference over the linear standard deviation, shape (10,)."""
         gap = self.nonlinear.errors - self.linear.errors
         return np.asarray(np.median(np.abs(gap), axis=0)) / self.linear.sd
 
     @property
-    def runaway(self) -> Floats:
-        """Which fits ended at a body that is wrong by more than its own size in mass or a moment, shape (N,)."""
-        return np.asarray((np.abs(self.nonlinear.errors[:, [0, 4, 5, 6]]) > 1.0).any(axis=1))
+    def diverged(self) -> NDArray[np.bool_]:
+        """Which fits have an error of more than the true value in the mass or a moment, shape (N,)."""
+        return np.asarray((np.abs(self.nonlinear.errors[:, JUDGED]) > 1.0).any(axis=1))
 
 
-def refit(raw: Posterior, linear: Linear, draws: Draws, noise: Noise, ours: int, theirs: int) -> dict[str, Refits]:
-    """Fit the first draws as the package does, and as the paper does.
-
-    Fits start from the truth: what is asked is where the optimum lies, not whether it is found.
+def refit_all(
+    chosen: Sequence[str],
+    counts: Mapping[str, int],
+    seed: int,
+    store: Path | None,
+    workers: int,
+    progress: Callable[[str], None],
+) -> dict[str, dict[str, Refits]]:
+    """Fit fresh sets of noise by each procedure at each level of noise.
 
     Parameters
     ----------
-    raw : Posterior
-        Of `studies.sensors.linear.raw_posterior`.
-    ours, theirs : int
-        How many draws.
+    chosen : sequence of str
+        Levels of noise.
+    counts : mapping of str to int
+        Number of fits by procedure, `LIKELIHOOD` or `PAPER`.
+    seed, store, workers, progress
+        See `studies.common.monte_carlo.run_trials`.
+
+    Returns
+    -------
+    dict of str to dict of str to Refits
+        Fits by level and procedure.
     """
-    found = {OURS: _ours(draws, noise, ours), PAPER: _paper(raw, draws, noise, theirs)}
-    measured = draws.measured_motion(noise)
-    moved, fitted = draws.joints(Wiener(), noise)[:ours], draws.joints(PIECES, noise)[:theirs]
-    rate, accel = (draws.raw(family, noise)[:ours] for family in ("rate", "accel"))
-    turned, pulled = (draws.treated(LowPass(), family, noise)[:theirs, 0] for family in ("rate", "accel"))
-    alike = Estimator(linear, integrated(linear.time, None), declared=False)
-    whole = Estimator(linear, linear.whitening(noise, measured))
-    first_order = {
-        OURS: Spread.of(whole.solve(linear.residual(rate, accel, moved))),
-        PAPER: Spread.of(alike.solve(linear.residual(turned, pulled, fitted))),
+    plan = [(level, procedure) for level in chosen for procedure, count in counts.items() for _ in range(count)]
+    trials = run_trials(refit, plan, store, seed=seed, workers=workers, progress=progress).complete()
+    results: dict[str, dict[str, Refits]] = {level: {} for level in chosen if plan}
+    for level, procedure in dict.fromkeys(plan):
+        made = [trial for task, trial in zip(plan, trials, strict=True) if task == (level, procedure)]
+        both = (Spread.of(_joined([trial[name] for trial in made])) for name in ("nonlinear", "linear"))
+        results[level][procedure] = Refits(*both)
+    return results
+
+
+def _joined(solved: Sequence[Solved]) -> Solved:
+    errors, stated, chi2 = (np.concatenate(parts) for parts in zip(*solved, strict=True))
+    return errors, stated, chi2
+
+
+def refit(task: tuple[str, str], rng: np.random.Generator) -> dict[str, Solved]:
+    """Fit one set of noise by a procedure at a level of noise, nonlinearly and to first order.
+
+    Fits start from the truth: the question is where the optimum lies, not whether it is reached.
+    """
+    level, procedure = task
+    noise = levels(fly())[level]
+    fit = _likelihood if procedure == LIKELIHOOD else _paper
+    return fit(Draws.of(fly(), 1, rng), noise, rng)
+
+
+def _likelihood(draws: Draws, noise: Noise, rng: np.random.Generator) -> dict[str, Solved]:
+    """Fit as the package does."""
+    measured, linear = draws.measured_motion(noise), linearised()
+    manoeuvre = Manoeuvre(draws.recording(noise), measured)
+    posterior = Posterior.of(model_of(noise, biased=False), [manoeuvre], step=STEP, flat_prior=True)
+    refined, optimum = maximise(posterior, rng, np.zeros(posterior.size))
+    chi2 = optimum.chi2 / (refined.samples - refined.size)
+    errors = linear.residual(draws.raw("rate", noise), draws.raw("accel", noise), draws.joints(Wiener(), noise))
+    return {
+        "nonlinear": _solved(Knowledge.at(refined, optimum.z), 1.0, chi2),
+        "linear": Estimator(linear, linear.whitening(noise, measured)).solve(errors),
     }
-    return {name: Refits(found[name], first_order[name]) for name in found}
 
 
-def _ours(draws: Draws, noise: Noise, count: int) -> Spread:
-    model, first, errors, stated, chi2 = model_of(noise, biased=False), None, [], [], []
-    for index in range(count):
-        manoeuvre = Manoeuvre(draws.recording(noise, index), draws.measured_motion(noise, index))
-        posterior = Posterior.of(model, [manoeuvre], step=STEP, flat_prior=True)
-        first = first or posterior
-        refined, optimum = maximise(posterior, np.random.default_rng(index), np.zeros(posterior.size))
-        errors.append(_quantities(refined, optimum.z) - paper.TRUTH)
-        stated.append(physical_sd(physical_slope(refined, optimum.z), optimum.covariance))
-        chi2.append(optimum.chi2 / (refined.samples - refined.size))
-    return Spread.of((np.array(errors), np.array(stated), np.array(chi2)))
+def _paper(draws: Draws, noise: Noise, rng: np.random.Generator) -> dict[str, Solved]:
+    """Fit as the paper does: signals treated, accelerations integrated, squares of SI units added."""
+    flight, linear = draws.flight, linearised()
+    rate, accel = (draws.treated(LowPass(), family, noise)[:, 0] for family in ("rate", "accel"))
+    joints = draws.joints(PIECES, noise)
+    moved = SampledJoints(np.stack(motion().evaluate(flight.time)) + joints[0])
+    recording = recording_of(flight.time, flight.rate + rate[0], flight.accel + accel[0])
+    posterior = raw_posterior(recording, moved, biased=False)
+    weight = integrated(flight.time, None)
+    scalars = weight.shape[1]  # the posterior's other rows are padding
 
-
-def _paper(raw: Posterior, draws: Draws, noise: Noise, count: int) -> Spread:
-    time, errors, stated, chi2 = draws.flight.time, [], [], []
-    weight = integrated(time, None)
-    flown = np.stack(raw.manoeuvres[0].motion.evaluate(time))
-    for index in range(count):
-        rate, accel = (
-            getattr(draws.flight, family) + draws.treated(LowPass(), family, noise)[index, 0]
-            for family in ("rate", "accel")
-        )
-        joints = SampledMotion(flown + draws.joints(PIECES, noise)[index])
-        posterior = with_manoeuvres(raw, [Manoeuvre(recording_of(time, rate, accel), joints)])
-        residual, jacobian = _weighted(posterior, weight)
-        solution = least_squares(residual, np.zeros(BODY), jacobian, method="lm", x_scale="jac")
-        slopes = jacobian(solution.x)
-        covariance = np.linalg.inv(slopes.T @ slopes)
-        variance = 2.0 * solution.cost / (len(weight) - BODY)
-        z = np.concatenate([solution.x, np.zeros(3)])
-        errors.append(_quantities(posterior, z) - paper.TRUTH)
-        stated.append(np.sqrt(variance) * physical_sd(physical_slope(posterior, z)[:, :BODY], covariance))
-        chi2.append(variance)
-    return Spread.of((np.array(errors), np.array(stated), np.array(chi2)))
-
-
-def _weighted(posterior: Posterior, weight: Floats) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
-    """Return the weighted residual and its Jacobian in all unknowns but the accelerometer's bias."""
-
-    def residual(x: Floats) -> Floats:
-        values: Floats = weight @ posterior.residuals(np.concatenate([x, np.zeros(3)])).ravel()[: weight.shape[1]]
+    def residual(z: Floats) -> Floats:
+        values: Floats = weight @ posterior.residuals(z).ravel()[:scalars]
         return values
 
-    def jacobian(x: Floats) -> Floats:
-        slopes: Floats = weight @ posterior.jacobian(np.concatenate([x, np.zeros(3)]))[: weight.shape[1], :BODY]
+    def jacobian(z: Floats) -> Floats:
+        slopes: Floats = weight @ posterior.jacobian(z)[:scalars]
         return slopes
 
-    return residual, jacobian
+    solution = least_squares(residual, np.zeros(posterior.size), jacobian, method="lm", x_scale="jac")
+    variance = 2.0 * solution.cost / (len(weight) - posterior.size)
+    knowledge = Knowledge(*linearise(posterior, solution.x), jacobian(solution.x))
+    equal_weights = Estimator(linear, weight, declared=False)
+    return {
+        "nonlinear": _solved(knowledge, np.sqrt(variance), variance),
+        "linear": equal_weights.solve(linear.residual(rate, accel, joints)),
+    }
 
 
-def _quantities(posterior: Posterior, z: Floats) -> Floats:
-    return np.asarray(mass_com_inertia(np.asarray(posterior.unknowns.values_at(z).inertial)))
+def _solved(knowledge: Knowledge, sigma: float, chi2: float) -> Solved:
+    return (knowledge.values - paper.TRUTH)[None], sigma * knowledge.sd[None], np.array([chi2])

@@ -1,12 +1,12 @@
-"""The linear method (19) with a known arm: errors in the regressor, and what they do to least squares.
+"""The linear method (19) with a known arm, and the effect of errors in its regressor on least squares.
 
 With the arm known, (19) is Phi_base p_base = -Phi_arm p_arm, which is not badly posed. But Phi holds measured rates,
-their derivatives and accelerations. Least squares minimise as if it were exact: with e the errors of these, the normal
-matrix gains the covariance sum_e var_e Psi_e' Psi_e of the regressor, Psi_e = d Phi / d e, and the estimate is
+their derivatives and accelerations, which have errors e, and least squares take Phi as exact. With Psi_e = d Phi / d e,
+the normal matrix gains the covariance sum_e var_e Psi_e' Psi_e of the regressor, and the estimate is
 
     p = p_true - (Phi' Phi + sum_e var_e Psi_e' Psi_e)^-1 sum_e var_e Psi_e' (Psi_e p_true + d (Phi_arm p_arm) / d e)
 
-for large samples. This is attenuation: the noisier, the lighter the base.
+for large samples. This is attenuation: the more noise, the smaller the estimated mass.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.robot.composite_tables import composite_rows, link_table
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.robot.joint_state import JointState
@@ -26,6 +26,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.regressors import balance_regressor
 from studies.base_body import paper
 from studies.common.ets7 import ACCELEROMETER, BASE, ets7
+from studies.common.quantities import MASS, inertia_matrix
 from studies.sensors.draws import Draws
 from studies.sensors.montecarlo import PIECES
 from studies.sensors.setting import Flight, Noise, motion
@@ -33,10 +34,8 @@ from studies.sensors.treatments import Differences, LowPass, Treatment, Wiener
 
 __all__ = ["TREATED", "Balance", "Regression", "attenuation", "regress", "solve_balance"]
 
-Floats = NDArray[np.floating]
-
 TREATED: tuple[Treatment, ...] = (Differences(), LowPass(), PIECES, Wiener())
-"""Of joints, rates and accelerations alike."""
+"""Treatments of joints, rates and accelerations alike."""
 
 
 class Balance:
@@ -62,7 +61,7 @@ class Balance:
         rate, change : (T, 3) array
             Angular velocity and its derivative, base axes [rad/s, rad/s2].
         accel : (T, 3) array
-            As the accelerometer reads [m/s2].
+            Acceleration as the accelerometer reads it [m/s2].
         """
         base, arm = _balance(self.base, self.arm, rate, change, accel)
         return np.asarray(base), np.asarray(arm)[..., 0]
@@ -79,40 +78,54 @@ def _balance(
 
 @dataclass(frozen=True)
 class Regression:
-    """Estimates of (19) with N sets of noise: relative errors (N, 10), and how many are no physical body."""
+    """Estimates of (19) from N sets of noise.
+
+    Attributes
+    ----------
+    errors : (N, 10) array
+        Errors relative to the true quantities.
+    unphysical : int
+        Number of estimates that no rigid body can have.
+    """
 
     errors: Floats
     unphysical: int
 
 
-def regress(
-    flight: Flight, draws: Draws, noise: Noise, treatments: Sequence[Treatment] = TREATED
-) -> dict[str, Regression]:
+def regress(draws: Draws, noise: Noise, treatments: Sequence[Treatment] = TREATED) -> dict[str, Regression]:
     """Solve (19) by least squares in SI units, every signal treated alike; first and last sample left out.
 
     Parameters
     ----------
-    flight : Flight
-        Without gravity gradient, which (19) does not hold.
     draws : Draws
-        Over that flight.
+        Sets of noise about a flight without gravity gradient, which (19) does not hold.
+    noise : Noise
+        Level of noise.
+    treatments : sequence of Treatment
+        Treatments to compare.
+
+    Returns
+    -------
+    dict of str to Regression
+        Estimates by the title of the treatment.
     """
+    flight = draws.flight
     truth = np.stack(motion().evaluate(flight.time))
-    found = {}
+    results = {}
     for treatment in treatments:
         joints = truth + draws.joints(treatment, noise)
         rate = draws.treated(treatment, "rate", noise)
         accel = flight.accel + draws.treated(treatment, "accel", noise)[:, 0]
         estimates = np.stack(
             [
-                solve_balance(*Balance(own)(flight.rate + turning[0], turning[1], pulled))
-                for own, turning, pulled in zip(joints, rate, accel, strict=True)
+                solve_balance(*Balance(states)(flight.rate + turning[0], turning[1], pulled))
+                for states, turning, pulled in zip(joints, rate, accel, strict=True)
             ]
         )
         quantities = np.stack([mass_com_inertia(p) for p in estimates])
-        bodies = [_physical(own) for own in quantities]
-        found[treatment.title] = Regression((quantities - paper.TRUTH) / np.abs(paper.TRUTH), bodies.count(False))
-    return found
+        unphysical = [_physical(values) for values in quantities].count(False)
+        results[treatment.title] = Regression((quantities - paper.TRUTH) / np.abs(paper.TRUTH), unphysical)
+    return results
 
 
 def attenuation(flight: Flight, noise: Noise) -> Floats:
@@ -142,6 +155,5 @@ def solve_balance(base: Floats, arm: Floats) -> Floats:
 
 
 def _physical(quantities: Floats) -> bool:
-    xx, yy, zz, xy, xz, yz = quantities[4:]
-    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return bool(quantities[0] > 0.0 and moments[0] > 0.0 and moments[2] < moments[0] + moments[1])
+    moments = np.linalg.eigvalsh(inertia_matrix(quantities))
+    return bool(quantities[MASS] > 0.0 and moments[0] > 0.0 and moments[2] < moments[0] + moments[1])

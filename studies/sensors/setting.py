@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_simpson
 
-from bayesid import BodyPrior, Kind, Model, Orbit, Robot, Sensor, White
+from bayesid import Kind, Model
+from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Excitation
-from bayesid.simulation.effects import AccelBias, GravityGradient
 from bayesid.simulation.sensors import StarTracker
 from studies.base_body import paper
 from studies.common import flight
-from studies.common.ets7 import ACCELEROMETER, BASE, BIAS, RADIUS, ets7, excitation
+from studies.common.ets7 import BIAS, INTERVAL, ets7, excitation
+from studies.common.models import base_model
 
-__all__ = ["INTERVAL", "JOLT", "Flight", "Noise", "fly", "joints_meet", "levels"]
-__all__ += ["model_of", "motion", "unread"]
+__all__ = ["Flight", "Noise", "fly", "junctions", "levels", "model_of", "motion", "near_junctions"]
 
-Floats = NDArray[np.floating]
+NEAR = 2.0
+"""Distance from a junction of (27) within which samples of the base's sensors may be left out [s].
 
-INTERVAL = 0.5
-"""Time between samples of all sensors [s]."""
-
-JOLT = 2.0
-"""Where (27) meets its connecting splines the joints' third derivative jumps; samples of the base's sensors this near
-may be left out [s]."""
+The third derivative of the joints' positions jumps at a junction.
+"""
 
 FINE = 0.1
 """Step of the independent simulator, and between the accelerations that are integrated to the true velocity [s]."""
@@ -34,24 +32,35 @@ FINE = 0.1
 
 @dataclass(frozen=True)
 class Noise:
-    """White noise per sample: of the rates [rad/s], of the accelerometer [m/s2], of the joints' positions [rad]."""
+    """Standard deviations of white noise per sample.
+
+    Attributes
+    ----------
+    rate : float
+        Noise of the base's rates [rad/s].
+    accel : float
+        Noise of the accelerometer [m/s2].
+    position : float
+        Noise of the joints' encoders [rad].
+    """
 
     rate: float
     accel: float
-    encoder: float
+    position: float
 
 
 @dataclass(frozen=True)
 class Flight:
-    """What truly happened at the samples.
+    """True motion at the samples.
 
     Attributes
     ----------
     time : (T,) array
+        Sample times [s].
     position : (T, 6) array
-        Of the joints [rad].
+        Joint positions [rad].
     rate, accel : (T, 3) array
-        Of the base, and at the accelerometer, base axes [rad/s, m/s2].
+        Rate of the base [rad/s] and acceleration at the accelerometer [m/s2], in base axes.
     rate_change : (T, 3) array
         Derivative of the rate [rad/s2].
     velocity : (T, 3) array
@@ -71,6 +80,7 @@ def motion() -> Excitation:
     return excitation(paper.EXCITATION)
 
 
+@cache
 def fly(*, gradient: bool = True) -> Flight:
     """Fly the manoeuvre from rest, in orbit or far from any mass."""
     planned = motion()
@@ -83,43 +93,36 @@ def fly(*, gradient: bool = True) -> Flight:
     return Flight(*(np.array(column[::every]) for column in columns))
 
 
-def model_of(noise: Noise, *, gradient: bool = True, biased: bool = True) -> Model:
+def model_of(noise: Noise, *, biased: bool) -> Model:
     """Return the model: base and initial rate unknown, and where ``biased`` the accelerometer's constant error."""
-    robot: Robot = ets7()
-    return Model(
-        robot,
-        (Sensor(Kind.RATE, White(noise.rate)), Sensor(Kind.ACCEL, White(noise.accel), position=ACCELEROMETER)),
-        (BodyPrior(BASE, robot.link(BASE).inertial, 1.0),),
-        Orbit(RADIUS) if gradient else None,
-        (*((GravityGradient(),) if gradient else ()), *((AccelBias(BIAS),) if biased else ())),
-    )
+    return base_model({Kind.RATE: noise.rate, Kind.ACCEL: noise.accel}, bias=BIAS if biased else 0.0)
 
 
-def levels(flight: Flight) -> dict[str, Noise]:
-    """Return the noises looked at, by name; the accelerometer's share of its peak is that of the rate.
+def levels(flown: Flight) -> dict[str, Noise]:
+    """Return the levels of noise by name.
 
-    The paper prints sigma 0.04 and 0.009 without a unit: read as degrees and degrees per second, or as a fraction of
-    the peak.
+    The paper prints sigma 0.04 and 0.009 without a unit. They are read as degrees and degrees per second, or as a
+    fraction of the peak; the accelerometer's noise is then the same fraction of its peak as the rate's.
     """
-    rate, accel = (float(np.abs(values).max()) for values in (flight.rate, flight.accel))
-    found = {}
+    rate, accel = (float(np.abs(values).max()) for values in (flown.rate, flown.accel))
+    noises = {}
     for sigma in (0.04, 0.009):
         degrees = float(np.radians(sigma))
-        found[f"{sigma:g} deg/s"] = Noise(degrees, degrees * accel / rate, degrees)
-    found["4 % of peak"] = Noise(0.04 * rate, 0.04 * accel, 1e-5)
+        noises[f"{sigma:g} deg/s"] = Noise(degrees, degrees * accel / rate, degrees)
+    noises["4 % of peak"] = Noise(0.04 * rate, 0.04 * accel, 1e-5)
     star = float(StarTracker(2.0).sigma(INTERVAL)[0])
     for grade, encoder in ((1e-5, 1e-4), (1e-5, 1e-5), (1e-5, 1e-6), (1e-7, 1e-6), (1e-9, 1e-6)):
-        found[f"2″, {grade:.0e}, {encoder:.0e}".replace("e-0", "e-")] = Noise(star, grade, encoder)
-    return found
+        noises[f"2″, {grade:.0e}, {encoder:.0e}".replace("e-0", "e-")] = Noise(star, grade, encoder)
+    return noises
 
 
-def joints_meet() -> tuple[float, float]:
-    """Return when (27) meets its connecting splines [s]."""
+def junctions() -> tuple[float, float]:
+    """Return the times at which the oscillation of (27) meets its connecting splines [s]."""
     planned = motion()
     return planned.ramp, planned.duration - planned.ramp
 
 
-def unread(time: Floats) -> NDArray[np.bool_]:
-    """Return which samples lie near the jolts of (27)."""
-    near: NDArray[np.bool_] = (np.abs(time[:, None] - np.array(joints_meet())) <= JOLT).any(axis=1)
+def near_junctions(time: Floats) -> NDArray[np.bool_]:
+    """Return which samples lie near a junction of (27), shape (T,)."""
+    near: NDArray[np.bool_] = (np.abs(time[:, None] - np.array(junctions())) <= NEAR).any(axis=1)
     return near

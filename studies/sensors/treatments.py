@@ -1,7 +1,7 @@
-"""Treatments of a noisy signal that is wanted with two derivatives: joint positions, or rates.
+"""Treatments of a noisy signal whose two derivatives are needed: joint positions, or rates.
 
-Each is called with the times (T,), the samples (T, n) and their noise, and returns value and two derivatives (3, T, n).
-Only the last uses the noise.
+A treatment is called with the times (T,), the samples (T, n) and the standard deviation of their noise, and returns the
+values and two derivatives (3, T, n). Only `Wiener` uses the noise.
 """
 
 from __future__ import annotations
@@ -11,23 +11,21 @@ from typing import Protocol
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 from scipy import signal
 from scipy.interpolate import make_smoothing_spline
 
+from bayesid._math.arrays import Floats
 from bayesid.recording.smoothing import JointSamples, smooth
 
 __all__ = ["Differences", "LowPass", "Polynomial", "SavitzkyGolay", "SmoothingSpline", "Treatment", "Wiener"]
 
-Floats = NDArray[np.floating]
-
 
 class Treatment(Protocol):
-    """What every treatment offers."""
+    """Interface of all treatments."""
 
     @property
     def title(self) -> str:
-        """Name in the report."""
+        """Name of the treatment in the report."""
         ...
 
     def __call__(self, time: Floats, values: Floats, sigma: float) -> Floats:
@@ -57,8 +55,9 @@ class LowPass:
     Parameters
     ----------
     cut : float
-        Cut-off of one pass [Hz].
+        Cut-off frequency of one pass [Hz].
     order : int
+        Order of one pass.
     """
 
     cut: float = 0.2
@@ -78,8 +77,9 @@ class SavitzkyGolay:
     Parameters
     ----------
     window : int
-        Samples, odd.
+        Number of samples in the window, which is odd.
     degree : int
+        Degree of the polynomials.
     """
 
     window: int = 21
@@ -101,24 +101,24 @@ class Polynomial:
     Parameters
     ----------
     breaks : tuple of float
-        Where pieces meet [s]; nothing is made continuous there.
+        Times at which pieces meet [s]; nothing is made continuous there.
 
     Notes
     -----
-    Degrees go to twice the square root of a piece's samples; beyond, polynomials swing at the ends.
+    Degrees go up to twice the square root of the number of a piece's samples; higher ones oscillate at the ends.
     """
 
     breaks: tuple[float, ...] = ()
 
     @property
     def title(self) -> str:
-        """Name in the report."""
+        """Name of the treatment in the report."""
         return "polynomials, piecewise" if self.breaks else "polynomial"
 
     def __call__(self, time: Floats, values: Floats, sigma: float) -> Floats:
         """Return values and two derivatives, shape (3, T, n)."""
         pieces = np.split(np.arange(len(time)), np.searchsorted(time, self.breaks))
-        return np.concatenate([_polynomial(time[own], values[own]) for own in pieces], axis=1)
+        return np.concatenate([_polynomial(time[piece], values[piece]) for piece in pieces], axis=1)
 
 
 def _polynomial(time: Floats, values: Floats) -> Floats:
@@ -127,7 +127,7 @@ def _polynomial(time: Floats, values: Floats) -> Floats:
     basis, factor = np.linalg.qr(chebyshev.chebvander(x, int(degrees[-1])))
     share = basis.T @ values
     left = (values**2).sum(axis=0) - np.cumsum(share**2, axis=0)
-    floor = 1e-24 * (values**2).sum(axis=0) + 1e-300  # where a polynomial is exact, rounding is left
+    floor = 1e-24 * (values**2).sum(axis=0) + 1e-300  # where a polynomial is exact, only rounding remains
     criterion = count * np.log(np.maximum(left, floor) / count) + (degrees + 1)[:, None] * np.log(count)
     share[degrees[:, None] > criterion.argmin(axis=0)] = 0.0
     series = np.linalg.solve(factor, share)
@@ -148,9 +148,9 @@ class SmoothingSpline:
 
 @dataclass(frozen=True)
 class Wiener:
-    """The package's smoother: an integrated Wiener process given the declared noise (`bayesid.recording.smoothing`)."""
+    """Smoother of the package, an integrated Wiener process given the noise (`bayesid.recording.smoothing`)."""
 
-    title: str = "ours"
+    title: str = "Wiener process"
 
     def __call__(self, time: Floats, values: Floats, sigma: float) -> Floats:
         """Return values and two derivatives, shape (3, T, n)."""

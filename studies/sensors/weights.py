@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from studies.sensors.setting import Noise
 
-__all__ = ["alternating", "as_read", "constant", "integral", "integrated", "integrated_whole"]
-
-Floats = NDArray[np.floating]
+__all__ = ["as_read", "constant", "integral", "integrated", "integrated_whole"]
 
 
 def integral(time: Floats) -> Floats:
@@ -18,21 +16,16 @@ def integral(time: Floats) -> Floats:
     return np.cumsum(0.5 * step[:, None] * (samples[1:] + samples[:-1]), axis=0)
 
 
-def alternating(count: int) -> Floats:
-    """Return the one unit signal that the trapezoidal rule does not see, shape (count,)."""
-    return np.where(np.arange(count) % 2, -1.0, 1.0) / np.sqrt(count)
-
-
 def as_read(time: Floats, noise: Noise | None) -> Floats:
-    """Weigh rates and accelerations by their noise, or all SI units alike."""
+    """Return weights of rates and accelerations by their noise, or equal ones in SI units without a noise."""
     rate, accel = (1.0, 1.0) if noise is None else (1.0 / noise.rate, 1.0 / noise.accel)
     return _both(rate * np.eye(len(time)), accel * np.eye(len(time)))
 
 
 def integrated(time: Floats, noise: Noise | None) -> Floats:
-    """Weigh rates and velocities, each by one noise as if it were white, or all SI units alike, as (21) does.
+    """Return weights of rates and velocities by their noise as if it were white, or equal ones as in (21) without one.
 
-    The velocity's one noise is the root mean square of what integration makes of the accelerometer's.
+    The noise of the velocity is the root mean square of the accelerometer's integrated noise.
     """
     rule = integral(time)
     if noise is None:
@@ -42,21 +35,21 @@ def integrated(time: Floats, noise: Noise | None) -> Floats:
 
 
 def integrated_whole(time: Floats, noise: Noise) -> Floats:
-    """Weigh the velocities with their whole covariance."""
+    """Return weights of rates by their noise and of velocities by their full covariance."""
     rule = integral(time)
     factor = np.linalg.cholesky(rule @ rule.T)
     return _both(np.eye(len(time)) / noise.rate, np.linalg.solve(factor, rule) / noise.accel)
 
 
 def constant(weight: Floats, time: Floats) -> Floats:
-    """Return what an unknown velocity at the start adds to a weighted residual of `integrated`, shape (m, 3)."""
+    """Return derivatives of a weighted residual of `integrated` by the velocity at the start, shape (m, 3)."""
     velocities = len(time) - 1
-    size = weight[-1].max() / integral(time)[-1].max()  # of a velocity's weight
+    size = weight[-1].max() / integral(time)[-1].max()  # weight of a velocity
     column = np.zeros((len(weight), 3))
     column[3 * len(time) :] = size * np.tile(np.eye(3), (velocities, 1))
     return column
 
 
 def _both(rate: Floats, accel: Floats) -> Floats:
-    """Return the operator on flat residuals (T, 6) of one on every rate and one on every acceleration."""
+    """Return one matrix on flat residuals (T, 6) from a matrix on each rate axis and one on each acceleration axis."""
     return np.concatenate([np.kron(rate, np.eye(3, 6)), np.kron(accel, np.eye(3, 6, 3))])

@@ -1,0 +1,37 @@
+"""The ten reported quantities of a body, in the order of `bayesid.inference.body_quantities.BODY_QUANTITIES`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bayesid.inference.body_quantities import BODY_QUANTITIES
+from bayesid.report.numbers import format_unit
+from bayesid.robot.inertial_parameters import InertialParameters
+
+__all__ = ["HEADINGS", "JUDGED", "LABELS", "MASS", "MOMENTS", "body_of", "inertia_matrix"]
+
+Floats = NDArray[np.floating]
+
+MASS, MOMENTS = 0, [4, 5, 6]
+"""Indices of the mass and of the three moments of inertia."""
+
+JUDGED = [MASS, *MOMENTS]
+"""Indices of the quantities by which studies judge an identification; the others may be zero."""
+
+LABELS = [key.replace("inertia.", "I ").replace("com.", "c ") for key in BODY_QUANTITIES]
+"""Short names for the axes of figures, such as ``I xx``."""
+
+HEADINGS = [f"{key} [{format_unit(unit)}]" for key, unit in BODY_QUANTITIES.items()]
+"""Names with units for the rows of tables, such as ``inertia.xx [kg m²]``."""
+
+
+def inertia_matrix(quantities: Floats) -> Floats:
+    """Return the inertia matrix (3, 3) of ten quantities."""
+    xx, yy, zz, xy, xz, yz = quantities[4:]
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def body_of(quantities: Floats) -> InertialParameters:
+    """Return the body with these ten quantities, whose inertia is about the centre of mass."""
+    return InertialParameters(quantities[0], quantities[1:4], inertia_matrix(quantities))
