@@ -43,10 +43,10 @@ def write_report(result: Result, output: Path) -> None:
     document.section("Question and answer")
     document.paragraph(
         "Which manoeuvre of ETS-VII tells most about its base? All manoeuvres last 120 s, start and end at rest with "
-        "the wrist extended, and keep the same limits. Rates have a noise of 1e-5 rad/s and accelerations of 1e-5 m/s² "
-        "at 2 Hz, encoders of 1e-6 rad. The accelerometer's bias (prior 1e-4 m/s²) and the initial rate are unknown "
-        "and marginalised; the arm is known. The predicted posterior is that of the problem linearised at the true "
-        "base, and sd stands for standard deviation throughout."
+        "the wrist extended, and keep the same limits. Rates have a noise of 1e-5 rad/s and accelerations of 1e-5 "
+        "m/s² at 2 Hz, encoders of 1e-6 rad. The accelerometer's bias (prior 1e-4 m/s²) and the initial rate are "
+        "unknown and marginalised; the arm is known. The predicted posterior is that of the problem linearised at the "
+        "true base, and sd stands for standard deviation throughout."
     )
     document.items(_answers(result))
     for name, contest in result.contests.items():
@@ -78,7 +78,7 @@ def _answers(result: Result) -> list[str]:
         best = contest.relative("d-optimal")[2]
         texts.append(
             f"{name.capitalize()}, the geometric mean of the d-optimal manoeuvre's sds is {1.0 / best:.2f} times "
-            f"smaller than that of (26) with the same splines (goal 2), "
+            "smaller than that of (26) with the same splines (goal 2), "
             f"{contest.relative('condition-number')[2] / best:.2f} times smaller than that of the condition number "
             f"(goal 1.3), and {contest.relative('printed')[2] / best:.2f} times smaller than that of the paper's "
             "printed optimum."
@@ -138,8 +138,8 @@ def _realised(document: Document, result: Result) -> None:
     document.section("Predicted, sampled and realised")
     document.paragraph(
         "Some designs were flown by MuJoCo with fresh noise of sensors and encoders and a fresh accelerometer bias "
-        "each time, and the base was identified by the mode of the posterior. One recording of each was also "
-        "sampled with emcee."
+        "each time, and the base was identified by the mode of the posterior. One recording of each was also sampled "
+        "with emcee."
     )
     for (name, key), item in result.realised.items():
         document.table(
