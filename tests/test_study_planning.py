@@ -15,7 +15,7 @@ REACHED = START + np.array([0.4, -0.3, 0.2, 0.1, -0.2, 0.2])
 
 
 def test_a_plan_hits_with_the_true_base_and_misses_with_a_wrong_one():
-    target = fly(Swing(START, REACHED, DURATION), DURATION).tip
+    target = fly(Swing(START, REACHED, DURATION)).tip
     truth = Robot.shipped("ets7").link(BASE).inertial
     model = model_of(Guess("truth", truth, 0.01))
     predictor = predictor_of(model, Swing(START, START, DURATION))

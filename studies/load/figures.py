@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -54,7 +55,11 @@ def error_figure(iterations: Sequence[Iteration]) -> Figure:
         for number, estimate in enumerate(estimates):
             error = np.abs(paper.errors(estimate))
             error[error == 0.0] = np.nan  # printed exactly
-            look = {"color": colour, "fillstyle": FILLS[number], "label": f"{name}, iteration {number + 1}"}
+            look: dict[str, Any] = {
+                "color": colour,
+                "fillstyle": FILLS[number],
+                "label": f"{name}, iteration {number + 1}",
+            }
             axes.plot(place, error, "os"[number], markersize=4, **look)
     axes.axhline(1e-6, color="black", linewidth=0.8, linestyle="--")
     axes.text(place[-1] + 0.4, 1.3e-6, "goal", ha="right", va="bottom")

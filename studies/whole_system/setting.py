@@ -13,7 +13,7 @@ from bayesid.robot.robot import Load
 from bayesid.simulation.effects import Effect, GravityGradient, JointFriction
 from bayesid.simulation.joint_torques import TorqueSensor
 from studies.common.ets7 import ACCEL, ACCELEROMETER, BASE, RADIUS, RATE, ets7
-from studies.planning.world import guess_about
+from studies.common.guesses import guess_about
 
 __all__ = ["LOAD", "bodies", "drawn", "friction_effects", "model_of", "spreads", "true_robot"]
 
