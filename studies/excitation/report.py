@@ -156,7 +156,7 @@ def _realised(document: Document, result: Result) -> None:
             ],
             f"{TITLES[key]}, {name}: errors of {len(item.errors)} recordings, so that each rms is known to "
             f"{100.0 * item.rms_error:.1f} %. The squared distance of the truth in the predicted covariance is "
-            f"{item.distances.mean():.2f} on average, where 10 ± {np.sqrt(20.0 / len(item.distances)):.2f} expected.",
+            f"{item.distances.mean():.2f} on average (expected: 10 ± {np.sqrt(20.0 / len(item.distances)):.2f}).",
             columns("lrrrr"),
         )
 

@@ -7,11 +7,12 @@ from itertools import combinations
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid.design import Plan, Separation, Tip
+from bayesid.design.plan import PlannedOutcome
 from studies.common.ets7 import TIP
 from studies.ets7_limits.setting import INTERVAL
+from studies.separating.expected import unexplained_information
 from studies.separating.setting import CANDIDATES, FlightFamily, drifting, rival_model
 
 __all__ = ["Pair", "pairs"]
@@ -24,10 +25,11 @@ class Pair:
     Attributes
     ----------
     labels : (str, str)
+        Labels of the effects.
     alone : (float, float)
         Noncentrality of each at its prior's amplitude, with base, initial rate and gradient marginalised.
     apart : (float, float)
-        Likewise with its rival of any size marginalised too.
+        Noncentrality of each with the rival, of any size, marginalised too.
     """
 
     labels: tuple[str, str]
@@ -36,7 +38,7 @@ class Pair:
 
     @property
     def left(self) -> float:
-        """Part of the signal that the rival cannot imitate, of the effect of which less is left."""
+        """Smaller of the two fractions of a signal that the rival cannot imitate."""
         return min(part / whole for part, whole in zip(self.apart, self.alone, strict=True))
 
 
@@ -45,27 +47,22 @@ def pairs(duration: float, thinning: int = 2) -> list[Pair]:
     labels = [effect.label for effect in CANDIDATES]
     model, family = rival_model(labels), FlightFamily(duration)
     plan = Plan(model, family, INTERVAL, Tip.of(model.robot, TIP), thinning=thinning)
-    z = drifting(model, plan.unknowns.names)
-    outcome = jax.jit(plan.outcome)(family.centre, z)
-    found = []
-    for couple in combinations(labels, 2):
-        own = replace(plan, model=rival_model(couple))
-        rows = np.array([plan.unknowns.names.index(name) for name in own.unknowns.names])
-        cut = outcome._replace(information=outcome.information[np.ix_(rows, rows)])
-        apart = np.asarray(Separation(couple).noncentrality(own, cut))
-        alone = []
-        for label in couple:
-            single = replace(plan, model=rival_model([label]))
-            rows = np.array([plan.unknowns.names.index(name) for name in single.unknowns.names])
-            part = np.asarray(outcome.information)[np.ix_(rows, rows)]
-            alone.append(_alone(part, list(single.effect(label))))
-        found.append(Pair(couple, (alone[0], alone[1]), (float(apart[0]), float(apart[1]))))
-    return sorted(found, key=lambda pair: pair.left)
+    outcome = jax.jit(plan.outcome)(family.centre, drifting(plan.unknowns))
 
+    def having(*present: str) -> tuple[Plan, PlannedOutcome]:
+        """Return plan and outcome of the model with some of the candidates."""
+        smaller = replace(plan, model=rival_model(present))
+        rows = np.array([plan.unknowns.names.index(name) for name in smaller.unknowns.names])
+        return smaller, outcome._replace(information=np.asarray(outcome.information)[np.ix_(rows, rows)])
 
-def _alone(information: NDArray[np.floating], group: list[int]) -> float:
-    """Trace of the information of a group with all else, which has a standard-normal prior, marginalised."""
-    rest = [index for index in range(len(information)) if index not in group]
-    cross = information[np.ix_(group, rest)]
-    inner = information[np.ix_(rest, rest)] + np.eye(len(rest))
-    return float(np.trace(information[np.ix_(group, group)] - cross @ np.linalg.solve(inner, cross.T)))
+    alone = {}
+    for label in labels:
+        single, cut = having(label)
+        group = list(single.effect(label))
+        rest = [index for index in range(len(cut.information)) if index not in group]
+        alone[label] = float(np.trace(unexplained_information(np.asarray(cut.information), group, rest)))
+    rows = []
+    for first, second in combinations(labels, 2):
+        apart = np.asarray(Separation((first, second)).noncentrality(*having(first, second)))
+        rows.append(Pair((first, second), (alone[first], alone[second]), (float(apart[0]), float(apart[1]))))
+    return sorted(rows, key=lambda pair: pair.left)
