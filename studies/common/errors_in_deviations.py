@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from bayesid._math.arrays import Floats
 
 __all__ = ["squared_distances"]
-
-Floats = NDArray[np.floating]
 
 
 def squared_distances(errors: Floats, covariance: Floats) -> Floats:

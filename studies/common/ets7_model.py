@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import BodyPrior, Effect, Kind, Model, Orbit, Robot, Sensor, White
+from bayesid._math.arrays import Floats
 from bayesid.simulation.effects import GravityGradient
 from studies.common.ets7 import ACCEL, ACCELEROMETER, ENCODER, RADIUS, RATE, extended_wrist
 
@@ -38,6 +38,6 @@ def orbiting_model(robot: Robot, priors: Sequence[BodyPrior], *effects: Effect, 
     return Model(robot, motion_sensors(), tuple(priors), Orbit(RADIUS), (GravityGradient(), *effects), **options)
 
 
-def extended_start() -> NDArray[np.floating]:
+def extended_start() -> Floats:
     """Return the joint positions with the first three at zero and the wrist extended, shape (6,) [rad]."""
     return np.array([0.0, 0.0, 0.0, *extended_wrist()])

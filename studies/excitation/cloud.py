@@ -6,15 +6,13 @@ from dataclasses import dataclass
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
+from bayesid._math.arrays import Floats
 from bayesid.design import DOptimal, Paper26, Paper26Intended, Problem
 from bayesid.design.plan import PlannedOutcome
 
 __all__ = ["Cloud", "Sensitivity", "random_cloud", "sensitivity"]
-
-Floats = NDArray[np.floating]
 
 
 @dataclass(frozen=True)

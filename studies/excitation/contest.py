@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.design import (
     AOptimal,
     ConditionNumber,
@@ -33,8 +33,6 @@ from studies.common.ets7 import ENCODER
 from studies.excitation.world import paper_family, problem, splines
 
 __all__ = ["Contest", "compete", "shrunk"]
-
-Floats = NDArray[np.floating]
 
 FEW: tuple[Criterion, ...] = (Paper26(), ConditionNumber(), DOptimal())
 """Criteria of a quick run: the paper's, the one usual for arms on the ground, and the posterior's volume."""

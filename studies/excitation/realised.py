@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Posterior, identify
+from bayesid._math.arrays import Floats
 from bayesid.design import Design
 from bayesid.inference import maximise
 from bayesid.robot.inertial_parameters import mass_com_inertia
@@ -18,8 +18,6 @@ from studies.common.monte_carlo import run_trials
 from studies.excitation.world import fly, recorded
 
 __all__ = ["Realised", "realise"]
-
-Floats = NDArray[np.floating]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_signed
+from bayesid.report.tables.design_tables import sd_rows
 from bayesid.robot.log_cholesky import LOG_CHOLESKY
 from studies.common.report_parts import QUANTITY_TITLES, columns
 from studies.excitation import Result
@@ -119,15 +120,12 @@ def _contest(document: Document, name: str, contest: Contest) -> None:
     scaled = [f"{TITLES[key]} by {format_number(value, 3)}" for key, value in contest.shrink.items() if value < 1.0]
     if scaled:
         document.paragraph(f"Made smaller, towards rest, to keep the limits: {'; '.join(scaled)}.")
-    predicted = {TITLES[key]: contest.designs[key].predicted.sd for key in SHOWN if key in contest.designs}
+    shown = {TITLES[key]: contest.designs[key] for key in SHOWN if key in contest.designs}
     document.table(
-        ["parameter", *predicted],
-        [
-            [title, *(format_number(float(sd[row]), 3) for sd in predicted.values())]
-            for row, title in enumerate(QUANTITY_TITLES)
-        ],
+        ["parameter", "unit", "true", *shown],
+        sd_rows(list(shown.values())),
         "Predicted posterior standard deviations.",
-        columns("l" + "r" * len(predicted)),
+        columns("llr" + "r" * len(shown)),
     )
     document.figure(
         _motion_figure(contest), "Joint positions, speed of the tip and rotation of the base since the start."

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.design import Criterion, Paper26Intended, PlannedMotion, Search, optimise
 from bayesid.design.design_problem import Known
 from bayesid.design.simulated_spacecraft import plan_recording
@@ -19,8 +19,6 @@ from studies.load import paper
 from studies.load.setting import DURATION, INTERVAL, MuJoCoSpacecraft, excitation, model, problem
 
 __all__ = ["Iteration", "iterate"]
-
-Floats = NDArray[np.floating]
 
 STEP = 0.5
 """Integration step of the fit [s]."""

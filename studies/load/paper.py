@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.robot.inertial_parameters import InertialParameters
 
 __all__ = ["GUESS", "RESULTS", "SCALE", "TRUTH", "Reading", "body", "errors", "readings"]
-
-Floats = NDArray[np.floating]
 
 TRUTH = np.array([370.0, 0.33, 0.50, 1.04, 700.0, 700.0, 700.0, 0.0, 0.0, 0.0])
 """True load: mass, centre of mass, inertia xx yy zz xy xz yz, in the order and units of

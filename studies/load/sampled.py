@@ -8,9 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from bayesid._math.arrays import Floats
 from bayesid.design import BSplines, Criterion, DOptimal, Limits, Loop, Paper26Intended, Sampled, Search
 from bayesid.design.knowledge_update import bodies_of_draws
 from bayesid.inference.body_quantities import BodyDraws
@@ -21,8 +19,6 @@ from studies.load import paper
 from studies.load.setting import DURATION, LIMITS, LOAD, MuJoCoSpacecraft, excitation, model, problem
 
 __all__ = ["Flight", "fly_all"]
-
-Floats = NDArray[np.floating]
 
 SPREAD = 2.0
 """Relative width of the load's prior: a tenth to thirty times of the truth lies within one width."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import BodyPrior, Load, Model, Recording, Robot
+from bayesid._math.arrays import Floats
 from bayesid.design import Criterion, Limits, PaperExcitation, Plan, PlannedMotion, Problem, Tip, TrajectoryFamily
 from studies.common.ets7 import TIP, ets7
 from studies.common.ets7_model import NOISE, extended_start, orbiting_model
@@ -37,7 +37,7 @@ PLAN_STEP, TRUTH_STEP = 2.0, 0.1
 """Integration steps of design and truth [s]."""
 
 
-def ship(load: NDArray[np.floating] = paper.GUESS) -> Robot:
+def ship(load: Floats = paper.GUESS) -> Robot:
     """Return ETS-VII with the paper's joint ranges and a load of ten quantities."""
     shipped = ets7()
     urdf = shipped.urdf.replace('"-6.283185307179586"', f'"{-RANGE!r}"').replace('"6.283185307179586"', f'"{RANGE!r}"')

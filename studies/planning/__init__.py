@@ -1,4 +1,4 @@
-"""Section 1.1.1 of the paper: what identification buys the planner of a free-flying robot.
+"""Section 1.1.1 of the paper: what the planner of a free-flying robot gains by identification.
 
 A path planned in joint space ends elsewhere if the base is not what the planner takes it for. An independent simulator
 flies the plan; the prediction says beforehand how far off it may end, before and after identification, and a plan made
@@ -77,7 +77,7 @@ def run(
 
 COMMAND = Command(
     "planning",
-    "Say what identification buys the planner.",
+    "Say what a planner gains by identification.",
     full="also from the paper's initial guess",
     seed=1,
     extra={

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from bayesid import Identification, InertialParameters, Manoeuvre, Model, Posterior, Recording, identify
+from bayesid._math.arrays import Floats
 from bayesid.design.base_prediction import BasePredictor, Prediction
 from bayesid.design.knowledge_update import updated_model
 from bayesid.design.pose_region import Pose
@@ -19,8 +19,6 @@ from studies.common.ets7 import BASE, START, TIP, ets7
 from studies.planning.world import ATTITUDE, Flown, FlownPose, Guess, Swing, fly, measure, model_of
 
 __all__ = ["Case", "Flight", "Trial", "analyse", "flight_of", "plan", "predictor_of"]
-
-Floats = NDArray[np.floating]
 
 REACHED = np.array([0.9, -1.5, 0.3, 0.5, -0.7, 0.6])
 """Joint positions [rad] whose final pose in a true flight is the target, so that it can be reached; no planner sees

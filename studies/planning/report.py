@@ -44,7 +44,7 @@ class Result:
 
 def write_report(result: Result, output: Path) -> None:
     """Write the report as PDF."""
-    document = Document("What identification buys the planner", "Section 1.1.1 of Lampariello and Hirzinger (2005)")
+    document = Document("What a planner gains by identification", "Section 1.1.1 of Lampariello and Hirzinger (2005)")
     document.section("Question and answer")
     document.paragraph(
         "Joint angles lead to a place in space only through the base, which moves as the arm does. A path planned in "

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from bayesid import BodyPrior, Excitation, InertialParameters, Manoeuvre, Model
+from bayesid._math.arrays import Floats
 from bayesid.robot.joint_state import JointState
 from studies.base_body import paper
 from studies.common import flight
@@ -18,8 +18,6 @@ from studies.common.flight import prescribed, true_robot
 from studies.common.guesses import guess_about
 
 __all__ = ["Flown", "FlownPose", "Guess", "Swing", "drawn_guess", "fly", "measure", "model_of", "paper_guess"]
-
-Floats = NDArray[np.floating]
 
 FlownPose = tuple[Floats, Floats]
 """Position (3,) [m] and quaternion x, y, z, w to orbit axes, counted in orbit axes from where the base started."""
