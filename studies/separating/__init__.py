@@ -17,8 +17,8 @@ from studies.common.command import Command
 from studies.common.ets7 import START, FlightManoeuvre
 from studies.ets7_limits.setting import DURATION, POINTS
 from studies.separating.analysis import Result, diagnosed_causes, expectations, realise
+from studies.separating.expected import pairs
 from studies.separating.manoeuvres import design_both, separating_problem
-from studies.separating.pairs import pairs
 from studies.separating.report import write_report
 
 __all__ = ["Result", "main", "run"]

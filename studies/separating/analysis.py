@@ -7,20 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.diagnosis import diagnose
 from bayesid.recording.joint_motion import Motion
 from studies.common.monte_carlo import run_trials
-from studies.separating.expected import Expected, Linearised
+from studies.separating.expected import Expected, Linearised, Pair
 from studies.separating.factors import Flown, Rivalry, Sampled, flown, noisy
 from studies.separating.manoeuvres import Designed
-from studies.separating.pairs import Pair
 from studies.separating.setting import CANDIDATES, RIVALS, STAGES, TRUTHS, amplitude, rival_model
 
 __all__ = ["Realised", "Result", "Verdict", "diagnosed_causes", "expectations", "realise"]
-
-Floats = NDArray[np.floating]
 
 DIRECTIONS = 200
 """Number of random directions of an effect for which the separation is computed."""

@@ -1,25 +1,27 @@
-"""Expectation of the Bayes factor between two rivals by linear theory, before anything is flown."""
+"""Linear theory of rivals before anything is flown: how alike effects are, and the expected Bayes factor."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
 
+import jax
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, Model, Recording
-from bayesid.design import planned_posterior
+from bayesid._math.arrays import Floats
+from bayesid.design import Plan, Separation, Tip, planned_posterior
 from bayesid.design.designed import sample_times
+from bayesid.design.plan import PlannedOutcome
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.simulated_recordings import blank_channels
 from bayesid.recording.joint_motion import Motion
+from studies.common.ets7 import TIP
 from studies.ets7_limits.setting import INTERVAL
-from studies.separating.setting import drifting, rival_of
+from studies.separating.setting import CANDIDATES, FlightFamily, drifting, rival_model, rival_of
 
-__all__ = ["Expected", "Linearised", "unexplained_information"]
-
-Floats = NDArray[np.floating]
+__all__ = ["Expected", "Linearised", "Pair", "pairs", "unexplained_information"]
 
 
 @dataclass(frozen=True)
@@ -120,3 +122,53 @@ class Linearised:
         total, signal = within + np.eye(len(rows)), self.information[np.ix_(rows, hidden)] @ amplitude
         fitted = signal @ np.linalg.solve(total, signal) + np.trace(np.linalg.solve(total, within))
         return float(0.5 * fitted - 0.5 * np.linalg.slogdet(total)[1])
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two effects on the first manoeuvre.
+
+    Attributes
+    ----------
+    labels : (str, str)
+        Labels of the effects.
+    alone : (float, float)
+        Noncentrality of each at its prior's amplitude, with base, initial rate and gradient marginalised.
+    apart : (float, float)
+        Noncentrality of each with the rival, of any size, marginalised too.
+    """
+
+    labels: tuple[str, str]
+    alone: tuple[float, float]
+    apart: tuple[float, float]
+
+    @property
+    def left(self) -> float:
+        """Smaller of the two fractions of a signal that the rival cannot imitate."""
+        return min(part / whole for part, whole in zip(self.apart, self.alone, strict=True))
+
+
+def pairs(duration: float, thinning: int = 2) -> list[Pair]:
+    """Return all pairs of the candidates, the most alike first."""
+    labels = [effect.label for effect in CANDIDATES]
+    model, family = rival_model(labels), FlightFamily(duration)
+    plan = Plan(model, family, INTERVAL, Tip.of(model.robot, TIP), thinning=thinning)
+    outcome = jax.jit(plan.outcome)(family.centre, drifting(plan.unknowns))
+
+    def having(*present: str) -> tuple[Plan, PlannedOutcome]:
+        """Return plan and outcome of the model with some of the candidates."""
+        smaller = replace(plan, model=rival_model(present))
+        rows = np.array([plan.unknowns.names.index(name) for name in smaller.unknowns.names])
+        return smaller, outcome._replace(information=np.asarray(outcome.information)[np.ix_(rows, rows)])
+
+    alone = {}
+    for label in labels:
+        single, cut = having(label)
+        group = list(single.effect(label))
+        rest = [index for index in range(len(cut.information)) if index not in group]
+        alone[label] = float(np.trace(unexplained_information(np.asarray(cut.information), group, rest)))
+    rows = []
+    for first, second in combinations(labels, 2):
+        apart = np.asarray(Separation((first, second)).noncentrality(*having(first, second)))
+        rows.append(Pair((first, second), (alone[first], alone[second]), (float(apart[0]), float(apart[1]))))
+    return sorted(rows, key=lambda pair: pair.left)

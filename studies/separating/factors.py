@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, Posterior
+from bayesid._math.arrays import Floats
 from bayesid.inference import maximise
 from bayesid.inference.importance import choose_parameterisation, importance_sample
 from bayesid.inference.noise_changes import with_manoeuvres
@@ -20,8 +20,6 @@ from studies.separating.setting import DRIFT, rival_model, rival_of
 from studies.truth.mujoco import Truth, leak
 
 __all__ = ["Flown", "Rivalry", "Sampled", "flown", "noisy"]
-
-Floats = NDArray[np.floating]
 
 
 @dataclass(frozen=True)

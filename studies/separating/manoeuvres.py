@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.design import BSplines, DOptimal, Plan, Problem, Search, Separation, Store, Tip, optimise
 from bayesid.design.design_problem import Known
 from bayesid.design.plan import Trajectory
@@ -38,7 +38,7 @@ class Designed:
         Motion of the robot at the prior's centre.
     """
 
-    parameters: NDArray[np.floating]
+    parameters: Floats
     costs: dict[str, float]
     largest: dict[str, float]
     motion: ParameterisedMotion

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid._io.words import joined
-from bayesid.report import Document
+from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
 from studies.common.ets7 import ACCEL, RATE
@@ -45,11 +45,10 @@ def write_report(result: Result, output: Path) -> None:
     for item in result.realised:
         before, other, after = (_range(item.factors[stage]) for stage in STAGES)
         document.paragraph(
-            f"Hidden: {HIDDEN[item.truth]}. The first manoeuvre shows that a cause is present: the log Bayes factor "
-            f"of the truth against no cause is {item.detected.min():.1f} to {item.detected.max():.1f} over "
-            f"{len(item.detected)} noises. The log Bayes factor against the rival is {before}, where {RIVALRY} is "
-            f"required to name a cause. With the separating manoeuvre it is {after}, and with a d-optimal manoeuvre "
-            f"of the same duration and limits {other}."
+            f"Hidden: {HIDDEN[item.truth]}. With the first manoeuvre alone, the log Bayes factor of the truth against "
+            f"no cause is {_range(item.detected)} over {len(item.detected)} noises, and against the rival {before}, "
+            f"where {RIVALRY} is required to name a cause. With the separating manoeuvre the latter is {after}, and "
+            f"with a d-optimal manoeuvre of the same duration and limits {other}."
         )
     document.paragraph(_verdict(result))
     _factors(document, result)
@@ -117,8 +116,8 @@ def _factors(document: Document, result: Result) -> None:
     for truth, sampled in result.sampled.items():
         document.paragraph(
             f"Check of Laplace's approximation with {truth} hidden, on the first noise and the separating manoeuvre: "
-            f"ln B is {sampled.laplace:.2f}, and by importance sampling {sampled.sampled:.2f} ± {sampled.error:.2f} "
-            f"(Pareto k-hat {sampled.pareto_k:.2f})."
+            f"ln B is {format_fixed(sampled.laplace, 2)}, and by importance sampling "
+            f"{format_quantity(sampled.sampled, sampled.error)} (Pareto k-hat {sampled.pareto_k:.2f})."
         )
 
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Effect, Model
+from bayesid._math.arrays import Floats
 from bayesid.design import Linear
 from bayesid.inference.unknowns import Unknowns
 from bayesid.simulation.effects import AccelBias, GravityGradient, RateBias, RateDrift, ThrusterLeak, WheelMomentum
@@ -17,8 +17,6 @@ from studies.ets7_limits.setting import DURATION, model_of
 
 __all__ = ["CANDIDATES", "DRIFT", "RIVALS", "SPREAD", "STAGES", "TRUTHS", "FlightFamily"]
 __all__ += ["amplitude", "drifting", "rival_model", "rival_of"]
-
-Floats = NDArray[np.floating]
 
 CANDIDATES: tuple[Effect, ...] = (
     WheelMomentum(1.0),
