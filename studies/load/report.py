@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from bayesid._math.arrays import Floats
 from bayesid.report import Document, format_quantity
 from bayesid.report.numbers import format_number
 from studies.common.report_parts import QUANTITY_TITLES, columns, not_evaluated
@@ -52,13 +53,14 @@ def write_report(result: Result, output: Path) -> None:
     document.write(output)
 
 
-def _printed_errors() -> list[str]:
-    return [f"{np.abs(paper.errors(quantities)).max():.1e}" for quantities in paper.RESULTS]
+def _worst(estimates: Iterable[Floats]) -> list[str]:
+    return [format_number(float(np.abs(paper.errors(estimate)).max()), 2) for estimate in estimates]
 
 
 def _answers(document: Document, result: Result) -> None:
     document.section("Questions and answers")
-    worst, printed = (" and then ".join(t) for t in ([f"{i.worst:.1e}" for i in result.iterations], _printed_errors()))
+    estimates = [item.estimate for item in result.iterations]
+    worst, printed = (" and then ".join(_worst(values)) for values in (estimates, paper.RESULTS))
     rows = [
         [
             "Is a load of 370 kg identified from a guess of 10 kg, without noise, within 1e-6 after two iterations?",
@@ -131,7 +133,7 @@ def _noise_free(document: Document, iterations: list[Iteration]) -> None:
         values += [format_number(quantities[k], 6) for quantities in paper.RESULTS]
         values += [f"{item.estimate[k]:{digits}}".replace("-", "−") for item in iterations]
         rows.append([title, *values])
-    rows.append(["worst relative error", "", "", *_printed_errors(), *(f"{item.worst:.1e}" for item in iterations)])
+    rows.append(["worst relative error", "", "", *_worst([*paper.RESULTS, *(item.estimate for item in iterations)])])
     document.table(
         ["", "truth", "guess", "paper 1", "paper 2", "here 1", "here 2"],
         rows,
