@@ -16,6 +16,7 @@ from studies.common.ets7 import BASE, TIP, ets7
 from studies.common.ets7_model import NOISE, orbiting_model
 from studies.common.flight import prescribed, true_robot
 from studies.common.guesses import guess_about
+from studies.truth.numerics import quintic_step
 
 __all__ = ["Flown", "FlownPose", "Guess", "Swing", "drawn_guess", "fly", "measure", "model_of", "paper_guess"]
 
@@ -83,12 +84,9 @@ class Swing:
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,)."""
-        x = np.clip(np.asarray(time, dtype=float) / self.duration, 0.0, 1.0)[:, None]
-        excursion = self.goal - self.start
-        share = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-        speed = 30.0 * x**2 * (1.0 - x) ** 2 / self.duration
-        bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / self.duration**2
-        return JointState(self.start + share * excursion, speed * excursion, bend * excursion)
+        steps = [quintic_step(instant / self.duration) for instant in np.asarray(time, dtype=float)]
+        value, slope, bend = np.array(steps).T[:, :, None] * (self.goal - self.start)
+        return JointState(self.start + value, slope / self.duration, bend / self.duration**2)
 
 
 def drawn_guess(seed: int) -> Guess:
