@@ -84,7 +84,7 @@ def width_figure(flights: Mapping[str, Flight], titles: Mapping[str, str]) -> Fi
             shifts.errorbar(moved, flight.shift(-1), 1.0, fmt="s", color=COLOURS[index], markersize=4, capsize=2)
     widths.set(yscale="log", title="relative standard deviation")
     shifts.axhline(0.0, color="black", linewidth=0.6)
-    shifts.set(title="mean less truth after the last step, in standard deviations", ylim=(-4.0, 4.0))
+    shifts.set(title="last mean less truth [standard deviations]", ylim=(-4.0, 4.0))
     for axes in (widths, shifts):
         axes.set_xticks(place, LABELS, rotation=60)
     shared_legend(figure, widths, 3, place="outside lower center")
