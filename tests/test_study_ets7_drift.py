@@ -19,26 +19,26 @@ def result():
 
 
 def test_the_three_causes_are_named(result):
-    case = result.main
+    case = result["main"]
     assert case.diagnosis.verdict.status in (Status.EXPLAINED, Status.AMBIGUOUS)
     assert set(case.diagnosis.verdict.causes) == set(CAUSES)
 
 
 def test_the_amplitudes_are_found_with_honest_widths(result):
-    amplitudes = result.main.amplitudes
-    assert len(amplitudes) == 3 + 3 * len(result.main.world.manoeuvres)
+    amplitudes = result["main"].amplitudes
+    assert len(amplitudes) == 3 + 3 * len(result["main"].world.manoeuvres)
     assert max(abs(item.distance) for item in amplitudes) < 4.0
 
 
 def test_the_attitude_is_predicted_only_after(result):
     noise = np.degrees(np.sqrt(3.0) * ATTITUDE_SIGMA)
-    for attitude in result.main.attitudes:
+    for attitude in result["main"].attitudes:
         assert attitude.errors["plain"] > 1.0
         assert attitude.errors["extended"] < 3.0 * noise
 
 
 def test_the_drift_bends_the_base_of_the_present_model(result):
-    gain, truth = result.main.diagnosis.gain, result.main.world.base
+    gain, truth = result["main"].diagnosis.gain, result["main"].world.base
     assert np.abs((gain.before.bodies.mean - truth) / gain.before.bodies.sd).max() > 10.0
     assert np.abs((gain.after.bodies.mean - truth) / gain.after.bodies.sd).max() < 4.0
 

@@ -9,8 +9,7 @@ import pytest
 
 from studies import load
 from studies.load import paper
-from studies.load.noise_free import errors
-from studies.load.report import write
+from studies.load.report import write_report
 from studies.load.setting import LIMITS, RANGE
 
 GOAL = 1e-6
@@ -26,7 +25,7 @@ def test_the_load_is_found_from_a_guess_of_a_thirtieth(result):
     assert len(result.iterations) == 2
     for iteration, printed in zip(result.iterations, paper.RESULTS, strict=True):
         assert iteration.worst < GOAL
-        assert np.abs(errors(printed)).max() > 1e3 * iteration.worst
+        assert np.abs(paper.errors(printed)).max() > 1e3 * iteration.worst
 
 
 @pytest.mark.usefixtures("slow")
@@ -42,11 +41,11 @@ def test_the_second_manoeuvre_is_another_and_both_keep_the_limits(result):
 
 
 def test_only_one_reading_of_the_printed_inertia_is_a_body():
-    own, link = paper.readings(paper.TRUTH)
-    np.testing.assert_allclose(own.moments, 700.0)
+    centre, link = paper.readings(paper.TRUTH)
+    np.testing.assert_allclose(centre.moments, 700.0)
     # 370 kg at 1.20 m
     np.testing.assert_allclose(link.moments, [700.0 - 370.0 * 1.4405, 700.0 - 370.0 * 1.4405, 700.0])
-    assert own.physical
+    assert centre.physical
     assert not link.physical
     for printed in paper.RESULTS:
         assert [reading.physical for reading in paper.readings(printed)] == [True, False]
@@ -54,5 +53,5 @@ def test_only_one_reading_of_the_printed_inertia_is_a_body():
 
 @pytest.mark.usefixtures("slow")
 def test_the_report_is_written(result, tmp_path: Path):
-    write(result.iterations, result.flights, tmp_path / "load.pdf")
+    write_report(result, tmp_path / "load.pdf")
     assert (tmp_path / "load.pdf").read_bytes().startswith(b"%PDF")

@@ -1,8 +1,8 @@
-"""Blind injections: how often a hidden cause is found, named rightly or wrongly, and how often nothing raises alarm.
+"""Blind injections: how often a hidden cause is named rightly or wrongly, and how often nothing hidden raises an alarm.
 
-Every trial hides one thing (or nothing, or something outside the catalogue) in data of an independent simulator, writes
-a study to the file contract, and runs the diagnosis on the files alone. Trials are kept one per line, so that a run can
-be interrupted and goes on where it stopped.
+Every trial hides one cause (or nothing, or a cause outside the catalogue) in data of an independent simulator, writes a
+study to the file contract, and runs the diagnosis on the files alone. A store keeps one trial per line, so that a run
+that was interrupted continues where it stopped.
 """
 
 from studies.blind_injections.report import main, write_report

@@ -20,7 +20,10 @@ from studies.common.command import Command
 __all__ = ["confusion", "main", "rates", "write_report"]
 
 BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, np.inf)
+"""Limits of the ranges of signal-to-noise ratio in the table."""
+
 TICKS = (3, 5, 7, 10, 20, 50)
+"""Ticks of the signal-to-noise ratio in the figure."""
 
 CLEAR = 7.0
 """Signal-to-noise ratio from which the hidden causes should be in the reported set."""
@@ -52,26 +55,26 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def rates(trials: Sequence[Trial]) -> list[list[str]]:
-    """Shares of the injected effects found, by signal-to-noise ratio, beside what theory allows."""
+    """Return the numbers of trials by signal-to-noise ratio and outcome, beside the limits of theory."""
     rows = []
     injected = [trial for trial in trials if trial.kind == "effect"]
     for low, high in pairwise(BINS):
-        own = [t for t in injected if t.signal_to_noise is not None and low <= t.signal_to_noise < high]
-        if own:
-            rows.append([f"{low:g} to {high:g}" if np.isfinite(high) else f"above {low:g}", *_row(own)])
+        within = [t for t in injected if t.signal_to_noise is not None and low <= t.signal_to_noise < high]
+        if within:
+            rows.append([f"{low:g} to {high:g}" if np.isfinite(high) else f"above {low:g}", *_row(within)])
     spoilt = [trial for trial in injected if trial.signal_to_noise is None]
     return [*rows, ["faults of the noise", *_row(spoilt)]] if spoilt else rows
 
 
-def _row(own: Sequence[Trial]) -> list[str]:
+def _row(trials: Sequence[Trial]) -> list[str]:
     count = {
-        key: str(sum(getattr(trial, key) for trial in own))
+        key: str(sum(getattr(trial, key) for trial in trials))
         for key in ("alarmed", "in_set", "named_rightly", "misnamed")
     }
-    limits = [(t.detection, t.detection * t.naming) for t in own if t.detection is not None and t.naming is not None]
+    limits = [(t.detection, t.detection * t.naming) for t in trials if t.detection is not None and t.naming is not None]
     detection, naming = (f"{sum(column):.1f}" for column in zip(*limits, strict=True)) if limits else ("-", "-")
     return [
-        str(len(own)),
+        str(len(trials)),
         count["alarmed"],
         detection,
         count["in_set"],
@@ -82,7 +85,7 @@ def _row(own: Sequence[Trial]) -> list[str]:
 
 
 def confusion(trials: Iterable[Trial]) -> list[list[str]]:
-    """Count what was said of each thing hidden; strengths and seeds together."""
+    """Return each hidden case with its answers and their numbers, all strengths and seeds together."""
     said: dict[str, Counter[str]] = {}
     for trial in trials:
         answer = " + ".join(sorted(trial.causes)) or trial.status
@@ -90,13 +93,13 @@ def confusion(trials: Iterable[Trial]) -> list[list[str]]:
             answer += f" or {max(len(trial.sets) - 1, 1)} more"
         said.setdefault(trial.case, Counter())[answer] += 1
     return [
-        [case, ", ".join(f"{answer} ({count})" if count > 1 else answer for answer, count in found.most_common())]
-        for case, found in said.items()
+        [case, ", ".join(f"{answer} ({count})" if count > 1 else answer for answer, count in answers.most_common())]
+        for case, answers in said.items()
     ]
 
 
 def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None) -> None:
-    """Write the report as PDF; ``planned`` trials of which these are some."""
+    """Write the report as PDF; ``planned`` is the number of trials of the whole campaign."""
     document = Document("Blind injections", "What the diagnosis says of hidden causes")
     nulls = [trial for trial in trials if trial.kind == "adequate"]
     outside = [trial for trial in trials if trial.kind == "unknown"]
@@ -118,7 +121,7 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
     document.table(
         ["signal-to-noise", "trials", "alarm", "limit", "in the set", "named alone", "limit", "misnamed"],
         rates(trials),
-        "Trials by the signal-to-noise ratio of what was hidden: the root of its noncentrality after the model's own "
+        "Trials by the signal-to-noise ratio of what was hidden: the root of its noncentrality after the model's "
         "unknowns have taken their share, from data with the same noise and a tenth of the strength. The limits are "
         "the numbers expected of a test that knows which effect to look for (family-wise 1 %), and of a comparison of "
         "likelihoods with the one other effect that comes closest. In the set: the hidden causes are among the sets "
@@ -190,7 +193,7 @@ def _findings(injected: Sequence[Trial], outside: Sequence[Trial], nulls: Sequen
     alarms = sum(trial.alarmed for trial in nulls)
     clear = [t for t in injected if t.signal_to_noise is not None and t.signal_to_noise >= CLEAR]
     left = [t for t in outside if t.signal_to_noise is not None and t.signal_to_noise >= 10.0]
-    found = [
+    sentences = [
         f"Nothing hidden: {_share(alarms, len(nulls))} raised an alarm; declared is 1 % (binomial p "
         f"{stats.binomtest(alarms, len(nulls), 0.01).pvalue:.2f})."
         if nulls
@@ -202,21 +205,21 @@ def _findings(injected: Sequence[Trial], outside: Sequence[Trial], nulls: Sequen
     limit = sum(t.detection * t.naming for t in clear if t.detection is not None and t.naming is not None)
     if limit > 0.0:
         ratio = sum(t.named_rightly for t in clear) / limit
-        found.append(f"Named alone, relative to theory's limit for the same trials: {ratio:.2f} (goal 0.95).")
-    found.append(
+        sentences.append(f"Named alone, relative to theory's limit for the same trials: {ratio:.2f} (goal 0.95).")
+    sentences.append(
         f"Outside the catalogue, 10 sigma and more left: {_share(sum(t.status == 'unknown' for t in left), len(left))} "
         f"called unknown (goal 95 %), {_share(sum(t.misnamed for t in left), len(left))} named as something of the "
         f"catalogue (goal at most 5 %); of all {len(outside)}, {sum(t.misnamed for t in outside)} were."
     )
     framed = [t for t in outside if t.true_frame is not None and t.status == "unknown"]
     if framed:
-        found.append(
+        sentences.append(
             f"Axes of an outside torque: {_share(sum(t.frame == t.true_frame for t in framed), len(framed))} named "
             f"rightly, {sum(t.frame not in (None, t.true_frame) for t in framed)} wrongly, the others not at all; "
             f"median correlation with the true torque {np.median([t.correlation or 0.0 for t in framed]):.2f} (goal "
             f"0.9)."
         )
-    return found
+    return sentences
 
 
 def _errors(label: str, errors: np.ndarray) -> list[str]:
@@ -244,8 +247,10 @@ def _figure(injected: Sequence[Trial]) -> Figure:
     axes = figure.subplots()
     kinds = ("named alone", "in the set", "alarm, nothing named", "no alarm", "misnamed")
     for row, label in enumerate(kinds):
-        own = [t.signal_to_noise for t in injected if t.signal_to_noise is not None and _outcome(t) == label]
-        axes.scatter(np.maximum(own, 0.5), np.full(len(own), row), s=14, alpha=0.6, color=COLOURS[row % len(COLOURS)])
+        ratios = [t.signal_to_noise for t in injected if t.signal_to_noise is not None and _outcome(t) == label]
+        axes.scatter(
+            np.maximum(ratios, 0.5), np.full(len(ratios), row), s=14, alpha=0.6, color=COLOURS[row % len(COLOURS)]
+        )
     axes.set_yticks(range(len(kinds)), kinds)
     axes.set_ylim(-0.6, len(kinds) - 0.4)
     axes.set_xscale("log")

@@ -1,4 +1,4 @@
-"""The trials: what is hidden, what the diagnosis said, kept in a file."""
+"""The trials: what is hidden and what the diagnosis says of it, kept in a store."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from studies.truth.mujoco import Study as Written
 __all__ = ["Plan", "Trial", "make", "plan", "read", "run"]
 
 WEAKER = 0.1
-"""Share of the strength in the data that a hidden effect's size is measured against."""
+"""Fraction of the strength in the data with which a trial is compared to measure the size of a hidden effect."""
 
 SPOILT = ("outliers", "quantisation")
-"""Causes that change no mean."""
+"""Beginnings of the names of causes that do not change the mean of the data."""
 
 
 @dataclass(frozen=True)
 class Plan:
-    """One trial to be made: case of `studies.truth.hidden_causes`, seed, strength."""
+    """One trial to be made: name of a case of `studies.truth.hidden_causes`, seed, and strength of what is hidden."""
 
     case: str
     seed: int
@@ -44,37 +44,42 @@ class Plan:
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial made.
+    """One trial that was made.
 
     Attributes
     ----------
     case, seed, strength
-        As planned.
+        Values of the trial's plan.
     kind : str
-        "effect", "adequate" or "unknown": what should be said.
+        Kind of what is hidden: "effect", "adequate" (nothing) or "unknown" (outside the catalogue).
     hidden : tuple of str
-        Causes, by any of whose names in `accept` they may go.
+        Hidden causes.
+    accept : tuple of str
+        Other names by which the hidden causes may be named.
     status : str
+        Status of the verdict.
     causes : tuple of str
+        Named causes.
     sets : tuple of tuple of str
-        The causes named and all rivals, equivalents included.
+        Named causes and all rivals, equivalents included.
     signal_to_noise : float or None
-        Root of the noncentrality of what is hidden, after the model's own unknowns have taken their share; None for
-        faults of the noise, which change no mean. For outside effects what the best set of causes leaves of it.
+        Root of the noncentrality of what is hidden, after the model's unknowns have taken their share; None for faults
+        of the noise, which do not change the mean. For outside effects, what the best set of causes leaves of it.
     detection, naming : float or None
-        Theory's limits: probability of an alarm by the test of the hidden effect alone, and of a larger likelihood than
-        the effect of another name that comes closest.
+        Limits of theory: probability of an alarm by the test of the hidden effect alone, and of a larger likelihood
+        than the closest effect of another name.
     p_value : float
-        Family-wise, of what the present model leaves.
+        Family-wise p-value of what the present model leaves.
     amplitude_errors : tuple of float
-        Of the amplitudes of causes named rightly, in the standard deviations stated.
+        Errors of the amplitudes of causes named rightly, in the stated standard deviations.
     body_errors : tuple of float
-        Of the base's ten parameters after the extension, in the standard deviations stated.
+        Errors of the base's ten parameters after the extension, in the stated standard deviations.
     frame, true_frame : str or None
-        Axes that an outside wrench was said to be fixed in, and is.
+        Axes in which an outside wrench is fixed, as the diagnosis says and in truth.
     correlation : float or None
-        Of the outside torque that was reconstructed with the true one.
+        Correlation of the reconstructed outside torque with the true one.
     seconds : float
+        Time of the diagnosis [s].
     """
 
     case: str
@@ -99,22 +104,22 @@ class Trial:
 
     @property
     def alarmed(self) -> bool:
-        """Whether anything was said to be there."""
+        """True if the diagnosis says that anything is hidden."""
         return self.status != "adequate"
 
     @property
     def named_rightly(self) -> bool:
-        """Whether the hidden set was the one named."""
+        """True if the hidden set is the one named."""
         return self.status == "explained" and self._right(self.causes)
 
     @property
     def in_set(self) -> bool:
-        """Whether the hidden set is among those reported."""
+        """True if the hidden set is among those reported."""
         return self.status in ("explained", "ambiguous") and any(self._right(labels) for labels in self.sets)
 
     @property
     def misnamed(self) -> bool:
-        """Whether something else was named, alone or among rivals."""
+        """True if causes are named, but the hidden set is neither named nor among the rivals."""
         return self.status in ("explained", "ambiguous") and not self.in_set
 
     def _right(self, labels: Sequence[str]) -> bool:
@@ -123,10 +128,10 @@ class Trial:
 
 
 def plan(full: bool) -> list[Plan]:
-    """Return the trials.
+    """Return the plans of all trials.
 
-    Every effect and pair at two strengths, outside effects at two, every null three times (about an hour on two cores);
-    with ``full`` at five strengths and four seeds, and a thousand nulls.
+    Every effect, pair and outside effect has two strengths, and thirty trials hide nothing (about an hour on two
+    cores). A full campaign has five strengths (three outside the catalogue), four seeds, and a thousand nulls.
     """
     strengths, seeds, nulls = ((0.1, 0.2, 0.4, 0.7, 1.5), 4, 1000) if full else ((0.2, 0.6), 1, 30)
     outside = (0.5, 1.0, 2.0) if full else (0.5, 1.0)
@@ -144,11 +149,12 @@ def plan(full: bool) -> list[Plan]:
 def run(
     plans: Sequence[Plan], kept: Path, progress: Callable[[str], None] = lambda text: None, workers: int = 1
 ) -> list[Trial]:
-    """Make the trials that the file does not hold yet.
+    """Make the trials that the store does not hold yet.
 
     Parameters
     ----------
     plans : sequence of Plan
+        Plans of the trials.
     kept : path
         Store of the trials, see `studies.common.monte_carlo`.
     progress : callable, optional
@@ -182,7 +188,7 @@ def _trial(content: Mapping[str, Any]) -> Trial:
 
 
 def make(item: Plan) -> Trial:
-    """Hide, diagnose, compare."""
+    """Make one trial: hide, diagnose and compare."""
     case = next(case for case in hidden_causes.CASES if case.name == item.case)
     began = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
@@ -218,12 +224,15 @@ def make(item: Plan) -> Trial:
 
 
 def _visible(case: hidden_causes.Case) -> bool:
-    """Whether what is hidden changes the mean of the data."""
+    """Return whether what is hidden changes the mean of the data."""
     return case.status != "adequate" and not any("noise" in c or c.startswith(SPOILT) for c in case.causes)
 
 
 def _limits(result: Diagnosis, case: hidden_causes.Case, weaker: Study) -> tuple[float, float | None, float | None]:
-    """Signal-to-noise ratio of what is hidden and theory's limits, from the same noise with less hidden."""
+    """Return the signal-to-noise ratio of what is hidden and the limits of theory.
+
+    The signal is the difference to data with the same noise and less hidden.
+    """
     fit, engine = result.before.fit, result.before.engine
     arrays = fit.posterior.data.arrays
     like = with_manoeuvres(fit.posterior, load_manoeuvres(weaker, fit.posterior.model.robot))
@@ -249,7 +258,7 @@ def _limits(result: Diagnosis, case: hidden_causes.Case, weaker: Study) -> tuple
 
 
 def _left(fit: Fit, columns: Floats, change: Floats) -> float:
-    """Noncentrality that a rival effect leaves."""
+    """Return the noncentrality that a rival effect leaves."""
     both = fit.project(np.column_stack([change, columns]))
     inner = both[1:, 1:] + np.eye(columns.shape[1])
     return float(both[0, 0] - both[0, 1:] @ np.linalg.solve(inner, both[1:, 0]))
@@ -270,15 +279,15 @@ def _body_errors(result: Diagnosis, written: Written) -> tuple[float, ...]:
 
 
 def _correlation(result: Diagnosis, case: hidden_causes.Case, item: Plan, written: Written) -> float:
-    """Correlation of the reconstructed with the true torque, all axes and recordings together."""
-    found, true = [], []
+    """Return the correlation of the reconstructed with the true torque, all axes and recordings together."""
+    estimated, true = [], []
     for time_, torque, truth in zip(
         result.unexplained.time, result.unexplained.torque[Frame.BASE], written.truths, strict=True
     ):
         there = case.torque(item.seed, item.strength, truth)
         true += [np.interp(time_, truth.times, there[:, axis]) for axis in range(3)]
-        found += list(torque.T)
-    return float(np.corrcoef(np.concatenate(found), np.concatenate(true))[0, 1])
+        estimated += list(torque.T)
+    return float(np.corrcoef(np.concatenate(estimated), np.concatenate(true))[0, 1])
 
 
 def _sets(result: Diagnosis) -> tuple[tuple[str, ...], ...]:

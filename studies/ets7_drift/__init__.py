@@ -10,14 +10,14 @@ from collections.abc import Sequence
 
 from bayesid._io.progress import Progress, silent
 from studies.common.command import Command
-from studies.ets7_drift.analysis import CAUSES, Case, Result, analyse
+from studies.ets7_drift.analysis import CAUSES, Case, analyse
 from studies.ets7_drift.report import write_report
 from studies.ets7_drift.world import DURATION, SPREAD, draw_world
 
-__all__ = ["CAUSES", "Case", "Result", "main", "run"]
+__all__ = ["CAUSES", "Case", "main", "run"]
 
 LOOSE = 0.05
-"""Width of the base's prior in the full run's second case: the masses and moments are then known to a tenth."""
+"""Relative width of the base's prior in the full run's second case: masses and moments are then known to a tenth."""
 
 
 def run(
@@ -28,30 +28,29 @@ def run(
     duration: float = DURATION,
     names: Sequence[str] | None = None,
     progress: Progress = silent,
-) -> Result:
-    """Run the study.
+) -> dict[str, Case]:
+    """Run the study and return its cases by name: ``main`` and, in a full run, ``loose``.
 
     Parameters
     ----------
     full : bool
-        Three recordings, and a second case: a base hardly known.
+        True for three recordings, and for a second case in which the base is hardly known.
     seed : int
-        Every random number follows from it.
+        Seed of all random numbers.
     recordings : int, optional
-        Three in a full run and two in a quick one where left out.
+        Number of recordings, by default three in a full run and two in a quick one.
     duration : float
-        Of each recording [s].
+        Duration of each recording [s].
     names : sequence of str, optional
-        Candidates; the whole catalogue where left out.
+        Names of the candidates, by default the whole catalogue.
     progress : callable, optional
-        Told a fraction and a sentence, anew in every case.
+        Receives a fraction and a sentence, anew in every case.
     """
-    count = recordings or (3 if full else 2)
-    world = draw_world(count, seed, duration=duration)
+    world = draw_world(recordings or (3 if full else 2), seed, duration=duration)
     cases = {"main": analyse(world, SPREAD, seed, progress, names=names)}
     if full:
         cases["loose"] = analyse(world, LOOSE, seed, progress, names=names, compared=False)
-    return Result(cases)
+    return cases
 
 
 COMMAND = Command(

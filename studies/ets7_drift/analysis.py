@@ -2,32 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from bayesid import Kind, Model, Posterior, Sensor, White
 from bayesid._io.progress import Progress, silent
+from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Diagnosis, Hypothesis, diagnose
 from bayesid.diagnosis.cause_amplitudes import amplitudes_of
 from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.simulation.effects import create
 from studies.ets7_drift.world import ATTITUDE_SIGMA, World, model_of
 
-__all__ = ["CAUSES", "Amplitude", "Attitude", "Case", "Result", "analyse"]
-
-Floats = NDArray[np.floating]
+__all__ = ["CAUSES", "Amplitude", "Attitude", "Case", "analyse"]
 
 CAUSES = ("initial-rate", "gravity-gradient", "wheel-momentum")
-"""What the truth has and the simulation lacks."""
+"""Causes that act in the truth and that the simulation lacks."""
 
 
 @dataclass(frozen=True)
 class Amplitude:
-    """A true amplitude beside the one found."""
+    """A true amplitude beside its estimate.
+
+    Attributes
+    ----------
+    name, unit : str
+        Name and unit of the quantity.
+    truth, mean, sd : float
+        True value, posterior mean and standard deviation, in the unit.
+    """
 
     name: str
     unit: str
@@ -37,25 +43,28 @@ class Amplitude:
 
     @property
     def distance(self) -> float:
-        """Found less true, in standard deviations."""
+        """Estimate less the truth, in standard deviations."""
         return (self.mean - self.truth) / self.sd
 
 
 @dataclass(frozen=True)
 class Attitude:
-    """Attitude of the base in one recording, Euler angles x, y, z since its start, (T, 3) [degrees].
+    """Attitude of the base in one recording, Euler angles x, y, z since its start.
 
     Attributes
     ----------
+    time : (T,) array
+        Sample times [s].
     measured : (T, 3) array
+        Measured angles [degrees].
     plain : (T, 3) array
-        Simulated by the present model as it stands.
+        Angles simulated by the present model as it stands [degrees].
     fitted : (T, 3) array
-        By the present model after its base was fitted to the rates.
+        Angles simulated by the present model after its base was fitted to the rates [degrees].
     extended : (T, 3) array
-        By the extended model; the fitted present model where nothing is named.
+        Angles simulated by the extended model [degrees]; the fitted present model where nothing is named.
     errors : dict of str to float
-        Root mean square of the angle between measured and simulated attitude [degrees].
+        Root mean square angle between measured and simulated attitude [degrees], by the name of the simulation.
     """
 
     time: Floats
@@ -68,15 +77,23 @@ class Attitude:
 
 @dataclass(frozen=True)
 class Case:
-    """One world and what the diagnosis made of it.
+    """One world and its diagnosis.
 
     Attributes
     ----------
+    world : World
+        What truly happens.
     spread : float
         Relative width of the base's prior.
+    diagnosis : Diagnosis
+        Diagnosis of the rates.
     steps : tuple of Hypothesis
         The present model, then the most probable sets of one, two and three causes that were tried; where causes are
-        named, of these.
+        named, the most probable sets of these.
+    amplitudes : tuple of Amplitude
+        Amplitudes of the named causes that have any.
+    attitudes : tuple of Attitude
+        Attitude in every recording; empty where it was not simulated.
     """
 
     world: World
@@ -87,21 +104,9 @@ class Case:
     attitudes: tuple[Attitude, ...]
 
     @property
-    def found(self) -> bool:
-        """Whether the three true causes are named, and no other."""
+    def right(self) -> bool:
+        """True if the three true causes are named, and no other."""
         return set(self.diagnosis.verdict.causes) == set(CAUSES)
-
-
-@dataclass(frozen=True)
-class Result:
-    """The cases by name: main, and in a full run loose."""
-
-    cases: Mapping[str, Case]
-
-    @property
-    def main(self) -> Case:
-        """The case of the paper's figure."""
-        return self.cases["main"]
 
 
 def analyse(
@@ -113,73 +118,72 @@ def analyse(
     names: Sequence[str] | None = None,
     compared: bool = True,
 ) -> Case:
-    """Diagnose the rates of a world; the attitude is only compared with.
+    """Diagnose the rates of a world; the attitude is not used, but compared with.
 
     Parameters
     ----------
+    world : World
+        What truly happens.
+    spread : float
+        Relative width of the base's prior.
+    seed : int
+        Seed of the diagnosis.
+    progress : callable, optional
+        Receives a fraction and a sentence.
     names : sequence of str, optional
-        Candidates; the whole catalogue where left out.
+        Names of the candidates, by default the whole catalogue.
     compared : bool
-        Whether to simulate the attitude.
+        True to simulate the attitude.
     """
     model = model_of(spread)
     effects = None if names is None else [create(name).attach(model.robot) for name in names]
-    found = diagnose(model, world.manoeuvres, seed, effects=effects, progress=progress)
-    attitudes = _attitudes(model, found) if compared else ()
-    return Case(world, spread, found, _steps(found), tuple(_amplitudes(world, found)), tuple(attitudes))
+    result = diagnose(model, world.manoeuvres, seed, effects=effects, progress=progress)
+    attitudes = tuple(_attitudes(model, result)) if compared else ()
+    return Case(world, spread, result, _steps(result), tuple(_amplitudes(world, result)), attitudes)
 
 
-def _steps(found: Diagnosis) -> tuple[Hypothesis, ...]:
+def _steps(result: Diagnosis) -> tuple[Hypothesis, ...]:
     """Return the present model and the most probable hypothesis of each number of causes."""
-    best, named = {0: found.search.base}, set(found.verdict.causes)
-    for hypothesis in found.search.tried[1:]:
+    best, named = {0: result.search.base}, set(result.verdict.causes)
+    for hypothesis in result.search.tried[1:]:
         if not named or set(hypothesis.labels) <= named:
             best.setdefault(len(hypothesis.labels), hypothesis)
     return tuple(best[count] for count in sorted(best))
 
 
-def _amplitudes(world: World, found: Diagnosis) -> Sequence[Amplitude]:
-    rows = []
-    if "wheel-momentum" in found.after.labels:
-        for truth, ((key, unit), mean, sd) in zip(
-            world.momentum, amplitudes_of(found.after, "wheel-momentum"), strict=True
-        ):
-            rows.append(Amplitude(f"wheel momentum {key}", unit, float(truth), mean, sd))
-    if "initial-rate" in found.after.labels:
-        for truth, ((key, unit), mean, sd) in zip(
-            world.rates.ravel(), amplitudes_of(found.after, "initial-rate"), strict=True
-        ):
-            rows.append(Amplitude(f"initial rate, {key}", unit, float(truth), mean, sd))
-    return rows
+def _amplitudes(world: World, result: Diagnosis) -> Iterator[Amplitude]:
+    for label, title, truths in (
+        ("wheel-momentum", "wheel momentum ", world.momentum),
+        ("initial-rate", "initial rate, ", world.rates.ravel()),
+    ):
+        if label in result.after.labels:
+            for truth, ((key, unit), mean, sd) in zip(truths, amplitudes_of(result.after, label), strict=True):
+                yield Amplitude(f"{title}{key}", unit, float(truth), mean, sd)
 
 
-def _attitudes(model: Model, found: Diagnosis) -> Sequence[Attitude]:
-    before = found.before.fit.z[found.before.engine.free]
+def _attitudes(model: Model, result: Diagnosis) -> Iterator[Attitude]:
+    before = result.before.fit.z[result.before.engine.free]
     simulated = {
-        "plain": _simulated(model, found, np.zeros_like(before)),
-        "fitted": _simulated(model, found, before),
-        "extended": _simulated(found.posterior.model, found, found.start),
+        "plain": _simulated(model, result, np.zeros_like(before)),
+        "fitted": _simulated(model, result, before),
+        "extended": _simulated(result.posterior.model, result, result.start),
     }
-    rows = []
-    for index, manoeuvre in enumerate(found.before.fit.posterior.manoeuvres):
+    for index, manoeuvre in enumerate(result.before.fit.posterior.manoeuvres):
         time, recorded = manoeuvre.recording.vector("attitude", ("x", "y", "z", "w"))
         measured, start = Rotation.from_quat(recorded), Rotation.from_quat(manoeuvre.attitude).inv()
         curves = {name: Rotation.from_quat(attitudes[index]) for name, attitudes in simulated.items()}
-        errors = {
-            name: float(np.degrees(np.sqrt(((measured.inv() * curve).magnitude() ** 2).mean())))
-            for name, curve in curves.items()
-        }
-        angles = [_angles(start * curve) for curve in (measured, *curves.values())]
-        rows.append(Attitude(time, angles[0], angles[1], angles[2], angles[3], errors))
-    return rows
+        squares = {name: (measured.inv() * curve).magnitude() ** 2 for name, curve in curves.items()}
+        errors = {name: float(np.degrees(np.sqrt(square.mean()))) for name, square in squares.items()}
+        angles = {name: _angles(start * curve) for name, curve in curves.items()}
+        yield Attitude(time, _angles(start * measured), **angles, errors=errors)
 
 
 def _angles(turned: Rotation) -> Floats:
     return np.unwrap(turned.as_euler("xyz", degrees=True), axis=0, period=360.0)
 
 
-def _simulated(model: Model, found: Diagnosis, z: Floats) -> list[Floats]:
-    """Simulate the attitude of all recordings."""
+def _simulated(model: Model, result: Diagnosis, z: Floats) -> list[Floats]:
+    """Return the simulated attitudes of all recordings."""
     sensors = (*model.sensors, Sensor(Kind.ATTITUDE, White(ATTITUDE_SIGMA)))
-    posterior = Posterior.of(replace(model, sensors=sensors), found.posterior.manoeuvres)
+    posterior = Posterior.of(replace(model, sensors=sensors), result.posterior.manoeuvres)
     return [np.asarray(predicted.attitude) for predicted in predicted_readings(posterior, z)]

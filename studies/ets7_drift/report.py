@@ -1,7 +1,8 @@
-"""The study's report."""
+"""Report of the study."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,74 +11,64 @@ from matplotlib.figure import Figure
 from bayesid.diagnosis import Status
 from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
-from bayesid.report.numbers import format_number, format_unit
+from bayesid.report.numbers import format_number, format_signed, format_unit, format_vector
 from bayesid.report.tables.diagnosis_tables import hypothesis_rows
 from studies.common.ets7 import RADIUS, RAMPS
-from studies.ets7_drift.analysis import CAUSES, Case, Result
-from studies.ets7_drift.world import (
-    ATTITUDE_SIGMA,
-    ENCODER_SIGMA,
-    INTERVAL,
-    MOMENTUM,
-    RATE,
-    RATE_SIGMA,
-    TRUE_SPREAD,
-)
+from studies.common.report_parts import QUANTITY_TITLES, columns, not_evaluated
+from studies.ets7_drift.analysis import CAUSES, Case
+from studies.ets7_drift.world import ATTITUDE_SIGMA, ENCODER_SIGMA, INTERVAL, MOMENTUM, RATE, RATE_SIGMA, TRUE_SPREAD
 
 __all__ = ["attitude_figure", "error_figure", "write_report"]
 
-TITLES = {"loose": "A base hardly known"}
-ALIGN = ["left", "right", "right", "right", "left", "left"]
 HEADER = ["causes", "log Bayes factor", "chi-square per sample", "p of what it leaves", "worst test", "adequate"]
+"""Titles of the columns of a table of hypotheses."""
+
+NOISE = float(np.degrees(np.sqrt(3.0) * ATTITUDE_SIGMA))
+"""Expected size of the attitude's noise [degrees]."""
 
 
-def write_report(result: Result, output: Path) -> None:
+def write_report(cases: Mapping[str, Case], output: Path) -> None:
     """Write the report as PDF."""
     document = Document("Drift of ETS-VII", "Section 2.1 and figure 2 of Lampariello and Hirzinger (IDETC 2005)")
-    case = result.main
+    case = cases["main"]
     _answer(document, case)
     _drift(document, case)
     _causes(document, case)
-    _measure(document, case)
-    for name, other in result.cases.items():
-        if name != "main":
-            _harder(document, TITLES[name], other)
-    if len(result.cases) == 1:
-        document.section("A harder case")
-        document.paragraph("Not evaluated: only the full study has it.")
+    _measured(document, case)
+    if "loose" in cases:
+        _harder(document, cases["loose"])
+    else:
+        not_evaluated(document, "A base hardly known")
     _assumed(document, case)
     document.write(output)
 
 
 def _answer(document: Document, case: Case) -> None:
-    document.section("What was asked, and what came out")
+    document.section("Question and answer")
     document.paragraph(
         "With attitude control off, the attitude of ETS-VII drifted away from its simulation (the paper's figure 2). "
-        "The "
-        "paper blames gravity gradient, momentum left in the reaction wheels and a non-zero initial rate. Here an "
-        "independent simulator makes recordings that have all three; the simulation knows the orbit, starts at rest "
-        "and "
-        "has no effect. The diagnosis sees the rates and joints alone and is to name the causes. The measured attitude "
-        "takes no part, so that what follows of it is prediction."
+        "The paper attributes this to gravity gradient, momentum left in the reaction wheels and a non-zero initial "
+        "rate. Here an independent simulator makes recordings with all three; the simulation knows the orbit, starts "
+        "at rest and has no effect. The diagnosis uses the rates and joints alone and is to name the causes. It does "
+        "not use the measured attitude, so that the attitude simulated with the named causes is a prediction."
     )
     document.paragraph(_verdict(case))
 
 
 def _verdict(case: Case) -> str:
     verdict = case.diagnosis.verdict
-    named = ", ".join(verdict.causes) or "nothing"
-    text = f"Verdict: {verdict.status.value}; named: {named}."
-    if case.found:
+    text = f"The verdict is {verdict.status.value}, and the causes named are: {', '.join(verdict.causes) or 'none'}."
+    if case.right:
         text += " These are the three true causes and no other."
     else:
         missed = [cause for cause in CAUSES if cause not in verdict.causes]
         wrong = [cause for cause in verdict.causes if cause not in CAUSES]
         text += f" Missed: {', '.join(missed) or 'none'}; wrongly named: {', '.join(wrong) or 'none'}."
     if verdict.rivals and verdict.status in (Status.AMBIGUOUS, Status.UNRESOLVED):
-        text += " Doing as well: " + "; ".join(" + ".join(rival.labels) for rival in verdict.rivals) + "."
+        text += f" Rivals that do as well: {'; '.join(' + '.join(rival.labels) for rival in verdict.rivals)}."
     if verdict.equivalents:
-        text += " Other names of the same change: "
-        text += "; ".join(f"{', '.join(names)} for {cause}" for cause, names in verdict.equivalents.items()) + "."
+        others = "; ".join(f"{', '.join(names)} for {cause}" for cause, names in verdict.equivalents.items())
+        text += f" Other names of the same change: {others}."
     return text
 
 
@@ -85,158 +76,141 @@ def _drift(document: Document, case: Case) -> None:
     document.section("The drift")
     document.figure(
         attitude_figure(case),
-        "The paper's figure 2 with its remedy: Euler angles of the base since the recording's start, measured, "
-        "simulated before, and simulated after. The short bump between 60 and 145 s is the arm. Where the extended "
-        "model lies on the measurement the dots hide it.",
+        "The paper's figure 2 with its remedy: Euler angles of the base since the start of the recording, measured, "
+        "simulated before, and simulated after. The short bump between 60 and 145 s is the motion of the arm. Where "
+        "the extended model agrees with the measurement, its dots hide the curve.",
     )
     document.figure(
         error_figure(case),
         "Angle between measured and simulated attitude. The grey line is the expected size of the attitude's noise.",
         "80%",
     )
-    rows = [
-        [manoeuvre.recording.name, *(f"{attitude.errors[key]:.4f}" for key in ("plain", "fitted", "extended"))]
-        for manoeuvre, attitude in zip(case.world.manoeuvres, case.attitudes, strict=True)
-    ]
-    noise = np.degrees(np.sqrt(3.0) * ATTITUDE_SIGMA)
     document.table(
         ["recording", "as it stands", "base fitted", "extended"],
-        rows,
-        "Root mean square angle between measured and simulated attitude [degrees]. Noise alone makes "
-        f"{noise:.4f} degrees. 'Base fitted': the present model after its base was fitted to the rates as well as it "
-        "can be.",
-        ["left", "right", "right", "right"],
+        [
+            [manoeuvre.recording.name, *(f"{attitude.errors[key]:.4f}" for key in ("plain", "fitted", "extended"))]
+            for manoeuvre, attitude in zip(case.world.manoeuvres, case.attitudes, strict=True)
+        ],
+        "Root mean square angle between measured and simulated attitude [degrees], where noise alone makes "
+        f"{NOISE:.4f} degrees. 'Base fitted' is the present model after its base was fitted to the rates as well as "
+        "it can be.",
+        columns("lrrr"),
     )
+
+
+def _hypotheses(document: Document, case: Case, caption: str, *, others: bool = False) -> None:
+    """Write a table of the steps of a case, or of the next best sets."""
+    search = case.diagnosis.search
+    rest = [hypothesis for hypothesis in search.tried[1:] if hypothesis not in case.steps][:6]
+    shown = rest if others else case.steps
+    if shown:
+        document.table(HEADER, hypothesis_rows(shown, search.base), caption, columns("lrrrll"))
 
 
 def _causes(document: Document, case: Case) -> None:
     document.section("The causes, one by one")
-    search = case.diagnosis.search
     named = " of the named causes" if case.diagnosis.verdict.causes else ""
-    document.table(
-        HEADER,
-        hypothesis_rows(case.steps, search.base),
-        f"From none to three: of each number the most probable set{named} ({len(search.tried) - 1} sets were fitted). "
-        "The "
-        "log Bayes factor is against the present model; the p-value is family-wise over all tests of what the fit "
-        "leaves.",
-        ALIGN,
+    _hypotheses(
+        document,
+        case,
+        f"The most probable sets{named} with none to three causes ({len(case.diagnosis.search.tried) - 1} sets were "
+        "fitted). The log Bayes factor is against the present model; the p-value is family-wise over all tests of "
+        "what the fit leaves.",
     )
-    rest = [hypothesis for hypothesis in search.tried[1:] if hypothesis not in case.steps][:6]
-    if rest:
-        document.table(HEADER, hypothesis_rows(rest, search.base), "The next best of all sets tried.", ALIGN)
+    _hypotheses(document, case, "The next best of all sets tried.", others=True)
 
 
-def _measure(document: Document, case: Case) -> None:
-    document.section("What was measured")
+def _measured(document: Document, case: Case) -> None:
+    document.section("Amplitudes and base body")
     if case.amplitudes:
         document.table(
-            ["amplitude", "unit", "true", "found ± sd", "distance [sd]"],
+            ["amplitude", "unit", "true", "estimate ± sd", "distance [sd]"],
             [
                 [
                     item.name,
                     format_unit(item.unit),
                     format_number(item.truth),
                     format_quantity(item.mean, item.sd),
-                    f"{item.distance:+.2f}".replace("-", "−"),
+                    format_signed(item.distance, 2),
                 ]
                 for item in case.amplitudes
             ],
-            "Amplitudes, all causes fitted together. The gravity gradient has none: it is there or not.",
-            ["left", "left", "right", "right", "right"],
+            "Amplitudes with their standard deviation (sd), all causes fitted together. The gravity gradient has no "
+            "amplitude.",
+            columns("llrrr"),
         )
     else:
         document.paragraph("Nothing is named, so that there is no amplitude to compare.")
-    gain = case.diagnosis.gain
-    bodies = list(
-        zip(
-            gain.before.bodies.names,
-            case.world.base,
-            gain.before.bodies.mean,
-            gain.before.bodies.sd,
-            gain.after.bodies.mean,
-            gain.after.bodies.sd,
-            strict=True,
-        )
-    )
+    before, after = case.diagnosis.gain.before.bodies, case.diagnosis.gain.after.bodies
+    rows = []
+    for k, title in enumerate(QUANTITY_TITLES):
+        truth, cells = float(case.world.base[k]), []
+        for bodies in (before, after):
+            mean, sd = float(bodies.mean[k]), float(bodies.sd[k])
+            cells += [format_quantity(mean, sd), format_signed((mean - truth) / sd)]
+        rows.append([title, f"{truth:.4g}", *cells])
     document.table(
         ["base", "true", "before ± sd", "error [sd]", "after ± sd", "error [sd]"],
-        [
-            [
-                name.partition(".")[2],
-                f"{truth:.4g}",
-                format_quantity(one, first),
-                f"{(one - truth) / first:+.1f}",
-                format_quantity(two, second),
-                f"{(two - truth) / second:+.1f}",
-            ]
-            for name, truth, one, first, two, second in bodies
-        ],
-        "The base body (kg, m, kg m²). Before: what the present model believes, which the drift has bent.",
-        ["left", *["right"] * 5],
+        rows,
+        "The base body, before and after the extension. The present model attributes the drift to the base, which "
+        "biases its estimates.",
+        columns("lrrrrr"),
     )
     document.paragraph(_gain_sentence(case))
 
 
 def _gain_sentence(case: Case) -> str:
-    gain = case.diagnosis.gain
+    before, after = case.diagnosis.gain.before, case.diagnosis.gain.after
     text = (
-        f"Chi-square per sample {format_number(gain.before.chi2_per_sample)} before and "
-        f"{gain.after.chi2_per_sample:.3f} after."
+        f"The chi-square per sample is {format_number(before.chi2_per_sample)} before and {after.chi2_per_sample:.3f} "
+        "after the extension."
     )
-    if gain.before.held_out is not None and gain.after.held_out is not None:
-        text += (
-            f" Log score of recordings left out: {format_number(float(gain.before.held_out.sum()), 4)} before and "
-            f"{format_number(float(gain.after.held_out.sum()), 4)} after."
-        )
+    if before.held_out is not None and after.held_out is not None:
+        scores = (format_number(float(held_out.sum()), 4) for held_out in (before.held_out, after.held_out))
+        text += " The log score of recordings left out is {} before and {} after.".format(*scores)
     return text
 
 
-def _harder(document: Document, title: str, case: Case) -> None:
-    document.section(title)
-    momentum = ", ".join(format_number(value, 2) for value in case.world.momentum)
+def _harder(document: Document, case: Case) -> None:
+    document.section("A base hardly known")
     document.paragraph(
-        f"Base known to a relative width of {100.0 * case.spread:g} %; wheel momentum {momentum} N m s. "
-        f"{_verdict(case)} "
-        f"{_gain_sentence(case)}"
+        f"Here the base is known to a relative width of {100.0 * case.spread:g} %, and the wheel momentum is "
+        f"{format_vector(case.world.momentum, 2)} N m s. {_verdict(case)} {_gain_sentence(case)}"
     )
-    document.table(
-        HEADER, hypothesis_rows(case.steps, case.diagnosis.search.base), "The best of each number of causes.", ALIGN
-    )
+    _hypotheses(document, case, "The most probable set of each number of causes.")
     if case.amplitudes:
-        distances = np.array([item.distance for item in case.amplitudes])
-        document.paragraph(f"Amplitudes lie at most {np.abs(distances).max():.1f} standard deviations from the truth.")
-    if not case.found and not case.diagnosis.verdict.causes:
-        gain = case.diagnosis.gain.before.bodies
-        off = (gain.mean[0] / case.world.base[0] - 1.0) * 100.0
+        distance = max(abs(item.distance) for item in case.amplitudes)
+        document.paragraph(f"Amplitudes lie at most {distance:.1f} standard deviations from the truth.")
+    if not case.right and not case.diagnosis.verdict.causes:
+        off = (case.diagnosis.gain.before.bodies.mean[0] / case.world.base[0] - 1.0) * 100.0
         tried = {frozenset(hypothesis.labels) for hypothesis in case.diagnosis.search.tried}
         was = "was fitted" if frozenset(CAUSES) in tried else "was never fitted"
         document.paragraph(
-            "Why not: the search fits the present model first and steps out from there. That fit lets the base imitate "
-            f"the drift; here its mass is {off:+.0f} % wrong. About a base so far off, what each cause promises to "
-            "first "
-            f"order, by which the search chooses what to try, is not what it would give. The true set {was}."
+            "The causes are missed for the following reason. The search fits the present model first and proceeds "
+            f"from there, and that fit lets the base imitate the drift: its mass is {off:+.0f} % wrong. The search "
+            "chooses what to try by the effect of each cause to first order, which is not accurate about a base so "
+            f"far off. The true set {was}."
         )
 
 
 def _assumed(document: Document, case: Case) -> None:
-    document.section("Assumed")
+    document.section("Assumptions")
     ramps = " and ".join(f"{start:g} to {stop:g} s" for start, stop in RAMPS)
     document.items(
         [
-            "No flight telemetry, wheel momentum or drift of ETS-VII is public as far as found; all numbers of the "
+            "We know of no public flight telemetry, wheel momentum or drift of ETS-VII. All numbers of the "
             "disturbances are assumed, and the recordings are simulated.",
-            f"Manoeuvre: joints 2 to 4 by 0.264, -0.321 and 0.057 rad out and back, over {ramps}: amplitudes and times "
-            "of a flight manoeuvre, its piecewise linear ramps replaced by quintic ones.",
-            f"Wheel momentum {MOMENTUM} N m s, constant; initial rates drawn with {RATE:g} rad/s per axis, attitudes "
-            "from "
-            f"all rotations, places on the circular orbit of {RADIUS / 1e3:g} km at will.",
-            f"True base drawn within {100.0 * TRUE_SPREAD:g} % (log-Cholesky) of the paper's; the model knows the "
-            "paper's "
-            f"to {100.0 * case.spread:g} %. The links are known exactly.",
-            f"Noise per sample, every {INTERVAL:g} s: rates {RATE_SIGMA:g} rad/s (the paper's star sensor: 2 arcsec), "
-            f"attitude {ATTITUDE_SIGMA:g} rad, joints {ENCODER_SIGMA:g} rad. The attitude at the start is exact.",
-            "Candidates: the whole catalogue that could exist in this situation.",
+            f"The manoeuvre moves joints 2 to 4 by 0.264, −0.321 and 0.057 rad out and back, over {ramps}: amplitudes "
+            "and times of a flight manoeuvre, its piecewise linear ramps replaced by quintic ones.",
+            f"The wheel momentum of {format_vector(MOMENTUM)} N m s is constant. Initial rates are drawn with a "
+            f"standard deviation of {format_number(RATE)} rad/s per axis, attitudes from all rotations, and places "
+            f"from all of the circular orbit of {RADIUS / 1e3:g} km.",
+            f"The true base is drawn within {100.0 * TRUE_SPREAD:g} % (log-Cholesky) of the paper's; the model knows "
+            f"the paper's to {100.0 * case.spread:g} %. The links are known exactly.",
+            f"The noise per sample, every {INTERVAL:g} s, is {format_number(RATE_SIGMA)} rad/s of the rates (the "
+            f"paper's star sensor: 2 arcsec), {format_number(ATTITUDE_SIGMA)} rad of the attitude and "
+            f"{format_number(ENCODER_SIGMA)} rad of the joints. The attitude at the start is exact.",
+            "The candidates are the whole catalogue of effects that can occur in this case.",
         ]
     )
 
@@ -246,28 +220,17 @@ def attitude_figure(case: Case) -> Figure:
     """Draw the paper's figure 2, one row per recording."""
     figure = wide_figure(1.75 * len(case.attitudes) + 0.3)
     panels = figure.subplots(len(case.attitudes), 3, squeeze=False, sharex=True)
-    for row, attitude in zip(panels, case.attitudes, strict=True):
+    after = {"color": COLOURS[0], "linestyle": "", "marker": ".", "markersize": 3.5, "label": "simulated after"}
+    for row, attitude, manoeuvre in zip(panels, case.attitudes, case.world.manoeuvres, strict=True):
         for axis, axes in enumerate(row):
             axes.plot(attitude.time, attitude.measured[:, axis], color="#000000", label="measured")
-            axes.plot(
-                attitude.time, attitude.plain[:, axis], color=COLOURS[1], linestyle="--", label="simulated before"
-            )
-            axes.plot(
-                attitude.time[::12],
-                attitude.extended[::12, axis],
-                color=COLOURS[0],
-                linestyle="",
-                marker=".",
-                markersize=3.5,
-                label="simulated after",
-            )
-    for row, manoeuvre in zip(panels, case.world.manoeuvres, strict=True):
+            axes.plot(attitude.time, attitude.plain[:, axis], "--", color=COLOURS[1], label="simulated before")
+            axes.plot(attitude.time[::12], attitude.extended[::12, axis], **after)
         row[0].set_ylabel(f"{manoeuvre.recording.name} [deg]")
-    for axis, axes in enumerate(panels[0]):
-        axes.set_title(f"angle about {'xyz'[axis]}")
-    for axes in panels[-1]:
-        axes.set_xlabel("time [s]")
-    panels[0][0].legend()
+    for axis, name in enumerate("xyz"):
+        panels[0, axis].set_title(f"angle about {name}")
+        panels[-1, axis].set_xlabel("time [s]")
+    panels[0, 0].legend()
     return figure
 
 
@@ -276,12 +239,12 @@ def error_figure(case: Case) -> Figure:
     """Draw the size of the attitude's error against time."""
     figure = wide_figure(2.4)
     axes = figure.subplots()
-    for index, attitude in enumerate(case.attitudes):
+    for colour, attitude, manoeuvre in zip(COLOURS, case.attitudes, case.world.manoeuvres, strict=False):
         for name, values, style in (("before", attitude.plain, "--"), ("after", attitude.extended, "-")):
             size = np.linalg.norm(values - attitude.measured, axis=1)
-            label = f"{case.world.manoeuvres[index].recording.name}, {name}"
-            axes.plot(attitude.time, size, color=COLOURS[index], linestyle=style, label=label)
-    axes.axhline(np.degrees(np.sqrt(3.0) * ATTITUDE_SIGMA), color="#888888", linewidth=0.8)
+            label = f"{manoeuvre.recording.name}, {name}"
+            axes.plot(attitude.time, size, color=colour, linestyle=style, label=label)
+    axes.axhline(NOISE, color="#888888", linewidth=0.8)
     axes.set(yscale="log", ylim=(1e-4, None), xlabel="time [s]", ylabel="error [deg]")
     axes.legend(ncols=len(case.attitudes))
     return figure

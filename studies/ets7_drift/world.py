@@ -5,32 +5,31 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from bayesid import BodyPrior, InertialParameters, Kind, Manoeuvre, Model, Orbit, Sensor, White
+from bayesid._math.arrays import Floats
 from studies.common.ets7 import BASE, RADIUS, FlightManoeuvre, ets7
 from studies.common.flight import ORBIT, fly, light_wheel, record
 from studies.truth.mujoco import Body, nearby
 
 __all__ = ["DURATION", "MOTION", "World", "draw_world", "model_of"]
 
-Floats = NDArray[np.floating]
-
 DURATION = 300.0
-"""Length of a recording [s]; the attitude control is off throughout."""
+"""Duration of a recording [s]; the attitude control is off throughout."""
 
 INTERVAL = 1.0
 """Time between samples of all sensors [s]."""
 
 MOTION = FlightManoeuvre(np.zeros(6), corner=None)
-"""The flight's manoeuvre from joints at zero, its linear ramps made quintic and smooth."""
+"""Manoeuvre of the flight from joints at zero, each of its linear ramps replaced by a smooth quintic."""
 
 STEP = 0.25
 """Integration step of MuJoCo [s]."""
 
 RATE_SIGMA, ATTITUDE_SIGMA, ENCODER_SIGMA = 1e-5, 1e-4, 1e-5
-"""Noise of rates (two seconds of arc per second), attitude (twenty seconds of arc) and joints [rad/s, rad, rad]."""
+"""Noise per sample of rates (two seconds of arc per second), attitude (twenty seconds of arc) and joints [rad/s, rad,
+rad]."""
 
 MOMENTUM = (0.6, -0.4, 0.8)
 """Momentum left in the reaction wheels [N m s]."""
@@ -55,7 +54,7 @@ class World:
     base : (10,) array
         Reported quantities of the true base body.
     manoeuvres : tuple of Manoeuvre
-        As recorded, with noise.
+        Manoeuvres as recorded, with noise.
     """
 
     momentum: Floats
@@ -70,37 +69,34 @@ def draw_world(recordings: int, seed: int, momentum: float = 1.0, duration: floa
     Parameters
     ----------
     recordings, seed : int
-        Number of recordings, and seed of every random number.
+        Number of recordings, and seed of all random numbers.
     momentum : float
         Momentum of the wheels over `MOMENTUM`.
     duration : float
-        Length of a recording [s].
+        Duration of a recording [s].
     """
-    rng = np.random.default_rng(seed)
-    published_robot = ets7()
-    published = published_robot.link(BASE).inertial
+    rng, robot = np.random.default_rng(seed), ets7()
+    published = robot.link(BASE).inertial
     base = nearby(Body(published.mass, published.com, published.inertia), rng, TRUE_SPREAD)
     wheels = np.array(MOMENTUM) * momentum
     manoeuvres, rates = [], RATE * rng.standard_normal((recordings, 3))
     time = np.arange(0.0, duration + 0.5 * INTERVAL, INTERVAL)
-    true = published_robot.with_inertial(BASE, InertialParameters(base.mass, base.com, base.inertia))
+    true = robot.with_inertial(BASE, InertialParameters(base.mass, base.com, base.inertia))
     noise = {"position": ENCODER_SIGMA, "attitude": ATTITUDE_SIGMA, "rate": RATE_SIGMA}
-    for index in range(recordings):
-        argument_of_latitude = float(rng.uniform(0.0, 2.0 * np.pi))
+    for index, rate in enumerate(rates):
+        latitude = float(rng.uniform(0.0, 2.0 * np.pi))
         attitude = Rotation.random(rng=rng).as_quat()
-        orbit = replace(ORBIT, argument_of_latitude=argument_of_latitude)
-        truth = fly(
-            true, MOTION, time, step=STEP, rate=rates[index], attitude=attitude, orbit=orbit, rotor=light_wheel(wheels)
-        )
-        manoeuvre = record(truth, f"flight {index + 1}", published_robot, noise, rng)
-        manoeuvres.append(replace(manoeuvre, attitude=attitude, argument_of_latitude=argument_of_latitude))
+        orbit, rotor = replace(ORBIT, argument_of_latitude=latitude), light_wheel(wheels)
+        truth = fly(true, MOTION, time, step=STEP, rate=rate, attitude=attitude, orbit=orbit, rotor=rotor)
+        manoeuvre = record(truth, f"flight {index + 1}", robot, noise, rng)
+        manoeuvres.append(replace(manoeuvre, attitude=attitude, argument_of_latitude=latitude))
     return World(wheels, rates, base.quantities, tuple(manoeuvres))
 
 
 def model_of(spread: float = SPREAD) -> Model:
-    """Return the model that starts at rest and knows of no disturbance, with the published base as prior.
+    """Return the model that starts at rest and has no disturbance, with the published base as prior.
 
-    It sees the rates alone; the measured attitude is kept to compare with.
+    It uses the rates alone; the measured attitude is kept for comparison.
     """
     robot = ets7()
     return Model(

@@ -1,9 +1,9 @@
 """Which manoeuvre tells most about the base: the paper's criterion against the posterior it leads to.
 
 The paper's 4.1 manoeuvre, a poor neighbour of it and the best by each criterion compete on ETS-VII at equal duration
-within equal limits, the rule of the flight (50 mm/s, 5 deg/s at the tip) and none for the tip. The predicted posterior
-is compared with emcee on data of an independent simulator and with the errors realised over repeated noise.
-``python -m studies.excitation --full`` writes ``reports/excitation.pdf``.
+within equal limits, once with the rule of the flight (50 mm/s and 5 deg/s at the tip) and once with no rule for the
+tip. The predicted posterior is compared with emcee on data of an independent simulator, and with the errors realised
+over repeated noise. ``python -m studies.excitation --full`` writes ``reports/excitation.pdf``.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from studies.excitation.world import FAST
 __all__ = ["Result", "main", "run"]
 
 SETS = {"within the flight's rule": LIMITS, "without a rule for the tip": FAST}
+"""Sets of limits by their names, which complete a sentence of the report."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,13 @@ class Result:
     Attributes
     ----------
     contests : mapping of str to Contest
-        By the name of the set of limits.
+        Contests by the name of their set of limits.
     realised : mapping of (set, design) to Realised
+        Designs that were flown.
     clouds : mapping of str to Cloud
-        By family, within the flight's rule.
+        Random manoeuvres within the flight's rule by their family.
     sensitivities : mapping of str to Sensitivity
-        Of the paper's manoeuvre and its poor neighbour, without a rule for the tip.
+        Sensitivities along the paper's manoeuvre and its poor neighbour, without a rule for the tip.
     """
 
     contests: Mapping[str, Contest]
@@ -64,21 +66,24 @@ def run(
     Parameters
     ----------
     full : bool
-        All criteria in place of three, and effort to match.
+        True for all criteria in place of three, and for effort to match.
     seed : int
-        Every random number follows from it.
+        Seed of all random numbers.
     search : Search, optional
         Effort of each design.
     repeats : int, optional
-        Noisy recordings identified of the d-optimal design within the first set of limits; a quarter of them of others.
+        Number of noisy recordings of the d-optimal design within the first set of limits; other designs that are flown
+        have a quarter of them.
     random : int, optional
-        Random manoeuvres per family.
+        Number of random manoeuvres per family.
     points : int
-        Free control points of every joint.
+        Number of free control points of every joint.
     sets : sequence of str
-        Of limits.
+        Names of the sets of limits.
+    progress : callable, optional
+        Receives a line on what is being done.
     """
-    search = search or (Search(starts=1, iterations=90) if full else Search(starts=1, iterations=10))
+    search = search or Search(starts=1, iterations=90 if full else 10)
     repeats = (400 if full else 4) if repeats is None else repeats
     random = (500 if full else 20) if random is None else random
     contests, realised = {}, {}
@@ -89,12 +94,11 @@ def run(
             item = contests[name].designs[design]
             realised[name, design] = realise(item, seed, count, 2000.0 if full else 300.0, progress)
     rng = np.random.default_rng(seed)
-    first = contests[sets[0]].designs
+    first, last = contests[sets[0]].designs, contests[sets[-1]].designs
     clouds = {
         "(27), three joints": random_cloud(first["27: paper-26"].problem, random, rng),
         "splines, six joints": random_cloud(first["paper-26"].problem, random, rng),
     }
-    last = contests[sets[-1]].designs
     weights = {name: sensitivity(last[name].problem, last[name].parameters) for name in ("printed", "poor")}
     return Result(contests, realised, clouds, weights)
 

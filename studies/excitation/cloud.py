@@ -1,4 +1,4 @@
-"""Does base motion measure the excitation? Criterion (26) against the posterior over random manoeuvres."""
+"""Whether base motion measures the excitation: criterion (26) against the posterior over random manoeuvres."""
 
 from __future__ import annotations
 
@@ -6,15 +6,13 @@ from dataclasses import dataclass
 
 import jax
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
+from bayesid._math.arrays import Floats
 from bayesid.design import DOptimal, Paper26, Paper26Intended, Problem
 from bayesid.design.plan import PlannedOutcome
 
 __all__ = ["Cloud", "Sensitivity", "random_cloud", "sensitivity"]
-
-Floats = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
@@ -26,7 +24,7 @@ class Cloud:
     printed, intended, motion : (n,) arrays
         Criterion (26) as printed, as intended, and the sum of the largest squared excursions alone.
     log_det : (n,) array
-        Of the posterior covariance of the base's coordinates.
+        Log-determinant of the posterior covariance of the base's coordinates.
     """
 
     printed: Floats
@@ -40,40 +38,37 @@ class Cloud:
         return rho, float((1.0 - rho**2) / np.sqrt(len(values) - 3.0))
 
 
-def random_cloud(own: Problem, count: int, rng: np.random.Generator) -> Cloud:
-    """Draw random manoeuvres, each as large as the limits allow times a random part."""
-    family = own.plan.family
+def random_cloud(problem: Problem, count: int, rng: np.random.Generator) -> Cloud:
+    """Draw random manoeuvres, each a random part of the largest that keeps the limits in its direction."""
+    plan, family = problem.plan, problem.plan.family
 
     @jax.jit
     def judged(parameters: jax.Array) -> tuple[jax.Array, ...]:
-        outcome: PlannedOutcome = own.plan.outcome(parameters, jax.numpy.asarray(own.centre))
+        outcome: PlannedOutcome = plan.outcome(parameters, jax.numpy.asarray(problem.centre))
         largest = jax.numpy.abs(outcome.trajectory.excursion).max(axis=0)
-        return (
-            -Paper26().cost(own.plan, outcome),
-            -Paper26Intended().cost(own.plan, outcome),
-            (largest**2).sum(),
-            2.0 * DOptimal().cost(own.plan, outcome),
-        )
+        criteria = -Paper26().cost(plan, outcome), -Paper26Intended().cost(plan, outcome)
+        return *criteria, (largest**2).sum(), 2.0 * DOptimal().cost(plan, outcome)
 
     rows: list[list[float]] = []
     while len(rows) < count:
-        way = family.scale * rng.normal(size=family.size)
+        direction = family.scale * rng.normal(size=family.size)
         size = 1.0
-        while own.fractions(family.centre + size * way)[0].max() > 1.0:
+        while problem.fractions(family.centre + size * direction)[0].max() > 1.0:
             size *= 0.7
-        rows.append([float(value) for value in judged(family.centre + size * rng.uniform(0.3, 1.0) * way)])
+        rows.append([float(value) for value in judged(family.centre + size * rng.uniform(0.3, 1.0) * direction)])
     return Cloud(*np.array(rows).T)
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """The weights of the errors in (25) along a manoeuvre.
+    """Weights of the errors in (25) along a manoeuvre.
 
     Attributes
     ----------
     time : (T,) array
+        Sample times [s].
     rate, accel : (T, 10) arrays
-        Length of the derivative of rate and acceleration with respect to each log-Cholesky coordinate of the base, in
+        Norm of the derivative of rate and acceleration with respect to each log-Cholesky coordinate of the base, in
         standard deviations of a sample.
     """
 
@@ -82,12 +77,9 @@ class Sensitivity:
     accel: Floats
 
 
-def sensitivity(own: Problem, parameters: Floats) -> Sensitivity:
-    """Return the sensitivities (25) of a manoeuvre."""
-    plan = own.plan
-    slopes = np.asarray(jax.jit(plan.slopes)(parameters, own.centre))[:, :, plan.bodies()]
-    return Sensitivity(
-        plan.samples,
-        np.linalg.norm(slopes[:, :3], axis=1),
-        np.linalg.norm(slopes[:, 3:6], axis=1),
-    )
+def sensitivity(problem: Problem, parameters: Floats) -> Sensitivity:
+    """Return the sensitivities (25) along the manoeuvre of some parameters."""
+    plan = problem.plan
+    slopes = np.asarray(jax.jit(plan.slopes)(parameters, problem.centre))[:, :, plan.bodies()]
+    rate, accel = (np.linalg.norm(slopes[:, start : start + 3], axis=1) for start in (0, 3))
+    return Sensitivity(plan.samples, rate, accel)

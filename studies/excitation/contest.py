@@ -1,4 +1,4 @@
-"""Manoeuvres of equal duration within equal limits, each the best by its own criterion, judged by the posterior."""
+"""Manoeuvres of equal duration within equal limits, each the best by one criterion, judged by the posterior."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.design import (
     AOptimal,
     ConditionNumber,
@@ -34,18 +34,11 @@ from studies.excitation.world import paper_family, problem, splines
 
 __all__ = ["Contest", "compete", "shrunk"]
 
-Floats = NDArray[np.floating]
-
-ALL: tuple[Criterion, ...] = (
-    Paper26(),
-    Paper26Intended(),
-    ConditionNumber(),
-    DOptimal(),
-    AOptimal(),
-    EOptimal(),
-    InformationGain(draws=2),
-)
 FEW: tuple[Criterion, ...] = (Paper26(), ConditionNumber(), DOptimal())
+"""Criteria of a quick run: the paper's, the one usual for arms on the ground, and the posterior's volume."""
+
+ALL: tuple[Criterion, ...] = (*FEW[:1], Paper26Intended(), *FEW[1:], AOptimal(), EOptimal(), InformationGain(draws=2))
+"""Criteria of a full run."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +50,10 @@ class Contest:
     limits : Limits
     designs : mapping of str to Design
         ``printed`` and ``poor`` are the paper's manoeuvre and its poor neighbour, made smaller until they keep the
-        limits; ``27: NAME`` was designed in the paper's own family, ``NAME`` with splines on all joints; ``wrong
-        guess`` is d-optimal for the paper's initial guess of the base.
+        limits; ``27: NAME`` was designed in the paper's family, ``NAME`` with splines on all joints; ``wrong guess`` is
+        d-optimal for the paper's initial guess of the base.
     shrink : mapping of str to float
-        By how much the first two were made smaller.
+        Factors by which the first two were made smaller.
     """
 
     limits: Limits
@@ -68,71 +61,67 @@ class Contest:
     shrink: Mapping[str, float]
 
     def relative(self, name: str) -> tuple[float, float, float]:
-        """Return log-determinant less that of (26), and worst and geometric-mean sd over those of (26)."""
-        own, base = self.designs[name].predicted, self.designs["paper-26"].predicted
-        return (
-            own.log_det - base.log_det,
-            own.worst / base.worst,
-            own.geometric_mean / base.geometric_mean,
-        )
+        """Return log-determinant less that of (26), and worst and geometric-mean deviation over those of (26)."""
+        this, base = self.designs[name].predicted, self.designs["paper-26"].predicted
+        return this.log_det - base.log_det, this.worst / base.worst, this.geometric_mean / base.geometric_mean
 
 
 def compete(
     limits: Limits, seed: int, search: Search, full: bool, points: int, progress: Callable[[str], None]
 ) -> Contest:
-    """Design by every criterion within some limits."""
+    """Design by every criterion within some limits; parameters as in `studies.excitation.run`."""
     seeds = [int(value) for value in np.random.SeedSequence(seed).generate_state(3)]
     rng = np.random.default_rng(seeds[0])
-    criteria = ALL if full else FEW
-    own = problem(paper_family(), limits, (Paper26(), DOptimal()))
+    sines = problem(paper_family(), limits, (Paper26(), DOptimal()))
     designs: dict[str, Design] = {}
     shrink: dict[str, float] = {}
     for name, q in (("printed", paper.EXCITATION), ("poor", POOR)):
-        parameters, shrink[name] = shrunk(own, q)
-        found = Found(parameters, float("nan"), (), 0)
+        parameters, shrink[name] = shrunk(sines, q)
+        given = Found(parameters, float("nan"), (), 0)
         like = designs["printed"].posterior if designs else None
-        designs[name] = evaluate(own, name, found, {0: ENCODER}, rng, like)
+        designs[name] = evaluate(sines, name, given, {0: ENCODER}, rng, like)
 
     def tell(family: str) -> Callable[[float, str], None]:
-        last = [-1]
+        told = [-1]  # a line every five percent
 
         def show(fraction: float, text: str) -> None:
-            if int(20 * fraction) > last[0]:
-                last[0] = int(20 * fraction)
+            if int(20 * fraction) > told[0]:
+                told[0] = int(20 * fraction)
                 progress(f"{family}: {100.0 * fraction:.0f} %, {text}")
 
         return show
 
-    for item in design(own, seeds[1], {0: ENCODER}, search, progress=tell("(27)")):
+    for item in design(sines, seeds[1], {0: ENCODER}, search, progress=tell("(27)")):
         designs[f"27: {item.criterion}"] = item
-    ours = problem(splines(points), limits, criteria)
-    for item in design(ours, seeds[2], {0: ENCODER}, search, progress=tell("splines")):
+    free = problem(splines(points), limits, ALL if full else FEW)
+    for item in design(free, seeds[2], {0: ENCODER}, search, progress=tell("splines")):
         designs[item.criterion] = item
     if full:
-        designs["wrong guess"] = _from_wrong_guess(ours, search, rng, designs["d-optimal"])
+        designs["wrong guess"] = _from_wrong_guess(free, search, rng, designs["d-optimal"])
     return Contest(limits, designs, shrink)
 
 
-def _from_wrong_guess(ours: Problem, search: Search, rng: np.random.Generator, like: Design) -> Design:
-    """Design by the posterior that would be if the paper's initial guess of the base were true."""
-    unknowns = ours.plan.unknowns
+def _from_wrong_guess(free: Problem, search: Search, rng: np.random.Generator, like: Design) -> Design:
+    """Design by the posterior as it would be if the paper's initial guess of the base were true."""
+    unknowns = free.plan.unknowns
     guess = unknowns.coordinates([paper.body(paper.GUESS)])
-    guessing = ours.knowing(Known(guess, np.eye(unknowns.size)))
-    found = optimise(guessing, DOptimal(), rng, search)
-    parameters, _ = shrunk(ours, found.parameters)  # the true base may not keep what the guessed one does
-    return evaluate(ours, "wrong guess", replace(found, parameters=parameters), {0: ENCODER}, rng, like.posterior)
+    best = optimise(free.knowing(Known(guess, np.eye(unknowns.size))), DOptimal(), rng, search)
+    parameters, _ = shrunk(free, best.parameters)  # the true base may not keep what the guessed one does
+    return evaluate(free, "wrong guess", replace(best, parameters=parameters), {0: ENCODER}, rng, like.posterior)
 
 
-def shrunk(own: Problem, q: Sequence[float] | Floats) -> tuple[Floats, float]:
-    """Make a manoeuvre smaller, towards rest, until it keeps the limits; return its parameters and by how much."""
-    centre, way = own.plan.family.centre, np.asarray(q) - own.plan.family.centre
+def shrunk(problem: Problem, q: Sequence[float] | Floats) -> tuple[Floats, float]:
+    """Make a manoeuvre smaller, towards rest, until it keeps the limits; return its parameters and the factor."""
+    centre = problem.plan.family.centre
+    direction = np.asarray(q) - centre
+
+    def kept(factor: float) -> bool:
+        return all(item.kept for item in problem.reached(centre + factor * direction))
+
+    if kept(1.0):
+        return centre + direction, 1.0
     low, high = 0.0, 1.0
-    if all(item.kept for item in own.reached(centre + way)):
-        return centre + way, 1.0
     for _ in range(20):
         middle = 0.5 * (low + high)
-        if all(item.kept for item in own.reached(centre + middle * way)):
-            low = middle
-        else:
-            high = middle
-    return centre + low * way, low
+        low, high = (middle, high) if kept(middle) else (low, middle)
+    return centre + low * direction, low

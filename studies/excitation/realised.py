@@ -6,19 +6,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Posterior, identify
+from bayesid._math.arrays import Floats
 from bayesid.design import Design
 from bayesid.inference import maximise
 from bayesid.robot.inertial_parameters import mass_com_inertia
+from studies.common.errors_in_deviations import squared_distances
 from studies.common.ets7 import BASE
 from studies.common.monte_carlo import run_trials
 from studies.excitation.world import fly, recorded
 
 __all__ = ["Realised", "realise"]
-
-Floats = NDArray[np.floating]
 
 
 @dataclass(frozen=True)
@@ -28,15 +27,15 @@ class Realised:
     Attributes
     ----------
     errors : (repeats, 10) array
-        Estimate less truth, in the order of the predicted quantities.
+        Estimates less the truth, in the order of the predicted quantities.
     sampled : (10,) array
-        Posterior standard deviation by emcee on one recording.
+        Posterior standard deviations by emcee on one recording.
     offset : (10,) array
-        Its mean less the truth.
+        Posterior mean by emcee less the truth.
     predicted : (10,) array
-        Standard deviation that was predicted.
+        Predicted standard deviations.
     distances : (repeats,) array
-        Squared distance of the truth from the estimate in the predicted covariance; ten on average.
+        Squared distances of the truth from the estimate in the predicted covariance, ten on average.
     """
 
     errors: Floats
@@ -68,9 +67,8 @@ def realise(
     truth, flown = mass_com_inertia(item.posterior.model.robot.link(BASE).inertial.vector), fly(item.motion)
 
     def identified(number: int, rng: np.random.Generator) -> dict[str, Floats]:
-        """Errors of the fit to one recording, and on the first recording what emcee says."""
-        manoeuvre = recorded(flown, rng)
-        posterior = Posterior.of(item.posterior.model, [manoeuvre], step=item.posterior.step)
+        """Return the errors of the fit to one recording, and on the first recording the outcome of emcee."""
+        posterior = Posterior.of(item.posterior.model, [recorded(flown, rng)], step=item.posterior.step)
         outcome = {}
         if number == 0:
             body = identify(posterior, seed, effective_samples=effective_samples).bodies[BASE]
@@ -80,9 +78,7 @@ def realise(
 
     trials = run_trials(identified, range(repeats), seed=seed, progress=lambda text: progress(f"{item.name}: {text}"))
     outcomes = trials.complete()
-    every = np.array([outcome["error"] for outcome in outcomes])
-    sampled, offset = np.array(outcomes[0]["sampled"]), np.array(outcomes[0]["offset"])
-    scale = item.predicted.sd
-    inverse = np.linalg.inv(item.predicted.covariance / np.outer(scale, scale))
-    distances = np.einsum("ij,jk,ik->i", every / scale, inverse, every / scale)
-    return Realised(every, sampled, offset, scale, distances)
+    errors = np.array([outcome["error"] for outcome in outcomes])
+    sampled, offset = (np.array(outcomes[0][key]) for key in ("sampled", "offset"))
+    distances = squared_distances(errors, item.predicted.covariance)
+    return Realised(errors, sampled, offset, item.predicted.sd, distances)

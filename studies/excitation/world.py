@@ -6,19 +6,17 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesid import BodyPrior, Kind, Manoeuvre, Model, Orbit, Sensor, White
+from bayesid import BodyPrior, Manoeuvre, Model
 from bayesid.design import BSplines, Criterion, Limits, PaperExcitation, Plan, Problem, Tip, TrajectoryFamily
 from bayesid.recording.joint_motion import Motion
-from bayesid.simulation.effects import AccelBias, GravityGradient
+from bayesid.simulation.effects import AccelBias
 from studies.common import flight
-from studies.common.ets7 import ACCEL, ACCELEROMETER, BASE, BIAS, ENCODER, RADIUS, RATE, ets7, extended_wrist
+from studies.common.ets7 import BASE, BIAS, ENCODER, TIP, ets7
+from studies.common.ets7_model import NOISE, extended_start, orbiting_model
 from studies.truth.mujoco import Truth
 
 __all__ = ["DURATION", "FAST", "fly", "model_of", "paper_family", "problem", "recorded", "splines"]
-
-Floats = NDArray[np.floating]
 
 DURATION = 120.0
 """Length of every manoeuvre [s]."""
@@ -27,10 +25,10 @@ INTERVAL = 0.5
 """Time between samples of all sensors [s]."""
 
 REACH = 2.6
-"""Joint range allowed to all, either way [rad]; the paper's printed optimum needs 2.5, more than its own limit."""
+"""Range of every joint, either way [rad]; the paper's printed optimum needs 2.5, more than the limit it states."""
 
 FAST = Limits(joint_speed=0.4)
-"""No rule for the tip: what the paper's printed optimum needs at this duration [rad/s]."""
+"""Limits without a rule for the tip: the joint speed [rad/s] that the paper's printed optimum needs in this time."""
 
 STEP = 0.1
 """Integration step of MuJoCo [s]."""
@@ -41,31 +39,23 @@ def model_of() -> Model:
     """Return the model: base unknown, arm known, the accelerometer's bias and the initial rate to be marginalised."""
     robot = ets7()
     robot = replace(robot, joints=tuple(replace(joint, lower=-REACH, upper=REACH) for joint in robot.joints))
-    sensors = (Sensor(Kind.RATE, White(RATE)), Sensor(Kind.ACCEL, White(ACCEL), position=ACCELEROMETER))
-    base = BodyPrior(BASE, robot.link(BASE).inertial, 1.0)
-    return Model(robot, sensors, (base,), Orbit(RADIUS), (GravityGradient(), AccelBias(BIAS)))
-
-
-def posture() -> Floats:
-    """Return the joints before and after: the wrist extended."""
-    return np.array([0.0, 0.0, 0.0, *extended_wrist()])
+    return orbiting_model(robot, [BodyPrior(BASE, robot.link(BASE).inertial, 1.0)], AccelBias(BIAS))
 
 
 def paper_family() -> PaperExcitation:
-    """Return (27) on the first three joints."""
-    return PaperExcitation(posture(), DURATION, moving=(0, 1, 2))
+    """Return the paper's motion (27) of the first three joints."""
+    return PaperExcitation(extended_start(), DURATION, moving=(0, 1, 2))
 
 
 def splines(points: int = 8) -> BSplines:
-    """Return quintic splines on all joints."""
-    return BSplines(posture(), range(6), DURATION, points)
+    """Return quintic splines on all joints, with so many free control points each."""
+    return BSplines(extended_start(), range(6), DURATION, points)
 
 
 def problem(family: TrajectoryFamily, limits: Limits, criteria: tuple[Criterion, ...]) -> Problem:
     """Return a design problem of a family within limits."""
     model = model_of()
-    plan = Plan(model, family, INTERVAL, Tip.of(model.robot, "tip"), step=2.0, thinning=2)
-    return Problem(plan, limits, criteria)
+    return Problem(Plan(model, family, INTERVAL, Tip.of(model.robot, TIP), step=2.0, thinning=2), limits, criteria)
 
 
 def fly(motion: Motion) -> Truth:
@@ -79,5 +69,5 @@ def recorded(truth: Truth, rng: np.random.Generator) -> Manoeuvre:
     joints = [joint.name for joint in robot.joints]
     channels = flight.readings(truth, joints, {"position": ENCODER}, rng)
     biased = truth._replace(accel=truth.accel + BIAS * rng.standard_normal(3))
-    channels |= flight.readings(biased, joints, {"rate": RATE, "accel": ACCEL}, rng)
+    channels |= flight.readings(biased, joints, {family: NOISE[family] for family in ("rate", "accel")}, rng)
     return flight.smoothed("manoeuvre", truth.times, channels, robot, ENCODER)

@@ -5,32 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 from bayesid.design import Search
 from studies.common.command import Command
-from studies.load.noise_free import Iteration, iterate
-from studies.load.report import write
-from studies.load.sampled import Flight, fly_all
+from studies.load.noise_free import iterate
+from studies.load.report import Result, write_report
+from studies.load.sampled import fly_all
 
 __all__ = ["Result", "main", "run"]
-
-
-@dataclass(frozen=True)
-class Result:
-    """Numbers of the study.
-
-    Attributes
-    ----------
-    iterations : list of Iteration
-        Without noise.
-    flights : mapping of str to Flight
-        With noise, by how the manoeuvres were planned; full study only.
-    """
-
-    iterations: list[Iteration]
-    flights: Mapping[str, Flight]
 
 
 def run(*, full: bool = False, seed: int = 0) -> Result:
@@ -39,9 +22,9 @@ def run(*, full: bool = False, seed: int = 0) -> Result:
     Parameters
     ----------
     full : bool
-        Search for the manoeuvres, and add the loops with noise: a quarter of an hour.
+        True to search for the manoeuvres and to add the loops with noise, which takes a quarter of an hour.
     seed : int
-        Every random number follows from it.
+        Seed of all random numbers.
     """
     if not full:
         return Result(iterate(seed=seed), {})
@@ -57,5 +40,4 @@ COMMAND = Command(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     options = COMMAND.parse(arguments)
-    result = run(full=options.full, seed=options.seed)
-    write(result.iterations, result.flights, options.output)
+    write_report(run(full=options.full, seed=options.seed), options.output)

@@ -1,4 +1,4 @@
-"""``python -m studies.load``."""
+"""Write the report: ``python -m studies.load --full``."""
 
 from studies.load import main
 

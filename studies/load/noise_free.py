@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.design import Criterion, Paper26Intended, PlannedMotion, Search, optimise
 from bayesid.design.design_problem import Known
 from bayesid.design.simulated_spacecraft import plan_recording
@@ -20,16 +20,15 @@ from studies.load.setting import DURATION, INTERVAL, MuJoCoSpacecraft, excitatio
 
 __all__ = ["Iteration", "iterate"]
 
-Floats = NDArray[np.floating]
-
 STEP = 0.5
 """Integration step of the fit [s]."""
 
-FOUND = (
+SEARCHED = (
     (0.5889, -0.9512, -1.388, -0.1733, 0.2603, -0.9514),
     (0.6149, -0.952, -1.3178, 0.241, 0.3158, -0.9504),
 )
-"""What the full study's searches found, for a quick one: q1 and q2 of the first three joints, of both iterations."""
+"""Results of the full study's searches, used by a quick one: q1 and q2 of the first three joints [rad] in both
+iterations."""
 
 
 @dataclass(frozen=True)
@@ -39,10 +38,10 @@ class Iteration:
     Attributes
     ----------
     parameters : (6,) array
-        q1 and q2 of the first three joints [rad].
+        Parameters q1 and q2 of the first three joints [rad].
     recording : Recording
     estimate : (10,) array
-        In the order of `paper.TRUTH`.
+        Estimated quantities of the load, in the order of `paper.TRUTH`.
     misfit : float
         Root mean square residual over 1e-5 rad/s and 1e-5 m/s2.
     excursion : (6,) array
@@ -56,19 +55,9 @@ class Iteration:
     excursion: Floats
 
     @property
-    def errors(self) -> Floats:
-        """Of mass, centre of mass and inertia; relative, products of inertia to the true moments, shape (10,)."""
-        return errors(self.estimate)
-
-    @property
     def worst(self) -> float:
-        """Largest of the errors."""
-        return float(np.abs(self.errors).max())
-
-
-def errors(estimate: Floats) -> Floats:
-    """Return errors relative to the truth; of products of inertia relative to the moments, shape (10,)."""
-    return (estimate - paper.TRUTH) / np.where(paper.TRUTH == 0.0, paper.TRUTH[4], paper.TRUTH)
+        """Largest relative error of the estimate."""
+        return float(np.abs(paper.errors(self.estimate)).max())
 
 
 def iterate(
@@ -77,18 +66,18 @@ def iterate(
     seed: int = 0,
     search: Search | None = None,
 ) -> list[Iteration]:
-    """Plan by a criterion of the paper, fly with MuJoCo, fit by least squares; and again from what was found.
+    """Plan by a criterion of the paper, fly with MuJoCo, fit by least squares; then again from the estimate.
 
-    Where no search is given, the manoeuvres are those of `FOUND`.
+    Where no search is given, the manoeuvres are those of `SEARCHED`.
     """
     known, spacecraft = model(1.0), MuJoCoSpacecraft()
     present = problem(known, excitation(), criterion)
     z: Floats = np.zeros(10)
-    posterior: Posterior | None = None
-    found = []
+    iterations = []
     time = np.arange(0.0, DURATION + 1e-9, INTERVAL)
-    for number, stream in enumerate(np.random.SeedSequence(seed).spawn(len(FOUND)), start=1):
-        best: Floats = np.array(FOUND[number - 1])
+    streams = np.random.SeedSequence(seed).spawn(len(SEARCHED))
+    for number, (stream, searched) in enumerate(zip(streams, SEARCHED, strict=True), start=1):
+        best: Floats = np.array(searched)
         if search is not None:
             best = optimise(present, criterion, np.random.default_rng(stream), search).parameters
         plan = plan_recording(present.plan.family.motion(best), known.robot, time, f"iteration {number}")
@@ -97,7 +86,7 @@ def iterate(
         posterior = Posterior.of(known, [Manoeuvre(recording, motion)], step=STEP, flat_prior=True)
         optimum = fit(posterior, z)
         z = optimum.z
-        found.append(
+        iterations.append(
             Iteration(
                 parameters=best,
                 recording=recording,
@@ -107,4 +96,4 @@ def iterate(
             )
         )
         present = present.knowing(Known(z, np.eye(10)))
-    return found
+    return iterations

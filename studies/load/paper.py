@@ -5,22 +5,32 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.robot.inertial_parameters import InertialParameters
 
-__all__ = ["GUESS", "RESULTS", "TRUTH", "Reading", "body", "readings"]
+__all__ = ["GUESS", "RESULTS", "SCALE", "TRUTH", "Reading", "body", "errors", "readings"]
 
-Floats = NDArray[np.floating]
-
-# mass, centre of mass, inertia xx yy zz xy xz yz: the order of `bayesid.inference.identification.BODY_QUANTITIES`
 TRUTH = np.array([370.0, 0.33, 0.50, 1.04, 700.0, 700.0, 700.0, 0.0, 0.0, 0.0])
+"""True load: mass, centre of mass, inertia xx yy zz xy xz yz, in the order and units of
+`bayesid.inference.body_quantities.BODY_QUANTITIES`."""
+
 GUESS = np.array([10.0, 0.1, 0.1, 0.1, 10.0, 10.0, 10.0, 1e-4, 1e-4, 1e-4])
+"""Initial guess of the load, in the same order."""
+
 RESULTS = (
     np.array([377.90, 0.30, 0.51, 1.00, 721.6, 743.2, 710.9, 0.0, 0.0, 0.0]),
     np.array([370.12, 0.33, 0.50, 1.04, 700.3, 700.7, 700.2, 0.0, 0.0, 0.0]),
 )
-"""After the first and the second iteration."""
+"""Results after the first and the second iteration, in the same order."""
+
+SCALE = np.where(TRUTH == 0.0, TRUTH[4], TRUTH)
+"""Scale of relative errors: the true values, and the true moments for the products of inertia, which are zero."""
+
+
+def errors(quantities: Floats) -> Floats:
+    """Return the errors of ten quantities over `SCALE`, shape (10,)."""
+    return (quantities - TRUTH) / SCALE
 
 
 @dataclass(frozen=True)
@@ -29,6 +39,8 @@ class Reading:
 
     Attributes
     ----------
+    about : str
+        Point that the inertia is taken about, in words.
     moments : (3,) array
         Principal moments about the centre of mass, ascending [kg m2].
     """
@@ -38,12 +50,12 @@ class Reading:
 
     @property
     def physical(self) -> bool:
-        """Whether a rigid body can have them: none negative, and none above the sum of the others."""
+        """True if a rigid body can have these moments: none negative, and none above the sum of the others."""
         return bool(self.moments[0] >= 0.0 and self.moments[0] + self.moments[1] >= self.moments[2] * (1.0 - 1e-12))
 
 
 def tensor(quantities: Floats) -> Floats:
-    """Return the printed inertia as a matrix."""
+    """Return the inertia of ten quantities as a matrix, shape (3, 3)."""
     xx, yy, zz, xy, xz, yz = quantities[4:]
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 

@@ -1,4 +1,4 @@
-"""Section 1.1.1 of the paper: what identification buys the planner of a free-flying robot.
+"""Section 1.1.1 of the paper: what the planner of a free-flying robot gains by identification.
 
 A path planned in joint space ends elsewhere if the base is not what the planner takes it for. An independent simulator
 flies the plan; the prediction says beforehand how far off it may end, before and after identification, and a plan made
@@ -8,6 +8,7 @@ with the identified base is flown too. ``python -m studies.planning --full`` wri
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 from studies.common.command import Command
 from studies.planning.analysis import Case, analyse
@@ -18,7 +19,7 @@ from studies.planning.world import DURATION, SPREAD, drawn_guess, paper_guess
 __all__ = ["Case", "Result", "main", "run"]
 
 GUESSES = 80
-"""Of the base, in a full run, over which the regions before identification are counted."""
+"""Number of guesses of the base in a full run, over which the regions before identification are counted."""
 
 NARROW = 0.02
 """Relative width of a prior under which final poses are nearly normal."""
@@ -31,47 +32,63 @@ def run(
     draws: int = 400,
     effective_samples: float = 1500.0,
     duration: float = DURATION,
-    progress: Callable[[str], None] | None = None,
+    store: Path | None = None,
+    workers: int = 1,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the study.
 
     Parameters
     ----------
     full : bool
-        Also start from the paper's own initial guess, which is far away.
+        True to start from the paper's initial guess too, which is far away.
     seed : int
-        Every random number follows from it.
+        Seed of all random numbers.
     draws : int
-        Of each prediction.
+        Number of draws of each prediction.
     effective_samples : float
-        Of each identification.
+        Effective sample size of each identification.
     duration : float
-        Of the planned path [s].
+        Duration of the planned path [s].
+    store : path, optional
+        File that keeps the trials of the calibration, see `studies.common.monte_carlo`.
+    workers : int
+        Number of processes for these trials.
     progress : callable, optional
-        Told what is being done.
+        Receives a line on what is being done.
     """
-    guesses = {"drawn": drawn_guess(seed)}
-    if full:
-        guesses["paper"] = paper_guess()
+    guesses = {"drawn": drawn_guess(seed)} | ({"paper": paper_guess()} if full else {})
     cases = {
-        name: analyse(guess, seed, draws, effective_samples, duration, progress or (lambda text: None))
-        for name, guess in guesses.items()
+        name: analyse(guess, seed, draws, effective_samples, duration, progress) for name, guess in guesses.items()
     }
-    first = cases["drawn"].first
-    count = GUESSES if full else GUESSES // 4
-    found = [
-        calibrate(first.goal, first.flown, duration, spread, guesses=count, draws=draws // 2, seed=seed)
-        for spread in (SPREAD, NARROW)
-    ]
-    return Result(cases, tuple(found))
+    calibration = calibrate(
+        cases["drawn"].first,
+        duration,
+        (SPREAD, NARROW),
+        guesses=GUESSES if full else GUESSES // 4,
+        draws=draws // 2,
+        seed=seed,
+        store=store,
+        workers=workers,
+        progress=progress,
+    )
+    return Result(cases, calibration)
 
 
 COMMAND = Command(
-    "planning", "Say what identification buys the planner.", full="also from the paper's initial guess", seed=1
+    "planning",
+    "Say what a planner gains by identification.",
+    full="also from the paper's initial guess",
+    seed=1,
+    extra={
+        "--trials": {"type": Path, "help": "file that keeps the trials of the calibration between runs"},
+        "--workers": {"type": int, "default": 1, "help": "processes that make these trials"},
+    },
 )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     options = COMMAND.parse(arguments)
-    write_report(run(full=options.full, seed=options.seed, progress=print), options.output)
+    result = run(full=options.full, seed=options.seed, store=options.trials, workers=options.workers, progress=print)
+    write_report(result, options.output)

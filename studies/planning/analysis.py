@@ -1,28 +1,28 @@
-"""Plan, predict, fly; identify; predict, plan again and fly."""
+"""Plan, predict and fly; identify; predict, plan again and fly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from bayesid import Identification, InertialParameters, Manoeuvre, Model, Posterior, Recording, identify
+from bayesid._math.arrays import Floats
 from bayesid.design.base_prediction import BasePredictor, Prediction
+from bayesid.design.knowledge_update import updated_model
 from bayesid.design.pose_region import Pose
-from bayesid.inference.posterior_as_prior import InertialDraws, joint_prior
+from bayesid.inference.posterior_as_prior import InertialDraws
 from studies.common.ets7 import BASE, START, TIP, ets7
-from studies.planning.world import ATTITUDE, Flown, Guess, Swing, fly, measure, model_of
+from studies.planning.world import ATTITUDE, Flown, FlownPose, Guess, Swing, fly, measure, model_of
 
-__all__ = ["Case", "Flight", "Trial", "analyse", "flight_of", "identified", "plan", "predictor_of"]
-
-Floats = NDArray[np.floating]
+__all__ = ["Case", "Flight", "Trial", "analyse", "flight_of", "plan", "predictor_of"]
 
 REACHED = np.array([0.9, -1.5, 0.3, 0.5, -0.7, 0.6])
-"""Joint positions whose final pose in a true flight is the target, so that it can be reached; no planner sees them."""
+"""Joint positions [rad] whose final pose in a true flight is the target, so that it can be reached; no planner sees
+them."""
 
 ARM = 2.0
 """Length that makes a rotation error comparable with a position error [m/rad]."""
@@ -30,43 +30,72 @@ ARM = 2.0
 
 @dataclass(frozen=True)
 class Flight:
-    """A planned path, what was predicted of it and where it truly ended."""
+    """A planned path and where it truly ended.
+
+    Attributes
+    ----------
+    goal : (6,) array
+        Joint positions at the end of the path [rad].
+    flown : Flown
+        Final poses of base and end-effector.
+    miss : float
+        Distance of the end-effector from its target [m].
+    turned : float
+        Angle between the attitude of the end-effector and that of its target [degrees].
+    """
 
     goal: Floats
     flown: Flown
     miss: float
-    """Of the end-effector, from the target [m]."""
     turned: float
-    """Likewise its attitude [degrees]."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A prediction of a flight beside the truth: errors of the mean, and whether the 95 % regions hold the truth."""
+    """A prediction beside the flight that it predicts."""
 
     title: str
     prediction: Prediction
-    errors: Mapping[str, tuple[float, float]]
-    """base, tip: position [mm], rotation [degrees]."""
-    inside: Mapping[str, tuple[bool, bool]]
+    flown: Flown
 
-    def pose(self, body: str) -> Pose:
-        """Predicted final pose of ``base`` or ``tip``."""
-        return (self.prediction.base if body == "base" else self.prediction.tip).pose()
+    def compared(self, body: str) -> tuple[Pose, FlownPose]:
+        """Return the final pose of ``base`` or ``tip``, predicted and flown."""
+        return getattr(self.prediction, body).pose(), getattr(self.flown, body)
+
+    def errors(self, body: str) -> tuple[float, float]:
+        """Return the errors of the mean of the predicted pose, position [mm] and rotation [degrees]."""
+        pose, (position, attitude) = self.compared(body)
+        distance = np.linalg.norm(pose.millimetres.mean - 1e3 * position)
+        return float(distance), float(np.linalg.norm(pose.turns(attitude)))
 
 
 @dataclass(frozen=True)
 class Case:
-    """One guess of the base and what follows from it."""
+    """One guess of the base and what follows from it.
+
+    Attributes
+    ----------
+    guess : Guess
+        Base as the planner takes it at first.
+    target : (position, attitude)
+        Target of the end-effector, in orbit axes from where the base started.
+    truth : InertialParameters
+        True base.
+    identification : Identification
+        Identification of the base from one recorded manoeuvre.
+    first, again : Flight
+        Flights planned with the guessed and with the identified base.
+    trials : tuple of Trial
+        Predictions of the first path with the guess and as identified, and of the second path as identified.
+    """
 
     guess: Guess
-    target: tuple[Floats, Floats]
+    target: FlownPose
     truth: InertialParameters
     identification: Identification
     first: Flight
     again: Flight
     trials: tuple[Trial, ...]
-    """The first path with the guess and as identified, and the second path as identified."""
 
 
 def analyse(
@@ -77,41 +106,31 @@ def analyse(
     duration: float,
     progress: Callable[[str], None],
 ) -> Case:
-    """Plan with a guess, fly, identify, and plan again."""
+    """Plan with a guess, fly, identify, and plan again; parameters as in `studies.planning.run`."""
     rng = np.random.default_rng(seed)
     before = model_of(guess)
-    target = fly(Swing(START, REACHED, duration), duration).tip
+    target = fly(Swing(START, REACHED, duration)).tip
     progress(f"{guess.title}: planning")
     predictor = predictor_of(before, Swing(START, START, duration))
     first = flight_of(plan(predictor, before, target, duration), target, duration)
     progress("identifying")
     result = identify(Posterior.of(before, [measure(seed)]), seed, effective_samples=effective_samples)
-    after = identified(before, result)
+    after = updated_model(before, InertialDraws.of(result))
     progress("planning again")
-    again_predictor = predictor_of(after, Swing(START, START, duration))
-    again = flight_of(plan(again_predictor, after, target, duration), target, duration)
+    identified = predictor_of(after, Swing(START, START, duration))
+    again = flight_of(plan(identified, after, target, duration), target, duration)
     trials = []
     for title, model, like, flight in (
         ("first path, guessed base", before, predictor, first),
-        ("first path, identified base", after, again_predictor, first),
-        ("second path, identified base", after, again_predictor, again),
+        ("first path, identified base", after, identified, first),
+        ("second path, identified base", after, identified, again),
     ):
-        swing = Swing(START, flight.goal, duration)
-        trials.append(_trial(title, predictor_of(model, swing, like).predict(draws, rng), flight.flown))
-    truth = ets7().link(BASE).inertial
-    return Case(guess, target, truth, result, first, again, tuple(trials))
+        prediction = predictor_of(model, Swing(START, flight.goal, duration), like).predict(draws, rng)
+        trials.append(Trial(title, prediction, flight.flown))
+    return Case(guess, target, ets7().link(BASE).inertial, result, first, again, tuple(trials))
 
 
-def identified(model: Model, result: Identification) -> Model:
-    """Return the model whose prior is the posterior of a result."""
-    prior = joint_prior(InertialDraws.of(result))
-    robot = model.robot
-    for name, centre in zip(prior.names, prior.centres, strict=True):
-        robot = robot.with_inertial(name, centre)
-    return replace(model, robot=robot, priors=prior.bodies(), mixing=prior.mixing())
-
-
-def plan(predictor: BasePredictor, model: Model, target: tuple[Floats, Floats], duration: float) -> Floats:
+def plan(predictor: BasePredictor, model: Model, target: FlownPose, duration: float) -> Floats:
     """Return the joint positions that bring the end-effector to a pose, with the model's base at its prior's centre."""
 
     def miss(goal: Floats) -> Floats:
@@ -119,8 +138,7 @@ def plan(predictor: BasePredictor, model: Model, target: tuple[Floats, Floats], 
         turn = Rotation.from_quat(tip.attitude[0, -1]) * Rotation.from_quat(target[1]).inv()
         return np.concatenate([tip.position[0, -1] - target[0], ARM * turn.as_rotvec()])
 
-    found = least_squares(miss, START, xtol=1e-10, ftol=1e-12, gtol=1e-12, max_nfev=60)
-    return np.asarray(found.x)
+    return np.asarray(least_squares(miss, START, xtol=1e-10, ftol=1e-12, gtol=1e-12, max_nfev=60).x)
 
 
 def predictor_of(model: Model, swing: Swing, like: BasePredictor | None = None) -> BasePredictor:
@@ -129,24 +147,9 @@ def predictor_of(model: Model, swing: Swing, like: BasePredictor | None = None) 
     return BasePredictor(model, Manoeuvre(Recording("path", None, time, {}), swing, ATTITUDE), TIP, like)
 
 
-def flight_of(goal: Floats, target: tuple[Floats, Floats], duration: float) -> Flight:
-    """Fly to a goal and measure how far from the target it ends."""
-    flown = fly(Swing(START, goal, duration), duration)
+def flight_of(goal: Floats, target: FlownPose, duration: float) -> Flight:
+    """Fly to a goal and measure how far from the target the end-effector ends."""
+    flown = fly(Swing(START, goal, duration))
+    turn = Rotation.from_quat(flown.tip[1]) * Rotation.from_quat(target[1]).inv()
     miss = float(np.linalg.norm(flown.tip[0] - target[0]))
-    return Flight(goal, flown, miss, _angle(flown.tip[1], target[1]))
-
-
-def _trial(title: str, prediction: Prediction, flown: Flown) -> Trial:
-    poses = {"base": (prediction.base.pose(), flown.base), "tip": (prediction.tip.pose(), flown.tip)}
-    errors = {
-        body: (
-            float(np.linalg.norm(pose.millimetres.mean - 1e3 * place)),
-            _angle(pose.mean_attitude, attitude),
-        )
-        for body, (pose, (place, attitude)) in poses.items()
-    }
-    return Trial(title, prediction, errors, {body: pose.holds(*real) for body, (pose, real) in poses.items()})
-
-
-def _angle(one: Floats, other: Floats) -> float:
-    return float(np.degrees((Rotation.from_quat(one) * Rotation.from_quat(other).inv()).magnitude()))
+    return Flight(goal, flown, miss, float(np.degrees(turn.magnitude())))

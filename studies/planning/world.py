@@ -4,25 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from bayesid import BodyPrior, Excitation, InertialParameters, Kind, Manoeuvre, Model, Orbit, Sensor, White
-from bayesid.recording.joint_motion import Motion
-from bayesid.robot.inertial_parameters import parameters_from_pseudo_inertia
+from bayesid import BodyPrior, Excitation, InertialParameters, Manoeuvre, Model
+from bayesid._math.arrays import Floats
 from bayesid.robot.joint_state import JointState
-from bayesid.robot.log_cholesky import log_cholesky_factor, upper_cholesky
-from bayesid.simulation.effects import GravityGradient
 from studies.base_body import paper
 from studies.common import flight
-from studies.common.ets7 import ACCEL, ACCELEROMETER, BASE, ENCODER, RADIUS, RATE, TIP, ets7
+from studies.common.ets7 import BASE, TIP, ets7
+from studies.common.ets7_model import NOISE, orbiting_model
 from studies.common.flight import prescribed, true_robot
+from studies.common.guesses import guess_about
+from studies.truth.numerics import quintic_step
 
-__all__ = ["Flown", "Guess", "Swing", "drawn_guess", "fly", "guess_about", "measure", "model_of", "paper_guess"]
+__all__ = ["Flown", "FlownPose", "Guess", "Swing", "drawn_guess", "fly", "measure", "model_of", "paper_guess"]
 
-Floats = NDArray[np.floating]
+FlownPose = tuple[Floats, Floats]
+"""Position (3,) [m] and quaternion x, y, z, w to orbit axes, counted in orbit axes from where the base started."""
 
 INTERVAL = 0.5
 """Time between samples of all sensors [s]."""
@@ -32,7 +31,7 @@ EXCITATION = Excitation(
     amplitude=np.array([-0.9, -0.2, -0.6, 0.0, 0.0, 0.0]),
     frequency=0.2,
 )
-"""The manoeuvre that is flown to identify the base."""
+"""Manoeuvre that is flown to identify the base."""
 
 INITIAL_RATE = 1e-4
 """Standard deviation of the true initial rate of that manoeuvre about each axis [rad/s]."""
@@ -41,10 +40,10 @@ ATTITUDE = Rotation.from_euler("xyz", [0.4, -0.3, 0.8]).as_quat()
 """Attitude of the base when the planned path starts, a quaternion from base to orbit axes."""
 
 DURATION = 60.0
-"""Length of the planned path [s]."""
+"""Duration of the planned path [s]."""
 
 SPREAD, FAR = 0.15, 1.0
-"""Relative widths of the priors in log-Cholesky coordinates."""
+"""Relative widths of the priors about a drawn guess and about the paper's, in log-Cholesky coordinates."""
 
 STEP = 0.1
 """Integration step of MuJoCo [s]."""
@@ -52,7 +51,7 @@ STEP = 0.1
 
 @dataclass(frozen=True)
 class Guess:
-    """What the planner takes the base for, and how sure it is."""
+    """Base as the planner takes it, with the relative width of its prior."""
 
     title: str
     body: InertialParameters
@@ -61,15 +60,23 @@ class Guess:
 
 @dataclass(frozen=True)
 class Flown:
-    """Final pose of base and end-effector: positions [m] and quaternions in orbit axes, from where the base started."""
+    """Final poses of base and end-effector."""
 
-    base: tuple[Floats, Floats]
-    tip: tuple[Floats, Floats]
+    base: FlownPose
+    tip: FlownPose
 
 
 @dataclass(frozen=True)
 class Swing:
-    """A path in joint space: each joint goes from rest to rest on a quintic."""
+    """A path in joint space on which each joint goes from rest to rest on a quintic.
+
+    Parameters
+    ----------
+    start, goal : (6,) arrays
+        Joint positions before and after [rad].
+    duration : float
+        Duration of the path [s].
+    """
 
     start: Floats
     goal: Floats
@@ -77,26 +84,15 @@ class Swing:
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,)."""
-        x = np.clip(np.asarray(time, dtype=float) / self.duration, 0.0, 1.0)[:, None]
-        way = self.goal - self.start
-        share = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
-        speed = 30.0 * x**2 * (1.0 - x) ** 2 / self.duration
-        bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) / self.duration**2
-        return JointState(self.start + share * way, speed * way, bend * way)
+        steps = [quintic_step(instant / self.duration) for instant in np.asarray(time, dtype=float)]
+        value, slope, bend = np.array(steps).T[:, :, None] * (self.goal - self.start)
+        return JointState(self.start + value, slope / self.duration, bend / self.duration**2)
 
 
 def drawn_guess(seed: int) -> Guess:
-    """Draw a guess of the base (`guess_about`)."""
-    truth = ets7().link(BASE).inertial
-    body = guess_about(truth, SPREAD, np.random.default_rng(seed))
+    """Draw a guess of the base such that the truth is a draw of the prior about it."""
+    body = guess_about(ets7().link(BASE).inertial, SPREAD, np.random.default_rng(seed))
     return Guess(f"Base guessed to {100.0 * SPREAD:g} %", body, SPREAD)
-
-
-def guess_about(truth: InertialParameters, spread: float, rng: np.random.Generator) -> InertialParameters:
-    """Draw a guess such that the truth is a draw of the prior about it: the inverse of the prior's relative factor."""
-    factor = np.asarray(log_cholesky_factor(jnp.asarray(spread * rng.normal(size=10))))
-    guess = upper_cholesky(truth.pseudo_inertia) @ np.linalg.inv(factor)
-    return InertialParameters.from_vector(np.asarray(parameters_from_pseudo_inertia(jnp.asarray(guess @ guess.T))))
 
 
 def paper_guess() -> Guess:
@@ -106,15 +102,13 @@ def paper_guess() -> Guess:
 
 def model_of(guess: Guess) -> Model:
     """Return the model of the planner: the arm is known, the base is not."""
-    robot = ets7().with_inertial(BASE, guess.body)
-    sensors = (Sensor(Kind.RATE, White(RATE)), Sensor(Kind.ACCEL, White(ACCEL), position=ACCELEROMETER))
-    return Model(robot, sensors, (BodyPrior(BASE, guess.body, guess.spread),), Orbit(RADIUS), (GravityGradient(),))
+    return orbiting_model(ets7().with_inertial(BASE, guess.body), [BodyPrior(BASE, guess.body, guess.spread)])
 
 
-def fly(motion: Motion, duration: float) -> Flown:
-    """Fly a planned path from rest."""
-    model = true_robot(ets7())
-    truth = model.run(prescribed(motion, [duration], STEP), [duration], attitude0=ATTITUDE, step=STEP)
+def fly(swing: Swing) -> Flown:
+    """Fly a planned path from rest and return the final poses."""
+    model, end = true_robot(ets7()), [swing.duration]
+    truth = model.run(prescribed(swing, end, STEP), end, attitude0=ATTITUDE, step=STEP)
     body = model.data.body(TIP)
     tip = Rotation.from_matrix(np.array(body.xmat).reshape(3, 3)).as_quat()
     return Flown((np.array(model.data.qpos[:3]), truth.attitude[-1]), (np.array(body.xpos), tip))
@@ -125,4 +119,4 @@ def measure(seed: int) -> Manoeuvre:
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, EXCITATION.duration, INTERVAL)
     truth = flight.fly(ets7(), EXCITATION, time, rate=INITIAL_RATE * rng.standard_normal(3), step=STEP)
-    return flight.record(truth, "identification", ets7(), {"position": ENCODER, "rate": RATE, "accel": ACCEL}, rng)
+    return flight.record(truth, "identification", ets7(), NOISE, rng)

@@ -1,7 +1,7 @@
 """Two causes that a first manoeuvre cannot tell apart, and the manoeuvre designed to separate them.
 
 Momentum left in the wheels of a slowly drifting base makes a torque that is nearly constant; so does a leaking valve.
-One of them is hidden with MuJoCo, both are fitted, and the Bayes factor is taken before and after the designed
+One of them is hidden with MuJoCo, both are fitted, and the Bayes factor is evaluated before and after the designed
 manoeuvre. ``python -m studies.separating`` writes ``reports/separating.pdf``.
 """
 
@@ -12,16 +12,19 @@ from pathlib import Path
 
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import Search, Store
+from bayesid.recording.joint_motion import Motion
 from studies.common.command import Command
+from studies.common.ets7 import START, FlightManoeuvre
 from studies.ets7_limits.setting import DURATION, POINTS
-from studies.separating.analysis import STAGES, Result, design_stage, expectations, motions_of, realise
-from studies.separating.pairs import pairs
+from studies.separating.analysis import Result, diagnosed_causes, expectations, realise
+from studies.separating.expected import pairs
+from studies.separating.manoeuvres import design_both, separating_problem
 from studies.separating.report import write_report
-from studies.separating.verdicts import verdicts
 
 __all__ = ["Result", "main", "run"]
 
 SEARCH = Search(starts=2, iterations=50)
+"""Effort of each design, minutes on two cores."""
 
 
 def run(
@@ -40,32 +43,36 @@ def run(
     Parameters
     ----------
     seed : int
-        Every random number follows from it.
+        Seed of all random numbers.
     duration : float
-        Of the designed manoeuvres [s].
+        Duration of every manoeuvre [s].
     points : int
-        Free control points of every joint.
+        Number of free control points of every joint.
     search : Search
+        Effort of each design.
     noises : int
-        Recordings of every flight.
+        Number of noisy recordings of every flight.
     diagnosed : bool
-        Whether to ask `diagnose` too.
+        True to run the package's diagnosis too.
     store : Store, optional
-        Keeps what the search found.
+        Store that keeps the results of the searches.
+    progress : callable, optional
+        Receives a line on what is being done.
     """
-    designs = design_stage(duration, points, seed, search, store or Store.forgetful(), progress)
-    motions = motions_of(designs)
+    designs = design_both(separating_problem(duration, points), seed, search, store or Store.forgetful(), progress)
+    motions: dict[str, Motion] = {"first": FlightManoeuvre(START)}
+    motions |= {name: item.motion for name, item in designs.items()}
     expected, directions = expectations(motions, duration, seed)
     realised, sampled = realise(motions, duration, noises, seed, progress)
-    found = verdicts(motions, STAGES, duration, seed, progress) if diagnosed else {}
-    return Result(pairs(duration), designs, expected, directions, realised, sampled, found, duration)
+    verdicts = diagnosed_causes(motions, duration, seed, progress) if diagnosed else {}
+    return Result(pairs(duration), designs, expected, directions, realised, sampled, verdicts, duration)
 
 
 COMMAND = Command(
     "separating",
     "Tell apart what a first manoeuvre confuses.",
     seed=1,
-    extra={"--store": {"type": Path, "help": "file that keeps what the search found, for an interrupted run"}},
+    extra={"--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"}},
 )
 
 

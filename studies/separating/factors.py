@@ -1,4 +1,4 @@
-"""Realised log Bayes factors: flights of the independent simulator, both rivals fitted."""
+"""Realised log Bayes factors: flights of the independent simulator, to which models with either rival are fitted."""
 
 from __future__ import annotations
 
@@ -7,36 +7,38 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, Posterior
+from bayesid._math.arrays import Floats
 from bayesid.inference import maximise
 from bayesid.inference.importance import choose_parameterisation, importance_sample
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.recording.joint_motion import Motion
 from studies.common.flight import light_wheel
 from studies.ets7_limits.flights import fly, record
-from studies.separating.setting import DRIFT, RIVALS, rival_model
+from studies.separating.setting import DRIFT, rival_model, rival_of
 from studies.truth.mujoco import Truth, leak
 
 __all__ = ["Flown", "Rivalry", "Sampled", "flown", "noisy"]
 
-Floats = NDArray[np.floating]
-
 
 @dataclass(frozen=True)
 class Flown:
-    """A flight: what the joints did, and what truly happened."""
+    """Motion of the joints in a flight, and what truly happened."""
 
     motion: Motion
     run: Truth
 
 
 def flown(motion: Motion, duration: float, truth: str, amplitude: Floats) -> Flown:
-    """Fly a manoeuvre with one of the rivals at work.
+    """Fly a manoeuvre with one of the rivals hidden.
 
     Parameters
     ----------
+    motion : Motion
+        Motion of the joints.
+    duration : float
+        Duration of the flight [s].
     truth : str
         Label of the rival, or empty for none.
     amplitude : (3,) array
@@ -50,9 +52,28 @@ def flown(motion: Motion, duration: float, truth: str, amplitude: Floats) -> Flo
     return Flown(motion, fly(motion, duration, DRIFT, **hidden))
 
 
+def noisy(flights: Mapping[str, Flown], names: Sequence[str], seed: int) -> list[Manoeuvre]:
+    """Record some flights with the joints exactly known; the noise of each follows from the seed and its name."""
+    manoeuvres = []
+    for name in names:
+        rng = np.random.default_rng([seed, *name.encode()])
+        manoeuvres.append(replace(record(flights[name].run, name, rng), motion=flights[name].motion))
+    return manoeuvres
+
+
 @dataclass(frozen=True)
 class Sampled:
-    """A log Bayes factor by importance sampling beside Laplace's, with the larger Pareto k-hat of the two models."""
+    """A log Bayes factor by Laplace's approximation and by importance sampling.
+
+    Attributes
+    ----------
+    laplace : float
+        Value by Laplace's approximation.
+    sampled, error : float
+        Value by importance sampling, and its standard error.
+    pareto_k : float
+        Larger Pareto k-hat of the two models.
+    """
 
     laplace: float
     sampled: float
@@ -62,32 +83,37 @@ class Sampled:
 
 @dataclass
 class Rivalry:
-    """The models with nothing, and with each of the rivals; compiled functions are kept between noises."""
+    """Models with neither and with each of the rivals, whose compiled functions are kept between noises.
+
+    Attributes
+    ----------
+    known : dict of (str, int) to Posterior
+        Posteriors by label and number of recordings.
+    """
 
     known: dict[tuple[str, int], Posterior] = field(default_factory=dict)
 
     def posterior(self, label: str, manoeuvres: Sequence[Manoeuvre]) -> Posterior:
         """Return the posterior of the model with one rival, or with neither where the label is empty."""
-        like = self.known.get((label, len(manoeuvres)))
-        if like is not None:
-            return with_manoeuvres(like, manoeuvres)
-        self.known[label, len(manoeuvres)] = Posterior.of(rival_model([label]), manoeuvres)
-        return self.known[label, len(manoeuvres)]
+        key = label, len(manoeuvres)
+        if key not in self.known:
+            self.known[key] = Posterior.of(rival_model([label]), manoeuvres)
+        return with_manoeuvres(self.known[key], manoeuvres)
 
     def log_evidence(self, label: str, manoeuvres: Sequence[Manoeuvre], rng: np.random.Generator) -> float:
-        """Laplace's log evidence of one model."""
+        """Return the log evidence of one model by Laplace's approximation."""
         refined, optimum = maximise(self.posterior(label, manoeuvres), rng)
         return optimum.log_evidence(refined)
 
     def log_factor(self, truth: str, manoeuvres: Sequence[Manoeuvre], rng: np.random.Generator) -> float:
-        """Log Bayes factor of the truth against its rival."""
-        own, other = (self.log_evidence(label, manoeuvres, rng) for label in _ordered(truth))
-        return own - other
+        """Return the log Bayes factor of the truth against its rival by Laplace's approximation."""
+        true, rival = (self.log_evidence(label, manoeuvres, rng) for label in (truth, rival_of(truth)))
+        return true - rival
 
     def sampled(self, truth: str, manoeuvres: Sequence[Manoeuvre], rng: np.random.Generator) -> Sampled:
-        """Log Bayes factor by Laplace's approximation and by importance sampling."""
+        """Return the log Bayes factor by Laplace's approximation and by importance sampling."""
         laplace, values = [], []
-        for label in _ordered(truth):
+        for label in (truth, rival_of(truth)):
             refined, optimum = maximise(self.posterior(label, manoeuvres), rng)
             laplace.append(optimum.log_evidence(refined))
             values.append(importance_sample(choose_parameterisation(refined, optimum, rng), optimum, rng))
@@ -97,16 +123,3 @@ class Rivalry:
             error=float(np.hypot(values[0].error, values[1].error)),
             pareto_k=max(value.pareto_k for value in values),
         )
-
-
-def noisy(flights: Mapping[str, Flown], names: Sequence[str], seed: int) -> list[Manoeuvre]:
-    """Record flights with the noise of one seed, the joints exactly known; a flight's noise is its own."""
-    found = []
-    for name in names:
-        rng = np.random.default_rng([seed, *name.encode()])
-        found.append(replace(record(flights[name].run, name, rng), motion=flights[name].motion))
-    return found
-
-
-def _ordered(truth: str) -> tuple[str, str]:
-    return truth, next(label for label in RIVALS if label != truth)

@@ -4,43 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bayesid.design import (
-    BSplines,
-    DOptimal,
-    Plan,
-    Problem,
-    Search,
-    Separation,
-    Store,
-    Tip,
-    optimise,
-)
-from bayesid.design.design_problem import Reached
+from bayesid._math.arrays import Floats
+from bayesid.design import BSplines, DOptimal, Plan, Problem, Search, Separation, Store, Tip, optimise
+from bayesid.design.design_problem import Known
 from bayesid.design.plan import Trajectory
 from bayesid.design.trajectories import ParameterisedMotion
 from studies.common.ets7 import LIMITS, START, TIP
 from studies.ets7_limits.setting import DURATION, INTERVAL, POINTS
 from studies.separating.setting import RIVALS, drifting, rival_model
 
-__all__ = ["Designed", "Drifting", "design_both", "separating_problem"]
-
-Floats = NDArray[np.floating]
-
-
-@dataclass(frozen=True)
-class Drifting(Problem):
-    """A problem whose manoeuvres start at the rate that the first manoeuvre has shown."""
-
-    @cached_property
-    def centre(self) -> Floats:
-        """The prior's centre, at that rate."""
-        return drifting(self.plan.model, self.plan.unknowns.names)
+__all__ = ["Designed", "design_both", "separating_problem"]
 
 
 @dataclass(frozen=True)
@@ -49,38 +26,42 @@ class Designed:
 
     Attributes
     ----------
-    name : str
-        Of its criterion.
     parameters : (n,) array
+        Parameters of the motion in its family.
     costs : mapping of str to float
-        Of all criteria.
-    reached : list of Reached
+        Values of both criteria by name.
+    largest : dict of str to float
+        Largest values of the limited quantities by name.
     motion : ParameterisedMotion
+        Motion of the joints.
     trajectory : Trajectory
+        Motion of the robot at the prior's centre.
     """
 
-    name: str
     parameters: Floats
     costs: dict[str, float]
-    reached: list[Reached]
+    largest: dict[str, float]
     motion: ParameterisedMotion
     trajectory: Trajectory
 
 
-def separating_problem(duration: float = DURATION, points: int = POINTS, thinning: int = 4) -> Drifting:
-    """Return the problem: six joints on B-splines within the flight rules, separation and volume as criteria."""
+def separating_problem(duration: float = DURATION, points: int = POINTS, thinning: int = 4) -> Problem:
+    """Return the problem: six joints on B-splines within the flight rules, separation and volume as criteria.
+
+    Manoeuvres start at the rate that the first manoeuvre has shown.
+    """
     model = rival_model(RIVALS)
     family = BSplines(START, range(len(START)), duration, points)
     plan = Plan(model, family, INTERVAL, Tip.of(model.robot, TIP), thinning=thinning)
     criteria: Any = (Separation(RIVALS), DOptimal())  # frozen, which the protocol's attributes are not
-    return Drifting(plan, LIMITS, criteria)
+    return Problem(plan, LIMITS, criteria, Known(drifting(plan.unknowns), np.eye(plan.unknowns.size)))
 
 
 def design_both(
-    problem: Drifting, seed: int, search: Search, store: Store, progress: Callable[[str], None]
+    problem: Problem, seed: int, search: Search, store: Store, progress: Callable[[str], None]
 ) -> dict[str, Designed]:
-    """Design by both criteria, each from its own random starts, the same for both."""
-    found, family = {}, problem.plan.family
+    """Design by both criteria, each from the same random starts."""
+    designs = {}
     for criterion in problem.criteria:
         kept = store.of(criterion.name)
         best = optimise(
@@ -91,13 +72,12 @@ def design_both(
             known=kept.known,
             keep=kept.keep,
             progress=lambda fraction, text: progress(text),
+        ).parameters
+        designs[criterion.name] = Designed(
+            parameters=best,
+            costs=problem.costs(best),
+            largest={item.name: item.largest for item in problem.reached(best)},
+            motion=problem.plan.family.motion(best),
+            trajectory=problem.trajectory(best),
         )
-        found[criterion.name] = Designed(
-            name=criterion.name,
-            parameters=best.parameters,
-            costs=problem.costs(best.parameters),
-            reached=problem.reached(best.parameters),
-            motion=family.motion(best.parameters),
-            trajectory=problem.trajectory(best.parameters),
-        )
-    return found
+    return designs

@@ -1,53 +1,54 @@
-"""The study's report."""
+"""Report of the study."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from bayesid.report import Document
+from bayesid._io.words import joined
+from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
-from bayesid.report.numbers import format_number
+from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
 from studies.common.ets7 import ACCEL, RATE
+from studies.common.report_parts import columns
 from studies.ets7_limits.figures import manoeuvre_figure
 from studies.ets7_limits.setting import INTERVAL
-from studies.separating.analysis import STAGES, Result
-from studies.separating.setting import DRIFT, SPREAD, TRUTHS
+from studies.separating.analysis import Result
+from studies.separating.setting import DRIFT, SPREAD, STAGES, TRUTHS
 
 __all__ = ["factor_figure", "write_report"]
 
 RIVALRY = 2.7
-"""Log Bayes factor within which two causes are rivals."""
+"""Log Bayes factor within which two causes are rivals, as in the package's diagnosis."""
 
 HIDDEN = {
-    "wheel-momentum": f"a wheel momentum of ({', '.join(f'{v:g}' for v in TRUTHS['wheel-momentum'])}) N m s",
-    "thruster-leak": f"a leak's torque of ({', '.join(f'{1e3 * v:g}' for v in TRUTHS['thruster-leak'])}) mN m",
+    "wheel-momentum": f"a wheel momentum of {format_vector(TRUTHS['wheel-momentum'])} N m s",
+    "thruster-leak": f"a leak's torque of {format_vector(1e3 * TRUTHS['thruster-leak'])} mN m",
 }
+"""Words for what is hidden."""
 
 
 def write_report(result: Result, output: Path) -> None:
     """Write the report as PDF."""
     document = Document("Telling two causes apart", "A manoeuvre designed to separate rivals, ETS-VII in MuJoCo")
-    document.section("What was asked, and what came out")
+    document.section("Question and answer")
     document.paragraph(
         "Momentum left in the wheels of a base that drifts slowly makes a torque, rate × momentum, that is nearly "
         "constant. So does a leaking valve. On a small first manoeuvre the two look alike. A second manoeuvre was "
-        "designed for the signal of each that the other cannot imitate; MuJoCo hid one of the two, then the other, and "
-        "the models were compared by their evidence, with base body and initial rates unknown."
+        "designed for the part of each signal that the other cannot imitate. MuJoCo hid one of the two, then the "
+        "other, and the models were compared by their evidence, with base body and initial rates unknown."
     )
     for item in result.realised:
-        before, after = item.factors["first alone"], item.factors["first, separating"]
-        other = item.factors["first, d-optimal"]
+        before, other, after = (_range(item.factors[stage]) for stage in STAGES)
         document.paragraph(
-            f"Hidden: {HIDDEN[item.truth]}. The first manoeuvre sees that something is there: the log Bayes "
-            "factor of the "
-            f"truth against no cause is {item.detected.min():.1f} to {item.detected.max():.1f} over "
-            f"{len(before)} noises. "
-            f"Against the rival it is {_range(before)}, where 2.7 is asked for to name a cause. "
-            "With the separating manoeuvre it is "
-            f"{_range(after)}, with a d-optimal manoeuvre of the same duration and limits {_range(other)}."
+            f"Hidden: {HIDDEN[item.truth]}. With the first manoeuvre alone, the log Bayes factor of the truth against "
+            f"no cause is {_range(item.detected)} over {len(item.detected)} noises, and against the rival {before}, "
+            f"where {RIVALRY} is required to name a cause. With the separating manoeuvre the latter is {after}, and "
+            f"with a d-optimal manoeuvre of the same duration and limits {other}."
         )
     document.paragraph(_verdict(result))
     _factors(document, result)
@@ -60,129 +61,113 @@ def write_report(result: Result, output: Path) -> None:
 
 
 def _range(values: np.ndarray) -> str:
-    return f"{values.mean():.1f} on average ({values.min():.1f} to {values.max():.1f})".replace("-", "−")
+    mean, low, high = (format_fixed(value, 1) for value in (values.mean(), values.min(), values.max()))
+    return f"{mean} on average ({low} to {high})"
 
 
 def _verdict(result: Result) -> str:
-    means = {(item.truth, stage): float(item.factors[stage].mean()) for item in result.realised for stage in STAGES}
     worse = [
         item.truth
         for item in result.realised
-        if means[item.truth, "first, separating"] < means[item.truth, "first, d-optimal"]
+        if item.factors["first, separating"].mean() < item.factors["first, d-optimal"].mean()
     ]
     if not worse:
-        return "Both ways the d-optimal manoeuvre separates less than the designed one."
+        return "Whichever cause is hidden, the d-optimal manoeuvre separates less than the separating one."
     return (
-        f"Not both ways is the designed manoeuvre the better one: where {' and '.join(worse)} is hidden, in the "
-        "direction chosen here, the d-optimal one separates more. The criterion adds up what is left of a "
-        "rival over all "
-        "its parameters, so that a direction that happens to be hard to see may be left out; over all directions see "
-        "below."
+        f"Where {joined(worse)} is hidden, in the direction chosen here, the d-optimal manoeuvre separates more than "
+        "the separating one. The criterion adds up the part of a rival's signal that cannot be imitated over all its "
+        "parameters, so that a direction that is hard to see may be neglected. The section on other directions shows "
+        "what holds over all of them."
     )
 
 
 def _factors(document: Document, result: Result) -> None:
-    document.section("Bayes factors, predicted and realised")
+    document.section("Bayes factors, expected and realised")
     rows = []
     for item in result.realised:
         for stage, values in item.factors.items():
-            own = result.expected[item.truth, stage]
-            cells = [own.alone, own.energy, own.log_factor, values.mean(), values.std(ddof=1)]
-            rows.append(
-                [
-                    item.truth,
-                    stage,
-                    *(f"{cell:.1f}".replace("-", "−") for cell in cells),
-                    f"{np.sqrt(own.apart):.1f}",
-                    f"{(values > RIVALRY).sum()} of {len(values)}",
-                ]
-            )
+            expected = result.expected[item.truth, stage]
+            cells = [
+                expected.alone,
+                expected.energy,
+                expected.log_factor,
+                values.mean(),
+                values.std(ddof=1),
+                expected.sd,
+            ]
+            above = f"{(values > RIVALRY).sum()} of {len(values)}"
+            rows.append([item.truth, stage, *(format_fixed(float(cell), 1) for cell in cells), above])
+    titles = ["λ", "λ(1−ρ²)/2", "expected ln B", "mean ln B", "sd ln B", "expected sd", f"ln B > {RIVALRY}"]
     document.table(
-        [
-            "hidden",
-            "manoeuvres",
-            "λ",
-            "λ(1−ρ²)/2",
-            "expected ln B",
-            "mean ln B",
-            "sd ln B",
-            "expected sd",
-            "ln B > 2.7",
-        ],
+        ["hidden", "manoeuvres", *titles],
         rows,
-        "λ: energy of the hidden cause's signal in units of the noise, base and initial rates marginalised; "
-        "λ(1−ρ²): what "
-        "the rival cannot imitate. The expected ln B adds what each prior costs (the wheels have three parameters, the "
-        "leak six) to λ(1−ρ²)/2; both are linear theory before the flight. Mean and standard deviation are over the "
-        "noises, evidences by Laplace's approximation.",
-        ["left", "left", *["right"] * 7],
+        "λ is the energy of the hidden cause's signal in units of the noise, with base and initial rates "
+        "marginalised; λ(1−ρ²) is the part that the rival cannot imitate. The expected log Bayes factor ln B adds the "
+        "cost of each prior (the wheels have three parameters, the leak six) to λ(1−ρ²)/2; both are linear theory "
+        "before the flight. Mean and standard deviation (sd) are over the noises, with evidences by Laplace's "
+        "approximation.",
+        columns("llrrrrrrr"),
     )
     document.figure(
         factor_figure(result),
-        "Log Bayes factor of the truth against its rival: every noise (points), the "
-        "mean expected by linear theory with its standard deviation (bars). The grey line is 2.7.",
+        "Log Bayes factor of the truth against its rival: the value of each noise (points), and the mean expected by "
+        f"linear theory with its standard deviation (bars). The grey line is {RIVALRY}.",
     )
-    for truth, found in result.sampled.items():
+    for truth, sampled in result.sampled.items():
         document.paragraph(
-            f"Check of Laplace's approximation, {truth} hidden, first noise, with the separating manoeuvre: "
-            f"ln B = {found.laplace:.2f}, by importance sampling {found.sampled:.2f} ± {found.error:.2f} (Pareto k-hat "
-            f"{found.pareto_k:.2f})."
+            f"Check of Laplace's approximation with {truth} hidden, on the first noise and the separating manoeuvre: "
+            f"ln B is {format_fixed(sampled.laplace, 2)}, and by importance sampling "
+            f"{format_quantity(sampled.sampled, sampled.error)} (Pareto k-hat {sampled.pareto_k:.2f})."
         )
 
 
 def _directions(document: Document, result: Result) -> None:
     document.section("Other directions")
-    rows = []
-    for (truth, stage), energies in result.directions.items():
-        low, middle, high = np.quantile(energies, [0.1, 0.5, 0.9])
-        rows.append(
-            [
-                truth,
-                stage,
-                *(format_number(float(v), 2) for v in (low, middle, high)),
-                f"{(energies > RIVALRY).mean():.0%}",
-            ]
-        )
     document.table(
-        ["hidden", "manoeuvres", "10 % quantile", "median", "90 % quantile", "above 2.7"],
-        rows,
-        f"λ(1−ρ²)/2, predicted, of effects of the same size in {len(next(iter(result.directions.values())))} random "
+        ["hidden", "manoeuvres", "10 % quantile", "median", "90 % quantile", f"above {RIVALRY}"],
+        [
+            [*key, *_numbers(np.quantile(energies, [0.1, 0.5, 0.9]), 2), f"{(energies > RIVALRY).mean():.0%}"]
+            for key, energies in result.directions.items()
+        ],
+        f"Predicted λ(1−ρ²)/2 of effects of the same size in {len(next(iter(result.directions.values())))} random "
         "directions.",
-        ["left", "left", *["right"] * 4],
+        columns("llrrrr"),
     )
+
+
+def _numbers(values: Iterable[float], digits: int = 3) -> list[str]:
+    return [format_number(float(value), digits) for value in values]
 
 
 def _pairs(document: Document, result: Result) -> None:
     document.section("How the rivals were chosen")
     document.paragraph(
-        "For every pair of five candidates the noncentrality on the first manoeuvre was computed, at the amplitudes of "
-        "their priors and summed over their parameters: alone, and with the rival of any size marginalised. A leak "
+        "For every pair of five candidates the noncentrality on the first manoeuvre was computed, at the amplitudes "
+        "of their priors and summed over their parameters: alone, and with the rival of any size marginalised. A leak "
         "and a drift of the rate sensor, or a leak and an accelerometer bias, are still more alike. Wheels and leak "
-        "were taken because a motion of the base decides between them: the wheels' torque follows the rate, the "
-        "leak's does not. No manoeuvre was designed for the other pairs."
+        "were chosen because a motion of the base decides between them: the torque of the wheels follows the rate, "
+        "that of the leak does not. No manoeuvre was designed for the other pairs."
     )
     document.table(
-        ["pair", "alone", "with the rival", "least part left"],
+        ["pair", "alone", "with the rival", "smaller remaining fraction"],
         [
             [
-                " / ".join(pair.labels),
-                " / ".join(format_number(value) for value in pair.alone),
-                " / ".join(format_number(value) for value in pair.apart),
-                f"{format_number(100.0 * pair.left, 2)} %",
+                *(" / ".join(texts) for texts in (pair.labels, _numbers(pair.alone), _numbers(pair.apart))),
+                format_percent(pair.left, 2),
             ]
             for pair in result.pairs
         ],
         "Noncentralities on the first manoeuvre, the most alike pairs first.",
-        ["left", "right", "right", "right"],
+        columns("lrrr"),
     )
 
 
 def _manoeuvres(document: Document, result: Result) -> None:
     document.section("The manoeuvres")
     document.paragraph(
-        "The first manoeuvre is that of the flight: joints 2 to 4 by 0.264, −0.321 and 0.057 rad, out and back. Both "
-        "designed manoeuvres move all six joints on B-splines within 50 mm/s and 5 degrees per second at the tip; both "
-        "searches began at the same random starts."
+        "The first manoeuvre is that of the flight: joints 2 to 4 move by 0.264, −0.321 and 0.057 rad, out and back. "
+        "Both designed manoeuvres move all six joints on B-splines within 50 mm/s and 5 degrees per second at the "
+        "tip; both searches began at the same random starts."
     )
     document.table(
         ["designed by", "sum λ(1−ρ²), weaker rival", "half log-determinant", "tip speed [mm/s]", "tip rate [deg/s]"],
@@ -190,56 +175,53 @@ def _manoeuvres(document: Document, result: Result) -> None:
             [
                 name,
                 format_number(float(np.exp(-2.0 * item.costs["separation"]))),
-                f"{item.costs['d-optimal']:.1f}".replace("-", "−"),
-                *(
-                    f"{scale * next(r.largest for r in item.reached if r.name == key):.1f}"
-                    for key, scale in (("tip_speed", 1e3), ("tip_rate", 180.0 / np.pi))
-                ),
+                format_fixed(item.costs["d-optimal"], 1),
+                format_fixed(1e3 * item.largest["tip_speed"], 1),
+                format_fixed(float(np.degrees(item.largest["tip_rate"])), 1),
             ]
             for name, item in result.designs.items()
         ],
-        "Both criteria of both manoeuvres, each alone: the first is to be large, the second small.",
-        ["left", *["right"] * 4],
+        "Both criteria of both manoeuvres, without the first manoeuvre: the first is to be large, the second small.",
+        columns("lrrrr"),
     )
     document.figure(manoeuvre_figure(result.designs["separation"].trajectory), "The separating manoeuvre.")
     document.figure(manoeuvre_figure(result.designs["d-optimal"].trajectory), "The d-optimal manoeuvre.")
 
 
 def _diagnosed(document: Document, result: Result) -> None:
-    document.section("What the diagnosis says")
+    document.section("Verdict of the diagnosis")
     if not result.verdicts:
-        document.paragraph("Not evaluated: `diagnose` was not asked in this run.")
+        document.paragraph("This section was not evaluated: the diagnosis was left out of this run.")
         return
     document.table(
         ["hidden", "manoeuvres", "status", "named", "rivals"],
         [
-            [truth, stage, item.status, ", ".join(item.causes) or "—", "; ".join(item.rivals) or "—"]
-            for (truth, stage), item in result.verdicts.items()
+            [*key, item.status, ", ".join(item.causes) or "—", "; ".join(item.rivals) or "—"]
+            for key, item in result.verdicts.items()
         ],
         "The package's diagnosis on the first noise, with the five candidates of the study.",
     )
     document.paragraph(
-        "The diagnosis has all five candidates to choose from, and the manoeuvre was designed for two of them: where a "
-        "leak and a drift of the rate sensor remain rivals, another manoeuvre would have to be designed for that pair."
+        "The diagnosis has all five candidates to choose from, and the manoeuvre was designed for two of them. Where "
+        "a leak and a drift of the rate sensor remain rivals, another manoeuvre would have to be designed for that "
+        "pair."
     )
 
 
 def _assumed(document: Document, result: Result) -> None:
-    document.section("What was assumed")
-    drift = ", ".join(f"{value:g}" for value in DRIFT)
+    document.section("Assumptions")
     document.items(
         [
-            f"Manoeuvres of {result.duration:g} s, samples each {INTERVAL:g} s with {format_number(RATE)} rad/s and "
-            f"{format_number(ACCEL)} m/s² of white noise; joints and attitude at the start known exactly.",
-            f"Base unknown to a relative width of {100.0 * SPREAD:g} % (log-Cholesky), arm known exactly, "
-            "gravity gradient "
-            f"modelled. Every manoeuvre starts at a rate of ({drift}) rad/s, about a degree in a minute, "
-            "which the fits "
-            "do not know; the design does, from the first manoeuvre. Wheels and leak are the same in both manoeuvres.",
-            "Priors: 1 N m s of wheel momentum; 0.5 mN and 0.5 mN m of leak; 10⁻⁷ rad/s² of rate drift, "
-            "5 × 10⁻⁵ rad/s of rate bias, 2 × 10⁻⁵ m/s² of accelerometer bias, per axis. The leak that is "
-            "hidden has no "
-            "force. ETS-VII's true wheel momentum is not public.",
+            f"Manoeuvres last {result.duration:g} s, with samples every {INTERVAL:g} s and {format_number(RATE)} "
+            f"rad/s and {format_number(ACCEL)} m/s² of white noise. The joints and the attitude at the start are "
+            "known exactly.",
+            f"The base is unknown to a relative width of {100.0 * SPREAD:g} % (log-Cholesky), the arm is known "
+            "exactly, and the gravity gradient is modelled. Every manoeuvre starts at a rate of "
+            f"{format_vector(DRIFT)} rad/s, about a degree in a minute, which the fits do not know; the design knows "
+            "it from the first manoeuvre. Wheels and leak are the same in both manoeuvres.",
+            "Priors, per axis: 1 N m s of wheel momentum; 0.5 mN and 0.5 mN m of leak; 10⁻⁷ rad/s² of rate drift, 5 × "
+            "10⁻⁵ rad/s of rate bias, and 2 × 10⁻⁵ m/s² of accelerometer bias. The hidden leak has no force. The true "
+            "wheel momentum of ETS-VII is not public.",
         ]
     )
 
@@ -249,31 +231,18 @@ def factor_figure(result: Result) -> Figure:
     """Draw every log Bayes factor beside its expectation."""
     figure = wide_figure(2.5)
     for axes, item in zip(figure.subplots(1, len(result.realised)), result.realised, strict=True):
-        for place, (stage, values) in enumerate(item.factors.items()):
-            own = result.expected[item.truth, stage]
-            axes.errorbar(
-                place - 0.15,
-                own.log_factor,
-                np.sqrt(own.apart),
-                color=COLOURS[1],
-                marker="s",
-                markersize=4,
-                capsize=3,
-                label="expected" if place == 0 else None,
-            )
-            shift = np.linspace(0.05, 0.25, len(values))
-            axes.plot(
-                place + shift,
-                values,
-                color=COLOURS[0],
-                linestyle="",
-                marker=".",
-                label="realised" if place == 0 else None,
-            )
+        place = np.arange(len(STAGES))
+        expected = [result.expected[item.truth, stage] for stage in STAGES]
+        means, sds = [each.log_factor for each in expected], [each.sd for each in expected]
+        bars: dict[str, Any] = {"fmt": "s", "color": COLOURS[1], "markersize": 4, "capsize": 3}
+        axes.errorbar(place - 0.15, means, sds, label="expected", **bars)
+        realised = np.stack([item.factors[stage] for stage in STAGES])
+        shift = np.linspace(0.05, 0.25, realised.shape[1])
+        axes.plot((place[:, None] + shift).ravel(), realised.ravel(), ".", color=COLOURS[0], label="realised")
         axes.axhline(RIVALRY, color="#888888", linewidth=0.8)
-        axes.set_xticks(range(len(STAGES)), [stage.replace(", ", ",\n") for stage in item.factors])
+        axes.set_xticks(place, [stage.replace(", ", ",\n") for stage in STAGES])
         axes.set(
-            title=f"hidden: {item.truth}", ylabel="log Bayes factor", yscale="symlog", xlim=(-0.5, len(STAGES) - 0.5)
+            title=f"hidden: {item.truth}", ylabel="log Bayes factor", yscale="symlog", xlim=(-0.5, place[-1] + 0.5)
         )
         axes.set_yticks([-3, 0, 3, 10, 30, 100], ["−3", "0", "3", "10", "30", "100"])
         axes.grid(visible=False, axis="x")

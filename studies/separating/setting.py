@@ -1,4 +1,4 @@
-"""The robot, the rivals and the manoeuvres of the study."""
+"""The robot, the rivals and the first manoeuvre of the study."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Effect, Model
+from bayesid._math.arrays import Floats
 from bayesid.design import Linear
+from bayesid.inference.unknowns import Unknowns
 from bayesid.simulation.effects import AccelBias, GravityGradient, RateBias, RateDrift, ThrusterLeak, WheelMomentum
 from studies.common.ets7 import START, FlightManoeuvre
 from studies.ets7_limits.setting import DURATION, model_of
 
-__all__ = ["CANDIDATES", "DRIFT", "RIVALS", "SPREAD", "TRUTHS", "FlightFamily", "amplitude", "drifting", "rival_model"]
-
-Floats = NDArray[np.floating]
+__all__ = ["CANDIDATES", "DRIFT", "RIVALS", "SPREAD", "STAGES", "TRUTHS", "FlightFamily"]
+__all__ += ["amplitude", "drifting", "rival_model", "rival_of"]
 
 CANDIDATES: tuple[Effect, ...] = (
     WheelMomentum(1.0),
@@ -25,15 +25,24 @@ CANDIDATES: tuple[Effect, ...] = (
     RateBias(5e-5),
     AccelBias(2e-5),
 )
-"""From which a pair is chosen; the leak is a small one, of half a millinewton."""
-
-RIVALS = ("wheel-momentum", "thruster-leak")
+"""Effects from which a pair is chosen, with the widths of their priors; the leak is a small one, of half a
+millinewton."""
 
 TRUTHS: dict[str, Floats] = {
     "wheel-momentum": np.array([-0.6, 0.35, 0.7]),
     "thruster-leak": np.array([-3e-4, 1.8e-4, 3.6e-4]),
 }
-"""Momentum left in the wheels [N m s], and torque of the leak [N m], base axes: one of them is hidden."""
+"""Momentum left in the wheels [N m s] and torque of the leak [N m], base axes, of which one is hidden."""
+
+RIVALS = tuple(TRUTHS)
+"""Labels of the two rivals."""
+
+STAGES = {
+    "first alone": ("first",),
+    "first, d-optimal": ("first", "d-optimal"),
+    "first, separating": ("first", "separation"),
+}
+"""Stages of the study, with the manoeuvres that are fitted together in each."""
 
 SPREAD = 0.1
 """Relative width of the prior of the base."""
@@ -43,7 +52,7 @@ DRIFT = np.array([3e-4, -2e-4, 2.5e-4])
 
 
 class FlightFamily(Linear):
-    """The flight manoeuvre times a factor."""
+    """Manoeuvre of the flight times a factor."""
 
     name = "flight"
 
@@ -57,26 +66,26 @@ class FlightFamily(Linear):
         return rest, (np.stack(FlightManoeuvre(START).evaluate(time)) - rest)[..., None]
 
 
-def rival_model(labels: Sequence[str], spread: float = SPREAD) -> Model:
-    """Return the model with some of the candidates, each by its label."""
+def rival_of(label: str) -> str:
+    """Return the label of the other rival."""
+    return next(other for other in RIVALS if other != label)
+
+
+def rival_model(labels: Sequence[str]) -> Model:
+    """Return the model with some of the candidates, given by their labels."""
     effects = tuple(effect for effect in CANDIDATES if effect.label in labels)
-    return replace(model_of(spread=spread), effects=(GravityGradient(), *effects))
+    return replace(model_of(spread=SPREAD), effects=(GravityGradient(), *effects))
 
 
 def amplitude(label: str) -> Floats:
-    """Return what is hidden in standard deviations of the prior; a leak has no force."""
+    """Return the hidden amplitude of a rival in standard deviations of its prior; a leak has no force."""
     effect = next(effect for effect in CANDIDATES if effect.label == label)
     sigma = np.array([parameter.sigma for parameter in effect.parameters])
-    values = np.zeros(len(sigma))
-    values[-3:] = TRUTHS[label]
-    return values / sigma
+    return np.pad(TRUTHS[label], (len(sigma) - 3, 0)) / sigma
 
 
-def drifting(model: Model, names: Sequence[str]) -> Floats:
+def drifting(unknowns: Unknowns) -> Floats:
     """Return the coordinates of the prior's centre, but with every manoeuvre starting at the rate `DRIFT`."""
-    z = np.zeros(len(names))
-    for axis, value in zip("xyz", DRIFT, strict=True):
-        for index, name in enumerate(names):
-            if name.startswith("initial-rate[") and name.endswith(f".{axis}"):
-                z[index] = value / model.rate_sigma
+    z = np.zeros(unknowns.size)
+    z[unknowns.layout.all_rates] = np.tile(DRIFT / unknowns.rate_sigma, unknowns.recordings)
     return z

@@ -7,36 +7,38 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from bayesid import Posterior, Robot
+from bayesid._math.arrays import Floats
 from bayesid.inference.mode import fit
 from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.robot.body_prior import draw_inertial
-from studies.common.ets7 import BASE
+from studies.common.errors_in_deviations import squared_distances
 from studies.common.monte_carlo import run_trials
-from studies.whole_system.sampled import distance, true_point
-from studies.whole_system.setting import LOAD, bodies, model_of, spreads
-from studies.whole_system.world import START_RATE, fly, record
+from studies.whole_system.sampled import true_point
+from studies.whole_system.setting import bodies, groups, model_of, spreads
+from studies.whole_system.world import fly, record
 
-__all__ = ["Coverage", "covered"]
+__all__ = ["SCORED", "Coverage", "covered"]
 
-Floats = NDArray[np.floating]
+SCORED = ("base", "load", "whole system")
+"""Groups of bodies whose masses are scored."""
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """Over K drawn systems, whose bodies have n unknowns.
+    """Errors over K drawn systems, whose bodies have n unknowns.
 
     Attributes
     ----------
     distances : (K,) array
-        Squared distance of the true bodies from the mode; chi-square with n degrees of freedom if all is right.
+        Squared distances of the true bodies from the mode; chi-square with n degrees of freedom if all is right.
     scores : (K, 3) array
-        Errors of the masses of base, load and whole system in their standard deviations.
+        Errors of the masses of the groups `SCORED` in their standard deviations.
     unknowns : int
+        Number n of unknowns.
     """
 
     distances: Floats
@@ -45,7 +47,7 @@ class Coverage:
 
     @property
     def p_value(self) -> float:
-        """Of the distances being chi-square (Kolmogorov-Smirnov)."""
+        """P-value of the distances being chi-square (Kolmogorov-Smirnov)."""
         return float(stats.kstest(self.distances, stats.chi2(self.unknowns).cdf).pvalue)
 
 
@@ -55,12 +57,13 @@ def covered(
     """Draw systems from the prior about the drawings, fly, record and identify each.
 
     The posterior is the normal approximation in coordinates linear in the parameters. The fit starts at the truth, to
-    save time: another start finds the same mode.
+    save time: another start leads to the same mode.
     """
+    unknowns = 10 * len(bodies(drawings))
     first: list[Posterior] = []  # its compiled functions serve all systems
 
     def system(number: int, rng: np.random.Generator) -> dict[str, Any]:
-        """Distance and scores of one system."""
+        """Return the distance and the scores of one system."""
         truth = drawings
         for name, spread in spreads(drawings).items():
             truth = truth.with_inertial(name, draw_inertial(drawings.link(name).inertial, spread, rng))
@@ -69,39 +72,38 @@ def covered(
         if not first:
             first.append(Posterior.of(model_of(drawings, torques=torques), [manoeuvre]))
         posterior = with_manoeuvres(first[0], [manoeuvre])
-        z = true_point(posterior, truth, START_RATE)
+        z = true_point(posterior, truth)
         refined = relinearised(posterior, z)
-        optimum = fit(refined, z)
-        proposal = LinearParameterisation(refined).proposal(optimum)
+        proposal = LinearParameterisation(refined).proposal(fit(refined, z))
         covariance = proposal.factor @ proposal.factor.T
-        own = slice(0, 10 * len(posterior.model.priors))  # not the initial rate: errors of joint speed enter it
+        # the bodies alone: errors of the joints' speed at the start enter the initial rate
+        errors = (posterior.unknowns.to_linear(z[None])[0] - proposal.mean)[:unknowns]
         return {
-            "distance": distance(
-                posterior.unknowns.to_linear(z[None])[0, own], proposal.mean[own], covariance[own, own]
-            ),
+            "distance": squared_distances(errors, covariance[:unknowns, :unknowns]),
             "scores": _mass_scores(posterior, proposal.mean, covariance, truth),
         }
 
     trials = run_trials(system, range(count), seed=seed, progress=lambda text: progress(f"coverage: {text}"))
     outcomes = trials.complete()
     distances, scores = (np.array([outcome[key] for outcome in outcomes]) for key in ("distance", "scores"))
-    return Coverage(distances, scores, 10 * len(spreads(drawings)))
+    return Coverage(distances, scores, unknowns)
 
 
 def _mass_scores(posterior: Posterior, mean: Floats, covariance: Floats, truth: Robot) -> Floats:
-    """Errors of three masses; a body's mass is linear in its ten linear coordinates."""
-    names = bodies(truth)
-    scores = []
-    for members in ((BASE,), (LOAD,), names):
+    """Return the errors of the masses of `SCORED` over their standard deviations, shape (3,).
 
-        def total(y: Floats, members: tuple[str, ...] = members) -> float:
-            bodies_there = posterior.unknowns.inertials(posterior.unknowns.from_linear(y[None])[0])
-            return sum(b.mass for name, b in zip(names, bodies_there, strict=True) if name in members)
+    Differences give the derivatives of the masses exactly, since a mass is linear in the linear coordinates.
+    """
+    names, members = bodies(truth), groups(truth)
+    gather = np.array([[float(name in members[group]) for name in names] for group in SCORED])
 
-        here, slope = total(mean), np.zeros(len(mean))
-        for index in range(10 * len(names)):
-            step = 1e-4 * np.sqrt(covariance[index, index])
-            slope[index] = (total(mean + step * np.eye(len(mean))[index]) - here) / step
-        true = sum(truth.link(name).inertial.mass for name in members)
-        scores.append((here - true) / np.sqrt(slope @ covariance @ slope))
-    return np.array(scores)
+    def masses(y: Floats) -> Floats:
+        inertial = np.asarray(posterior.unknowns.values_of(posterior.unknowns.from_linear(y)).inertial)
+        return inertial.reshape(len(y), -1, 10)[:, :, 0] @ gather.T
+
+    count = 10 * len(names)
+    step = 1e-4 * np.sqrt(np.diag(covariance)[:count])
+    (here,), ahead = masses(mean[None]), masses(mean + np.eye(count, len(mean)) * step[:, None])
+    slope = (ahead - here) / step[:, None]
+    true = gather @ np.array([truth.link(name).inertial.mass for name in names])
+    return np.asarray((here - true) / np.sqrt(np.diag(slope.T @ covariance[:count, :count] @ slope)))

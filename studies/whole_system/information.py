@@ -1,8 +1,8 @@
 """What a manoeuvre and its sensors teach beyond the drawings: the information about the truth, linearised.
 
-One Jacobian per manoeuvre, with all sensors, serves every question. The whitening takes sensors in turn, each given
-those before it, so that leaving out later ones is exact; knowing a body is leaving out its columns; another prior
-rescales them.
+One Jacobian per manoeuvre, with all sensors, serves every question. The whitening conditions every sensor on those
+before it, so that later ones may be left out exactly; a body is known exactly where its columns are left out; another
+prior rescales them.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from enum import Enum
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, Posterior, Robot
+from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.robot.inertial_parameters import PARAMETERS
@@ -23,11 +23,9 @@ from studies.whole_system.setting import bodies, model_of, spreads
 
 __all__ = ["Information", "Known", "Sensors", "informed"]
 
-Floats = NDArray[np.floating]
-
 
 class Sensors(Enum):
-    """Sensors in use, and how many columns of the whitened residual are theirs."""
+    """Sensors in use, each with its title and the number of columns of the whitened residual that they fill."""
 
     RATE = ("star sensor's rate", 3)
     MOTION = ("rate and accelerometer", 6)
@@ -36,7 +34,7 @@ class Sensors(Enum):
 
 @dataclass(frozen=True)
 class Known:
-    """What is known of the bodies after a manoeuvre, in coordinates whose prior is standard normal.
+    """Knowledge of the bodies after a manoeuvre, in coordinates whose prior is standard normal.
 
     Attributes
     ----------
@@ -56,7 +54,7 @@ class Known:
     covariance: Floats
 
     def mass(self, *members: str) -> tuple[float, float]:
-        """Relative standard deviation of the sum of some bodies' masses: prior and posterior."""
+        """Return the relative standard deviation of the sum of some bodies' masses, prior and posterior."""
         slope = np.zeros(len(self.covariance))
         total = sum(self.robot.link(name).inertial.mass for name in members)
         for index, name in enumerate(self.names):
@@ -65,25 +63,33 @@ class Known:
         return float(np.linalg.norm(slope)), float(np.sqrt(slope @ self.covariance @ slope))
 
     def shrinkage(self, name: str) -> Floats:
-        """One less the ratio of posterior to prior width of the ten coordinates of a body, shape (10,)."""
+        """Return one minus the ratio of posterior to prior width of the ten coordinates of a body, shape (10,)."""
         first = PARAMETERS * self.names.index(name)
         return 1.0 - np.sqrt(np.diag(self.covariance)[first : first + PARAMETERS])
 
     @cached_property
     def directions(self) -> Floats:
-        """Posterior over prior width of the independent directions of the bodies' coordinates, ascending."""
+        """Ratios of posterior to prior width along the independent directions of the coordinates, ascending."""
         count = PARAMETERS * len(self.names)
         return np.sqrt(np.clip(np.linalg.eigvalsh(self.covariance[:count, :count]), 0.0, None))
 
     @property
     def contraction(self) -> int:
-        """How many of them the data narrowed to half of the prior or less."""
+        """Number of directions that the data narrowed to less than half of the prior."""
         return int((self.directions < 0.5).sum())
 
 
 @dataclass(frozen=True)
 class Information:
-    """Whitened Jacobian of some manoeuvres with all sensors about the truth, shape (rows, columns, n)."""
+    """Information of a manoeuvre with all sensors.
+
+    Attributes
+    ----------
+    robot : Robot
+        True robot, about which the posterior was linearised.
+    jacobian : (rows, columns, n) array
+        Jacobian of the whitened residuals.
+    """
 
     robot: Robot
     jacobian: Floats
@@ -91,15 +97,16 @@ class Information:
     def knowledge(
         self, sensors: Sensors, *, known: Sequence[str] = (), widths: Mapping[str, float] | None = None
     ) -> Known:
-        """Return what is known after the manoeuvre.
+        """Return the knowledge after the manoeuvre.
 
         Parameters
         ----------
         sensors : Sensors
+            Sensors in use.
         known : sequence of str
-            Names of bodies taken for exactly known.
+            Names of bodies that are taken as exactly known.
         widths : mapping of str to float, optional
-            Other widths of the bodies' priors.
+            Widths of the bodies' priors in place of those of the drawings.
         """
         designed = spreads(self.robot)
         wanted = designed if widths is None else widths
@@ -114,15 +121,11 @@ class Information:
 
 
 def informed(truth: Robot, manoeuvres: Mapping[str, Manoeuvre]) -> dict[str, Information]:
-    """Linearise manoeuvres of the true robot about the truth, each by itself."""
+    """Linearise each manoeuvre of the true robot about the truth."""
     linearised: dict[str, Information] = {}
-    posterior: Posterior | None = None
+    like = Posterior.of(model_of(truth, torques=True), [next(iter(manoeuvres.values()))])
     for name, manoeuvre in manoeuvres.items():
-        posterior = (
-            Posterior.of(model_of(truth, torques=True), [manoeuvre])
-            if posterior is None
-            else with_manoeuvres(posterior, [manoeuvre])  # shares what is compiled
-        )
+        posterior = with_manoeuvres(like, [manoeuvre])  # shares what is compiled
         jacobian = posterior.jacobian(posterior.starting_point())[: -posterior.size]
         linearised[name] = Information(truth, jacobian.reshape(-1, posterior.residual_shape[2], posterior.size))
     return linearised

@@ -1,8 +1,9 @@
-"""The regressor method (19) with the joint torques (23) on the same data: linear, and fed with differentiated rates.
+"""The linear regressor method (19), with the joint torques (23), which needs differentiated rates.
 
-Rates, accelerations and joint motion are measured, so every entry of the regressor is noisy. Least squares takes it for
-exact: errors in variables pull the answer towards zero. The method is given everything it can use: the same prior, made
-normal in the linear parameters; smoothing of the rates by local cubics; and weights from its own residuals.
+Rates, accelerations and joint motion are measured, so that every entry of the regressor is noisy. Least squares takes
+the entries for exact: errors in variables pull the estimate towards zero. The method is given everything it can use:
+the same prior, made normal in the linear parameters; smoothing of the rates by local cubics; and weights from its
+residuals.
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 
 from bayesid import Manoeuvre, Robot
+from bayesid._math.arrays import Floats
 from bayesid.inference.unknowns import Unknowns
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.kinematics import kinematics
@@ -23,17 +24,25 @@ from studies.whole_system.setting import LOAD, bodies, spreads
 
 __all__ = ["linear_prior", "regress"]
 
-Floats = NDArray[np.floating]
+WINDOW, ORDER = 9, 3
+"""Number of samples, and order, of the local polynomials through the rates."""
 
-WINDOW, ORDER, ROUNDS = 9, 3, 4
-"""Samples and order of the local polynomials through the rates; rounds of reweighting."""
+ROUNDS = 4
+"""Number of iterations that weight the equations by their residuals."""
+
+MOVING = 5e-4
+"""Speed of a joint above which its torque is used [rad/s]; below it the sign of the friction is not certain."""
+
+FRICTION_PRIOR = (5.0, 50.0)
+"""Standard deviations of the priors of dry and viscous friction [N m, N m s]."""
 
 VAGUE = 1e-4
-"""Factor on the precision of the load's prior."""
+"""Factor on the precision of the load's prior, which made normal in the linear parameters at a width of 100 % would
+exclude a load twice as heavy."""
 
 
 def linear_prior(drawings: Robot) -> tuple[Floats, Floats]:
-    """Return centre and covariance of the linear parameters of all bodies under the prior, (10 B,), (10 B, 10 B)."""
+    """Return centre (10 B,) and covariance (10 B, 10 B) of the linear parameters of all bodies under the prior."""
     priors = tuple(BodyPrior(name, drawings.link(name).inertial, width) for name, width in spreads(drawings).items())
     unknowns = Unknowns(priors, (), 1, 0.0, (0.0,))
     centre = jnp.zeros(unknowns.size)
@@ -42,12 +51,12 @@ def linear_prior(drawings: Robot) -> tuple[Floats, Floats]:
 
 
 def regress(manoeuvre: Manoeuvre, drawings: Robot, *, torques: bool) -> tuple[Floats, Floats]:
-    """Estimate the linear parameters of all bodies.
+    """Estimate the linear parameters of all bodies from a manoeuvre, with or without its joint torques.
 
     Returns
     -------
     estimate, covariance : (10 B,), (10 B, 10 B) arrays
-        The covariance is the one that the method believes in.
+        Estimate, and the covariance that the method itself states.
     """
     recording, joints = manoeuvre.recording, drawings.joints
     time, measured = recording.vector("rate")
@@ -69,15 +78,15 @@ def regress(manoeuvre: Manoeuvre, drawings: Robot, *, torques: bool) -> tuple[Fl
             rubbing = np.zeros((len(time), frictions))
             rubbing[:, 2 * index], rubbing[:, 2 * index + 1] = np.sign(speed[:, index]), speed[:, index]
             _, torque = recording.series(f"torque.{joint.name}")
-            moving = np.abs(speed[:, index]) > 5e-4
+            moving = np.abs(speed[:, index]) > MOVING
             blocks.append((np.concatenate([regressor[:, 6 + index], rubbing], axis=1)[moving], torque[moving]))
     centre, covariance = linear_prior(drawings)
     count = len(centre)
     precision = np.zeros((count + frictions, count + frictions))
     precision[:count, :count] = np.linalg.inv(covariance)
     load = slice(10 * names.index(LOAD), 10 * names.index(LOAD) + 10)
-    precision[load, load] *= VAGUE  # normal in linear parameters, a prior of 100 % would exclude a load twice as heavy
-    precision[count:, count:] = np.diag(np.tile([5.0**-2, 50.0**-2], frictions // 2))
+    precision[load, load] *= VAGUE
+    precision[count:, count:] = np.diag(np.tile(np.array(FRICTION_PRIOR) ** -2.0, frictions // 2))
     blocks = [(np.pad(a, ((0, 0), (0, count + frictions - a.shape[1]))), b) for a, b in blocks]
     x = np.concatenate([centre, np.zeros(frictions)])
     start = x.copy()

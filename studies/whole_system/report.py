@@ -1,4 +1,4 @@
-"""The study's report."""
+"""Report of the study."""
 
 from __future__ import annotations
 
@@ -13,26 +13,48 @@ from scipy import stats
 from bayesid import Robot
 from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
-from bayesid.report.numbers import format_number
-from studies.common.ets7 import ACCEL, BASE, ENCODER, RATE
-from studies.whole_system.contest import QUANTITIES, Method
+from bayesid.report.numbers import format_fixed, format_number, format_percent
+from bayesid.robot.inertial_parameters import mass_com_inertia
+from studies.common.ets7 import ACCEL, ENCODER, RATE
+from studies.common.report_parts import QUANTITY_TITLES, columns, not_evaluated
+from studies.whole_system.contest import Method
 from studies.whole_system.coverage import Coverage
 from studies.whole_system.information import Information, Known, Sensors
 from studies.whole_system.sampled import Sampled
-from studies.whole_system.setting import ARM, BASE_SPREAD, COULOMB, LOAD, LOAD_SPREAD, TORQUE, VISCOUS, bodies
+from studies.whole_system.setting import ARM, BASE_SPREAD, COULOMB, LOAD, LOAD_SPREAD, TORQUE, VISCOUS, bodies, groups
 
 __all__ = ["Result", "write_report"]
 
 GROUPS = ("base", "load", "arm", "whole system")
-KEYS = ("mass", "com x", "com y", "com z", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
+"""Titles of the columns for the masses of `groups`."""
+
+COORDINATES = ("α", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3")
+"""Titles of the ten log-Cholesky coordinates of a body."""
+
+CONTENT = float(stats.chi2.cdf(1.0, 1))
+"""Probability within one standard deviation of a normal distribution."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What the study found; samples and coverage in a full run only.
+    """Outcome of the study; samples and coverage are evaluated in a full run only.
 
-    ``known`` holds the information of every manoeuvre by name; ``hand_speed`` is the largest relative to the base with
-    six joints moving [m/s].
+    Attributes
+    ----------
+    truth, drawings : Robot
+        The robot as it truly is, and as the drawings state it.
+    known : mapping of str to Information
+        Information of every manoeuvre by name.
+    cases : tuple of Sampled
+        Identifications with emcee.
+    coverage : Coverage or None
+        Errors over systems drawn from the prior.
+    methods : tuple of Method
+        Errors of the linear and of the integral method.
+    duration : float
+        Duration of each manoeuvre [s].
+    hand_speed : float
+        Largest speed of the end-effector relative to the base with six joints moving [m/s].
     """
 
     truth: Robot
@@ -58,47 +80,40 @@ def write_report(result: Result, output: Path) -> None:
     document.write(output)
 
 
-def masses(knowledge: Known) -> list[tuple[float, float]]:
-    """Prior and posterior relative width of four masses, in the order of `GROUPS`."""
-    names = bodies(knowledge.robot)
-    arm = [name for name in names if name not in (BASE, LOAD)]
-    return [knowledge.mass(*members) for members in ((BASE,), (LOAD,), arm, names)]
+def _percents(knowledge: Known, *, before: bool = False) -> list[str]:
+    """Return the relative standard deviations of four masses in the order of `GROUPS`, before or after the data."""
+    pairs = [knowledge.mass(*members) for members in groups(knowledge.robot).values()]
+    return [format_percent(prior if before else after, 2) if prior else "known" for prior, after in pairs]
 
 
 def _summary(document: Document, result: Result) -> None:
     six = result.known["six joints"]
-    motion, torques = (masses(six.knowledge(sensors)) for sensors in (Sensors.MOTION, Sensors.TORQUES))
-    thrust = masses(result.known["six joints, known thrust"].knowledge(Sensors.MOTION))
-    document.section("What was asked, and what came out")
+    motion, torques = (six.knowledge(sensors) for sensors in (Sensors.MOTION, Sensors.TORQUES))
+    thrust = result.known["six joints, known thrust"].knowledge(Sensors.MOTION)
+    linear = next(method for method in result.methods if method.title == "regressors, motion alone")
+    document.section("Question and answer")
     document.paragraph(
-        "ETS-VII holds a load of 120 kg. Of no body the ten inertial parameters are known exactly: the arm's six links "
-        f"are known from drawings to {100 * ARM:g} % in log-Cholesky coordinates ({200 * ARM:g} % of each mass), the "
-        f"base to {100 * BASE_SPREAD:g} %, the load to {100 * LOAD_SPREAD:g} %: 80 unknowns and the initial rate. What "
-        f"do {result.duration:g} s of motion and its sensors teach?"
+        "ETS-VII holds a load of 120 kg. The ten inertial parameters of no body are known exactly: the arm's six "
+        f"links are known from drawings to {100 * ARM:g} % in log-Cholesky coordinates ({200 * ARM:g} % of each "
+        f"mass), the base to {100 * BASE_SPREAD:g} %, the load to {100 * LOAD_SPREAD:g} %. These are 80 unknowns, to "
+        f"which the initial rate is added. What do {result.duration:g} s of motion and its sensors teach?"
     )
     document.items(
         [
-            f"Motion alone fixes ratios of masses and not their scale. The scale comes from the drawings of the arm: "
-            f"the mass of the whole system is known to {_percent(motion[3][1])}, from {_percent(motion[3][0])} before.",
-            f"Measured joint torques bring the scale, although friction in every joint is unknown: "
-            f"{_percent(torques[3][1])}. A known thrust does the same without them: {_percent(thrust[3][1])}.",
-            f"Of the 80 directions in which the bodies could differ, the data narrow "
-            f"{six.knowledge(Sensors.MOTION).contraction} (motion) or "
-            f"{six.knowledge(Sensors.TORQUES).contraction} (torques too) to less than half of the prior. The rest "
-            "is the prior and is reported as such: the base parameters tell which combinations could "
-            "ever be learnt, the manoeuvre and the noise which of them are.",
-            _regressor_sentence(result),
+            "Motion alone fixes the ratios of the masses and not their scale. The scale comes from the drawings of "
+            f"the arm: the mass of the whole system is known to {_percents(motion)[3]} after the manoeuvre and to "
+            f"{_percents(motion, before=True)[3]} before.",
+            f"Measured joint torques bring the scale, to {_percents(torques)[3]}, although the friction of every "
+            f"joint is unknown. A known thrust brings it without them, to {_percents(thrust)[3]}.",
+            f"Of the 80 directions in which the bodies could differ, the data narrow {motion.contraction} (motion) or "
+            f"{torques.contraction} (with torques) to less than half of the prior. The others keep their prior and "
+            "are reported as such: the base parameters tell which combinations can be identified in principle, the "
+            "manoeuvre and the noise which of them are.",
+            "The paper's linear regressor method (19), applied to motion alone, estimates a system of "
+            f"{100.0 * (1.0 + linear.errors[:, 3].mean()):.2g} % of the true mass. Its right side is zero, and least "
+            "squares with noisy entries takes the smallest parameters that explain it. The integral of the motion "
+            "does not have that problem.",
         ]
-    )
-
-
-def _regressor_sentence(result: Result) -> str:
-    linear = next(m for m in result.methods if m.title == "regressors, motion alone")
-    whole = linear.errors[:, 3].mean()
-    return (
-        "The paper's linear regressor method (19), used on motion alone, answers with a system of "
-        f"{100.0 * (1.0 + whole):.2g} % of the true mass: its right side is zero, and least squares with noisy entries "
-        "takes the smallest parameters that explain it. The integral of the motion does not have that problem."
     )
 
 
@@ -108,50 +123,36 @@ def _manoeuvres(document: Document, result: Result) -> None:
     for name, information in result.known.items():
         for sensors in Sensors:
             knowledge = information.knowledge(sensors)
-            rows.append(
-                [
-                    name,
-                    sensors.value[0],
-                    str(knowledge.contraction),
-                    *(_percent(width) for _, width in masses(knowledge)),
-                ]
-            )
-    prior = masses(result.known["six joints"].knowledge(Sensors.MOTION))
-    rows.append(["before", "drawings", "0", *(_percent(width) for width, _ in prior)])
+            rows.append([name, sensors.value[0], str(knowledge.contraction), *_percents(knowledge)])
+    prior = result.known["six joints"].knowledge(Sensors.MOTION)
     document.table(
         ["manoeuvre", "sensors", "directions learnt", *GROUPS],
-        rows,
+        [*rows, ["before", "drawings", "0", *_percents(prior, before=True)]],
         "Relative standard deviation of four masses after one manoeuvre, and the number of directions (of 80) whose "
         "width the data at least halve. The information is linearised about the truth. With joint torques, friction "
         "in every joint is unknown.",
-        ["left", "left", "right", "right", "right", "right", "right"],
+        columns("llrrrrr"),
     )
     document.figure(
         _directions_figure({name: info.knowledge(Sensors.TORQUES) for name, info in result.known.items()}),
-        "Posterior over prior width of the 80 independent directions, all sensors, best known first. At one (10⁰) the "
-        "data said nothing.",
+        "Ratio of posterior to prior width of the 80 independent directions with all sensors, best known first. A "
+        "ratio of one (10⁰) means that the data are not informative.",
     )
     document.figure(
         _shrinkage_figure(result.known["six joints"]),
-        "What six moving joints teach of each log-Cholesky coordinate of each body: one less the ratio of posterior to "
-        "prior width, with motion alone and with joint torques. White: the answer is the prior.",
+        "What six moving joints teach of each log-Cholesky coordinate of each body: one minus the ratio of posterior "
+        "to prior width, with motion alone and with joint torques. Where a cell is white, the posterior is the prior.",
     )
 
 
 def _parts(document: Document, result: Result) -> None:
     document.section("What must be known")
-    names = bodies(result.truth)
-    arm = tuple(name for name in names if name not in (BASE, LOAD))
-    cases: dict[str, tuple[str, ...]] = {
-        "nothing": (),
-        "link 2 (22.5 kg)": ("link2",),
-        "the arm": arm,
-        "the load": (LOAD,),
-        "the base": (BASE,),
-    }
-    vague = dict.fromkeys(names, 1.0)
-    before = masses(result.known["six joints"].knowledge(Sensors.MOTION, widths=vague))
-    rows = [["nothing", "before any", "", *(_percent(width) for width, _ in before)]]
+    parts = groups(result.truth)
+    cases: dict[str, tuple[str, ...]] = {"nothing": (), "link 2 (22.5 kg)": ("link2",)}
+    cases |= {f"the {name}": parts[name] for name in ("arm", "load", "base")}
+    vague = dict.fromkeys(bodies(result.truth), 1.0)
+    before = result.known["six joints"].knowledge(Sensors.MOTION, widths=vague)
+    rows = [["nothing", "before any", "", *_percents(before, before=True)]]
     for title, known in cases.items():
         for name, sensors in (
             ("six joints", Sensors.MOTION),
@@ -159,75 +160,71 @@ def _parts(document: Document, result: Result) -> None:
             ("six joints, known thrust", Sensors.MOTION),
         ):
             knowledge = result.known[name].knowledge(sensors, known=known, widths=vague)
-            widths = masses(knowledge)
-            rows.append(
-                [title, name, sensors.value[0], *(_percent(after) if prior else "known" for prior, after in widths)]
-            )
+            rows.append([title, name, sensors.value[0], *_percents(knowledge)])
     document.paragraph(
-        "The paper concludes that part of the system must be known to identify the whole. Here no drawings help: every "
-        "body that is not known has a prior of 100 % in log-Cholesky coordinates, 200 % of its mass. Motion alone then "
-        "leaves the scale to the prior, gravity gradient or not, and one known body of any size restores it, "
-        "as far as the motion ties the others to it. Joint torques or a known thrust do so with nothing known."
+        "The paper concludes that part of the system must be known to identify the whole. Here no drawings help: "
+        "every body that is not known has a prior of 100 % in log-Cholesky coordinates, 200 % of its mass. Motion "
+        "alone then leaves the scale to the prior, with or without gravity gradient, and one known body of any size "
+        "restores it, as far as the motion ties the others to it. Joint torques or a known thrust restore it with "
+        "nothing known."
     )
     document.table(
         ["known exactly", "manoeuvre", "sensors", *GROUPS],
         rows,
-        "Relative standard deviation of four masses without drawings. Above 100 % the linearisation means no more than "
-        "that nothing is known.",
-        ["left", "left", "left", "right", "right", "right", "right"],
+        "Relative standard deviation of four masses without drawings. A value above 100 % only means that nothing is "
+        "known, since the linearisation does not hold there.",
+        columns("lllrrrr"),
     )
 
 
 def _samples(document: Document, result: Result) -> None:
     document.section("Identified and sampled")
     if not result.cases:
-        document.paragraph("Not evaluated: only the full study has it.")
+        not_evaluated(document)
         return
     document.paragraph(
-        "The drawings are one draw such that the truth is a draw of the prior about them; for the load they say "
-        f"{result.drawings.link(LOAD).inertial.mass:.3g} kg. One recording with noise, all six joints moving, is "
-        "identified with emcee: ensembles propose in coordinates linear in the parameters, where the ridges that the "
-        "unknown scale makes are straight."
+        "The drawings are one draw such that the truth is a draw of the prior about them; for the load they state "
+        f"{result.drawings.link(LOAD).inertial.mass:.3g} kg. One recording with noise, with all six joints moving, is "
+        "identified with emcee. Its ensembles propose in coordinates linear in the parameters, where the ridges that "
+        "the unknown scale makes are straight."
     )
     rows = []
     for case in result.cases:
         r = case.result
-        rows.append(
-            [
-                case.title,
-                str(r.posterior.size),
-                f"{r.chains.effective_samples:.0f}",
-                f"{r.chains.r_hat:.4f}",
-                f"{r.chains.evaluations}",
-                f"{r.evidence.pareto_k:.2f}",
-                f"{r.evidence.value:.2f} ± {r.evidence.error:.2f}" if r.evidence.trusted else "not evaluated",
-                f"{r.optimum.chi2 / r.posterior.samples:.3f}",
-                f"{case.distance:.0f} ({case.p_value:.2f})",
-            ]
-        )
+        numbers = [
+            str(r.posterior.size),
+            f"{r.chains.effective_samples:.0f}",
+            f"{r.chains.r_hat:.4f}",
+            str(r.chains.evaluations),
+            f"{r.evidence.pareto_k:.2f}",
+            f"{r.evidence.value:.2f} ± {r.evidence.error:.2f}" if r.evidence.trusted else "not evaluated",
+            f"{r.optimum.chi2 / r.posterior.samples:.3f}",
+            f"{case.distance:.0f} ({case.p_value:.2f})",
+        ]
+        rows.append([case.title, *numbers])
+    titles = [
+        "unknowns",
+        "eff. samples",
+        "R-hat",
+        "evaluations",
+        "k-hat",
+        "log evidence",
+        "chi²/sample",
+        "distance (p)",
+    ]
     document.table(
-        [
-            "sensors",
-            "unknowns",
-            "eff. samples",
-            "R-hat",
-            "evaluations",
-            "k-hat",
-            "log evidence",
-            "chi²/sample",
-            "distance (p)",
-        ],
+        ["sensors", *titles],
         rows,
-        "Convergence, importance sampling (evidence is evaluated where Pareto k-hat is below 0.7), and the squared "
-        "distance of the true bodies from the mean, to be compared with their 80 unknowns.",
-        ["left", *["right"] * 8],
+        "Convergence, importance sampling (the evidence is evaluated where Pareto k-hat is below 0.7), and the "
+        "squared distance of the true bodies from the mean, to be compared with their 80 unknowns.",
+        columns("lrrrrrrrr"),
     )
     for case in result.cases:
         document.table(
-            ["body", "quantity", "true", "drawings", "identified ± sd", "error / sd"],
+            ["body", "quantity", "true", "drawings", "identified ± standard deviation (sd)", "error / sd"],
             _body_rows(case, result.drawings),
-            f"Identified from {case.title}: masses of all bodies, and everything of the load.",
-            ["left", "left", "right", "right", "right", "right"],
+            f"Identified from {case.title}: masses of all bodies, and all parameters of the load.",
+            columns("llrrrr"),
         )
         for sentence in case.result.disagreements:
             document.paragraph(sentence)
@@ -236,21 +233,11 @@ def _samples(document: Document, result: Result) -> None:
 def _body_rows(case: Sampled, drawings: Robot) -> list[list[str]]:
     rows = []
     for name, body in case.result.bodies.items():
-        given = drawings.link(name).inertial
-        drawn = [given.mass, *given.com, *(given.inertia[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))]
-        for k, key in enumerate(KEYS if name == LOAD else KEYS[:1]):
-            unit = "kg" if k == 0 else "m" if k < 4 else "kg m²"
+        stated = mass_com_inertia(drawings.link(name).inertial.vector)
+        for k, title in enumerate(QUANTITY_TITLES if name == LOAD else QUANTITY_TITLES[:1]):
             true, mean, sd = float(case.truth[name][k]), float(body.mean[k]), float(body.sd[k])
-            rows.append(
-                [
-                    name,
-                    f"{key} [{unit}]",
-                    format_number(true, 4),
-                    format_number(float(drawn[k]), 4),
-                    format_quantity(mean, sd),
-                    f"{(mean - true) / sd:.1f}",
-                ]
-            )
+            numbers = [format_number(true, 4), format_number(float(stated[k]), 4), format_quantity(mean, sd)]
+            rows.append([name, title, *numbers, format_fixed((mean - true) / sd, 1)])
     return rows
 
 
@@ -258,18 +245,18 @@ def _coverage(document: Document, result: Result) -> None:
     document.section("Does the uncertainty hold the truth?")
     coverage = result.coverage
     if coverage is None:
-        document.paragraph("Not evaluated: only the full study has it.")
+        not_evaluated(document)
         return
     count, n = len(coverage.distances), coverage.unknowns
     inside = (np.abs(coverage.scores) < 1.0).sum(axis=0)
     document.paragraph(
-        f"{count} systems were drawn from the prior, each flown by the independent simulator on a manoeuvre of its own "
-        f"of {0.5 * result.duration:g} s and recorded with fresh noise, and identified from motion alone. The squared "
+        f"{count} systems were drawn from the prior. Each was flown by the independent simulator on another manoeuvre "
+        f"of {0.5 * result.duration:g} s, recorded with fresh noise, and identified from motion alone. The squared "
         f"distance of the truth should be chi-square with {n} degrees of freedom: its mean is "
-        f"{coverage.distances.mean():.1f} ± {np.sqrt(2.0 * n / count):.1f}, the Kolmogorov-Smirnov test gives p = "
-        f"{coverage.p_value:.2f}. Within one standard deviation lie the masses of base, load and whole system in "
-        f"{inside[0]}, {inside[1]} and {inside[2]} cases of {count} ({0.683 * count:.0f} ± "
-        f"{np.sqrt(count * 0.683 * 0.317):.0f} expected)."
+        f"{coverage.distances.mean():.1f} ± {np.sqrt(2.0 * n / count):.1f}, and the Kolmogorov-Smirnov test gives p = "
+        f"{coverage.p_value:.2f}. The masses of base, load and whole system lie within one standard deviation in "
+        f"{inside[0]}, {inside[1]} and {inside[2]} cases of {count} ({CONTENT * count:.0f} ± "
+        f"{np.sqrt(count * CONTENT * (1.0 - CONTENT)):.0f} expected)."
     )
     document.figure(
         _coverage_figure(coverage),
@@ -281,51 +268,46 @@ def _methods(document: Document, result: Result) -> None:
     document.section("Regressors against the integral of the motion")
     count = len(result.methods[0].errors)
     document.paragraph(
-        "The paper sets the linear regressor method (19) against the least squares of the integrated motion (21). Both "
-        f"get the same {count} recordings of one flight that differ by their noise, and the same prior of base and "
-        "arm. The linear method differentiates the rates with local cubics over nine samples, weights every equation "
-        "by its own residuals, and gets no prior of the load, which would be wrong when made normal. The integral "
-        "method is the mode of this package's posterior, with encoder noise carried through the dynamics; its fits "
-        "start at the truth, to save time."
+        "The paper compares the linear regressor method (19) with the least squares of the integrated motion (21). "
+        f"Here both get the same {count} recordings of one flight that differ by their noise, and the same prior of "
+        "base and arm. The linear method differentiates the rates with local cubics over nine samples, weights every "
+        "equation by its residuals, and gets no prior of the load, which would be wrong when made normal. The "
+        "integral method is the mode of this package's posterior, with encoder noise carried through the dynamics; "
+        "its fits start at the truth, to save time."
     )
     rows = []
     for method in result.methods:
-        for k, quantity in enumerate(QUANTITIES):
-            errors, believed = method.errors[:, k], method.believed[:, k]
-            bias, spread = errors.mean(), errors.std(ddof=1)
-            rows.append(
-                [
-                    method.title if k == 0 else "",
-                    quantity,
-                    f"{format_quantity(100.0 * bias, 100.0 * spread / np.sqrt(count))} %",
-                    _percent(spread),
-                    _percent(float(believed.mean())),
-                ]
-            )
+        for k, (group, errors, stated) in enumerate(zip(GROUPS, method.errors.T, method.believed.T, strict=True)):
+            spread = errors.std(ddof=1)
+            mean = format_quantity(100.0 * errors.mean(), 100.0 * spread / np.sqrt(count))
+            widths = [format_percent(float(width), 2) for width in (spread, stated.mean())]
+            rows.append(["" if k else method.title, f"mass of the {group}", f"{mean} %", *widths])
     document.table(
-        ["method", "quantity", "mean error ± its uncertainty", "spread", "sd it states"],
+        ["method", "quantity", "mean error ± its uncertainty", "spread", "stated sd"],
         rows,
         "Relative errors of masses over recordings with fresh noise. The truth is fixed here, so that the mean error "
-        "holds that of the drawings where the data leave them in force; the stated sd covers both.",
-        ["left", "left", "right", "right", "right"],
+        "includes that of the drawings where the data do not overrule them; the stated standard deviation (sd) covers "
+        "both.",
+        columns("llrrr"),
     )
 
 
 def _assumed(document: Document, result: Result) -> None:
-    document.section("What was assumed")
+    document.section("Assumptions")
     document.items(
         [
-            "Truth: the published ETS-VII (paper's base, sources of the arm in the robot file) with a rigid load on "
-            "link 6; motion by MuJoCo with gravity gradient on every body; joints follow their path exactly.",
-            f"Noise per sample at 2 Hz: rate {RATE:g} rad/s, accelerometer {ACCEL:g} m/s², encoders {ENCODER:g} rad, "
-            f"joint torques {TORQUE:g} N m.",
-            f"Friction in every joint: {COULOMB:g} N m dry and {VISCOUS:g} N m s viscous, added to the torques by its "
-            "formula; unknown to the identification, with priors of 5 N m and 50 N m s.",
-            "Manoeuvres: sums of three sines between 0.02 and 0.06 Hz under ramps, excursions of about half a radian; "
-            f"the end-effector reaches {result.hand_speed:.2g} m/s relative to the base, the flight allowed 0.05. "
-            "Known thrust: two pulses of 20 N over 2 s on the base.",
-            "Widths of directions and masses from information linearised about the truth; the sampled posteriors are "
-            "not linearised.",
+            "The truth is the published ETS-VII (base of the paper; sources of the arm in the robot file) with a "
+            "rigid load on link 6. MuJoCo simulates the motion with gravity gradient on every body; joints follow "
+            "their path exactly.",
+            f"The noise per sample at 2 Hz is {RATE:g} rad/s of the rate, {ACCEL:g} m/s² of the accelerometer, "
+            f"{ENCODER:g} rad of the encoders, and {TORQUE:g} N m of the joint torques.",
+            f"Friction of {COULOMB:g} N m (dry) and {VISCOUS:g} N m s (viscous) in every joint is added to the "
+            "torques by its formula. It is unknown to the identification, with priors of 5 N m and 50 N m s.",
+            "Manoeuvres are sums of three sines between 0.02 and 0.06 Hz under ramps, with excursions of about half a "
+            f"radian. The end-effector reaches {result.hand_speed:.2g} m/s relative to the base, where the flight "
+            "allowed 0.05. The known thrust has two pulses of 20 N over 2 s on the base.",
+            "Widths of directions and masses are from information linearised about the truth; the sampled posteriors "
+            "are not linearised.",
         ]
     )
 
@@ -334,12 +316,11 @@ def _assumed(document: Document, result: Result) -> None:
 def _directions_figure(knowledge: Mapping[str, Known]) -> Figure:
     figure = wide_figure(2.6)
     axes = figure.subplots()
-    for index, (name, known) in enumerate(knowledge.items()):
+    for colour, (name, known) in zip(COLOURS, knowledge.items(), strict=False):
         widths = np.maximum(known.directions, 1e-9)
-        axes.semilogy(np.arange(1, len(widths) + 1), widths, ".-", color=COLOURS[index], markersize=3.0, label=name)
+        axes.semilogy(np.arange(1, len(widths) + 1), widths, ".-", color=colour, markersize=3.0, label=name)
     axes.axhline(0.5, color="grey", linewidth=0.6)
-    axes.set_xlabel("direction")
-    axes.set_ylabel("posterior / prior width")
+    axes.set(xlabel="direction", ylabel="posterior / prior width")
     axes.legend()
     return figure
 
@@ -349,16 +330,14 @@ def _shrinkage_figure(information: Information) -> Figure:
     figure = wide_figure(2.9)
     panels = figure.subplots(1, 2, sharey=True)
     names = bodies(information.robot)
-    image = None
     for axes, sensors in zip(panels, (Sensors.MOTION, Sensors.TORQUES), strict=True):
         knowledge = information.knowledge(sensors)
         values = np.array([knowledge.shrinkage(name) for name in names])
-        image = axes.imshow(values, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
-        axes.set_xticks(range(10), ["α", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3"])
+        axes.imshow(values, cmap="Blues", vmin=0.0, vmax=1.0, aspect="auto")
+        axes.set_xticks(range(10), COORDINATES)
         axes.set_yticks(range(len(names)), names)
         axes.set_title(sensors.value[0])
-    if image is not None:
-        figure.colorbar(image, ax=panels, label="shrinkage")
+    figure.colorbar(panels[0].images[0], ax=panels, label="shrinkage")
     return figure
 
 
@@ -369,12 +348,6 @@ def _coverage_figure(coverage: Coverage) -> Figure:
     count = len(coverage.distances)
     quantiles = stats.chi2(coverage.unknowns).ppf((np.arange(count) + 0.5) / count)
     axes.plot(quantiles, np.sort(coverage.distances), ".", color=COLOURS[0])
-    ends = [quantiles[0], quantiles[-1]]
-    axes.plot(ends, ends, color="black", linewidth=0.6)
-    axes.set_xlabel(f"quantile of chi-square, {coverage.unknowns} degrees of freedom")
-    axes.set_ylabel("squared distance")
+    axes.plot(quantiles[[0, -1]], quantiles[[0, -1]], color="black", linewidth=0.6)
+    axes.set(xlabel=f"quantile of chi-square, {coverage.unknowns} degrees of freedom", ylabel="squared distance")
     return figure
-
-
-def _percent(relative: float) -> str:
-    return f"{format_number(100.0 * relative, 2)} %"

@@ -6,16 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from bayesid import Identification, Manoeuvre, Posterior, Robot, identify
+from bayesid._math.arrays import Floats
 from bayesid.robot.inertial_parameters import mass_com_inertia
+from studies.common.errors_in_deviations import squared_distances
 from studies.whole_system.setting import COULOMB, VISCOUS, bodies, model_of
+from studies.whole_system.world import START_RATE
 
-__all__ = ["Sampled", "distance", "sampled", "true_point"]
-
-Floats = NDArray[np.floating]
+__all__ = ["Sampled", "sampled", "true_point"]
 
 
 @dataclass(frozen=True)
@@ -27,12 +27,13 @@ class Sampled:
     title : str
         Sensors in use.
     result : Identification
+        Posterior of all bodies.
     distance : float
         Squared Mahalanobis distance of the true bodies from the mean, in coordinates linear in the parameters.
     p_value : float
-        Of a distance that large, under a normal posterior.
+        Probability of a larger distance under a normal posterior.
     truth : mapping of str to (10,) array
-        Mass, centre of mass, inertia about it of every body.
+        True mass, centre of mass and inertia about it of every body.
     """
 
     title: str
@@ -43,45 +44,38 @@ class Sampled:
 
 
 def sampled(
-    title: str,
     truth: Robot,
     drawings: Robot,
     manoeuvre: Manoeuvre,
-    rate: Floats,
     *,
     torques: bool,
     seed: int,
     effective_samples: float,
     progress: Callable[[str], None],
 ) -> Sampled:
-    """Identify all bodies; ``rate`` is the true initial rate of the base, base axes [rad/s]."""
+    """Identify all bodies from a manoeuvre, with or without its joint torques."""
+    title = "motion and joint torques" if torques else "motion alone"
     posterior = Posterior.of(model_of(drawings, torques=torques), [manoeuvre])
-
-    def tell(fraction: float, text: str) -> None:
-        progress(f"{title}: {text}")
-
-    result = identify(posterior, seed, effective_samples=effective_samples, progress=tell)
-    z = true_point(posterior, truth, rate)
+    result = identify(
+        posterior,
+        seed,
+        effective_samples=effective_samples,
+        progress=lambda fraction, text: progress(f"{title}: {text}"),
+    )
     count = 10 * len(posterior.model.priors)
     linear = posterior.unknowns.to_linear(result.chains.flat)[:, :count]
-    square = distance(posterior.unknowns.to_linear(z[None])[0, :count], linear.mean(axis=0), np.cov(linear.T))
+    true = posterior.unknowns.to_linear(true_point(posterior, truth)[None])[0, :count]
+    distance = float(squared_distances(true - linear.mean(axis=0), np.cov(linear.T)))
     described = {name: mass_com_inertia(truth.link(name).inertial.vector) for name in bodies(truth)}
-    return Sampled(title, result, square, float(stats.chi2.sf(square, count)), described)
+    return Sampled(title, result, distance, float(stats.chi2.sf(distance, count)), described)
 
 
-def true_point(posterior: Posterior, truth: Robot, rate: Floats) -> Floats:
+def true_point(posterior: Posterior, truth: Robot) -> Floats:
     """Return the coordinates of the truth."""
-    priors = posterior.model.priors
-    z = posterior.unknowns.coordinates([truth.link(prior.name).inertial for prior in priors], rate[None])
-    frictions = 2 * sum(effect.uses("friction") for effect in posterior.model.effects)
+    priors, effects = posterior.model.priors, posterior.model.effects
+    z = posterior.unknowns.coordinates([truth.link(prior.name).inertial for prior in priors], START_RATE[None])
+    frictions = 2 * sum(effect.uses("friction") for effect in effects)
     if frictions:
-        widths = [p.sigma for effect in posterior.model.effects for p in effect.parameters]
+        widths = [parameter.sigma for effect in effects for parameter in effect.parameters]
         z[-frictions:] = np.tile([COULOMB, VISCOUS], frictions // 2) / widths
     return z
-
-
-def distance(point: Floats, mean: Floats, covariance: Floats) -> float:
-    """Squared Mahalanobis distance."""
-    scale = 1.0 / np.sqrt(np.diag(covariance))
-    d = (point - mean) * scale
-    return float(d @ np.linalg.solve(covariance * np.outer(scale, scale), d))

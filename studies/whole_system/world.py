@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, Robot
 from bayesid.robot.joint_state import JointState
@@ -17,13 +16,14 @@ from studies.whole_system.setting import COULOMB, TORQUE, VISCOUS
 
 __all__ = ["START_RATE", "flights", "fly", "hand_speed", "record"]
 
-Floats = NDArray[np.floating]
-
 STEP, INTERVAL = 0.1, 0.5
 """Integration step of MuJoCo, and time between samples [s]."""
 
 START_RATE = np.array([2e-4, -1e-4, 3e-4])
 """True rate of the base at the start [rad/s]."""
+
+CENTRE = np.array([0.2, -0.8, 1.2, -0.5, 0.6, 0.3])
+"""Joint positions before and after a manoeuvre [rad]."""
 
 
 def flights(duration: float) -> dict[str, dict[str, Any]]:
@@ -53,18 +53,17 @@ def fly(
     seed : int
         Seed of the manoeuvre.
     duration : float
-        Length of the manoeuvre [s].
+        Duration of the manoeuvre [s].
     joints : tuple of int
         Joints that move.
     amplitude : float
         Typical excursion [rad].
     **hidden
-        What else acts, keywords of `studies.truth.mujoco.TruthModel`.
+        Further influences, keywords of `studies.truth.mujoco.TruthModel`.
     """
     size = np.zeros(len(robot.joints))
     size[list(joints)] = amplitude
-    centre = np.array([0.2, -0.8, 1.2, -0.5, 0.6, 0.3])
-    motion = smooth_motion(len(size), duration, seed, amplitude=size, centre=centre)
+    motion = smooth_motion(len(size), duration, seed, amplitude=size, centre=CENTRE)
     time = np.arange(0.0, duration + 1e-9, INTERVAL)
     return flight.true_robot(robot, **hidden).run(motion, time, rate0=START_RATE, step=STEP)
 
@@ -78,7 +77,7 @@ def hand_speed(truth: Truth, robot: Robot) -> float:
 
 
 def record(truth: Truth, robot: Robot, name: str, rng: np.random.Generator | None) -> Manoeuvre:
-    """Record a flight with the noise of all sensors; torques hold the friction of the joints."""
+    """Record a flight with the noise of all sensors; torques include the friction of the joints."""
     friction = COULOMB * np.sign(truth.speed) + VISCOUS * truth.speed
     noise = {"position": ENCODER, "torque": TORQUE, "rate": RATE, "accel": ACCEL}
     return flight.record(truth._replace(torque=truth.torque + friction), name, robot, noise, rng, by_channel=())
