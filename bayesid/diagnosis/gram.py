@@ -1,0 +1,167 @@
+"""Gram matrix of candidate signatures after the fitted unknowns have taken their share.
+
+With the whitened residual ``r`` of the present model, the derivatives ``X`` of the residual in its fitted unknowns,
+whose prior is standard normal, and the signatures ``S`` of whatever the model may lack, the residual with amplitudes
+``a`` is ``r + S a + X dz``. Once the unknowns are integrated out, the data speak on the amplitudes through
+
+    A = S'S - S'X (X'X + 1)^-1 X'S,    g = S'r - S'X (X'X + 1)^-1 (X'r + z)
+
+alone: the likelihood of ``a`` relative to that of ``a = 0`` is ``exp(-g'a - a'A a / 2)``. At the mode of the present
+model ``X'r + z = 0``, and the score ``g`` is ``S'r``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from bayesid._math.arrays import Floats, Integers
+
+__all__ = ["Gram", "independent_directions"]
+
+LOST = 1e-10
+"""Fraction of a column's length below which what the unknowns leave of it is rounding and is set to zero."""
+
+DEPENDENT = 1e-10
+"""Fraction of the largest eigenvalue, among columns of unit length, below which a direction counts as dependent."""
+
+
+def independent_directions(matrix: Floats) -> Floats:
+    """Return combinations of columns that are orthonormal in a Gram matrix, one for each independent direction.
+
+    Parameters
+    ----------
+    matrix : (m, m) array
+        Positive semidefinite matrix.
+
+    Returns
+    -------
+    (m, k) array
+        Matrix ``W`` with ``W' matrix W = 1``, where ``k`` is the numerical rank, judged after each column has been
+        brought to unit length, so that units do not matter.
+    """
+    length = np.sqrt(np.diag(matrix))
+    inverse = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
+    values, vectors = np.linalg.eigh(inverse[:, None] * matrix * inverse)
+    kept = values > DEPENDENT * max(values.max(initial=0.0), np.finfo(float).tiny)
+    return inverse[:, None] * vectors[:, kept] / np.sqrt(values[kept])
+
+
+@dataclass(frozen=True)
+class Gram:
+    """All that the data say about the amplitudes of candidate signatures.
+
+    Attributes
+    ----------
+    matrix : (m, m) array
+        Information ``A`` on the amplitudes, per product of their units.
+    score : (m,) array
+        Derivative ``g`` of half of chi-square in the amplitudes, where all are zero. The likelihood is largest at the
+        amplitudes ``-A^-1 g``.
+    groups : mapping of str to (k,) arrays of int
+        Indices of the columns of each group, by name.
+    """
+
+    matrix: Floats
+    score: Floats
+    groups: Mapping[str, Integers]
+
+    def __post_init__(self) -> None:
+        for name in ("matrix", "score"):
+            locked = np.array(getattr(self, name), dtype=float)
+            if not np.isfinite(locked).all():
+                raise ValueError(f"the {name} of a Gram must be finite; a signature or the residual is not")
+            locked.setflags(write=False)
+            object.__setattr__(self, name, locked)
+        size = len(self.score)
+        if self.matrix.shape != (size, size):
+            raise ValueError(f"a score of length {size} needs a matrix of that size, received {self.matrix.shape}")
+        object.__setattr__(self, "groups", {name: np.array(own, dtype=int) for name, own in self.groups.items()})
+
+    @staticmethod
+    def of(columns: Mapping[str, Floats], residual: Floats, fitted: Floats, coordinates: Floats | None = None) -> Gram:
+        """Return the Gram of signatures beside a fitted model.
+
+        The signatures are projected off the fitted columns, with the unknowns' prior as further rows, before any
+        product is formed: differences of large products would lose signatures that the unknowns imitate closely.
+
+        Parameters
+        ----------
+        columns : mapping of str to (N, k) arrays
+            Derivatives of the whitened residual in the amplitudes of each group.
+        residual : (N,) array
+            Whitened residual of the present model.
+        fitted : (N, n) array
+            Derivatives of the residual in the fitted unknowns, each with a standard normal prior.
+        coordinates : (n,) array, optional
+            Values of the unknowns, in prior standard deviations. Where they are left out, the model is at its mode.
+        """
+        rows, unknowns = fitted.shape
+        z = -fitted.T @ residual if coordinates is None else coordinates
+        basis = np.linalg.qr(np.concatenate([fitted, np.eye(unknowns)]))[0]
+        sizes = [array.shape[1] for array in columns.values()]
+        left = np.empty((rows + unknowns, sum(sizes)))
+        groups, first = {}, 0
+        for (name, array), size in zip(columns.items(), sizes, strict=True):
+            share = basis[:rows].T @ array
+            own = left[:, first : first + size]
+            np.subtract(array, basis[:rows] @ share, out=own[:rows])
+            own[rows:] = -basis[rows:] @ share
+            own[:, np.linalg.norm(own, axis=0) <= LOST * np.linalg.norm(array, axis=0)] = 0.0
+            groups[name] = np.arange(first, first + size)
+            first += size
+        return Gram(left.T @ left, left.T @ np.concatenate([residual, z]), groups)
+
+    def keeping(self, names: Iterable[str]) -> Gram:
+        """Return the Gram of some of the groups, in the order of the names."""
+        chosen = {name: self.groups[name] for name in names}
+        kept = np.concatenate([np.zeros(0, dtype=int), *chosen.values()])
+        groups, first = {}, 0
+        for name, own in chosen.items():
+            groups[name] = np.arange(first, first + len(own))
+            first += len(own)
+        return Gram(self.matrix[np.ix_(kept, kept)], self.score[kept], groups)
+
+    def cosines(self, first: str, second: str) -> Floats:
+        """Return the canonical correlations of two groups after projection, shape (k,), the largest first.
+
+        The largest says how well some change by the one group can imitate some change by the other; only where the
+        smallest is near one, too, can the groups imitate each other altogether. ``k`` is the smaller of their ranks.
+        """
+        own, other = self.groups[first], self.groups[second]
+        left = independent_directions(self.matrix[np.ix_(own, own)])
+        right = independent_directions(self.matrix[np.ix_(other, other)])
+        found = np.linalg.svd(left.T @ self.matrix[np.ix_(own, other)] @ right, compute_uv=False)
+        return np.minimum(found, 1.0)
+
+    def signal_to_noise(self, *names: str) -> float:
+        """Return the root of the improvement of chi-square by groups, fitted jointly with the unknowns, less its rank.
+
+        The improvement includes that of the unknowns' prior. Where it is below the rank, the ratio is zero.
+        """
+        own = np.concatenate([self.groups[name] for name in names])
+        fitted = independent_directions(self.matrix[np.ix_(own, own)]).T @ self.score[own]
+        return float(np.sqrt(max(fitted @ fitted - len(fitted), 0.0)))
+
+    def null_scores(self, rng: np.random.Generator, draws: int) -> Floats:
+        """Draw scores of a model that lacks nothing, shape (draws, m): normal with covariance ``A``.
+
+        Write the truth as the unknowns ``t``, drawn from their prior, and the noise ``e``. At the mode the residual
+        and the unknowns, ``[r; z]``, are what the projection off ``[X; 1]`` leaves of ``[e; t]``, whose elements are
+        independent and standard normal. The score is the product of that with the projected signatures, so that its
+        covariance is the products of the projected signatures with one another, which is ``A``. No simulation is
+        needed where the model is linear over its posterior.
+        """
+        return rng.normal(size=(draws, self._root.shape[1])) @ self._root.T
+
+    @cached_property
+    def _root(self) -> Floats:
+        """Matrix, (m, k), whose product with its transpose is ``A``."""
+        length = np.sqrt(np.diag(self.matrix))
+        inverse = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
+        values, vectors = np.linalg.eigh(inverse[:, None] * self.matrix * inverse)
+        kept = values > 0.0
+        return length[:, None] * vectors[:, kept] * np.sqrt(values[kept])

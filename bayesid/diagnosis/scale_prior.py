@@ -1,0 +1,124 @@
+"""Prior of amplitudes of one unit whose common scale is itself unknown.
+
+The amplitudes of a group are normal, ``a ~ N(0, tau^2 Lambda)``, and their scale ``tau`` is log-uniform between a floor
+below what the data can resolve and a physical bound. A Gaussian prior at the bound would charge a group with many small
+amplitudes for every one of them; here the common scale is charged once. Every candidate has a prior of this one form,
+so that their Occam factors are comparable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.gram import Gram
+
+__all__ = ["AmplitudeGroup", "CandidateCause", "ScaleRange", "scale_range"]
+
+UNRESOLVED_GAIN = 0.01
+"""Square of the scale times the information in the most visible direction, at the floor that the data set: there the
+evidence differs from that of no amplitude at all by less than 0.01 per direction."""
+
+
+@dataclass(frozen=True)
+class AmplitudeGroup:
+    """Amplitudes that share one unknown scale.
+
+    Attributes
+    ----------
+    name : str
+        Name of the group of columns in the Gram.
+    high : float
+        Physical bound of the scale, in the unit of the amplitudes.
+    low : float, optional
+        Smallest scale. Where it is left out, it is what the data cannot resolve (`scale_range`).
+    spread : (k,) array, optional
+        Variances of the amplitudes relative to the square of the scale, the diagonal of ``Lambda``; ones by default.
+    """
+
+    name: str
+    high: float
+    low: float | None = None
+    spread: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.high < np.inf:
+            raise ValueError(f"{self.name}: the bound of the scale must be positive and finite, received {self.high}")
+        if self.low is not None and not 0.0 < self.low <= self.high:
+            raise ValueError(f"{self.name}: the floor of the scale must lie in (0, {self.high}], received {self.low}")
+        if self.spread is not None:
+            spread = np.array(self.spread, dtype=float)
+            if not ((spread > 0.0) & np.isfinite(spread)).all():
+                raise ValueError(f"{self.name}: relative variances must be positive and finite, received {spread}")
+            spread.setflags(write=False)
+            object.__setattr__(self, "spread", spread)
+
+    def roots(self, size: int) -> Floats:
+        """Return the standard deviations of ``size`` amplitudes relative to the scale, shape (size,)."""
+        if self.spread is None:
+            return np.ones(size)
+        if self.spread.shape != (size,):
+            raise ValueError(f"{self.name}: {size} amplitudes need so many variances, received {self.spread.shape}")
+        return np.sqrt(self.spread)
+
+
+@dataclass(frozen=True)
+class CandidateCause:
+    """What the model may lack: one or more groups of amplitudes that come and go together, each with its own scale.
+
+    Attributes
+    ----------
+    name : str
+    groups : tuple of AmplitudeGroup
+    generic : bool
+        Whether it stands for something unknown, such as a disturbing torque, rather than for a cause of the catalogue.
+    """
+
+    name: str
+    groups: tuple[AmplitudeGroup, ...]
+    generic: bool = False
+
+    def rescaled(self, gram: Gram, bound: float = 1.0, floor: float = 1.0) -> CandidateCause:
+        """Return the cause with the bounds of its scales and the floors multiplied by factors.
+
+        A floor that the data would set is written down first, so that it is multiplied, too.
+        """
+        groups = []
+        for group in self.groups:
+            low = scale_range(group, gram).low if group.low is None and floor != 1.0 else group.low
+            groups.append(replace(group, high=group.high * bound, low=None if low is None else low * floor))
+        return replace(self, groups=tuple(groups))
+
+
+@dataclass(frozen=True)
+class ScaleRange:
+    """Range of a log-uniform scale.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends, in the unit of the amplitudes. They are equal where the data cannot see the group within its bound.
+    visible : bool
+        Whether the data can see the group within its bound at all.
+    """
+
+    low: float
+    high: float
+    visible: bool
+
+
+def scale_range(group: AmplitudeGroup, gram: Gram) -> ScaleRange:
+    """Return the range of a group's scale.
+
+    The floor that the data set is the scale at which its square times the largest eigenvalue of
+    ``Lambda^1/2 A Lambda^1/2`` is 0.01. A group whose bound is below that floor is invisible: its evidence is that of
+    nothing, whatever the data.
+    """
+    own = gram.groups[group.name]
+    root = group.roots(len(own))
+    largest = float(np.linalg.eigvalsh(root[:, None] * gram.matrix[np.ix_(own, own)] * root).max(initial=0.0))
+    floor = np.sqrt(UNRESOLVED_GAIN / largest) if largest > 0.0 else np.inf
+    low = min(floor, group.high) if group.low is None else group.low
+    return ScaleRange(float(low), group.high, bool(floor <= group.high))

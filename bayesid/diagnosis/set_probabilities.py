@@ -1,0 +1,108 @@
+"""Posterior probabilities of sets of causes."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from bayesid.diagnosis.cause_prior import CausePrior
+
+__all__ = ["CauseSet", "SetProbabilities"]
+
+
+@dataclass(frozen=True)
+class CauseSet:
+    """One set of causes.
+
+    Attributes
+    ----------
+    causes : tuple of str
+        Causes of the catalogue, sorted.
+    generic : str or None
+        Generic candidate beside them.
+    log_evidence : float
+        Relative to nothing.
+    log_prior : float
+        Logarithm of its prior probability.
+    probability : float
+        Posterior probability among all sets considered.
+    """
+
+    causes: tuple[str, ...]
+    generic: str | None
+    log_evidence: float
+    log_prior: float = 0.0
+    probability: float = 0.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All candidates in the set."""
+        return self.causes if self.generic is None else (*self.causes, self.generic)
+
+
+@dataclass(frozen=True)
+class SetProbabilities:
+    """Probabilities of all sets considered.
+
+    Attributes
+    ----------
+    sets : tuple of CauseSet
+        Sets, the most probable first. The empty one is always among them.
+    causes, generics : tuple of str
+        Names of all candidates of the catalogue and of all generic ones, sorted.
+    prior : CausePrior
+    """
+
+    sets: tuple[CauseSet, ...]
+    causes: tuple[str, ...]
+    generics: tuple[str, ...]
+    prior: CausePrior
+
+    @staticmethod
+    def of(
+        sets: Iterable[CauseSet], causes: Iterable[str], generics: Iterable[str], prior: CausePrior
+    ) -> SetProbabilities:
+        """Return the probabilities of sets of known evidence, the empty one among them."""
+        causes, generics = tuple(sorted(causes)), tuple(sorted(generics))
+        weighed = [
+            replace(
+                item,
+                log_prior=prior.log_probability(len(item.causes), len(causes), item.generic is not None, len(generics)),
+            )
+            for item in sets
+        ]
+        weighed.sort(key=lambda item: (-item.log_prior - item.log_evidence, item.names))
+        logs = np.array([item.log_prior + item.log_evidence for item in weighed])
+        shares = np.exp(logs - logsumexp(logs))
+        found = tuple(replace(item, probability=float(p)) for item, p in zip(weighed, shares, strict=True))
+        return SetProbabilities(found, causes, generics, prior)
+
+    def under(self, prior: CausePrior) -> SetProbabilities:
+        """Return the probabilities of the same sets under another prior of causes; no evidence is computed anew."""
+        return SetProbabilities.of(self.sets, self.causes, self.generics, prior)
+
+    @property
+    def nothing(self) -> float:
+        """Probability that nothing is lacking."""
+        return float(sum(item.probability for item in self.sets if not item.names))
+
+    @property
+    def unknown(self) -> float:
+        """Probability that something generic is at work, whatever causes accompany it."""
+        return float(sum(item.probability for item in self.sets if item.generic is not None))
+
+    def of_any(self, names: Collection[str]) -> float:
+        """Return the probability that at least one of some candidates is at work, such as a class of equivalents."""
+        return float(sum(item.probability for item in self.sets if not set(names).isdisjoint(item.names)))
+
+    @property
+    def inclusion(self) -> dict[str, float]:
+        """Probability of each candidate, generic ones included, to be at work, whatever accompanies it."""
+        found = dict.fromkeys((*self.causes, *self.generics), 0.0)
+        for item in self.sets:
+            for name in item.names:
+                found[name] += item.probability
+        return found
