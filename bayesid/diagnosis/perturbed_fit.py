@@ -67,6 +67,8 @@ class Fit:
     converged : bool
     released : (k,) array of int
         Which of the model's unknowns the study takes to be zero and this fit does not.
+    frozen : (l,) array of int
+        Which of them are held at zero.
     """
 
     posterior: Posterior
@@ -80,6 +82,12 @@ class Fit:
     operating: OperatingTrajectory
     converged: bool
     released: NDArray[np.intp]
+    frozen: NDArray[np.intp]
+
+    @property
+    def own_coordinates(self) -> Floats:
+        """The model's free unknowns in prior standard deviations, in the order of `own`."""
+        return np.delete(self.z, self.frozen)
 
     @property
     def chi2(self) -> float:
@@ -273,6 +281,7 @@ class Engine:
             best.operating,
             converged,
             self._released,
+            self.frozen,
         )
 
     def _point(
