@@ -63,6 +63,13 @@ _TEMPLATE = """\
   grid(columns: (auto, 1fr), column-gutter: 1em, row-gutter: 0.65em,
     ..cells.pos().chunks(2).map(pair => (text(fill: luma(35%), pair.at(0)), pair.at(1))).flatten())
 })
+#let foot(small) = context {
+  if counter(page).get().first() == 1 {
+    set par(justify: false, leading: 0.5em)
+    line(length: 100%, stroke: 0.4pt) + v(-0.5em) + text(size: 7.5pt, small) + v(-0.3em)
+  }
+  align(center, counter(page).display("1 / 1", both: true))
+}
 #let title(main, sub, date) = align(left, {
   text(size: 18pt, weight: "bold", main)
   if sub != "" { linebreak() + text(size: 12pt, fill: luma(35%), sub) }
@@ -109,11 +116,8 @@ class Document:
         self._parts.append(f"#decision({literal(title)}{cells})\n")
 
     def foot(self, text: str) -> None:
-        """Add a text in small print at the foot of the present page."""
-        self._parts.append(
-            "#place(bottom, float: true, block(width: 100%, { line(length: 100%, stroke: 0.4pt); set text(size: 7.5pt)\n"
-            f"set par(justify: false, leading: 0.5em); {literal(text)} }}))\n"
-        )
+        """Put a text in small print at the foot of the first page."""
+        self._parts.insert(1, f"#set page(footer: foot({literal(text)}))\n")
 
     def page(self) -> None:
         """Go on at the top of a new page."""

@@ -8,7 +8,6 @@ import numpy as np
 
 from bayesid.diagnosis import Diagnosis
 from bayesid.diagnosis.gram import Gram
-from bayesid.diagnosis.probable_verdict import UNKNOWN
 from bayesid.report.class_probabilities import alternatives, class_of
 
 __all__ = ["CausePair", "cause_cosines", "inseparable_pairs"]
@@ -55,7 +54,7 @@ def inseparable_pairs(result: Diagnosis, most: int) -> list[CausePair]:
 
     Equivalents come first, then the pairs with the largest smallest correlation.
     """
-    named = [name for names in alternatives(result) for name in names if name != UNKNOWN]
+    named = [name for names in alternatives(result) for name in names if name in result.evidence.catalogue]
     inclusion = result.probabilities.inclusion
     catalogue = [name for name in result.evidence.catalogue if name not in result.evidence.invisible]
     if not named:
@@ -64,7 +63,7 @@ def inseparable_pairs(result: Diagnosis, most: int) -> list[CausePair]:
     for first in dict.fromkeys(named):
         for second in catalogue:
             key = frozenset((first, second))
-            if second == first or first not in result.evidence.causes or key in seen:
+            if second == first or key in seen:
                 continue
             seen.add(key)
             equivalent = second in class_of(result, first)

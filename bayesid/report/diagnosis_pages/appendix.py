@@ -48,14 +48,13 @@ def _add_candidates(document: Document, result: Diagnosis) -> None:
             "log Bayes factor",
             "size, or 95 % limit",
             "power",
-            "from",
         ],
         diagnosis_tables.candidate_rows(result.candidates, result.alarm.level),
-        f"All {len(result.candidates)} candidates, each alone beside the present model; the probability is that of "
-        "being at work, whatever accompanies it. Refitted: fitted together with all unknowns; linear: from the "
-        "response at the present fit. The p-value counts all tests. Sizes are given of candidates that are seen; of "
-        "the others, the magnitudes that they stay below with 95 %. A cell is empty where nothing was evaluated.",
-        ["left", "right", "right", "right", "right", "left", "right", "left"],
+        f"All {len(result.candidates)} candidates, each alone beside the present model, from the linear response; the "
+        "probability is that of being at work, whatever accompanies it. The p-value counts all tests. Sizes are given "
+        "of candidates that are seen; of the others, the magnitudes that they stay below with 95 %. A cell is empty "
+        "where nothing was evaluated.",
+        ["left", "right", "right", "right", "right", "left", "right"],
     )
 
 

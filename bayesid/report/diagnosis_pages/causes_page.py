@@ -27,7 +27,7 @@ def add_causes(document: Document, result: Diagnosis) -> None:
         else "What could be at work"
     )
     document.table(
-        ["set", "probability", "log evidence", "size", "bound", "share of the bound"],
+        ["causes", "probability", "log evidence", "size", "bound", "share of the bound"],
         probability_tables.set_rows(result, SETS),
         f"The {min(SETS, len(result.probabilities.sets))} most probable sets of causes, of "
         f"{len(result.probabilities.sets)} considered. The log evidence is relative to that of nothing. Sizes are root "

@@ -10,6 +10,7 @@ from bayesid.report import figures
 from bayesid.report.document import Document
 from bayesid.report.given_values import ParameterChange
 from bayesid.report.sentences.diagnosis_sentences import wrench_sentence
+from bayesid.report.simulation_errors import simulation_errors
 from bayesid.report.tables import change_tables
 from bayesid.report.tables.diagnosis_tables import correlation_rows
 
@@ -23,13 +24,15 @@ def add_consequences(document: Document, result: Diagnosis, changes: Sequence[Pa
     """Add all inertial parameters and the reconstructed disturbance."""
     named = bool(result.verdict.causes)
     document.section("Consequences" if named else "Inertial parameters and the disturbance")
-    if changes and named:
+    if changes:
         document.table(
-            ["parameter", "unit", "given", "without", "with", "shift [sd]"],
-            change_tables.change_rows(changes),
+            ["parameter", "unit", "given", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
+            change_tables.change_rows(changes, named),
             "Inertial parameters, ± sd: given with the prior's width, fitted without the named causes, fitted with "
-            "them. A shift of many standard deviations of the fit without is the error that would have been believed.",
-            ["left", "left", "right", "right", "right", "right"],
+            "them. A shift of many standard deviations of the fit without is the error that would have been believed."
+            if named
+            else "Inertial parameters, ± sd: given with the prior's width, and fitted with the present model.",
+            ["left", "left", *["right"] * (4 if named else 2)],
         )
     if changes:
         document.figure(
@@ -37,6 +40,12 @@ def add_consequences(document: Document, result: Diagnosis, changes: Sequence[Pa
             "Inertial parameters about the values given, as multiples of the prior's width; bars hold 95 %. Widths "
             "without the causes assume that the present model is right.",
         )
+    document.table(
+        ["sensor", "unit", *(["before", "after"] if named else ["error"]), "noise alone"],
+        change_tables.error_rows(simulation_errors(result), named),
+        "Root mean square error of the simulation, length of all axes, freed of its correlation.",
+        ["left", "left", *["right"] * (3 if named else 2)],
+    )
     _add_disturbance(document, result)
 
 

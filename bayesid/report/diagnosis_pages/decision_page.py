@@ -23,7 +23,7 @@ __all__ = ["add_decision", "decision_entries"]
 MOVED = 4
 """Inertial parameters in the table of the first page."""
 
-CLASSES = 5
+CLASSES = 4
 """Classes of causes in the table of probabilities."""
 
 
@@ -53,7 +53,6 @@ def add_decision(
     )
     _add_picture(document, result)
     _add_changes(document, result, changes)
-    _add_errors(document, result, errors)
     document.table(
         ["at work", "probability"],
         probability_tables.probability_rows(result, CLASSES),
@@ -72,9 +71,8 @@ def decision_entries(
     entries = [("Verdict", verdict_sentence(result))]
     for cause in verdict.causes:
         entries += [
-            ("Cause", f"{cause}. {cause_summary(result.after, cause)}".rstrip()),
+            ("Cause", _cause_text(result, cause)),
             ("Size, ± 95 %", size_text(result.after, cause)),
-            ("Probability", format_probability(cause_probability(result, cause))),
         ]
     entries += [
         ("Alternative", f"{set_text(names)}, probability {format_probability(alternative_probability(result, names))}")
@@ -90,6 +88,11 @@ def decision_entries(
         ("What to do", action_sentence(result)),
     ]
     return entries
+
+
+def _cause_text(result: Diagnosis, cause: str) -> str:
+    probability = format_probability(cause_probability(result, cause))
+    return f"{cause}, probability {probability}. {cause_summary(result.after, cause)}".rstrip()
 
 
 def _change_text(result: Diagnosis, changes: Sequence[ParameterChange], errors: Sequence[SimulationError]) -> str:
@@ -133,18 +136,8 @@ def _add_changes(document: Document, result: Diagnosis, changes: Sequence[Parame
         change_tables.change_rows(change_tables.most_moved(changes, MOVED), named),
         "The inertial parameters that move most: given, fitted without the named causes, fitted with them, ± sd."
         if named
-        else "Inertial parameters: given, and fitted with the present model, ± sd.",
+        else "Inertial parameters: given, and fitted with the present model, ± sd. All are on a later page.",
         ["left", "left", *["right"] * (4 if named else 2)],
-    )
-
-
-def _add_errors(document: Document, result: Diagnosis, errors: Sequence[SimulationError]) -> None:
-    named = bool(result.verdict.causes)
-    document.table(
-        ["sensor", "unit", *(["before", "after"] if named else ["error"]), "noise alone"],
-        change_tables.error_rows(errors, named),
-        "Root mean square error of the simulation, length of all axes, freed of its correlation.",
-        ["left", "left", *["right"] * (3 if named else 2)],
     )
 
 

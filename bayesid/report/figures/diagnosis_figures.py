@@ -40,7 +40,7 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
     figure = wide_figure(0.75 + 0.155 * len(rows))
     axes = figure.subplots()
     place = np.arange(len(rows))[::-1]
-    kinds = {"named": COLOURS[0], "significant": COLOURS[4], "not significant": "#bbbbbb"}
+    kinds = {"named": COLOURS[0], "significant": "#777777", "not significant": "#cccccc"}
     state = [
         "named" if row.name in named else "significant" if row.p_value_adjusted < alarm else "not significant"
         for row in rows

@@ -32,7 +32,7 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
     """Return how the verdict was reached."""
     prior, probabilities = result.probabilities.prior, result.probabilities
     yield (
-        f"An alarm is raised where the loudest of {len(result.alarm.log_p)} tests together is as loud as noise alone "
+        f"An alarm is raised where the loudest of {result.alarm.tests} tests together is as loud as noise alone "
         f"makes it in less than {100.0 * result.alarm.level:g} % of cases, all dependence between the tests included."
     )
     yield (

@@ -109,7 +109,7 @@ def alarm_sentence(result: Diagnosis) -> str:
     alarm = result.alarm
     found = "no alarm is raised" if alarm.silent else "an alarm is raised"
     return (
-        f"Of {len(alarm.log_p)} tests of what the present simulation leaves, the loudest is that for {alarm.loudest} "
+        f"Of {alarm.tests} tests of what the present simulation leaves, the loudest is that for {alarm.loudest} "
         f"(p {relation(format_p_value(alarm.p_value))}, all tests counted). Below {alarm.level:g} the alarm is raised: "
         f"here {found}."
     )

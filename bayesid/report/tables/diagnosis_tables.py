@@ -38,7 +38,7 @@ SEEN = 2.0
 
 
 def candidate_rows(rows: Sequence[Candidate], alarm: float) -> Rows:
-    """Return name, probability, signal-to-noise ratio, p-value, log Bayes factor, size or limit, power, and origin.
+    """Return name, probability, signal-to-noise ratio, p-value, log Bayes factor, size or limit, and power.
 
     Parameters
     ----------
@@ -55,7 +55,6 @@ def candidate_rows(rows: Sequence[Candidate], alarm: float) -> Rows:
             "" if row.log_bayes_factor is None else format_signed(row.log_bayes_factor),
             _size_text(row, alarm),
             "" if row.power is None else format_fixed(row.power, 2),
-            "refitted" if row.refitted else "linear",
         ]
         for row in rows
     ]

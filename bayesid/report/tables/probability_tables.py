@@ -17,7 +17,7 @@ from bayesid.report.numbers import (
     format_text,
     format_unit,
 )
-from bayesid.report.sentences.set_words import NOTHING, SOMETHING, set_text, verdict_text
+from bayesid.report.sentences.set_words import NOTHING, SOMETHING, verdict_text
 from bayesid.report.set_sizes import GroupSize, set_sizes
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
@@ -45,30 +45,33 @@ def probability_rows(result: Diagnosis, most: int) -> Rows:
 
 
 def set_rows(result: Diagnosis, most: int) -> Rows:
-    """Return set, probability, log evidence, and cause, size, bound and share of it, of the most probable sets.
+    """Return cause, probability and log evidence of the set, size, bound and share of it, of the most probable sets.
 
-    A set of several causes, or of causes in several units, has several rows, of which the first names it.
+    A set of several causes, or of causes in several units, has several rows, of which only the first has numbers of the
+    whole set; a plus sign stands before each further cause.
     """
     rows = []
     for item in result.probabilities.sets[:most]:
-        first = [set_text(item.names), format_probability(item.probability), format_signed(item.log_evidence)]
-        sizes = set_sizes(result, item.names)
-        several = len(item.names) > 1
-        cells = [_size_cells(size, several) for size in sizes] or [["", "", ""]]
-        rows += [[*(first if place == 0 else ["", "", ""]), *own] for place, own in enumerate(cells)]
+        whole = [format_probability(item.probability), format_signed(item.log_evidence) if item.names else "0"]
+        before = None
+        for size in set_sizes(result, item) or [GroupSize(NOTHING)]:
+            name = size.cause if before is None else f"+ {size.cause}" if size.cause != before else ""
+            rows.append([name, *(whole if before is None else ["", ""]), *_size_cells(size)])
+            before = size.cause
     return rows
 
 
-def _size_cells(size: GroupSize, several: bool) -> list[str]:
-    name = f"{size.cause} " if several else ""
-    if size.size is None or size.share is None:
-        return [f"{name}fixed by physics".strip(), "", ""]
-    share = f"{format_percent(size.share)}{'' if size.plausible else ', beyond it'}"
-    if size.bound is None:
-        return [name.strip(), "", share]
-    unit = format_unit(size.bound.unit)
-    text = f"{name}{format_number(size.size, 2)} {unit}".rstrip()
-    return [text, f"{format_number(size.bound.largest, 2)} {unit}".rstrip(), share]
+def _size_cells(size: GroupSize) -> list[str]:
+    if size.cause == NOTHING:
+        return ["", "", ""]
+    if size.size is None:
+        return ["fixed by physics", "", ""]
+    share = "" if size.share is None else f"{format_percent(size.share)}{'' if size.plausible else ', beyond it'}"
+    if size.unit is None:
+        return ["", "", share]
+    unit = format_unit(size.unit)
+    bound = "" if size.largest is None else f"{format_number(size.largest, 2)} {unit}".rstrip()
+    return [f"{format_number(size.size, 2)} {unit}".rstrip(), bound, share]
 
 
 def sensitivity_rows(result: Diagnosis) -> Rows:
