@@ -238,6 +238,24 @@ def check_displaced(effect: Effect, hook: str) -> None:
     np.testing.assert_allclose(change.weights.sum(axis=1), 0.0, atol=1e-9 * np.abs(change.weights).max())
 
 
+def check_in_recording(effect: Effect, hook: str) -> None:
+    """In every recording it is the same effect with the same parameters."""
+    for index in range(3):
+        assert (effect.in_recording(index).name, effect.in_recording(index).parameters) == (
+            effect.name,
+            effect.parameters,
+        )
+
+
+def check_jumps(effect: Effect, hook: str) -> None:
+    """The table is the same up to the jump and another just after it."""
+    (instant,) = effect.jumps(TIMES[-1])
+    table = effect.table(ROBOT, SWING, np.array([0.0, instant, instant + 1e-9, TIMES[-1]]))
+    np.testing.assert_array_equal(table[0], table[1])
+    assert not np.allclose(table[1], table[2])
+    np.testing.assert_array_equal(table[2], table[3])
+
+
 def check_body_tables(effect: Effect, hook: str) -> None:
     """Known and unknown bodies together are all of them, and loads have a column each."""
     tables = [table for _, table in effect.body_tables(ROBOT, ("link2",), SWING, TIMES)]
@@ -402,6 +420,8 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "label": check_label,
     "link": check_link,
     "table": check_table,
+    "in_recording": check_in_recording,
+    "jumps": check_jumps,
     "body_tables": check_body_tables,
 }
 FRAMEWORK = {"uses", "constants", "bound", "amplitude_units"}

@@ -19,6 +19,7 @@ from bayesid.simulation.effects.environment_effects import (
 from bayesid.simulation.effects.instant import Instant, Modes, Readings, Resonance, Wrench
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh, WheelMomentum
 from bayesid.simulation.effects.joint_friction import JointFriction, TorqueBias
+from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound, bounds_by_label
 from bayesid.simulation.effects.register import create, known_effects, register
 from bayesid.simulation.effects.sensor_faults import (
@@ -55,6 +56,7 @@ __all__ = [
     "JointLatency",
     "LinkInertia",
     "MagneticDipole",
+    "MassShift",
     "Modes",
     "Parameter",
     "Payload",
