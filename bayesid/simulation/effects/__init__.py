@@ -6,6 +6,7 @@ study files; the class states everything else that the package needs to know of 
 
 from bayesid.simulation.effects.arm_effects import LinkInertia, Payload
 from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointFlexibility, JointLatency
+from bayesid.simulation.effects.clock_faults import AccelClock, AccelLatency, RateClock, RateLatency
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity
 from bayesid.simulation.effects.environment_effects import (
@@ -25,13 +26,11 @@ from bayesid.simulation.effects.register import create, known_effects, register
 from bayesid.simulation.effects.sensor_faults import (
     AccelBias,
     AccelDrift,
-    AccelLatency,
     AccelMisalignment,
     AccelPosition,
     AccelScale,
     RateBias,
     RateDrift,
-    RateLatency,
     RateMisalignment,
     RateScale,
     SensorFault,
@@ -39,6 +38,7 @@ from bayesid.simulation.effects.sensor_faults import (
 
 __all__ = [
     "AccelBias",
+    "AccelClock",
     "AccelDrift",
     "AccelLatency",
     "AccelMisalignment",
@@ -64,6 +64,7 @@ __all__ = [
     "Prior",
     "Quantity",
     "RateBias",
+    "RateClock",
     "RateDrift",
     "RateLatency",
     "RateMisalignment",
