@@ -6,6 +6,7 @@ study files; the class states everything else that the package needs to know of 
 
 from bayesid.simulation.effects.arm_effects import LinkInertia, Payload
 from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointFlexibility, JointLatency
+from bayesid.simulation.effects.attitude_misalignment import AttitudeMisalignment
 from bayesid.simulation.effects.clock_faults import AccelClock, AccelLatency, RateClock, RateLatency
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity
@@ -45,6 +46,7 @@ __all__ = [
     "AccelPosition",
     "AccelScale",
     "AerodynamicDrag",
+    "AttitudeMisalignment",
     "Effect",
     "EncoderOffset",
     "FlexibleAppendage",

@@ -44,6 +44,9 @@ They are the largest of the grades in El-Sheimy and Youssef, Inertial sensors te
 Satellite Navigation 1:2, 2020, table 1.
 """
 
+MISMOUNTED = 0.1, "A sensor that was mounted without a measurement of its axes is within six degrees of them."
+"""Largest rotation of a sensor against its stated mounting [rad], and the reason."""
+
 WARM_UP = 600.0
 """Time within which an instrument that warms up changes by all of its constant error [s]; assumed."""
 
@@ -127,7 +130,7 @@ class _Scale(_Axes):
 
 class _Misalignment(_Axes):
     unit = "rad"
-    largest, reason = 0.1, "A sensor that was mounted without a measurement of its axes is within six degrees of them."
+    largest, reason = MISMOUNTED
     separated_by = "It mixes the axes: turn about one axis at a time, with large readings."
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
