@@ -18,11 +18,10 @@ from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects import MassShift, create
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Kind, Sensor, White
-from bayesid.simulation.simulator import ModelConstants, Simulator, Values
-from bayesid.simulation.time_grid import build_grid, pad_grids
 from studies.truth import mujoco as mj
 from studies.truth import stepwise as ref
 from studies.truth.urdf import SERVICER3
+from tests.simulated import simulated as predicted
 
 POINT, RATE0 = (0.2, -0.1, 0.3), (0.02, -0.03, 0.015)
 TIMES = np.arange(0.0, 40.01, 0.5)
@@ -37,17 +36,7 @@ MOMENTS = np.concatenate([MASS * (AFTER - BEFORE), SECOND[SIX]])
 
 def simulated(robot: Robot, motion, effect: MassShift | None = None, moments=MOMENTS, rate0=RATE0, **options):
     """Rate, accelerometer and rotation matrices of the package's simulation, each with the leading axis T."""
-    sensors = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(1e-5), position=POINT))
-    model = Model(robot, sensors, (), effects=() if effect is None else (effect,))
-    options = {"step": 0.25, "jumps": () if effect is None else effect.jumps(TIMES[-1]), **options}
-    grid = pad_grids([build_grid(robot, (), motion, TIMES, options.pop("step"), effects=model.effects, **options)])
-    present = tuple(jnp.asarray(moments) for _ in model.effects)
-    values = Values(jnp.zeros(0), jnp.asarray([rate0]), jnp.zeros((1, 3)), jnp.zeros((1, 0)), present)
-    found, quaternion, _ = Simulator.of(model).readings(
-        ModelConstants.of(model), values, grid, jnp.asarray([[0.0, 0.0, 0.0, 1.0]])
-    )
-    attitude = np.array([pin.Quaternion(np.array(q)).toRotationMatrix() for q in quaternion[0]])
-    return np.asarray(found.rate[0]), np.asarray(found.accel[0]), attitude
+    return predicted(robot, motion, TIMES, rate0, POINT, effect, moments, **options)
 
 
 def stepwise(moments: np.ndarray, step: float = 0.05):

@@ -36,6 +36,7 @@ from bayesid.simulation.effects.sensor_faults import (
     RateScale,
     SensorFault,
 )
+from bayesid.simulation.effects.wheel_history import WheelHistory
 
 __all__ = [
     "AccelBias",
@@ -78,6 +79,7 @@ __all__ = [
     "SolarPressure",
     "ThrusterLeak",
     "TorqueBias",
+    "WheelHistory",
     "WheelMomentum",
     "Wrench",
     "bounds_by_label",
