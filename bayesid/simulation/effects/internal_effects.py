@@ -21,7 +21,7 @@ from bayesid.simulation.effects.register import register
 if TYPE_CHECKING:
     from bayesid.simulation.model import Model
 
-__all__ = ["FlexibleAppendage", "FuelSlosh", "WheelMomentum"]
+__all__ = ["FlexibleAppendage", "FuelSlosh", "WheelMomentum", "wheel_bound"]
 
 FREQUENCY, FREQUENCY_SPREAD = 0.12, 1.0
 """Median of a hidden vibration's frequency [Hz] and standard deviation of its logarithm, for 0.02 to 0.9 Hz at 2 sd."""
@@ -82,13 +82,7 @@ class WheelMomentum(Effect):
 
     def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
         """Return the momentum of all wheels that a robot of this mass and size carries, at full speed."""
-        size = RobotSize.of(model.robot)
-        radius = RIM_RADIUS * size.length
-        reason = (
-            f"Wheels whose rotors are {100.0 * ROTORS:g} % of {three_digits(size.mass)} kg run with {RIM_SPEED:g} m/s "
-            f"at their rims of {radius:.2g} m radius."
-        )
-        return (PhysicalBound("N m s", ROTORS * size.mass * RIM_SPEED * radius, reason),)
+        return (wheel_bound(model.robot),)
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return the momentum of the wheels, and a zero derivative."""
@@ -258,3 +252,14 @@ def spacecraft_box(robot: Robot) -> tuple[Floats, Floats]:
     base = robot.link(robot.base).inertial
     second = np.diag(base.pseudo_inertia[:3, :3]) / base.mass - base.com**2
     return base.com, 1.5 * np.sqrt(3.0 * second)
+
+
+def wheel_bound(robot: Robot) -> PhysicalBound:
+    """Return the momentum of all wheels that a robot of this mass and size carries, at full speed [N m s]."""
+    size = RobotSize.of(robot)
+    radius = RIM_RADIUS * size.length
+    reason = (
+        f"Wheels whose rotors are {100.0 * ROTORS:g} % of {three_digits(size.mass)} kg run with {RIM_SPEED:g} m/s "
+        f"at their rims of {radius:.2g} m radius."
+    )
+    return PhysicalBound("N m s", ROTORS * size.mass * RIM_SPEED * radius, reason)
