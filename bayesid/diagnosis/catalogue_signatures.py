@@ -13,6 +13,7 @@ from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
 from bayesid.inference.compiled import Arrays
 from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 __all__ = ["MOMENT_UNITS", "catalogue_signatures", "group_names", "moment_spreads"]
@@ -43,7 +44,7 @@ def moment_spreads(units: Sequence[str], reach: float) -> list[Floats]:
 def catalogue_signatures(
     engine: Engine, fit: Fit, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
 ) -> SignatureBank:
-    """Return the bank of the effects without vibrations.
+    """Return the bank of the effects that have one form: neither a frequency nor an instant.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def catalogue_signatures(
     signatures: dict[str, Signatures] = {}
     causes = []
     for effect in effects:
-        if effect.modes_count:
+        if effect.modes_count or isinstance(effect, MassShift):
             continue
         sizes = {bound.unit: bound.largest for bound in bounds[effect.label]}
         if effect.amplitude_units == MOMENT_UNITS:

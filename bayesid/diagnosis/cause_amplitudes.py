@@ -33,7 +33,7 @@ class CauseAmplitude(NamedTuple):
 def amplitudes_of(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:
     """Return the amplitudes of one cause of a hypothesis; of initial rates, one per axis and recording."""
     for index, effect in enumerate(hypothesis.fit.effects):
-        if effect.label == label:
+        if label in (effect.label, effect.name):  # a jump's label holds its instants
             mean, sd = effect_amplitude(hypothesis, index)
             return list(map(CauseAmplitude, effect.quantities, mean.tolist(), sd.tolist()))
     if label == INITIAL_RATE:

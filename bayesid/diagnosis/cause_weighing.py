@@ -21,6 +21,7 @@ from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
 from bayesid.diagnosis.tone_tuning import with_tuned_tones
 from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 __all__ = ["WeighedCauses", "weigh_causes"]
@@ -158,7 +159,7 @@ def _settled(
         if not chosen:
             return point, found, best
         best, expected = fit_in_amplitudes(point, chosen)
-        if abs(best.cost - expected) < AGREES or any(effect.modes_count for effect in chosen):
+        if abs(best.cost - expected) < AGREES:
             return point, found, best
         point = linearise(point.engine, best, effects, bounds)
         found = enumerate_sets(point.evidence, prior)
@@ -169,10 +170,12 @@ def _settled(
 
 
 def _best_effects(found: SetProbabilities, effects: Sequence[Effect]) -> list[Effect]:
-    """Return the effects without vibrations of the most probable set."""
+    """Return the effects of the most probable set; none where one of them has several forms."""
     best = next((item for item in found.sets if item.names), None)
     causes = () if best is None else best.causes
-    return [effect for effect in effects if effect.label in causes and not effect.modes_count]
+    chosen = [effect for effect in effects if effect.label in causes]
+    several = any(effect.modes_count or isinstance(effect, MassShift) for effect in chosen)
+    return [] if several else chosen
 
 
 def _vibrations(found: SetProbabilities, effects: Sequence[Effect]) -> dict[str, tuple[str, ...]]:

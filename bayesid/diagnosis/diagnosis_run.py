@@ -183,7 +183,10 @@ def _diagnose(
     engine = engine.with_posterior(relinearised(posterior, first.z))
     before = Hypothesis(engine, engine.fit(z=first.z))
     clock.ends("fit")
-    catalogue = candidates(model, knows_latitude=knows_latitude) if effects is None else list(effects)
+    wheels = any(f"wheel_momentum.{axis}" in item.recording.channels for item in manoeuvres for axis in "xyz")
+    catalogue = (
+        candidates(model, knows_latitude=knows_latitude, records_wheels=wheels) if effects is None else list(effects)
+    )
     limits = bounds_by_label(catalogue, model, stated)
     weighed = weigh_causes(engine, before.fit, catalogue, limits, prior, rng, progress)
     classes = weighed.classes()

@@ -13,11 +13,13 @@ from bayesid.diagnosis.amplitude_posterior import AmplitudePosterior
 from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.linearisation import Linearisation
+from bayesid.diagnosis.mass_shift_signatures import shift_instants
 from bayesid.diagnosis.noise_states import NoiseState
 from bayesid.diagnosis.perturbed_fit import Fit
 from bayesid.diagnosis.vibration_signatures import coupling_matrix, slosh_entries
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.instant import Resonance
+from bayesid.simulation.effects.mass_shift import MassShift
 
 __all__ = ["fit_hypothesis"]
 
@@ -43,12 +45,13 @@ def fit_hypothesis(state: NoiseState, causes: Sequence[str], effects: Sequence[E
         If no start of the fit has a motion.
     """
     point, names = state.point, [name for name in causes if name not in state.names]
-    chosen = [effect for effect in effects if effect.label in names]
+    wanted = [effect for effect in effects if effect.label in names]
+    chosen = [_settled(effect, point, names) for effect in wanted]
     engine = point.engine.released() if INITIAL_RATE in names else point.engine
     z = point.fit.z.copy()
     if INITIAL_RATE in names:
         z[point.engine.frozen] = engine.posterior.starting_point()[point.engine.frozen]
-    starts = [_starts(effect, point, names) for effect in chosen]
+    starts = [_starts(effect, point, names) for effect in wanted]
     best: Fit | None = None
     problem: InputError | None = None
     for start in list(product(*starts))[:MOST_STARTS]:
@@ -79,6 +82,18 @@ def _starts(effect: Effect, point: Linearisation, names: Sequence[str]) -> Seque
     frequency, damping = (0.1, 0.01) if tone is None else tone
     alone = len(names) == 1
     return effect.starts_near([Resonance(frequency, coupling_matrix(entries), damping)], alone)
+
+
+def _settled(effect: Effect, point: Linearisation, names: Sequence[str]) -> Effect:
+    """Return an effect with what its most probable form settles: the instant of a jump."""
+    if not isinstance(effect, MassShift):
+        return effect
+    form = point.evidence.forms(names)[effect.label]
+    ends = np.asarray(point.fit.operating.node.environment.time).max(axis=1)
+    recording, place = divmod(form, len(shift_instants(1.0)))
+    instants = [np.inf] * len(ends)
+    instants[recording] = float(shift_instants(float(ends[recording]))[place])
+    return MassShift(instants).attach(point.engine.posterior.model.robot)
 
 
 def _amplitudes(label: str, point: Linearisation, names: Sequence[str]) -> Floats:

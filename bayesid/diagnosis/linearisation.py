@@ -12,6 +12,7 @@ from bayesid.diagnosis.catalogue_signatures import catalogue_signatures, group_n
 from bayesid.diagnosis.generic_signatures import generic_signatures
 from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.initial_rate_signatures import initial_rate_signatures
+from bayesid.diagnosis.mass_shift_signatures import mass_shift_signatures
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.signature_bank import SignatureBank
@@ -72,6 +73,7 @@ def linearise(
             catalogue_signatures(engine, fit, effects, bounds),
             initial_rate_signatures(engine, fit),
             vibration_signatures(engine, fit, effects, bounds),
+            mass_shift_signatures(engine, fit, effects, bounds),
             generic_signatures(engine, fit),
         ]
     )
