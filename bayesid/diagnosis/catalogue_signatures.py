@@ -13,9 +13,10 @@ from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
 from bayesid.inference.compiled import Arrays
 from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
-__all__ = ["MOMENT_UNITS", "catalogue_signatures", "moment_spreads"]
+__all__ = ["MOMENT_UNITS", "catalogue_signatures", "group_names", "moment_spreads"]
 
 MOMENT_UNITS = ("kg", "kg m", "kg m2")
 """Units of mass, first and second moments, in which a body that is missing is linear."""
@@ -43,7 +44,7 @@ def moment_spreads(units: Sequence[str], reach: float) -> list[Floats]:
 def catalogue_signatures(
     engine: Engine, fit: Fit, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
 ) -> SignatureBank:
-    """Return the bank of the effects without vibrations.
+    """Return the bank of the effects that have one form: neither a frequency nor an instant.
 
     Parameters
     ----------
@@ -58,11 +59,11 @@ def catalogue_signatures(
     signatures: dict[str, Signatures] = {}
     causes = []
     for effect in effects:
-        if effect.modes_count:
+        if effect.modes_count or isinstance(effect, MassShift):
             continue
         sizes = {bound.unit: bound.largest for bound in bounds[effect.label]}
         if effect.amplitude_units == MOMENT_UNITS:
-            name = f"moments of {effect.link}"
+            name = group_names(effect)[MOMENT_UNITS[0]]
             if name not in signatures:
                 signatures[name] = Signatures(name, _moments(engine, fit, effect, data))
             units = [quantity.unit for quantity in effect.amplitude_quantities]
@@ -91,11 +92,18 @@ def _linear(engine: Engine, fit: Fit, effect: Effect, data: Arrays) -> dict[str,
         return {"1": Signatures(effect.label, columns)}
     columns = columns / np.tile([parameter.sigma for parameter in linear.parameters], recordings)
     units = np.tile([parameter.unit for parameter in linear.parameters], recordings)
-    several = len(set(units)) > 1
-    return {
-        unit: Signatures(f"{effect.label} [{unit}]" if several else effect.label, columns[:, units == unit])
-        for unit in dict.fromkeys(units.tolist())
-    }
+    return {unit: Signatures(name, columns[:, units == unit]) for unit, name in group_names(effect).items()}
+
+
+def group_names(effect: Effect) -> dict[str, str]:
+    """Return the names of an effect's groups in the Gram, by the unit of their amplitudes.
+
+    The ten moments of a link are one group, whatever changes them.
+    """
+    units = effect.amplitude_units
+    if units == MOMENT_UNITS:
+        return dict.fromkeys(units, f"moments of {effect.link}")
+    return {unit: f"{effect.label} [{unit}]" if len(units) > 1 else effect.label for unit in units}
 
 
 def _moments(engine: Engine, fit: Fit, effect: Effect, data: Arrays) -> Floats:

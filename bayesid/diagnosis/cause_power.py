@@ -41,7 +41,9 @@ def cause_power(
     scores = np.zeros((draws, len(gram.score)))
     part = Gram(gram.matrix[np.ix_(own_columns, own_columns)], gram.score[own_columns], {})
     scores[:, own_columns] = part.null_scores(rng, draws)
-    for form, drawn in enumerate(np.array_split(np.arange(draws), len(cause.variants))):
+    shares = np.exp([variant.log_weight for variant in cause.variants])
+    counts = rng.multinomial(draws, shares / shares.sum())
+    for form, drawn in enumerate(np.split(np.arange(draws), np.cumsum(counts)[:-1])):
         for own in evidence.spectra([name], {name: form}):
             scales = np.exp(rng.uniform(np.log(own.range.low), np.log(own.range.high), size=(len(drawn), 1)))
             amplitudes = scales * own.root * rng.normal(size=(len(drawn), len(own.columns)))

@@ -11,10 +11,12 @@ from scipy.special import logsumexp
 
 from bayesid._io.files import write_text
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.cause_search import Hypothesis
-from bayesid.diagnosis.omnibus_tests import FORCE, TORQUE
+from bayesid.diagnosis.hypothesis import Hypothesis
 
 __all__ = ["Frame", "Unexplained", "unexplained_wrench"]
+
+TORQUE, FORCE = 0.05, 0.05
+"""Unit of the cosines' amplitudes [N m, N]."""
 
 WAVES = 40
 """Cosines in time per axis and recording."""

@@ -17,7 +17,7 @@ __all__ = ["evidence_beside"]
 def evidence_beside(
     evidence: SetEvidence, names: Iterable[str], forms: Mapping[str, int], others: Iterable[str]
 ) -> dict[str, Floats]:
-    """Return what each other cause adds to the log evidence of a set, by the cause's forms.
+    """Return what each other cause adds to the log evidence of a set, by the cause's forms, weighed with their shares.
 
     The set's scales are held at their most probable values, at which its amplitudes take their share of the Gram; what
     remains is a Gram of single causes. One such Gram serves all other causes. Scales that the addition moves make the

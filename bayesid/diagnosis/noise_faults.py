@@ -72,11 +72,19 @@ class NoiseFault:
         return SUMMARIES.get(name, SUMMARIES["noise"])
 
 
-def noise_fault(label: str, fit: Fit) -> NoiseFault | None:
-    """Estimate a noise fault from the residual of a fit and put it into the fit's posterior; None if it is no such."""
+def noise_fault(label: str, fit: Fit, least: float = -np.inf) -> NoiseFault | None:
+    """Estimate a noise fault from the residual of a fit and put it into the fit's posterior; None if it is no such.
+
+    Parameters
+    ----------
+    label : str
+    fit : Fit
+    least : float
+        Log likelihood that coloured noise has to gain, by the spectrum of the residual, to be of interest.
+    """
     name, _, place = label.partition(":")
     if name == "coloured-noise":
-        return _coloured(label, Kind.of(place), fit)
+        return _coloured(label, Kind.of(place), fit, least)
     if name == "outliers":
         return _outliers(label, Kind.of(place), fit)
     if name == "quantisation":
@@ -97,7 +105,7 @@ def _understated(label: str, kind: Kind, fit: Fit) -> NoiseFault:
     )
 
 
-def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
+def _coloured(label: str, kind: Kind, fit: Fit, least: float) -> NoiseFault | None:
     slot = _slot(fit.posterior, kind)
     whole, _ = _shaped(fit)
     powers, angles, interval = [], [], 1.0
@@ -119,6 +127,8 @@ def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
 
     starts = [np.array([a, np.log(b * interval)]) for a in (-1.0, 0.5) for b in (3.0, 12.0)]
     best = min((minimize(whittle, start, method="Nelder-Mead") for start in starts), key=lambda found: float(found.fun))
+    if float(power.sum()) - best.fun < least:
+        return None
     steps = 0.1 * np.eye(2)
     curvature = np.array([(whittle(best.x + h) - 2.0 * best.fun + whittle(best.x - h)) / 0.01 for h in steps])
     level, time = best.x[0], np.log(np.clip(np.exp(best.x[1]), 0.2 * interval, longest))

@@ -92,7 +92,9 @@ class CandidateCause:
     generic : bool
         Whether it stands for something unknown, such as a disturbing torque, rather than for a cause of the catalogue.
     others : tuple of tuples of AmplitudeGroup
-        Groups of further forms; all forms are equally probable.
+        Groups of further forms.
+    shares : tuple of float
+        Prior probabilities of all forms, given that the cause is at work; by default they are equal.
     fixed : bool
         Whether the amplitudes are all exactly one, since physics leaves them no freedom; their scales do not matter.
     """
@@ -101,17 +103,21 @@ class CandidateCause:
     groups: tuple[AmplitudeGroup, ...]
     generic: bool = False
     others: tuple[tuple[AmplitudeGroup, ...], ...] = ()
+    shares: tuple[float, ...] = ()
     fixed: bool = False
 
     def __post_init__(self) -> None:
+        if self.shares and (len(self.shares) != 1 + len(self.others) or not all(share > 0.0 for share in self.shares)):
+            raise ValueError(f"{self.name!r}: every form needs a positive share, received {self.shares}")
         if self.fixed and (self.others or len(self.groups) != 1):
             raise ValueError(f"{self.name!r}: a cause of fixed size has one form with one group")
 
     @property
     def variants(self) -> tuple[Variant, ...]:
         """All forms, with their prior probabilities."""
-        log_weight = -float(np.log(1 + len(self.others)))
-        return tuple(Variant(groups, log_weight) for groups in (self.groups, *self.others))
+        forms = (self.groups, *self.others)
+        shares = self.shares or (1.0 / len(forms),) * len(forms)
+        return tuple(Variant(groups, float(np.log(share))) for groups, share in zip(forms, shares, strict=True))
 
     def rescaled(self, gram: Gram, bound: float = 1.0, floor: float = 1.0) -> CandidateCause:
         """Return the cause with the bounds of its scales and the floors multiplied by factors.

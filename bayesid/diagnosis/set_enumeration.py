@@ -102,7 +102,7 @@ def _screened(
         forms = evidence.forms(parent.names)
         for name, values in evidence_beside(evidence, parent.names, forms, others).items():
             key = (tuple(sorted((*parent.causes, name))), parent.generic)
-            gain = float(logsumexp(values)) + evidence.causes[name].variants[0].log_weight
+            gain = float(logsumexp(values))
             near = [int(k) for k in np.argsort(-values, kind="stable")[:MOST_FORMS] if values[k] > values.max() - FORMS_NEAR]
             choices = [{**forms, name: form} for form in near]
             before, others_choices = weighed.get(key, (-np.inf, []))

@@ -83,6 +83,9 @@ class SetEvidence:
             name: tuple(tuple(GroupSpectrum.of(g, gram) for g in variant.groups) for variant in cause.variants)
             for name, cause in self.causes.items()
         }
+        self._log_weights = {
+            name: np.array([variant.log_weight for variant in cause.variants]) for name, cause in self.causes.items()
+        }
 
     @cached_property
     def catalogue(self) -> tuple[str, ...]:
@@ -111,7 +114,8 @@ class SetEvidence:
         choices = self._choices(ordered)
         if len(choices) == 1:
             return dict(zip(ordered, choices[0], strict=True))
-        return dict(zip(ordered, max(choices, key=lambda forms: self._of(ordered, forms).log_evidence), strict=True))
+        best = max(choices, key=lambda own: self._of(ordered, own).log_evidence + self._log_weight(ordered, own))
+        return dict(zip(ordered, best, strict=True))
 
     def places(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[tuple[str, int]]:
         """Return the groups of a set, each by its cause and its place in that, in the order of the integration.
@@ -155,12 +159,16 @@ class SetEvidence:
             if choices is None
             else [tuple(choice[name] for name in ordered) for choice in choices]
         )
-        log_weight = sum(self.causes[name].variants[0].log_weight for name in ordered)
-        return float(logsumexp([self._of(ordered, own).log_evidence for own in forms])) + log_weight
+        return float(logsumexp([self._of(ordered, own).log_evidence + self._log_weight(ordered, own) for own in forms]))
+
+    def _log_weight(self, ordered: Sequence[str], forms: Sequence[int]) -> float:
+        """Return the logarithm of the prior probability of a combination of forms."""
+        return sum(self._log_weights[name][form] for name, form in zip(ordered, forms, strict=True))
 
     def of_forms(self, name: str) -> Floats:
-        """Return the logarithms of the evidence of each form of one cause."""
-        return np.array([self._of([name], (place,)).log_evidence for place in range(len(self._spectra[name]))])
+        """Return the logarithms of the evidence of each form of one cause, times the form's prior probability."""
+        found = [self._of([name], (place,)).log_evidence for place in range(len(self._spectra[name]))]
+        return np.array(found) + self._log_weights[name]
 
     def most_probable(self, names: Iterable[str], forms: Mapping[str, int]) -> tuple[Integers, Floats]:
         """Return the columns of a set and the standard deviations of their amplitudes at the most probable scales.
@@ -238,12 +246,11 @@ class SetEvidence:
         ordered = sorted(names)
         free = [name for name in ordered if not self.causes[name].fixed]
         shifted, gain = self._with_fixed(ordered, scores)
-        log_weight = sum(self.causes[name].variants[0].log_weight for name in ordered)
         found = []
         for forms in self._choices(ordered):
             chosen = dict(zip(ordered, forms, strict=True))
-            found.append(self._many(self.spectra(free, chosen), shifted))
-        return np.asarray(logsumexp(found, axis=0)) + gain + log_weight
+            found.append(self._many(self.spectra(free, chosen), shifted) + self._log_weight(ordered, forms))
+        return np.asarray(logsumexp(found, axis=0)) + gain
 
     def _many(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
         """Return the logarithm of the evidence of groups for many scores."""

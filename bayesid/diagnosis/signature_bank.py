@@ -27,11 +27,14 @@ class Signatures:
         Derivatives of the whitened residual in the amplitudes: of all recordings, or of one, the others being zero.
     recording : int, optional
         Number of that one recording.
+    tone : pair of float, optional
+        Frequency [Hz] and damping ratio of a vibration.
     """
 
     name: str
     columns: Floats
     recording: int | None = None
+    tone: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,16 @@ from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
-__all__ = ["DAMPING", "FREQUENCIES", "PAIRS", "coupling_matrix", "vibration_signatures"]
+__all__ = [
+    "DAMPING",
+    "FREQUENCIES",
+    "PAIRS",
+    "coupling_matrix",
+    "slosh_entries",
+    "tone_forms",
+    "tone_signatures",
+    "vibration_signatures",
+]
 
 PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
 """Entries of the symmetric coupling matrix: the base's acceleration by the spring's momentum, linear before angular."""
@@ -53,40 +62,47 @@ def vibration_signatures(
     tones : sequence of pairs of float
         Frequencies [Hz] and damping ratios of the grid.
     """
-    wanted = {effect.label: effect for effect in effects if effect.modes_count}
-    if not wanted:
-        return SignatureBank()
-    signatures = []
-    names: dict[str, list[str]] = {label: [] for label in wanted}
-    for frequency, damping in tones:
-        columns = _couplings(engine, fit, frequency, damping)
-        for label, effect in wanted.items():
-            name = f"{label} at {frequency:.4g} Hz, {damping:.3g}"
-            own = columns @ slosh_entries() if isinstance(effect, FuelSlosh) else columns
-            signatures.append(Signatures(name, own))
-            names[label].append(name)
-    causes = [_cause(effect, names[label], bounds[label]) for label, effect in wanted.items()]
+    wanted = [effect for effect in effects if effect.modes_count]
+    signatures: list[Signatures] = []
+    groups: dict[str, list[Signatures]] = {effect.label: [] for effect in wanted}
+    for tone in tones if wanted else ():
+        for label, item in tone_signatures(engine, fit, wanted, tone).items():
+            signatures.append(item)
+            groups[label].append(item)
+    causes = []
+    for effect in wanted:
+        forms = [form for item in groups[effect.label] for form in tone_forms(effect, item.name, bounds[effect.label])]
+        causes.append(CandidateCause(effect.label, forms[0], others=tuple(forms[1:])))
     return SignatureBank(tuple(signatures), tuple(causes))
 
 
-def _cause(effect: Effect, names: Sequence[str], bounds: Sequence[PhysicalBound]) -> CandidateCause:
-    """Return the cause whose forms are its frequencies, and for slosh the reaches of the tank as well."""
+def tone_signatures(
+    engine: Engine, fit: Fit, effects: Sequence[Effect], tone: tuple[float, float]
+) -> dict[str, Signatures]:
+    """Return the signatures of vibrations of one frequency [Hz] and damping, by the label of the effect."""
+    frequency, damping = tone
+    columns = _couplings(engine, fit, frequency, damping)
+    return {
+        effect.label: Signatures(
+            f"{effect.label} at {frequency:.6g} Hz, damping {damping:.3g}",
+            columns @ slosh_entries() if isinstance(effect, FuelSlosh) else columns,
+            tone=tone,
+        )
+        for effect in effects
+    }
+
+
+def tone_forms(effect: Effect, name: str, bounds: Sequence[PhysicalBound]) -> list[tuple[AmplitudeGroup, ...]]:
+    """Return the forms of a vibration at one tone, of which slosh has one for each of two reaches of the tank."""
     sizes = {bound.unit: bound.largest for bound in bounds}
     if isinstance(effect, FuelSlosh):
         units = ("kg", *("kg m",) * 3, *("kg m2",) * 6)
         reach = max(parameter.sigma + abs(parameter.mean) for parameter in effect.parameters[3:])
-        forms = [
-            (AmplitudeGroup(name, sizes["kg"], spread=spread),)
-            for name in names
-            for spread in moment_spreads(units, reach)[:2]
-        ]
-    elif isinstance(effect, FlexibleAppendage):
+        return [(AmplitudeGroup(name, sizes["kg"], spread=own),) for own in moment_spreads(units, reach)[:2]]
+    if isinstance(effect, FlexibleAppendage):
         root = np.repeat([sizes["sqrt(kg)"], sizes["sqrt(kg) m"]], 3)
-        spread = np.array([(root[i] * root[j]) ** 2 for i, j in PAIRS])
-        forms = [(AmplitudeGroup(name, 1.0, spread=spread),) for name in names]
-    else:
-        raise TypeError(f"{effect.label!r}: the coupling of this vibration has no bounds")
-    return CandidateCause(effect.label, forms[0], others=tuple(forms[1:]))
+        return [(AmplitudeGroup(name, 1.0, spread=np.array([(root[i] * root[j]) ** 2 for i, j in PAIRS])),)]
+    raise TypeError(f"{effect.label!r}: the coupling of this vibration has no bounds")
 
 
 def coupling_matrix(entries: Floats) -> Floats:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.cause_search import Hypothesis
+from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.disturbing_wrench import Frame, Unexplained
 
 __all__ = ["TorqueCorrelation", "torque_correlations"]
