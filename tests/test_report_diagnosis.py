@@ -27,6 +27,7 @@ from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.recording import Recording
 from bayesid.report import diagnosis_report, figures
 from bayesid.report.cause_marks import cause_marks
+from bayesid.report.cause_torque import cause_torque
 from bayesid.report.class_probabilities import alternative_probability, cause_probability
 from bayesid.report.diagnosis_pages.decision_page import decision_entries
 from bayesid.report.diagnosis_pages.limits_page import unseen_candidates
@@ -349,7 +350,7 @@ def test_the_advice_is_on_the_causes_in_which_the_alternatives_differ(biased):
 def test_what_to_do_follows_from_the_verdict(biased):
     said = {status: action_sentence(judged(biased, status)) for status in Status}
     assert len(set(said.values())) == len(Status)
-    assert said[Status.EXPLAINED] == "Add accel-bias to the model's effects, and use the values fitted with it."
+    assert said[Status.EXPLAINED] == "Add accel-bias to the model's effects and use the values fitted with it."
     assert said[Status.ADEQUATE] == "Use the model as it is."
 
 
@@ -679,6 +680,33 @@ def test_the_forest_shows_what_was_given_and_both_fits(biased):
     np.testing.assert_allclose(without, [(item.without - item.given) / item.prior_sd for item in changes])
     np.testing.assert_allclose(fitted, [(item.fitted - item.given) / item.prior_sd for item in changes])
     assert [label.get_text() for label in axes.get_yticklabels()] == [item.name for item in changes]
+
+
+def test_what_is_no_effect_is_put_elsewhere_into_the_model(biased):
+    verdict = ProbableVerdict(Status.EXPLAINED, ("initial-rate", "rate-noise"))
+    after = replace(biased.after, faults=(SimpleNamespace(label="rate-noise"),))
+    result = replace(biased, after=after, sensitivity=replace(biased.sensitivity, verdict=verdict))
+    assert action_sentence(result) == (
+        "Let the initial rates be unknown, declare rate-noise with the sensors and use the values fitted with them."
+    )
+
+
+def test_the_torque_of_the_causes_is_that_of_their_formulas(biased):
+    assert cause_torque(biased.after) is None  # a reading, not a torque
+    both = biased.fitted(("wheel-momentum", "thruster-leak"))
+    values = {effect.label: both.fit.values(index) for index, effect in enumerate(both.fit.effects)}
+    node = both.fit.operating.node
+    rate, com = np.asarray(node.rate)[0], np.asarray(node.body.com)[0]
+    leak = np.ravel(values["thruster-leak"])
+    expected = leak[3:] - np.cross(com, leak[:3]) - np.cross(rate, np.ravel(values["wheel-momentum"]))
+    (torque,) = cause_torque(both)
+    assert len(torque) == len(biased.disturbance.time[0])
+    own = np.concatenate([[True], np.diff(np.asarray(node.environment.time)[0]) > 0.0])
+    np.testing.assert_allclose(torque, expected[own], atol=1e-12)
+    drawn = figures.wrench_histories(biased.disturbance, Frame.BASE, [torque]).axes[0]
+    dashed = next(line for line in drawn.lines if line.get_linestyle() == "--" and len(line.get_xdata()))
+    ratio = dashed.get_ydata() / torque[:, 0]
+    np.testing.assert_allclose(ratio, ratio[0])
 
 
 @pytest.fixture(scope="module")

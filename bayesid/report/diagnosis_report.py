@@ -53,7 +53,6 @@ def diagnosis_report(
     add_limits(document, result)
     if identification is None:
         add_assumptions(document, result)
-    document.page()
     add_appendix(document, result)
     if identification is None:
         add_measured(document, result)

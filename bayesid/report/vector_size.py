@@ -93,13 +93,13 @@ def of_normal(axes: tuple[str, ...], unit: str, mean: Floats, covariance: Floats
         return VectorSize(axes, unit, mean, 0.0, float(np.sqrt(np.trace(covariance))), np.pi)
     along = mean / magnitude
     across = np.eye(3) - np.outer(along, along)
-    widest = float(np.linalg.eigvalsh(across @ covariance @ across).max())
+    widest = float(np.linalg.eigvalsh(across @ covariance @ across)[-1])
     return VectorSize(
         axes,
         unit,
         mean,
         magnitude,
-        float(np.sqrt(max(along @ covariance @ along, 0.0))),
+        float(np.sqrt(max(float(along @ covariance @ along), 0.0))),
         CIRCLE95 * float(np.sqrt(max(widest, 0.0))) / magnitude,
     )
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from bayesid.diagnosis import Diagnosis, Frame, Status, Unexplained
 from bayesid.diagnosis.wrench_correlations import torque_correlations
 from bayesid.report import figures
+from bayesid.report.cause_torque import cause_torque
 from bayesid.report.document import Document
 from bayesid.report.given_values import ParameterChange
 from bayesid.report.sentences.diagnosis_sentences import wrench_sentence
@@ -79,7 +80,16 @@ def _add_wrench(document: Document, result: Diagnosis, wrench: Unexplained, whol
     in_orbit = result.before.fit.posterior.model.orbit is not None
     for frame, name in AXES.items():
         if frame is Frame.BASE or (whole and (in_orbit or frame is Frame.INERTIAL)):
-            document.figure(figures.wrench_histories(wrench, frame), f"Reconstructed torque and force, {name} axes.")
+            cause = cause_torque(result.after) if not whole else None
+            document.figure(
+                figures.wrench_histories(wrench, frame, cause),
+                f"Reconstructed torque and force, {name} axes."
+                + (
+                    " Dashed: the whole torque of the named causes, with what the model's unknowns could explain of it."
+                    if cause is not None
+                    else ""
+                ),
+            )
     if whole:
         document.figure(
             figures.wrench_spectrum(wrench),

@@ -102,11 +102,11 @@ def _shown(points: Floats, marks: list[CauseMark], plane: tuple[int, int]) -> fl
 
 
 def _draw_mark(axes: Axes, mark: CauseMark, plane: tuple[int, int], reach: float) -> None:
-    start = mark.point[list(plane)]
-    end = start
+    across, up = plane
+    start = end = (float(mark.point[across]), float(mark.point[up]))
     axes.plot(*start, "o", color=COLOURS[0], markersize=6, markeredgecolor="white", zorder=5)
     if mark.direction is not None:
-        end = start + reach * mark.direction[list(plane)]
+        end = (start[0] + reach * float(mark.direction[across]), start[1] + reach * float(mark.direction[up]))
         axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": COLOURS[0], "linewidth": 1.8}, zorder=5)
         axes.plot(*end, alpha=0.0)  # so that the axes hold the arrow
     axes.annotate(mark.label, end, (4, 5), textcoords="offset points", color=COLOURS[0], fontsize=7, zorder=6)

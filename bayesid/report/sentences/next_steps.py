@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, Status
+from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.probable_verdict import UNKNOWN
 from bayesid.report.class_probabilities import alternatives
 from bayesid.report.sentences.next_experiment import advice
@@ -26,17 +27,29 @@ def action_sentence(result: Diagnosis) -> str:
         case Status.ADEQUATE:
             return "Use the model as it is."
         case Status.EXPLAINED:
-            one = len(result.verdict.causes) == 1
-            return (
-                f"Add {joined(result.verdict.causes)} to the model's effects, and use the values fitted with "
-                f"{'it' if one else 'them'}."
-            )
+            return _addition(result)
         case Status.AMBIGUOUS:
             first = next(advice_sentences(result), "")
             return f"Do not rely on one of the alternatives; fly the manoeuvre that separates them. {first}".rstrip()
         case Status.UNRESOLVED:
             return "Record longer, or repeat the manoeuvres: the signal grows with the root of their number."
     return f"Do not use the present model's values. {SEPARATE_UNKNOWN}"
+
+
+def _addition(result: Diagnosis) -> str:
+    """Return how to put the named causes into the model: effects, faults of the noise, and a base that turned."""
+    causes = result.verdict.causes
+    faults = [fault.label for fault in result.after.faults]
+    steps = []
+    if effects := [name for name in causes if name not in (*faults, INITIAL_RATE)]:
+        steps.append(f"add {joined(effects)} to the model's effects")
+    if INITIAL_RATE in causes:
+        steps.append("let the initial rates be unknown")
+    if named := [name for name in causes if name in faults]:
+        steps.append(f"declare {joined(named)} with the sensors")
+    steps.append(f"use the values fitted with {'it' if len(causes) == 1 else 'them'}")
+    text = f"{joined(steps)}."
+    return text[0].upper() + text[1:]
 
 
 def advice_sentences(result: Diagnosis) -> Iterator[str]:
