@@ -65,6 +65,7 @@ def diagnose_study(
     import numpy as np
 
     from bayesid._io.files import complete_folder, write_json
+    from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_model import load_manoeuvres, load_model
     from bayesid.diagnosis import diagnose, identify_extended
     from bayesid.inference.posterior import Posterior
@@ -89,5 +90,6 @@ def diagnose_study(
         result.unexplained.write(folder / "unexplained.csv")
         if identification is not None:
             write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
-        diagnosis_report(result, identification, study.title, folder / "report.pdf")
+        origin = report_origin(study, "diagnose", seed)
+        diagnosis_report(result, identification, study.title, folder / "report.pdf", origin=origin)
     yield f"Wrote {output / 'report.pdf'}."
