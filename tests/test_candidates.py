@@ -8,13 +8,13 @@ from types import SimpleNamespace
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from bayesid.diagnosis.cause_search import CauseSearch
+from bayesid.diagnosis.detection_power import average_power, detection_power
+from bayesid.diagnosis.score_tests import DRAWS, Score
 from scipy import stats
 
 from bayesid.diagnosis import candidates
 from bayesid.diagnosis.candidate_table import candidate_table, magnitude_limit
-from bayesid.diagnosis.cause_search import CauseSearch
-from bayesid.diagnosis.detection_power import average_power, detection_power
-from bayesid.diagnosis.score_tests import DRAWS, Score
 from bayesid.inference.posterior import Posterior
 from bayesid.report.sentences.next_experiment import advice
 from bayesid.report.tables.diagnosis_tables import candidate_rows, prior_texts

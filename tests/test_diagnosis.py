@@ -7,16 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bayesid.diagnosis.amplitude_scale import SCALES, log_mixture
+from bayesid.diagnosis.score_tests import chi2_log_sf
 from scipy import stats
 
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
-from bayesid.diagnosis.amplitude_scale import SCALES, log_mixture
 from bayesid.diagnosis.diagnosis_run import extended_start
 from bayesid.diagnosis.noise_faults import noise_fault
 from bayesid.diagnosis.perturbed_fit import Engine
-from bayesid.diagnosis.score_tests import chi2_log_sf
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create

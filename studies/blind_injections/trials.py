@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bayesid.diagnosis.detection_power import detection_power
 from scipy import stats
 
 from bayesid._math.arrays import Floats
@@ -17,7 +18,6 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Frame, diagnose
 from bayesid.diagnosis.candidate_table import effect_amplitude
-from bayesid.diagnosis.detection_power import detection_power
 from bayesid.diagnosis.perturbed_fit import Fit
 from bayesid.inference.noise_changes import with_manoeuvres
 from studies.common.monte_carlo import read_store, run_trials
