@@ -200,8 +200,8 @@ def _diagnose(
     gain = measure_gain(before, after)
     progress(0.85, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
-    disturbance = unexplained_wrench(before, open_question)
-    unexplained = unexplained_wrench(after, False) if named else disturbance
+    disturbance = unexplained_wrench(before, weighed.base.bank, open_question)
+    unexplained = unexplained_wrench(after, weighed.state(named).point.bank, False) if named else disturbance
     table = candidate_table(weighed, catalogue, rng)
     clock.ends("consequences")
     return Diagnosis(

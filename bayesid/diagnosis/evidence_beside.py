@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
-from bayesid._math.arrays import Floats
+import numpy as np
+
+from bayesid.diagnosis.scale_prior import CandidateCause
 from bayesid.diagnosis.set_evidence import SetEvidence
 
-__all__ = ["evidence_beside", "gram_beside"]
+__all__ = ["evidence_beside"]
+
+
+MOST_FORMS = 12
+"""Most forms of one cause that are weighed beside a set: those that do best by themselves."""
 
 
 def evidence_beside(
     evidence: SetEvidence, names: Iterable[str], forms: Mapping[str, int], others: Iterable[str]
-) -> dict[str, Floats]:
-    """Return what each other cause adds to the log evidence of a set, by the cause's forms, weighed with their shares.
+) -> dict[str, dict[int, float]]:
+    """Return what each other cause adds to the log evidence of a set, by the cause's forms.
 
     The set's scales are held at their most probable values, at which its amplitudes take their share of the Gram; what
     remains is a Gram of single causes. One such Gram serves all other causes. Scales that the addition moves make the
@@ -29,6 +36,14 @@ def evidence_beside(
     others : iterable of str
         Causes to add, each by itself.
     """
-    others = list(others)
-    rest = SetEvidence(evidence.beside(names, forms, others), [evidence.causes[name] for name in others])
-    return {name: rest.of_forms(name) for name in others}
+    kept = {name: evidence.ranked[name][:MOST_FORMS] for name in others}
+    causes = [_with_forms(evidence.causes[name], places) for name, places in kept.items()]
+    rest = SetEvidence(evidence.beside(names, forms, kept), causes)
+    return {name: dict(zip(places, rest.of_forms(name).tolist(), strict=True)) for name, places in kept.items()}
+
+
+def _with_forms(cause: CandidateCause, places: Sequence[int]) -> CandidateCause:
+    """Return a cause with some of its forms, each with the share of the prior that it has among all."""
+    chosen = [cause.variants[place] for place in places]
+    shares = tuple(float(np.exp(variant.log_weight)) for variant in chosen)
+    return replace(cause, groups=chosen[0].groups, others=tuple(own.groups for own in chosen[1:]), shares=shares)

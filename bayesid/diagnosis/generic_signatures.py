@@ -12,9 +12,12 @@ from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
 from bayesid.robot.robot_size import RobotSize
 
-__all__ = ["generic_signatures"]
+__all__ = ["FORCE", "TORQUE", "WAVES", "generic_signatures"]
 
-WAVES = 30
+TORQUE, FORCE = "disturbing torque", "disturbing force"
+"""Names of the smooth disturbances."""
+
+WAVES = 40
 """Cosines in time of a disturbing torque or force, per axis and recording."""
 
 ERROR_WAVES = 20
@@ -48,9 +51,9 @@ def generic_signatures(engine: Engine, fit: Fit) -> SignatureBank:
     force = ACCELERATION * size.mass
     torque = force * size.radius
     banks = [
-        _smooth(engine, fit, "disturbing torque", 3, torque),
+        _smooth(engine, fit, TORQUE, 3, torque),
         *(
-            [_smooth(engine, fit, "disturbing force", 0, force)]
+            [_smooth(engine, fit, FORCE, 0, force)]
             if any(sensor.kind.feels_force for sensor in engine.posterior.model.sensors)
             else []
         ),

@@ -24,6 +24,9 @@ FEW = 300
 BEST = 20
 """Most sets of two and more candidates that are extended where there are more extensions than few."""
 
+SINGLES = 16
+"""Most single candidates that are extended to pairs where there are many."""
+
 PROMISING = 1e-4
 """Probability relative to the most probable set so far down to which a set is extended, apart from the best of its
 size: what is added to a less probable one would have to earn some 15 nats to matter."""
@@ -65,7 +68,9 @@ def enumerate_sets(
     for size in range(1, largest + 1):
         keys = _extensions(last, evidence)
         many = size > 1 and sum(_cost(key, evidence) for key in keys) > FEW
-        if size > 2 and len(keys) > FEW:
+        if many and size == 2:
+            last = _strongest(found, evidence, prior)
+        elif size > 2 and len(keys) > FEW:
             last = _best(found, size - 1, evidence, prior)
             keys = _extensions(last, evidence)
         last = _screened(last, found, evidence, prior) if many else [_whole(key, evidence) for key in keys]
@@ -102,10 +107,9 @@ def _screened(
         forms = evidence.forms(parent.names)
         for name, values in evidence_beside(evidence, parent.names, forms, others).items():
             key = (tuple(sorted((*parent.causes, name))), parent.generic)
-            gain = float(logsumexp(values)) + max(evidence.bodily.get(name, 0.0), 0.0)
-            near = [
-                int(k) for k in np.argsort(-values, kind="stable")[:MOST_FORMS] if values[k] > values.max() - FORMS_NEAR
-            ]
+            gain = float(logsumexp(list(values.values()))) + max(evidence.bodily.get(name, 0.0), 0.0)
+            order = sorted(values, key=lambda form, values=values: -values[form])[:MOST_FORMS]
+            near = [form for form in order if values[form] > values[order[0]] - FORMS_NEAR]
             choices = [{**forms, name: form} for form in near]
             before, others_choices = weighed.get(key, (-np.inf, []))
             weighed[key] = (
@@ -135,6 +139,12 @@ def _best(found: list[CauseSet], size: int, evidence: SetEvidence, prior: CauseP
     least = PROMISING * ranked[0].probability
     last = [item for item in ranked if len(item.names) == size][:BEST]
     return [item for place, item in enumerate(last) if place == 0 or item.probability >= least]
+
+
+def _strongest(found: list[CauseSet], evidence: SetEvidence, prior: CausePrior) -> list[CauseSet]:
+    """Return the single candidates that are worth extending, the most probable first."""
+    ranked = SetProbabilities.of(found, evidence.catalogue, evidence.generics, prior).sets
+    return [item for item in ranked if len(item.names) == 1][:SINGLES]
 
 
 def _extensions(sets: Iterable[CauseSet], evidence: SetEvidence) -> list[tuple[tuple[str, ...], str | None]]:

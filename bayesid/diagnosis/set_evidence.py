@@ -250,13 +250,13 @@ class SetEvidence:
         ranges: list[Sequence[int]] = [range(count) for count in counts]
         if np.prod(counts, dtype=float) > MOST_FORMS:
             ranges = [
-                self._ranked[name][:BEST_FORMS] if count > BEST_FORMS else range(count)
+                self.ranked[name][:BEST_FORMS] if count > BEST_FORMS else range(count)
                 for name, count in zip(ordered, counts, strict=True)
             ]
         return list(product(*ranges))
 
     @cached_property
-    def _ranked(self) -> dict[str, tuple[int, ...]]:
+    def ranked(self) -> dict[str, tuple[int, ...]]:
         """Forms of each cause, the most probable by itself first."""
         found = {}
         for name in self._spectra:

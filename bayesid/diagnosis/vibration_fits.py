@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid.diagnosis.hypothesis_fit import fit_hypothesis
 from bayesid.diagnosis.linearisation import Linearisation
 from bayesid.diagnosis.noise_states import NoiseState
 from bayesid.diagnosis.perturbed_fit import Fit
-from bayesid.diagnosis.set_probabilities import SetProbabilities
+from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["plausible_vibrations", "with_fitted_vibrations"]
@@ -66,11 +68,25 @@ def with_fitted_vibrations(
         gains[label] = max(fits[label].log_evidence - point.log_nothing - linear, 0.0)
     if not gains:
         return found, best
-    sets = [
-        replace(item, log_evidence=item.log_evidence + max((gains.get(name, 0.0) for name in item.causes), default=0.0))
-        for item in found.sets
-    ]
+    known = {item.names: item.log_evidence for item in found.sets}
+    sets = [replace(item, log_evidence=_corrected(item, gains, known)) for item in found.sets]
     corrected = SetProbabilities.of(sets, found.causes, found.generics, found.prior)
     top = next((item for item in corrected.sets if item.names), None)
     chosen = [label for label in fits if top is not None and label in top.causes]
     return corrected, fits[chosen[0]] if chosen else best
+
+
+def _corrected(item: CauseSet, gains: Mapping[str, float], known: Mapping[tuple[str, ...], float]) -> float:
+    """Return the log evidence of a set with the gain of its vibration.
+
+    Two vibrations of the linear model may stand for one that is not linear: a set with both is at least as probable as
+    one of them fitted, but does not gain again.
+    """
+    own = [name for name in item.causes if name in gains]
+    if len(own) < 2:
+        return item.log_evidence + sum(gains[name] for name in own)
+    values = [item.log_evidence]
+    for label in own:
+        fewer = tuple(name for name in item.names if name == label or name not in own)
+        values.append(known.get(fewer, -np.inf) + gains[label])
+    return max(values)

@@ -132,8 +132,8 @@ def coupling_matrix(entries: Floats) -> Floats:
 def slosh_entries() -> Floats:
     """Return the 21 entries of the coupling, (21, 10), per mass, first moment x y z and second xx xy yy xz yz zz.
 
-    With ``p`` the place of a mass ``m``, the matrix is ``m [[1, -[p]], [[p], [p][p]']]``, where ``[p]`` is the matrix of
-    the cross product and ``[p][p]' = p'p 1 - p p'``.
+    With ``p`` the place of a mass ``m``, the matrix is ``m [[1, -[p]], [[p], [p][p]']]``, where ``[p]`` is the matrix
+    of the cross product and ``[p][p]' = p'p 1 - p p'``.
     """
     matrices = np.zeros((10, 6, 6))
     matrices[0, :3, :3] = np.eye(3)
