@@ -79,7 +79,7 @@ def test_the_contract_of_the_json(wheel):
 
 # probabilities --------------------------------------------------------------------------------------------------------
 
-FAINT = 1e-5
+FAINT = 8e-6
 """Bias of the accelerometer in a small study [m/s2], seen but not beyond doubt."""
 
 NAMES = ("accel-bias", "accel-drift", "rate-bias", "thruster-leak", "wheel-momentum")
@@ -149,7 +149,8 @@ def test_the_order_of_the_candidates_does_not_matter(small):
 
 def test_the_seed_hardly_matters(small):
     result, other = small(), small(seed=4)
-    assert result.alarm.p_value != other.alarm.p_value
+    draws = [found.alarm.candidates.largest.values for found in (result, other)]
+    assert not np.array_equal(*draws)
     first, second = shown(result), shown(other)
     for key in first.keys() | second.keys():
         assert abs(first.get(key, 0.0) - second.get(key, 0.0)) < 0.02

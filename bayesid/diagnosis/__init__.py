@@ -1,4 +1,4 @@
-"""What the simulation gets wrong: candidates, their signatures, the probability of every set of causes, and the gain."""
+"""What the simulation gets wrong: candidates, their signatures, probabilities of sets of causes, and the gain."""
 
 from bayesid.diagnosis.candidate_effects import candidates
 from bayesid.diagnosis.candidate_table import Candidate

@@ -51,7 +51,11 @@ class AmplitudePosterior:
         if not names:
             raise ValueError("a posterior of amplitudes needs at least one cause, received none")
         forms = evidence.forms(names)
-        average, spectra, places = evidence.average(names), evidence.spectra(names, forms), evidence.places(names, forms)
+        average, spectra, places = (
+            evidence.average(names),
+            evidence.spectra(names, forms),
+            evidence.places(names, forms),
+        )
         weights = np.exp(average.log_posterior.ravel())
         order = np.argsort(-weights, kind="stable")
         kept = order[: min(int(np.searchsorted(np.cumsum(weights[order]), HELD)) + 1, MOST_TERMS)]

@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.body_evidence import MissingBody, rigid_moments
 from bayesid.diagnosis.perturbation import tables_of
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
 from bayesid.inference.compiled import Arrays
+from bayesid.simulation.effects.arm_effects import Payload
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
@@ -23,6 +25,9 @@ MOMENT_UNITS = ("kg", "kg m", "kg m2")
 
 REACHES = (1.0, 0.25, 0.0625)
 """Distances of a missing body from the origin, relative to the longest, that are equally probable beforehand."""
+
+RADII = (0.25, 0.0625, 0.015625)
+"""Radii of gyration of a missing body relative to the longest distance, equally probable beforehand."""
 
 
 def moment_spreads(units: Sequence[str], reach: float) -> list[Floats]:
@@ -69,7 +74,9 @@ def catalogue_signatures(
             units = [quantity.unit for quantity in effect.amplitude_quantities]
             reach = sizes["kg m"] / sizes["kg"]
             groups = [(AmplitudeGroup(name, sizes["kg"], spread=own),) for own in moment_spreads(units, reach)]
-            causes.append(CandidateCause(effect.label, groups[0], others=tuple(groups[1:])))
+            radii = tuple(share * reach for share in RADII)
+            body = MissingBody(sizes["kg"], reach, radii, rigid_moments) if isinstance(effect, Payload) else None
+            causes.append(CandidateCause(effect.label, groups[0], others=tuple(groups[1:]), body=body))
             continue
         found = _linear(engine, fit, effect, data)
         signatures |= {item.name: item for item in found.values()}

@@ -66,7 +66,10 @@ def effect_amplitude(hypothesis: Hypothesis, index: int) -> tuple[Floats, Floats
         return np.zeros(0), np.zeros(0)
     first = fit.own.shape[1] + sum(columns.shape[1] for columns in fit.added[:index])
     count = len(effect.parameters)
-    coordinates, covariance = fit.coordinates[index][:count], fit.covariance[first : first + count, first : first + count]
+    coordinates, covariance = (
+        fit.coordinates[index][:count],
+        fit.covariance[first : first + count, first : first + count],
+    )
 
     def report(c: jax.Array) -> jax.Array:
         return effect.report(physical(effect, c))

@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis.amplitude_fit import fit_in_amplitudes
+from bayesid.diagnosis.burst_signatures import burst_signatures
 from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.equivalent_causes import classes_of_equivalents
 from bayesid.diagnosis.family_alarm import FamilyAlarm
@@ -19,7 +20,9 @@ from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.set_enumeration import enumerate_sets
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
+from bayesid.diagnosis.signature_bank import SignatureBank
 from bayesid.diagnosis.tone_tuning import with_tuned_tones
+from bayesid.diagnosis.vibration_fits import plausible_vibrations, with_fitted_vibrations
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
@@ -34,9 +37,6 @@ ROUNDS = 3
 
 MATTERS = 3e-3
 """Probability from which a set is evaluated anew under other ranges of the scales."""
-
-PLAUSIBLE = 0.01
-"""Probability from which a vibration is tuned."""
 
 SUSPECT = 1e-3
 """Local p-value of a test of the noise below which the fault is weighed as a cause."""
@@ -74,7 +74,10 @@ class WeighedCauses:
         wider = {
             state.names: SetEvidence(
                 state.point.evidence.gram,
-                [cause.rescaled(state.point.evidence.gram, bound, floor) for cause in state.point.evidence.causes.values()],
+                [
+                    cause.rescaled(state.point.evidence.gram, bound, floor)
+                    for cause in state.point.evidence.causes.values()
+                ],
             )
             for state in self.states
         }
@@ -83,8 +86,8 @@ class WeighedCauses:
             state = self.state(item.causes)
             names = [name for name in item.names if name not in state.names]
             if item.probability >= MATTERS and names:
-                offset = state.log_nothing - self.states[0].log_nothing
-                item = replace(item, log_evidence=wider[state.names].log_evidence(names) + offset)
+                change = wider[state.names].log_evidence(names) - state.point.evidence.log_evidence(names)
+                item = replace(item, log_evidence=item.log_evidence + change)
             sets.append(item)
         found = self.probabilities
         return SetProbabilities.of(sets, found.causes, found.generics, found.prior)
@@ -130,7 +133,8 @@ def weigh_causes(
         single = enumerate_sets(base.evidence, prior, largest=1)
         return WeighedCauses(base, alarm, (NoiseState(None, base),), _with_faults(single, faults))
     progress(0.5, "weighing the sets of causes")
-    point, found, best = _settled(base, effects, bounds, prior)
+    point, found, best = _settled(_with_bursts(base), effects, bounds, prior)
+    found, best = with_fitted_vibrations(point, found, effects, best)
     states = [NoiseState(None, point)]
     sets = [list(found.sets)]
     for label, residual in _suspects(alarm, best, base.fit).items():
@@ -151,7 +155,7 @@ def _settled(
 ) -> tuple[Linearisation, SetProbabilities, Fit]:
     """Enumerate, linearise about the best set where the linear model fails there, and again until it holds."""
     point, found, best = base, enumerate_sets(base.evidence, prior), base.fit
-    if beside := _vibrations(found, effects):
+    if beside := plausible_vibrations(found, effects):
         point = with_tuned_tones(point, effects, bounds, beside)
         found = enumerate_sets(point.evidence, prior)
     for _ in range(ROUNDS):
@@ -161,12 +165,17 @@ def _settled(
         best, expected = fit_in_amplitudes(point, chosen)
         if abs(best.cost - expected) < AGREES:
             return point, found, best
-        point = linearise(point.engine, best, effects, bounds)
+        point = _with_bursts(linearise(point.engine, best, effects, bounds))
         found = enumerate_sets(point.evidence, prior)
-        if beside := _vibrations(found, effects):
+        if beside := plausible_vibrations(found, effects):
             point = with_tuned_tones(point, effects, bounds, beside)
             found = enumerate_sets(point.evidence, prior)
     return point, found, best
+
+
+def _with_bursts(point: Linearisation) -> Linearisation:
+    """Return the linearisation with bursts of the sensors among its candidates."""
+    return point.with_bank(SignatureBank.joined([point.bank, burst_signatures(point.engine, point.fit)]))
 
 
 def _best_effects(found: SetProbabilities, effects: Sequence[Effect]) -> list[Effect]:
@@ -176,17 +185,6 @@ def _best_effects(found: SetProbabilities, effects: Sequence[Effect]) -> list[Ef
     chosen = [effect for effect in effects if effect.label in causes]
     several = any(effect.modes_count or isinstance(effect, MassShift) for effect in chosen)
     return [] if several else chosen
-
-
-def _vibrations(found: SetProbabilities, effects: Sequence[Effect]) -> dict[str, tuple[str, ...]]:
-    """Return the plausible vibrations, each with its company in the most probable set that holds it."""
-    inclusion = found.inclusion
-    beside = {}
-    for effect in effects:
-        if effect.modes_count and inclusion[effect.label] > PLAUSIBLE:
-            own = next(item for item in found.sets if effect.label in item.causes)
-            beside[effect.label] = tuple(name for name in own.causes if name != effect.label)
-    return beside
 
 
 def _suspects(alarm: FamilyAlarm, best: Fit, base: Fit) -> dict[str, Fit]:

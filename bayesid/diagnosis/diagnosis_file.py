@@ -98,9 +98,7 @@ def _gain(result: Diagnosis) -> dict[str, Any]:
         "residual_rms_in_sigma": {"before": gain.before.rms, "after": gain.after.rms},
         "within_one_sigma": {"before": gain.before.inside, "after": gain.after.inside},
         "parameter_shift_in_sd": dict(zip(names, gain.shift.tolist(), strict=True)),
-        "parameter_sd_ratio": dict(
-            zip(names, (gain.after.bodies.sd / gain.before.bodies.sd).tolist(), strict=True)
-        ),
+        "parameter_sd_ratio": dict(zip(names, (gain.after.bodies.sd / gain.before.bodies.sd).tolist(), strict=True)),
     }
 
 

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-import numpy as np
-import scipy.linalg as sla
-
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.set_evidence import SetEvidence
 
 __all__ = ["evidence_beside"]
@@ -34,15 +30,5 @@ def evidence_beside(
         Causes to add, each by itself.
     """
     others = list(others)
-    gram, score = evidence.gram, evidence.score_beside(names)
-    held, deviations = evidence.most_probable(names, forms)
-    groups = {group.name for name in others for form in evidence.causes[name].variants for group in form.groups}
-    part = gram.keeping(sorted(groups))
-    kept = np.concatenate([np.zeros(0, dtype=int), *(gram.groups[name] for name in part.groups)])
-    information = deviations[:, None] * gram.matrix[np.ix_(held, held)] * deviations + np.eye(len(held))
-    lower = np.linalg.cholesky(information)
-    shared = sla.solve_triangular(lower, deviations[:, None] * gram.matrix[np.ix_(held, kept)], lower=True)
-    pull = sla.solve_triangular(lower, deviations * score[held], lower=True)
-    beside = Gram(part.matrix - shared.T @ shared, score[kept] - shared.T @ pull, part.groups)
-    rest = SetEvidence(beside, [evidence.causes[name] for name in others])
+    rest = SetEvidence(evidence.beside(names, forms, others), [evidence.causes[name] for name in others])
     return {name: rest.of_forms(name) for name in others}

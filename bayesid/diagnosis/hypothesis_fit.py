@@ -26,6 +26,10 @@ __all__ = ["fit_hypothesis"]
 MOST_STARTS = 6
 """Most starting points of one fit."""
 
+HELD = (1.0, 0.85)
+"""Frequencies with the base held, from which the fit of a vibration starts, relative to the tone that is seen with the
+base free; the base's yielding raises the tone."""
+
 
 def fit_hypothesis(state: NoiseState, causes: Sequence[str], effects: Sequence[Effect]) -> Hypothesis:
     """Fit the present model with some causes.
@@ -81,8 +85,9 @@ def _starts(effect: Effect, point: Linearisation, names: Sequence[str]) -> Seque
     group = point.evidence.causes[effect.label].variants[forms[effect.label]].groups[0].name
     tone = next(item.tone for item in point.bank.signatures if item.name == group)
     frequency, damping = (0.1, 0.01) if tone is None else tone
-    alone = len(names) == 1
-    return effect.starts_near([Resonance(frequency, coupling_matrix(entries), damping)], alone)
+    coupling = coupling_matrix(entries)
+    tones = [Resonance(share * frequency, coupling, damping) for share in HELD]
+    return [start for tone in tones for start in effect.starts_near([tone], False)]
 
 
 def _settled(effect: Effect, point: Linearisation, names: Sequence[str]) -> Effect:

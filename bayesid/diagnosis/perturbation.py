@@ -84,9 +84,7 @@ def tables_of(effect: Effect, posterior: Posterior) -> Table:
 
     def over(times: Array) -> Floats:
         robot, pairs = posterior.model.robot, zip(posterior.manoeuvres, np.asarray(times), strict=True)
-        return np.stack(
-            [effect.in_recording(r).table(robot, one.motion, own) for r, (one, own) in enumerate(pairs)]
-        )
+        return np.stack([effect.in_recording(r).table(robot, one.motion, own) for r, (one, own) in enumerate(pairs)])
 
     return Table(over(grid.node.environment.time), over(grid.sample.environment.time))
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.body_evidence import MissingBody
 from bayesid.diagnosis.gram import Gram
 
 __all__ = ["AmplitudeGroup", "CandidateCause", "ScaleRange", "Variant", "scale_range"]
@@ -95,6 +96,8 @@ class CandidateCause:
         Groups of further forms.
     shares : tuple of float
         Prior probabilities of all forms, given that the cause is at work; by default they are equal.
+    body : MissingBody, optional
+        Body of positive mass at a bounded place whose moments the amplitudes are.
     fixed : bool
         Whether the amplitudes are all exactly one, since physics leaves them no freedom; their scales do not matter.
     """
@@ -104,6 +107,7 @@ class CandidateCause:
     generic: bool = False
     others: tuple[tuple[AmplitudeGroup, ...], ...] = ()
     shares: tuple[float, ...] = ()
+    body: MissingBody | None = None
     fixed: bool = False
 
     def __post_init__(self) -> None:
@@ -134,7 +138,8 @@ class CandidateCause:
                 low = scale_range(group, gram).low if group.low is None and floor != 1.0 else group.low
                 groups.append(replace(group, high=group.high * bound, low=None if low is None else low * floor))
             forms.append(tuple(groups))
-        return replace(self, groups=forms[0], others=tuple(forms[1:]))
+        body = None if self.body is None else replace(self.body, heaviest=self.body.heaviest * bound)
+        return replace(self, groups=forms[0], others=tuple(forms[1:]), body=body)
 
 
 @dataclass(frozen=True)

@@ -102,15 +102,20 @@ def _screened(
         forms = evidence.forms(parent.names)
         for name, values in evidence_beside(evidence, parent.names, forms, others).items():
             key = (tuple(sorted((*parent.causes, name))), parent.generic)
-            gain = float(logsumexp(values))
-            near = [int(k) for k in np.argsort(-values, kind="stable")[:MOST_FORMS] if values[k] > values.max() - FORMS_NEAR]
+            gain = float(logsumexp(values)) + max(evidence.bodily.get(name, 0.0), 0.0)
+            near = [
+                int(k) for k in np.argsort(-values, kind="stable")[:MOST_FORMS] if values[k] > values.max() - FORMS_NEAR
+            ]
             choices = [{**forms, name: form} for form in near]
             before, others_choices = weighed.get(key, (-np.inf, []))
             weighed[key] = (
                 max(before, parent.log_evidence + gain),
                 others_choices + [choice for choice in choices if choice not in others_choices],
             )
-    sets = [CauseSet(*key, value) for key, (value, _) in sorted(weighed.items(), key=lambda item: (item[0][0], item[0][1] or ""))]
+    sets = [
+        CauseSet(*key, value)
+        for key, (value, _) in sorted(weighed.items(), key=lambda item: (item[0][0], item[0][1] or ""))
+    ]
     everything = SetProbabilities.of(found + sets, evidence.catalogue, evidence.generics, prior).sets
     least = np.exp(-NEAR) * everything[0].probability
     matter = {(item.causes, item.generic) for item in everything if item.probability >= least}

@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+import scipy.linalg as sla
 from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats, Integers
@@ -159,7 +160,61 @@ class SetEvidence:
             if choices is None
             else [tuple(choice[name] for name in ordered) for choice in choices]
         )
-        return float(logsumexp([self._of(ordered, own).log_evidence + self._log_weight(ordered, own) for own in forms]))
+        values = [self._of(ordered, own).log_evidence + self._log_weight(ordered, own) for own in forms]
+        best = dict(zip(ordered, forms[int(np.argmax(values))], strict=True))
+        return float(logsumexp(values)) + self._bodily(ordered, best)
+
+    def _bodily(self, ordered: Sequence[str], forms: Mapping[str, int]) -> float:
+        """Return what it adds to the log evidence of a set that some of its amplitudes are moments of a body.
+
+        A body has a positive mass at a place, where the linear prior has ten free moments. Each is weighed beside the
+        others of the set at their most probable scales, both ways.
+        """
+        total = 0.0
+        for name in ordered:
+            cause = self.causes[name]
+            if cause.body is not None:
+                (group,) = cause.variants[forms[name]].groups
+                beside = self.beside([other for other in ordered if other != name], forms, [name])
+                own = beside.groups[group.name]
+                lightest = self._spectra[name][forms[name]][0].range.low
+                body = cause.body.log_evidence(beside.matrix[np.ix_(own, own)], beside.score[own], lightest)
+                alone = SetEvidence(
+                    beside.keeping([group.name]), [replace(cause, groups=(group,), others=(), shares=())]
+                )
+                total += body - alone._of([name], (0,)).log_evidence
+        return total
+
+    @cached_property
+    def bodily(self) -> dict[str, float]:
+        """What it adds to the log evidence of each cause by itself that its amplitudes are moments of a body."""
+        names = [name for name, cause in self.causes.items() if cause.body is not None]
+        return {name: self._bodily([name], self.forms([name])) for name in names}
+
+    def beside(self, names: Iterable[str], forms: Mapping[str, int], others: Iterable[str]) -> Gram:
+        """Return the Gram of other causes after a set at its most probable scales has taken its share.
+
+        Parameters
+        ----------
+        names : iterable of str
+            The set.
+        forms : mapping of str to int
+            Form of each of its causes.
+        others : iterable of str
+        """
+        names = list(names)
+        groups = {group.name for name in others for form in self.causes[name].variants for group in form.groups}
+        part = self.gram.keeping(sorted(groups))
+        if not names:
+            return part
+        kept = np.concatenate([np.zeros(0, dtype=int), *(self.gram.groups[name] for name in part.groups)])
+        score = self.score_beside(names)
+        held, deviations = self.most_probable(names, forms)
+        information = deviations[:, None] * self.gram.matrix[np.ix_(held, held)] * deviations + np.eye(len(held))
+        lower = np.linalg.cholesky(information)
+        shared = sla.solve_triangular(lower, deviations[:, None] * self.gram.matrix[np.ix_(held, kept)], lower=True)
+        pull = sla.solve_triangular(lower, deviations * score[held], lower=True)
+        return Gram(part.matrix - shared.T @ shared, score[kept] - shared.T @ pull, part.groups)
 
     def _log_weight(self, ordered: Sequence[str], forms: Sequence[int]) -> float:
         """Return the logarithm of the prior probability of a combination of forms."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +19,7 @@ __all__ = ["with_tuned_tones"]
 DAMPINGS = (0.003, 0.008, DAMPING, 0.05)
 """Dampings that are equally probable beforehand."""
 
-ROUNDS, POINTS = 3, 5
+ROUNDS, POINTS = 2, 5
 """Grids of frequencies, each within the step of the one before, and points in each."""
 
 
@@ -65,11 +66,12 @@ def _tuned(
     )
     tried: dict[tuple[float, float], tuple[SignatureBank, float]] = {}
 
-    def value(tone: tuple[float, float]) -> float:
+    def value(frequency: float, damping: float) -> float:
+        tone = (float(f"{frequency:.5g}"), damping)
         if tone not in tried:
             item = tone_signatures(point.engine, point.fit, [effect], tone)[effect.label]
             forms = tone_forms(effect, item.name, bounds)
-            bank = SignatureBank((item,), (CandidateCause(effect.label, forms[0], others=tuple(forms[1:])),))
+            bank = SignatureBank((item,), (replace(cause, groups=forms[0], others=tuple(forms[1:]), shares=()),))
             both = point.with_bank(SignatureBank.joined([rest, bank]))
             tried[tone] = bank, both.evidence.log_evidence([*others, effect.label])
         return tried[tone][1]
@@ -79,8 +81,8 @@ def _tuned(
     centre, damping, reach = float(logs[cell]), DAMPING, 0.5 * step
     for _ in range(ROUNDS):
         points = centre + np.linspace(-reach, reach, POINTS)
-        centre = float(max(points, key=lambda x: value((float(np.exp(x)), damping))))
-        damping = max(DAMPINGS, key=lambda d: value((float(np.exp(centre)), d)))
+        centre = float(max(points, key=lambda x: value(float(np.exp(x)), damping)))
+        damping = max(DAMPINGS, key=lambda d: value(float(np.exp(centre)), d))
         reach = 2.0 * reach / (POINTS - 1)
     return _resolved(point.bank, cause, cell, per_tone, tried, float(logs[cell]), step)
 
@@ -99,9 +101,7 @@ def _resolved(
     kept = [form for form in range(len(cause.variants)) if form // per_tone != cell]
     forms = [cause.variants[form].groups for form in kept]
     shares = [share] * len(forms)
-    signatures = [
-        item for item in bank.signatures if item.name in {group.name for groups in forms for group in groups}
-    ]
+    signatures = [item for item in bank.signatures if item.name in {group.name for groups in forms for group in groups}]
     for damping in DAMPINGS:
         own = sorted(frequency for frequency, other in tried if other == damping)
         edges = np.clip(np.log(own), middle - 0.5 * step, middle + 0.5 * step)
@@ -113,5 +113,5 @@ def _resolved(
                 forms.append(variant.groups)
                 shares.append(max(float(width) / step, 1e-6) / (grid * len(DAMPINGS) * per_tone))
     return SignatureBank(
-        tuple(signatures), (CandidateCause(cause.name, forms[0], others=tuple(forms[1:]), shares=tuple(shares)),)
+        tuple(signatures), (replace(cause, groups=forms[0], others=tuple(forms[1:]), shares=tuple(shares)),)
     )

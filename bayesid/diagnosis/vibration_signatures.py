@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.body_evidence import MissingBody, outer_moments
 from bayesid.diagnosis.catalogue_signatures import moment_spreads
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
@@ -20,6 +21,7 @@ __all__ = [
     "FREQUENCIES",
     "PAIRS",
     "coupling_matrix",
+    "missing_body",
     "slosh_entries",
     "tone_forms",
     "tone_signatures",
@@ -35,13 +37,16 @@ FREQUENCIES = (0.02, 0.027, 0.036, 0.048, 0.065, 0.087, 0.115, 0.155, 0.21, 0.28
 DAMPING = 0.02
 """Damping of the grid relative to critical, so that a tone between two frequencies is seen at either."""
 
+GRID = tuple((frequency, DAMPING) for frequency in FREQUENCIES)
+"""Frequency and damping of every form."""
+
 
 def vibration_signatures(
     engine: Engine,
     fit: Fit,
     effects: Sequence[Effect],
     bounds: Mapping[str, Sequence[PhysicalBound]],
-    tones: Sequence[tuple[float, float]] = tuple((frequency, DAMPING) for frequency in FREQUENCIES),
+    tones: Sequence[tuple[float, float]] = GRID,
 ) -> SignatureBank:
     """Return the bank of hidden vibrations, each of the catalogue's with one form per frequency.
 
@@ -72,7 +77,8 @@ def vibration_signatures(
     causes = []
     for effect in wanted:
         forms = [form for item in groups[effect.label] for form in tone_forms(effect, item.name, bounds[effect.label])]
-        causes.append(CandidateCause(effect.label, forms[0], others=tuple(forms[1:])))
+        body = missing_body(effect, bounds[effect.label])
+        causes.append(CandidateCause(effect.label, forms[0], others=tuple(forms[1:]), body=body))
     return SignatureBank(tuple(signatures), tuple(causes))
 
 
@@ -97,12 +103,25 @@ def tone_forms(effect: Effect, name: str, bounds: Sequence[PhysicalBound]) -> li
     sizes = {bound.unit: bound.largest for bound in bounds}
     if isinstance(effect, FuelSlosh):
         units = ("kg", *("kg m",) * 3, *("kg m2",) * 6)
-        reach = max(parameter.sigma + abs(parameter.mean) for parameter in effect.parameters[3:])
-        return [(AmplitudeGroup(name, sizes["kg"], spread=own),) for own in moment_spreads(units, reach)[:2]]
+        spreads = moment_spreads(units, _reach(effect))[:2]
+        return [(AmplitudeGroup(name, sizes["kg"], spread=own),) for own in spreads]
     if isinstance(effect, FlexibleAppendage):
         root = np.repeat([sizes["sqrt(kg)"], sizes["sqrt(kg) m"]], 3)
         return [(AmplitudeGroup(name, 1.0, spread=np.array([(root[i] * root[j]) ** 2 for i, j in PAIRS])),)]
     raise TypeError(f"{effect.label!r}: the coupling of this vibration has no bounds")
+
+
+def missing_body(effect: Effect, bounds: Sequence[PhysicalBound]) -> MissingBody | None:
+    """Return the body that swings, which for slosh is a point mass in the spacecraft; None for others."""
+    if not isinstance(effect, FuelSlosh):
+        return None
+    (size,) = bounds
+    return MissingBody(size.largest, _reach(effect), (0.0,), outer_moments)
+
+
+def _reach(effect: Effect) -> float:
+    """Return the largest distance of a tank from the base origin along an axis [m]."""
+    return max(parameter.sigma + abs(parameter.mean) for parameter in effect.parameters[3:])
 
 
 def coupling_matrix(entries: Floats) -> Floats:
@@ -116,8 +135,8 @@ def coupling_matrix(entries: Floats) -> Floats:
 def slosh_entries() -> Floats:
     """Return the 21 entries of the coupling, (21, 10), per mass, first moment x y z and second xx xy yy xz yz zz.
 
-    With ``p`` the place of a mass ``m``, the matrix is ``m [[1, -[p]], [[p], [p][p]']]``, where ``[p]`` is the matrix of
-    the cross product and ``[p][p]' = p'p 1 - p p'``.
+    With ``p`` the place of a mass ``m``, the matrix is ``m [[1, -[p]], [[p], [p][p]']]``, where ``[p]`` is the matrix
+    of the cross product and ``[p][p]' = p'p 1 - p p'``.
     """
     matrices = np.zeros((10, 6, 6))
     matrices[0, :3, :3] = np.eye(3)

@@ -200,7 +200,7 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
             for trial in outside
         ],
         "What was said of causes that the catalogue does not have. Left: signal-to-noise ratio after the most probable "
-        "set of known causes has taken its share. Correlation of the torque reconstructed with the true one, base axes. "
+        "set of known causes has taken its share. Correlation: of the torque reconstructed with the true one. "
         "'Orbit' torques are fixed in the orbit axes of each recording's start, from which orbit axes turn by ten "
         "degrees.",
     )
@@ -227,8 +227,8 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
             ]
             for trial in trials
         ],
-        "Every trial; the seed and the strength repeat it. The probability is that of the named causes together; others "
-        "are the other explanations that the verdict gives and other names of the same causes.",
+        "Every trial; the seed and the strength repeat it. The probability is that of the named causes together. "
+        "Others: number of other explanations that the verdict gives, and of other names of the same causes.",
     )
     document.write(file)
 

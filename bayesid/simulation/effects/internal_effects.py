@@ -230,9 +230,7 @@ class FuelSlosh(_Vibration):
         starts = [(max(mass, SMALLEST_MASS), place)]
         if alone:  # the position may have several optima
             starts += [(SLOSH_MASS, middle + TANK_DISTANCE * corner) for corner in TANK_CORNERS]
-        return [
-            coordinates_of(self.parameters, [own, first.frequency, first.damping, *where]) for own, where in starts
-        ]
+        return [coordinates_of(self.parameters, [own, first.frequency, first.damping, *where]) for own, where in starts]
 
     def modes(self, values: Array) -> Modes:
         """Return three modes, one along each axis."""
