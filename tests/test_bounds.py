@@ -101,7 +101,8 @@ def test_the_linear_form_of_an_effect_has_the_same_bounds():
     attached = [effect.attach(model.robot) for effect in every_effect(model)]
     linear = [(effect, effect.in_amplitudes()) for effect in attached]
     changed = [(effect, form) for effect, form in linear if form is not effect]
-    assert {effect.name for effect, _ in changed} == {"aerodynamic-drag", "solar-pressure", "joint-flexibility"}
+    names = {"aerodynamic-drag", "solar-pressure", "joint-flexibility", "payload", "link-inertia"}
+    assert {effect.name for effect, _ in changed} == names
     for effect, form in changed:
         assert form.physical_bounds(model) == effect.physical_bounds(model)
 

@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats
 
-__all__ = ["MissingBodyPrior", "MissingBody", "body_log_evidence", "outer_moments", "rigid_moments"]
+__all__ = ["MissingBody", "MissingBodyPrior", "body_log_evidence", "outer_moments", "rigid_moments"]
 
 ITERATIONS = 60
 """Most steps of the search for the mode."""
