@@ -92,6 +92,18 @@ def test_stated_probabilities_are_compared_with_how_often_they_held():
     assert reliability(trials[-1:]) == []
 
 
+def test_outside_the_catalogue_it_is_right_to_say_so():
+    aside = stated(0.6, ("rate-bias",), ())
+    ambiguous = replace(aside, kind="unknown", status="ambiguous", sets=(("rate-bias",), ("unknown",)))
+    assert ambiguous.in_set
+    assert not ambiguous.misnamed
+    assert not ambiguous.holds
+    assert replace(ambiguous, sets=(("rate-bias",),)).misnamed
+    close = replace(ambiguous, status="explained", sets=(("rate-bias",),), accept=("rate-bias",))
+    assert close.named_rightly
+    assert close.holds
+
+
 def test_the_plans_hide_everything_and_nothing():
     for full in (False, True):
         plans = plan(full)

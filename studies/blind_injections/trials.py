@@ -20,6 +20,7 @@ from bayesid.diagnosis import Diagnosis, Frame, diagnose
 from bayesid.diagnosis.cause_amplitudes import effect_amplitude
 from bayesid.diagnosis.family_alarm import FamilyAlarm
 from bayesid.diagnosis.perturbed_fit import Fit
+from bayesid.diagnosis.probable_verdict import UNKNOWN
 from bayesid.diagnosis.scale_prior import AmplitudeGroup
 from bayesid.diagnosis.signature_bank import SignatureBank
 from bayesid.inference.noise_changes import with_manoeuvres
@@ -61,7 +62,7 @@ class Trial:
     hidden : tuple of str
         Hidden causes.
     accept : tuple of str
-        Other names by which the hidden causes may be named.
+        Other names by which the hidden causes may be named; outside the catalogue, causes that come close.
     status : str
         Status of the verdict.
     causes : tuple of str
@@ -146,6 +147,8 @@ class Trial:
 
     def _right(self, labels: Sequence[str]) -> bool:
         names = set(self.hidden) | set(self.accept)
+        if self.kind == "unknown":
+            return UNKNOWN in labels or set(labels) <= names
         return len(labels) == len(self.hidden) and set(labels) <= names
 
 
