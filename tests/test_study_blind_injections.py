@@ -92,6 +92,14 @@ def test_stated_probabilities_are_compared_with_how_often_they_held():
     assert reliability(trials[-1:]) == []
 
 
+def test_trials_that_state_no_probabilities_are_left_out(tmp_path):
+    file = tmp_path / "trials.jsonl"
+    file.write_text('{"seed": 0}\n{"trial": 0, "task": {}, "result": {"case": "rate-bias", "seconds": 3.0}}\n')
+    assert read(file) == []
+    with pytest.raises(ValueError, match="give another file"):
+        run([], file)
+
+
 def test_outside_the_catalogue_it_is_right_to_say_so():
     aside = stated(0.6, ("rate-bias",), ())
     ambiguous = replace(aside, kind="unknown", status="ambiguous", sets=(("rate-bias",), ("unknown",)))
