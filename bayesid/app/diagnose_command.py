@@ -65,6 +65,7 @@ def diagnose_study(
     import numpy as np
 
     from bayesid._io.files import complete_folder, write_json
+    from bayesid._io.phase_clock import PhaseClock
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_model import load_manoeuvres, load_model
     from bayesid.diagnosis import diagnose, identify_extended
@@ -81,15 +82,18 @@ def diagnose_study(
     result = diagnose(model, manoeuvres, seed, knows_latitude=knows, progress=progress)
     keep(result)
     yield from diagnosis_sentences(result)
-    identification = None
+    clock, identification = PhaseClock(), None
     if effective_samples is not None and result.posterior.size:
         progress(0.9, "sampling the extended model")
         identification = identify_extended(result, seed, effective_samples=effective_samples)
+    clock.ends("sample")
     with complete_folder(output) as folder:
-        write_json(folder / "diagnosis.json", result.to_dict(identification))
         result.unexplained.write(folder / "unexplained.csv")
         if identification is not None:
             write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
         origin = report_origin(study, "diagnose", seed)
         diagnosis_report(result, identification, study.title, folder / "report.pdf", origin=origin)
+        clock.ends("report")
+        content = result.to_dict(identification)
+        write_json(folder / "diagnosis.json", content | {"seconds": content["seconds"] | clock.seconds})
     yield f"Wrote {output / 'report.pdf'}."

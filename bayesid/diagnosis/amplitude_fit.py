@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.catalogue_signatures import group_names
 from bayesid.diagnosis.linearisation import Linearisation
 from bayesid.diagnosis.perturbed_fit import Fit
@@ -68,7 +68,7 @@ def predicted_cost(point: Linearisation) -> float:
     return constant - half_log_det - point.log_nothing
 
 
-def _places(linear: Effect, effect: Effect, groups: Mapping[str, Floats]) -> list[int]:
+def _places(linear: Effect, effect: Effect, groups: Mapping[str, Integers]) -> list[int]:
     """Return the columns of the Gram of each amplitude, recording after recording."""
     names = group_names(effect)
     waiting = {name: list(map(int, groups[name])) for name in set(names.values())}
@@ -77,7 +77,7 @@ def _places(linear: Effect, effect: Effect, groups: Mapping[str, Floats]) -> lis
     return [waiting[names[str(unit)]].pop(0) for unit in units]
 
 
-def _mode(point: Linearisation, names: Sequence[str], held: Floats, deviations: Floats) -> tuple[Floats, float]:
+def _mode(point: Linearisation, names: Sequence[str], held: Integers, deviations: Floats) -> tuple[Floats, float]:
     """Return the amplitudes at the mode, given their scales, and the decrease of the cost that they bring."""
     evidence = point.evidence
     score = evidence.score_beside(names)

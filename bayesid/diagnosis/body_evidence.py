@@ -11,7 +11,7 @@ from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats
 
-__all__ = ["BodyPrior", "MissingBody", "body_log_evidence", "outer_moments", "rigid_moments"]
+__all__ = ["MissingBody", "MissingBodyPrior", "body_log_evidence", "outer_moments", "rigid_moments"]
 
 ITERATIONS = 60
 """Most steps of the search for the mode."""
@@ -24,7 +24,7 @@ PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
 @dataclass(frozen=True)
-class BodyPrior:
+class MissingBodyPrior:
     """Prior of a body that the model lacks.
 
     The logarithm of the mass has the mean and the variance of a uniform one, the place is normal about the origin, and
@@ -96,7 +96,9 @@ class MissingBody:
         linear = -np.linalg.solve(matrix + ridge, score)
         light = min(lightest, 0.5 * self.heaviest)
         values = [
-            body_log_evidence(matrix, score, BodyPrior(light, self.heaviest, self.reach, radius), self.moments, linear)
+            body_log_evidence(
+                matrix, score, MissingBodyPrior(light, self.heaviest, self.reach, radius), self.moments, linear
+            )
             for radius in self.radii
         ]
         return float(logsumexp(values)) - float(np.log(len(values)))
@@ -118,7 +120,7 @@ def outer_moments(theta: Floats) -> Floats:
 
 
 def body_log_evidence(
-    matrix: Floats, score: Floats, prior: BodyPrior, moments: Callable[[Floats], Floats], linear: Floats
+    matrix: Floats, score: Floats, prior: MissingBodyPrior, moments: Callable[[Floats], Floats], linear: Floats
 ) -> float:
     """Return the Laplace approximation of the log evidence of a body relative to no body.
 
@@ -128,7 +130,7 @@ def body_log_evidence(
         Information on the ten moments.
     score : (10,) array
         The likelihood of moments ``a`` relative to none is ``exp(-score'a - a'matrix a / 2)``.
-    prior : BodyPrior
+    prior : MissingBodyPrior
     moments : callable
         The ten moments of the logarithm of the mass, the place and so on.
     linear : (10,) array
@@ -137,7 +139,7 @@ def body_log_evidence(
     return max(_from(start, matrix, score, prior, moments) for start in _starts(prior, linear))
 
 
-def _starts(prior: BodyPrior, linear: Floats) -> list[Floats]:
+def _starts(prior: MissingBodyPrior, linear: Floats) -> list[Floats]:
     """Return starting points: the linear fit where it has a mass, and light bodies at the linear fit's direction."""
     starts = []
     first = linear[1:4]
@@ -151,7 +153,9 @@ def _starts(prior: BodyPrior, linear: Floats) -> list[Floats]:
     return starts
 
 
-def _from(theta: Floats, matrix: Floats, score: Floats, prior: BodyPrior, moments: Callable[[Floats], Floats]) -> float:
+def _from(
+    theta: Floats, matrix: Floats, score: Floats, prior: MissingBodyPrior, moments: Callable[[Floats], Floats]
+) -> float:
     """Return the log evidence about the mode that a Levenberg-Marquardt search reaches, in prior deviations."""
     mean, sd = prior.mean, prior.sd
     x = (theta - mean) / sd

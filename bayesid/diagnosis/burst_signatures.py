@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Integers
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
@@ -33,7 +33,7 @@ def burst_signatures(engine: Engine, fit: Fit) -> SignatureBank:
     banks = []
     for kind in posterior.model.channels.kinds:
         columns = posterior.model.channels.of(kind)
-        places: list[tuple[float, int, Floats]] = []
+        places: list[tuple[float, int, Integers]] = []
         for r, item in enumerate(posterior.whitenings):
             there = np.flatnonzero(item.outputs[:, columns].any(axis=1))
             energy = (whole[r, there, columns] ** 2).sum(axis=1)
@@ -57,9 +57,9 @@ def burst_signatures(engine: Engine, fit: Fit) -> SignatureBank:
     return SignatureBank.joined(banks)
 
 
-def _apart(places: list[tuple[float, int, Floats]]) -> list[tuple[float, int, Floats]]:
+def _apart(places: list[tuple[float, int, Integers]]) -> list[tuple[float, int, Integers]]:
     """Return the strongest places that do not overlap."""
-    chosen: list[tuple[float, int, Floats]] = []
+    chosen: list[tuple[float, int, Integers]] = []
     for value, r, rows in places:
         if all(r != other or rows[0] > own[-1] or rows[-1] < own[0] for _, other, own in chosen):
             chosen.append((value, r, rows))

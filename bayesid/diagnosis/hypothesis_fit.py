@@ -76,7 +76,8 @@ def _starts(effect: Effect, point: Linearisation, names: Sequence[str]) -> Seque
     if not effect.modes_count:
         linear = effect.in_amplitudes()
         if linear is effect and effect.parameters:
-            return [_amplitudes(effect.label, point, names) / [parameter.sigma for parameter in effect.parameters]]
+            mean = _amplitudes(effect.label, point, names)  # recording after recording, where each has its own
+            return [mean / np.resize([parameter.sigma for parameter in effect.parameters], mean.shape)]
         return effect.starts
     amplitudes = _amplitudes(effect.label, point, names)
     entries = slosh_entries() @ amplitudes if len(amplitudes) == slosh_entries().shape[1] else amplitudes

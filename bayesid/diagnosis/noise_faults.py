@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -138,7 +138,7 @@ def _coloured(label: str, kind: Kind, fit: Fit, least: float) -> NoiseFault | No
     return _coloured_at(label, kind, fit, np.array([level, time]), relative)
 
 
-def _slow_gain(slow: list[tuple[Floats, Floats]], x: Floats, interval: float, longest: float) -> float:
+def _slow_gain(slow: Sequence[tuple[Floats, Floats]], x: Floats, interval: float, longest: float) -> float:
     """Return the gain of log likelihood by coloured noise in the slowest waves, of which a fit may have taken some."""
     level, rho = np.exp(2.0 * x[0]), np.exp(-interval / np.clip(np.exp(x[1]), 0.2 * interval, longest))
     total = 0.0

@@ -73,7 +73,7 @@ class SignatureBank:
         recordings = len(fit.posterior.manoeuvres)
         rows = len(fit.residual) // recordings
         unknowns = fit.own.shape[1]
-        upper = np.linalg.qr(np.concatenate([fit.own, np.eye(unknowns)]), mode="r")
+        upper = np.asarray(np.linalg.qr(np.concatenate([fit.own, np.eye(unknowns)]), mode="r"))
         places: list[Integers] = []
         for item in self.signatures:
             first = places[-1][-1] + 1 if places else 0

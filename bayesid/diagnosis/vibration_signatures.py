@@ -37,13 +37,16 @@ FREQUENCIES = (0.02, 0.027, 0.036, 0.048, 0.065, 0.087, 0.115, 0.155, 0.21, 0.28
 DAMPING = 0.02
 """Damping of the grid relative to critical, so that a tone between two frequencies is seen at either."""
 
+GRID = tuple((frequency, DAMPING) for frequency in FREQUENCIES)
+"""Frequency and damping of every form."""
+
 
 def vibration_signatures(
     engine: Engine,
     fit: Fit,
     effects: Sequence[Effect],
     bounds: Mapping[str, Sequence[PhysicalBound]],
-    tones: Sequence[tuple[float, float]] = tuple((frequency, DAMPING) for frequency in FREQUENCIES),
+    tones: Sequence[tuple[float, float]] = GRID,
 ) -> SignatureBank:
     """Return the bank of hidden vibrations, each of the catalogue's with one form per frequency.
 
