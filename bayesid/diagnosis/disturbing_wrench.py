@@ -116,18 +116,18 @@ def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: 
     for r in range(count):
         own = np.concatenate([[True], np.diff(times[r]) > 0.0])
         waves = _waves(times[r][own])
-        parts = []
+        sides = []
         for first in (0, half):
             block = slice(first + r * WAVES * 3, first + (r + 1) * WAVES * 3)
             mean = np.einsum("kt,ka->ta", waves, amplitude[block].reshape(WAVES, 3))
             spread = covariance[block, block].reshape(WAVES, 3, WAVES, 3)
             sd = np.sqrt(np.maximum(np.einsum("kt,kala,lt->ta", waves, spread, waves), 0.0))
-            parts.append((mean, sd))
+            sides.append((mean, sd))
         time.append(times[r][own])
-        torque.append(parts[0][0])
-        force.append(parts[1][0])
-        torque_sd.append(parts[0][1])
-        force_sd.append(parts[1][1])
+        torque.append(sides[0][0])
+        force.append(sides[1][0])
+        torque_sd.append(sides[0][1])
+        force_sd.append(sides[1][1])
 
     def turned(series: list[Floats], frame: Frame) -> list[Floats]:
         out = []

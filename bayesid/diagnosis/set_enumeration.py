@@ -108,7 +108,7 @@ def _screened(
         for name, values in evidence_beside(evidence, parent.names, forms, others).items():
             key = (tuple(sorted((*parent.causes, name))), parent.generic)
             gain = float(logsumexp(list(values.values()))) + max(evidence.bodily.get(name, 0.0), 0.0)
-            order = sorted(values, key=lambda form, values=values: -values[form])[:MOST_FORMS]
+            order = [form for form, _ in sorted(values.items(), key=lambda item: -item[1])][:MOST_FORMS]
             near = [form for form in order if values[form] > values[order[0]] - FORMS_NEAR]
             choices = [{**forms, name: form} for form in near]
             before, others_choices = weighed.get(key, (-np.inf, []))
