@@ -602,7 +602,9 @@ def test_amplitudes_describe_the_same_effect_where_it_is_small(without):
     originals = [effect for effect in EFFECTS if effect.in_amplitudes() is not effect]
     bare, whole, linear = without["plain"](), carrying(PLAIN, originals), carrying(PLAIN, LINEAR)
     for effect in originals:
-        values = small.get(effect.name, jnp.array([1e-4, 0.5, -0.3, 0.2]))
+        pressed = jnp.array([1e-4, 0.5, -0.3, 0.2])
+        coordinates = 1e-3 * jnp.linspace(-1.0, 1.0, 10)  # of a link, log-Cholesky
+        values = small.get(effect.name, pressed if len(effect.parameters) == 4 else coordinates)
         changes = []
         for flight, at in ((whole, values), (linear, effect.amplitudes(values))):
             there = flight(**{effect.label: at})

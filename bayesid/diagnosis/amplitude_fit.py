@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.catalogue_signatures import group_names
+from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.linearisation import Linearisation
 from bayesid.diagnosis.perturbed_fit import Fit
 from bayesid.diagnosis.set_evidence import precision_roots
@@ -16,9 +18,15 @@ from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["fit_in_amplitudes", "predicted_cost"]
 
+FAR = 20.0
+"""Difference from the predicted cost beyond which a fit is started anew [nats]."""
 
-def fit_in_amplitudes(point: Linearisation, effects: Sequence[Effect]) -> tuple[Fit, float]:
+
+def fit_in_amplitudes(point: Linearisation, effects: Sequence[Effect], released: bool = False) -> tuple[Fit, float]:
     """Fit causes that are linear in their amplitudes, with all unknowns.
+
+    Where the fit does not end where the linear model says, it is started from the prior's centre as well, since the
+    unknowns of the present model may have strayed too far to imitate what it lacks.
 
     Parameters
     ----------
@@ -26,16 +34,18 @@ def fit_in_amplitudes(point: Linearisation, effects: Sequence[Effect]) -> tuple[
         From whose Gram the scales and the start follow.
     effects : sequence of Effect
         The causes, none of which vibrates.
+    released : bool
+        Whether the initial rates that the study takes to be zero are among the causes.
 
     Returns
     -------
     fit : Fit
-        With the effects in amplitudes.
+        With the effects in amplitudes; released rates are no unknowns of it, but keep their values.
     expected : float
         Cost that the linear model predicts for it: where both agree, the linear evidence holds.
     """
     evidence = point.evidence
-    names = sorted(effect.label for effect in effects)
+    names = sorted([*(effect.label for effect in effects), *([INITIAL_RATE] if released else [])])
     forms = evidence.forms(names)
     held, deviations = evidence.most_probable(names, forms)
     mean, gain = _mode(point, names, held, deviations)
@@ -55,9 +65,20 @@ def fit_in_amplitudes(point: Linearisation, effects: Sequence[Effect]) -> tuple[
         else:
             start.append(np.zeros(0))
         scaled.append(linear)
-    engine = point.engine
-    fit = engine.fit(scaled, start, z=point.fit.z, operating=point.fit.operating)
-    return fit, predicted_cost(point) - gain
+    engine = point.engine.released() if released else point.engine
+    frozen = point.engine.frozen
+    z = point.fit.z.copy()
+    if released:
+        z[frozen] = engine.posterior.starting_point()[frozen]
+    expected = predicted_cost(point) - gain
+    fit = engine.fit(scaled, start, z=z, operating=None if released else point.fit.operating)
+    if abs(fit.cost - expected) > FAR:
+        fresh = engine.fit(scaled, [np.zeros_like(own) for own in start])
+        fit = fresh if fresh.cost < fit.cost else fit
+    if not released:
+        return fit, expected
+    known = np.delete(fit.own, np.searchsorted(engine.free, frozen), axis=1)
+    return replace(fit, own=known, released=np.zeros(0, dtype=int), frozen=frozen), expected
 
 
 def predicted_cost(point: Linearisation) -> float:

@@ -13,6 +13,7 @@ from bayesid.diagnosis.burst_signatures import burst_signatures
 from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.equivalent_causes import classes_of_equivalents
 from bayesid.diagnosis.family_alarm import FamilyAlarm
+from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.linearisation import Linearisation, linearise
 from bayesid.diagnosis.noise_states import NoiseState, fault_names, noise_state
 from bayesid.diagnosis.noise_tests import noise_tests
@@ -159,11 +160,14 @@ def _settled(
         point = with_tuned_tones(point, effects, bounds, beside)
         found = enumerate_sets(point.evidence, prior)
     for _ in range(ROUNDS):
-        chosen = _best_effects(found, effects)
-        if not chosen:
+        chosen, released = _best_known(found, effects)
+        if not chosen and not released:
             return point, found, best
-        best, expected = fit_in_amplitudes(point, chosen)
-        if abs(best.cost - expected) < AGREES:
+        fit, expected = fit_in_amplitudes(point, chosen, released)
+        if fit.cost > best.cost:
+            return point, found, best
+        best = fit
+        if abs(fit.cost - expected) < AGREES:
             return point, found, best
         point = _with_bursts(linearise(point.engine, best, effects, bounds))
         found = enumerate_sets(point.evidence, prior)
@@ -178,13 +182,17 @@ def _with_bursts(point: Linearisation) -> Linearisation:
     return point.with_bank(SignatureBank.joined([point.bank, burst_signatures(point.engine, point.fit)]))
 
 
-def _best_effects(found: SetProbabilities, effects: Sequence[Effect]) -> list[Effect]:
-    """Return the effects of the most probable set; none where one of them has several forms."""
-    best = next((item for item in found.sets if item.names), None)
+def _best_known(found: SetProbabilities, effects: Sequence[Effect]) -> tuple[list[Effect], bool]:
+    """Return the effects of the most probable set that names all of its causes, and whether it frees initial rates.
+
+    There are none where one of them has several forms.
+    """
+    best = next((item for item in found.sets if item.causes and item.generic is None), None)
     causes = () if best is None else best.causes
     chosen = [effect for effect in effects if effect.label in causes]
-    several = any(effect.modes_count or isinstance(effect, MassShift) for effect in chosen)
-    return [] if several else chosen
+    if any(effect.modes_count or isinstance(effect, MassShift) for effect in chosen):
+        return [], False
+    return chosen, INITIAL_RATE in causes
 
 
 def _suspects(alarm: FamilyAlarm, best: Fit, base: Fit) -> dict[str, Fit]:

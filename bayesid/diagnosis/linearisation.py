@@ -11,7 +11,7 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.catalogue_signatures import catalogue_signatures, group_names
 from bayesid.diagnosis.generic_signatures import generic_signatures
 from bayesid.diagnosis.gram import Gram
-from bayesid.diagnosis.initial_rate_signatures import initial_rate_signatures
+from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE, initial_rate_signatures
 from bayesid.diagnosis.mass_shift_signatures import mass_shift_signatures
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.set_evidence import SetEvidence
@@ -98,6 +98,8 @@ def _assembled(engine: Engine, fit: Fit, bank: SignatureBank) -> Linearisation:
 def _amplitudes(fit: Fit, gram: Gram) -> Floats:
     """Return the amplitudes of all columns of the Gram at a fit, shape (m,)."""
     found = np.zeros(len(gram.score))
+    if INITIAL_RATE in gram.groups:
+        found[gram.groups[INITIAL_RATE]] = fit.posterior.unknowns.rate_sigma * fit.z[fit.frozen]
     for index, effect in enumerate(fit.effects):
         names = group_names(effect)
         if not effect.parameters:
