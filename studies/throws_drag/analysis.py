@@ -136,7 +136,13 @@ def study_body(
 
 
 def _taken(found: Diagnosis) -> Hypothesis:
-    best = next((item for item in found.probabilities.sets if item.causes and item.generic is None), None)
+    """Return the extended model, or where nothing is named the most probable one with effects alone.
+
+    Faults of the noise belong to the recordings and not to the bodies, which are compared across recordings.
+    """
+    effects = {effect.label for effect in found.effects}
+    known = (item for item in found.probabilities.sets if item.causes and item.generic is None)
+    best = next((item for item in known if effects.issuperset(item.causes)), None)
     return found.after if found.verdict.causes or found.alarm.silent or best is None else found.fitted(best.causes)
 
 
