@@ -238,6 +238,24 @@ def check_displaced(effect: Effect, hook: str) -> None:
     np.testing.assert_allclose(change.weights.sum(axis=1), 0.0, atol=1e-9 * np.abs(change.weights).max())
 
 
+def check_in_recording(effect: Effect, hook: str) -> None:
+    """In every recording it is the same effect with the same parameters."""
+    for index in range(3):
+        assert (effect.in_recording(index).name, effect.in_recording(index).parameters) == (
+            effect.name,
+            effect.parameters,
+        )
+
+
+def check_jumps(effect: Effect, hook: str) -> None:
+    """The table is the same up to the jump and another just after it."""
+    (instant,) = effect.jumps(TIMES[-1])
+    table = effect.table(ROBOT, SWING, np.array([0.0, instant, instant + 1e-9, TIMES[-1]]))
+    np.testing.assert_array_equal(table[0], table[1])
+    assert not np.allclose(table[1], table[2])
+    np.testing.assert_array_equal(table[2], table[3])
+
+
 def check_body_tables(effect: Effect, hook: str) -> None:
     """Known and unknown bodies together are all of them, and loads have a column each."""
     tables = [table for _, table in effect.body_tables(ROBOT, ("link2",), SWING, TIMES)]
@@ -325,7 +343,7 @@ def check_quantities(effect: Effect, hook: str) -> None:
 def check_label(effect: Effect, hook: str) -> None:
     name, _, place = effect.label.partition(":")
     assert name == effect.name
-    assert not place or place in {*ROBOT.links, *JOINTS}
+    assert not place or place in {*ROBOT.links, *JOINTS, *"xyz"}
 
 
 def check_link(effect: Effect, hook: str) -> None:
@@ -377,6 +395,17 @@ def check_count(effect: Effect, hook: str) -> None:
     assert effect.uses(hooks[hook])
 
 
+def check_per_recording(effect: Effect, hook: str) -> None:
+    """Each of two recordings has its own values: the readings of one do not depend on those of the other."""
+    flight = Flight(PLAIN.extend(effect), recordings=2)
+    there, absent = typical(effect, SMALL), jnp.asarray(effect.absent)
+    only = flight(**{effect.label: jnp.stack([there, absent])})
+    none = flight(**{effect.label: jnp.stack([absent, absent])})
+    for key in ("rate", "accel"):
+        assert np.abs(only[key] - none[key])[0].max() > SHOWN[key]
+        np.testing.assert_array_equal(only[key][1], none[key][1])
+
+
 CHECKS: dict[str, Callable[[Effect, str], None]] = {
     **dict.fromkeys(CALLS, check_values),
     "name": check_name,
@@ -402,13 +431,13 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "label": check_label,
     "link": check_link,
     "table": check_table,
+    "in_recording": check_in_recording,
+    "jumps": check_jumps,
+    "per_recording": check_per_recording,
     "body_tables": check_body_tables,
 }
 FRAMEWORK = {"uses", "constants", "bound", "amplitude_units"}
 """What the simulation asks of an effect and no effect overrides."""
-
-PER_RECORDING = {"per_recording"}
-"""No shipped effect has values of its own for each recording; tests/test_candidates.py has one that does."""
 
 
 def hooks_of(effect: Effect) -> list[str]:
@@ -428,7 +457,7 @@ def test_every_hook_keeps_its_contract(effect, hook):
 
 def test_no_hook_is_left_out():
     """Everything public on `Effect` has a check, and something to check it on; every shipped effect has a place."""
-    public = {name for name in vars(Effect) if not name.startswith("_")} - FRAMEWORK - PER_RECORDING
+    public = {name for name in vars(Effect) if not name.startswith("_")} - FRAMEWORK
     assert public == CHECKS.keys()
     assert {hook for _, hook in PAIRS} == CHECKS.keys()
     assert {type(effect) for effect in EFFECTS} == {*KINDS, CreepingWheel}
@@ -475,8 +504,8 @@ def spied(effect: Effect) -> Effect:
 class Flight:
     """A compiled simulation of a model, of values of its effects."""
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
+    def __init__(self, model: Model, recordings: int = 1) -> None:
+        self.model, self.recordings = model, recordings
         samples = np.linspace(0.0, 6.0, 25)
         grid = build_grid(
             ROBOT,
@@ -489,18 +518,22 @@ class Flight:
             effects=model.effects,
             torques=model.torque is not None,
         )
-        grids, attitude = pad_grids([grid]), jnp.asarray([[0.1, -0.2, 0.3, 0.9]])
-        attitude /= jnp.linalg.norm(attitude)
-        rate, tilt = jnp.asarray([[0.02, -0.03, 0.01]]), jnp.zeros((1, 3))
-        simulator, constants, speed = Simulator.of(model), ModelConstants.of(model), jnp.zeros((1, 0))
+        grids, attitude = pad_grids([grid] * recordings), jnp.asarray([[0.1, -0.2, 0.3, 0.9]] * recordings)
+        attitude /= jnp.linalg.norm(attitude[0])
+        rate, tilt = jnp.asarray([[0.02, -0.03, 0.01]] * recordings), jnp.zeros((recordings, 3))
+        simulator, constants, speed = Simulator.of(model), ModelConstants.of(model), jnp.zeros((recordings, 0))
         self._run = jax.jit(
             lambda effects: simulator.readings(constants, Values(BODY, rate, tilt, speed, effects), grids, attitude)
         )
 
     def __call__(self, **present: jnp.ndarray) -> dict[str, np.ndarray]:
         """Readings with the named effects at some values and the others absent."""
-        values = tuple(present.get(effect.label, jnp.asarray(effect.absent)) for effect in self.model.effects)
-        found = self._run(values)[0]
+        values = []
+        for effect in self.model.effects:
+            given = present.get(effect.label, jnp.asarray(effect.absent))
+            own = effect.per_recording and given.ndim == 1
+            values.append(jnp.stack([given] * self.recordings) if own else given)
+        found = self._run(tuple(values))[0]
         return {key: np.asarray(value) for key, value in (*found.channels.items(), ("torque", found.torque))}
 
 
@@ -569,7 +602,9 @@ def test_amplitudes_describe_the_same_effect_where_it_is_small(without):
     originals = [effect for effect in EFFECTS if effect.in_amplitudes() is not effect]
     bare, whole, linear = without["plain"](), carrying(PLAIN, originals), carrying(PLAIN, LINEAR)
     for effect in originals:
-        values = small.get(effect.name, jnp.array([1e-4, 0.5, -0.3, 0.2]))
+        pressed = jnp.array([1e-4, 0.5, -0.3, 0.2])
+        coordinates = 1e-3 * jnp.linspace(-1.0, 1.0, 10)  # of a link, log-Cholesky
+        values = small.get(effect.name, pressed if len(effect.parameters) == 4 else coordinates)
         changes = []
         for flight, at in ((whole, values), (linear, effect.amplitudes(values))):
             there = flight(**{effect.label: at})

@@ -17,7 +17,7 @@ from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.set_enumeration import enumerate_sets
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
-from bayesid.diagnosis.verdict import Status
+from bayesid.diagnosis.status import Status
 from bayesid.diagnosis.verdict_sensitivity import verdict_sensitivity
 from tests.gram_problem import LinearProblem
 
@@ -277,7 +277,14 @@ def test_verdict_that_rests_on_the_prior_says_so_and_a_clear_one_does_not():
         gram = problem.observed(np.random.default_rng(0), {"cause 2": np.array([size])}).gram()
         evidence = SetEvidence(gram, [cause(name) for name in names])
         alarm = EvidenceAlarm.of(evidence, np.random.default_rng(0))
-        sensitivities[size] = verdict_sensitivity(evidence, enumerate_sets(evidence), alarm, np.random.default_rng(1))
+
+        def widened(bound: float, floor: float, evidence: SetEvidence = evidence) -> SetProbabilities:
+            causes = [own.rescaled(evidence.gram, bound, floor) for own in evidence.causes.values()]
+            return enumerate_sets(SetEvidence(evidence.gram, causes))
+
+        sensitivities[size] = verdict_sensitivity(
+            enumerate_sets(evidence), classes_of_equivalents(evidence), alarm.silent(), widened
+        )
     assert sensitivities[3.0].verdict.status is Status.EXPLAINED
     assert sensitivities[3.0].verdict.causes == ("cause 2",)
     assert sensitivities[3.0].changes == ()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from studies.blind_injections import Trial, plan, run, write_report
-from studies.blind_injections.report import confusion, rates
+from studies.blind_injections.report import confusion, rates, reliability
 from studies.blind_injections.trials import Plan, read
 from studies.common.monte_carlo import read_store
 
@@ -33,7 +33,13 @@ def test_what_was_hidden_is_compared_with_what_is_said(trials):
     assert 0.5 <= bias.naming <= 1.0
     assert len(bias.amplitude_errors) == 3
     assert max(map(abs, bias.amplitude_errors)) < 5.0
+    assert bias.probability > 0.9
+    assert bias.probabilities["rate-bias"] >= bias.probability - 1e-9
+    assert min(bias.probabilities.values()) > 0.01
+    assert bias.seconds["total"] > bias.seconds["verdict"] > 0.0
     assert not null.alarmed
+    assert null.probability is None
+    assert null.nothing > 0.5
     assert null.signal_to_noise is None
     assert len(null.body_errors) == 10
 
@@ -65,6 +71,45 @@ def test_wrong_names_are_counted(trials):
     assert row[4:6] == ["2", "1"]
     assert row[7] == "1"
     assert confusion([bias, wrong, wrong])[0] == ["rate-bias", "rate-drift (2), rate-bias"]
+
+
+def stated(probability: float | None, causes: tuple[str, ...], hidden: tuple[str, ...]) -> Trial:
+    """A trial of which only what was hidden and what was said matters."""
+    empty = dict.fromkeys(Trial.__dataclass_fields__)
+    said = {"probability": probability, "causes": causes, "hidden": hidden, "accept": ()}
+    return Trial(**{**empty, **said})
+
+
+def test_stated_probabilities_are_compared_with_how_often_they_held():
+    trials = [stated(0.92, ("rate-bias",), ("rate-bias",))] * 7
+    trials += [stated(0.94, ("rate-bias",), ("rate-bias", "accel-bias"))]  # what is named holds, though not all of it
+    trials += [stated(0.93, ("rate-drift",), ("rate-bias",)), stated(0.91, ("rate-bias", "rate-drift"), ("rate-bias",))]
+    trials += [stated(1.0, ("rate-drift",), ("rate-drift",)), stated(None, (), ())]
+    ninety, certain, every = reliability(trials)
+    assert ninety == ["0.9 to 0.95", "10", "0.922", "8", "0.800", "0.490 to 0.943"]  # Wilson 1927
+    assert certain[:5] == ["0.999 to 1", "1", "1.000", "1", "1.000"]
+    assert every[:2] == ["all", "11"]
+    assert reliability(trials[-1:]) == []
+
+
+def test_trials_that_state_no_probabilities_are_left_out(tmp_path):
+    file = tmp_path / "trials.jsonl"
+    file.write_text('{"seed": 0}\n{"trial": 0, "task": {}, "result": {"case": "rate-bias", "seconds": 3.0}}\n')
+    assert read(file) == []
+    with pytest.raises(ValueError, match="give another file"):
+        run([], file)
+
+
+def test_outside_the_catalogue_it_is_right_to_say_so():
+    aside = stated(0.6, ("rate-bias",), ())
+    ambiguous = replace(aside, kind="unknown", status="ambiguous", sets=(("rate-bias",), ("unknown",)))
+    assert ambiguous.in_set
+    assert not ambiguous.misnamed
+    assert not ambiguous.holds
+    assert replace(ambiguous, sets=(("rate-bias",),)).misnamed
+    close = replace(ambiguous, status="explained", sets=(("rate-bias",),), accept=("rate-bias",))
+    assert close.named_rightly
+    assert close.holds
 
 
 def test_the_plans_hide_everything_and_nothing():

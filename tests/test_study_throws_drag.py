@@ -24,7 +24,7 @@ def result(slow):
 
 def test_the_rigid_model_is_not_adequate(result):
     found = result.studies[0].diagnosis
-    assert not found.search.base.adequate
+    assert not found.alarm.silent
     assert found.gain.before.chi2_per_sample > 1.2
     assert result.studies[0].taken.labels
 

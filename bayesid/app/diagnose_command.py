@@ -65,29 +65,48 @@ def diagnose_study(
     import numpy as np
 
     from bayesid._io.files import complete_folder, write_json
+    from bayesid._io.phase_clock import PhaseClock
+    from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_model import load_manoeuvres, load_model
-    from bayesid.diagnosis import diagnose, identify_extended
+    from bayesid.diagnosis import CausePrior, diagnose, identify_extended
     from bayesid.inference.posterior import Posterior
     from bayesid.inference.posterior_file import write_netcdf
     from bayesid.inference.recording_check import refuse_wrong_units
     from bayesid.report import diagnosis_report
     from bayesid.report.sentences.diagnosis_sentences import diagnosis_sentences
+    from bayesid.simulation.effects import PhysicalBound
 
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
     refuse_wrong_units(Posterior.of(model, manoeuvres))
     knows = all(section.argument_of_latitude is not None for section in study.recordings)
-    result = diagnose(model, manoeuvres, seed, knows_latitude=knows, progress=progress)
+    said = study.diagnosis
+    result = diagnose(
+        model,
+        manoeuvres,
+        seed,
+        bounds={
+            label: [PhysicalBound(unit, size, "Stated in the study.") for unit, size in sizes.items()]
+            for label, sizes in said.bounds.items()
+        },
+        prior=CausePrior(said.one_more_cause, said.outside_catalogue),
+        knows_latitude=knows,
+        progress=progress,
+    )
     keep(result)
     yield from diagnosis_sentences(result)
-    identification = None
+    clock, identification = PhaseClock(), None
     if effective_samples is not None and result.posterior.size:
         progress(0.9, "sampling the extended model")
         identification = identify_extended(result, seed, effective_samples=effective_samples)
+    clock.ends("sample")
     with complete_folder(output) as folder:
-        write_json(folder / "diagnosis.json", result.to_dict(identification))
         result.unexplained.write(folder / "unexplained.csv")
         if identification is not None:
             write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
-        diagnosis_report(result, identification, study.title, folder / "report.pdf")
+        origin = report_origin(study, "diagnose", seed)
+        diagnosis_report(result, identification, study.title, folder / "report.pdf", origin=origin)
+        clock.ends("report")
+        content = result.to_dict(identification)
+        write_json(folder / "diagnosis.json", content | {"seconds": content["seconds"] | clock.seconds})
     yield f"Wrote {output / 'report.pdf'}."

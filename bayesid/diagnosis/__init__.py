@@ -1,23 +1,28 @@
-"""What the simulation gets wrong: candidates, tests, search, verdict and gain."""
+"""What the simulation gets wrong: candidates, their signatures, the probability of every set of causes, the gain."""
 
 from bayesid.diagnosis.candidate_effects import candidates
 from bayesid.diagnosis.candidate_table import Candidate
-from bayesid.diagnosis.cause_search import CauseSearch, Hypothesis
+from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.diagnosis_run import Diagnosis, diagnose, identify_extended
 from bayesid.diagnosis.disturbing_wrench import Frame, Unexplained
 from bayesid.diagnosis.gain import Gain
-from bayesid.diagnosis.verdict import Status, Verdict
+from bayesid.diagnosis.hypothesis import Hypothesis
+from bayesid.diagnosis.probable_verdict import ProbableVerdict
+from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
+from bayesid.diagnosis.status import Status
 
 __all__ = [
     "Candidate",
-    "CauseSearch",
+    "CausePrior",
+    "CauseSet",
     "Diagnosis",
     "Frame",
     "Gain",
     "Hypothesis",
+    "ProbableVerdict",
+    "SetProbabilities",
     "Status",
     "Unexplained",
-    "Verdict",
     "candidates",
     "diagnose",
     "identify_extended",

@@ -50,7 +50,12 @@ class AmplitudePosterior:
         names = tuple(names)
         if not names:
             raise ValueError("a posterior of amplitudes needs at least one cause, received none")
-        average, spectra, places = evidence.average(names), evidence.spectra(names), evidence.places(names)
+        forms = evidence.forms(names)
+        average, spectra, places = (
+            evidence.average(names),
+            evidence.spectra(names, forms),
+            evidence.places(names, forms),
+        )
         weights = np.exp(average.log_posterior.ravel())
         order = np.argsort(-weights, kind="stable")
         kept = order[: min(int(np.searchsorted(np.cumsum(weights[order]), HELD)) + 1, MOST_TERMS)]
@@ -67,7 +72,7 @@ class AmplitudePosterior:
         means = -(np.swapaxes(roots, 1, 2) @ (roots @ evidence.gram.score[columns])[..., None])[..., 0]
         amplitudes, first = {}, 0
         for (name, place), own in zip(places, spectra, strict=True):
-            key = (name, evidence.causes[name].groups[place].name)
+            key = (name, evidence.causes[name].variants[forms[name]].groups[place].name)
             amplitudes[key] = np.arange(first, first + len(own.columns))
             first += len(own.columns)
         return AmplitudePosterior(amplitudes, weights[kept] / weights[kept].sum(), means, roots)

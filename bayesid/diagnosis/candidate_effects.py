@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.register import known_effects
+from bayesid.simulation.effects.wheel_history import WheelHistory
 from bayesid.simulation.model import Model
 
 __all__ = ["candidates"]
 
 
-def candidates(model: Model, *, knows_latitude: bool = True) -> list[Effect]:
+def candidates(model: Model, *, knows_latitude: bool = True, records_wheels: bool = False) -> list[Effect]:
     """Return every effect that the model does not have and that could exist in its situation.
 
     Where an effect could exist its class states (`Effect.instances`).
@@ -19,12 +20,14 @@ def candidates(model: Model, *, knows_latitude: bool = True) -> list[Effect]:
     model : Model
     knows_latitude : bool
         Whether the recordings say where on the orbit they were made.
+    records_wheels : bool
+        Whether the momentum of the wheels is recorded, so that none runs unseen.
     """
     present = {effect.label for effect in model.effects}
     return [
         effect.attach(model.robot)
         for kind in known_effects().values()
-        if knows_latitude or not kind.needs_latitude
+        if (knows_latitude or not kind.needs_latitude) and not (records_wheels and kind is WheelHistory)
         for effect in kind.instances(model)
         if effect.label not in present
     ]

@@ -1,28 +1,27 @@
-"""What the data say of each candidate by itself: signal-to-noise, p-values, Bayes factor, amplitude, limit, power."""
+"""What the data say of each candidate by itself: probability, p-values, Bayes factor, amplitude, limit, power."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy import stats
-from scipy.optimize import brentq
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.amplitude_scale import effect_mixture
-from bayesid.diagnosis.cause_search import CauseSearch, Hypothesis, significance
-from bayesid.diagnosis.detection_power import average_power, vibration_power
-from bayesid.diagnosis.fit_starts import start_coordinates
-from bayesid.diagnosis.perturbation import physical
+from bayesid.diagnosis.amplitude_posterior import AmplitudePosterior
+from bayesid.diagnosis.catalogue_signatures import group_names
+from bayesid.diagnosis.cause_power import cause_power
+from bayesid.diagnosis.cause_weighing import WeighedCauses
+from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
+from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Quantity
 
-__all__ = ["Candidate", "candidate_table", "effect_amplitude", "magnitude_limit"]
+__all__ = ["Candidate", "candidate_table"]
 
-LIMIT = 0.95
-"""Probability with which a magnitude stays below its upper limit."""
+POWER_DRAWS = 400
+"""Simulated studies for the power of a candidate, good to 0.025."""
 
 
 @dataclass(frozen=True)
@@ -32,21 +31,26 @@ class Candidate:
     Attributes
     ----------
     name : str
+    probability : float
+        That it is at work, whatever accompanies it.
     signal_to_noise : float
+        Root of the improvement of chi-square by its best form, less its degrees of freedom.
     p_value, p_value_adjusted : float
         Local and family-wise.
     log_bayes_factor : float or None
         Against the present model; None where not evaluated.
     quantities : tuple of Quantity
-    mean, sd : arrays
-        Amplitude.
+        Amplitudes that vanish with it.
+    mean, sd, upper_limit : arrays
+        Of the amplitudes, given that it alone is at work; the limit holds their magnitudes with 95 %.
     power : float or None
-        Probability that an effect drawn from its prior would have raised the alarm.
-    refitted : bool
-        Whether the figures come from a fit rather than from the linear response.
+        Probability that it would have raised the alarm, its size drawn from its prior; None for faults of the noise.
+    generic : bool
+        Whether it names no cause.
     """
 
     name: str
+    probability: float
     signal_to_noise: float
     p_value: float
     p_value_adjusted: float
@@ -54,155 +58,109 @@ class Candidate:
     quantities: tuple[Quantity, ...]
     mean: Floats
     sd: Floats
+    upper_limit: Floats
     power: float | None
-    refitted: bool
-
-    @property
-    def upper_limit(self) -> Floats:
-        """Size that the quantities' magnitudes stay below with 95 %, their posterior being normal."""
-        return np.array([magnitude_limit(mean, sd) for mean, sd in zip(self.mean, self.sd, strict=True)])
+    generic: bool = False
 
 
-def magnitude_limit(mean: float, sd: float, probability: float = LIMIT) -> float:
-    """Return the quantile of the magnitude of a normal variable (folded normal distribution)."""
-    if not sd > 0.0:
-        return abs(mean)
-    centre = abs(mean) / sd
+def candidate_table(weighed: WeighedCauses, effects: Sequence[Effect], rng: np.random.Generator) -> list[Candidate]:
+    """Return every candidate, the most probable first, then by Bayes factor.
 
-    def missing(over: float) -> float:
-        return float(stats.norm.cdf(over) - stats.norm.cdf(-over - 2.0 * centre)) - probability
-
-    # far from zero one tail counts, at zero both
-    over = brentq(missing, stats.norm.ppf(probability) - 1e-6, stats.norm.ppf(0.5 + 0.5 * probability) + 1e-6)
-    return sd * (centre + float(over))
-
-
-def candidate_table(search: CauseSearch) -> list[Candidate]:
-    """Every candidate, the most probable first."""
-    alone = {h.labels[0]: h for h in search.tried if len(h.labels) == 1}
+    Parameters
+    ----------
+    weighed : WeighedCauses
+    effects : sequence of Effect
+        Candidates of the catalogue.
+    rng : Generator
+        For the power.
+    """
+    evidence, alarm = weighed.base.evidence, weighed.alarm
+    inclusion, p_values = weighed.probabilities.inclusion, alarm.log_p_values()
+    quantities = _quantities(effects)
     rows = []
-    for label, effect in search.candidates.items():
-        if label in alone:
-            rows.append(_fitted(alone[label], search, effect))
-        elif label in search.suite.effects:
-            rows.append(_linear(effect, search))
-        elif effect.modes_count:
-            rows.append(_vibrating(effect, search))
-    for label, log_p in search.base.outcome.log_p.items():
-        if label in search.base.outcome.scores or label == "variance by axis":
-            continue
-        rows.append(_noise(label, log_p, alone.get(label), search))
-    if "initial-rate" in alone:
-        hypothesis = alone["initial-rate"]
-        rows.append(_noise("initial-rate", significance(hypothesis, search.base)[1], hypothesis, search))
-    return sorted(rows, key=lambda row: (row.log_bayes_factor is None, -(row.log_bayes_factor or 0.0)))
+    for name, cause in evidence.causes.items():
+        forms = evidence.forms([name])
+        groups = cause.variants[forms[name]].groups
+        sized = name in quantities and not cause.fixed
+        amplitude = _Amplitude.of(name, evidence, quantities) if sized else NO_AMPLITUDE
+        local, adjusted = p_values[name]
+        rows.append(
+            Candidate(
+                name,
+                inclusion[name],
+                evidence.gram.signal_to_noise(*(group.name for group in groups)),
+                float(np.exp(local)),
+                float(np.exp(adjusted)),
+                alarm.candidates.log_evidence[name],
+                amplitude.quantities,
+                amplitude.mean,
+                amplitude.sd,
+                amplitude.limit,
+                cause_power(name, evidence, alarm.candidates, rng, draws=POWER_DRAWS),
+                cause.generic,
+            )
+        )
+    rows += [_noise(name, weighed) for name in alarm.noise if name in inclusion]
+    return sorted(rows, key=lambda row: (-round(row.probability, 6), -_factor(row), row.name))
 
 
-def effect_amplitude(hypothesis: Hypothesis, index: int) -> tuple[Floats, Floats]:
-    """Mean and standard deviation of what is reported of one effect of a fit; per recording where it has its own."""
-    fit = hypothesis.fit
-    effect = fit.effects[index]
-    first = fit.own.shape[1] + sum(columns.shape[1] for columns in fit.added[:index])
-    count = fit.added[index].shape[1]
-    return _reported(effect, fit.coordinates[index], fit.covariance[first : first + count, first : first + count])
+def _factor(row: Candidate) -> float:
+    return -np.inf if row.log_bayes_factor is None else row.log_bayes_factor
 
 
-def _reported(effect: Effect, coordinates: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    if not effect.parameters:
-        return np.zeros(0), np.zeros(0)
-    if effect.per_recording:  # the first recording's stand for all in tables
-        count = len(effect.parameters)
-        coordinates, covariance = coordinates[:count], covariance[:count, :count]
+@dataclass(frozen=True)
+class _Amplitude:
+    """Amplitudes of one candidate."""
 
-    def report(c: jax.Array) -> jax.Array:
-        return effect.report(physical(effect, c))
+    quantities: tuple[Quantity, ...]
+    mean: Floats
+    sd: Floats
+    limit: Floats
 
-    point = jnp.asarray(coordinates)
-    slope = np.asarray(jax.jacfwd(report)(point))
-    return np.asarray(report(point)), np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
+    @staticmethod
+    def of(name: str, evidence: SetEvidence, quantities: Mapping[str, tuple[Quantity, ...]]) -> _Amplitude:
+        posterior = AmplitudePosterior.of(evidence, [name])
+        forms = evidence.forms([name])
+        groups = evidence.causes[name].variants[forms[name]].groups
+        places = np.concatenate([posterior.amplitudes[name, group.name] for group in groups])
+        own = places[: len(quantities[name])]  # of a cause per recording, those of the first
+        return _Amplitude(
+            quantities[name],
+            posterior.mean[own],
+            np.sqrt(np.diag(posterior.covariance)[own]),
+            posterior.upper_limits()[own],
+        )
 
 
-def _fitted(hypothesis: Hypothesis, search: CauseSearch, effect: Effect) -> Candidate:
-    snr, log_p = significance(hypothesis, search.base)
-    mean, sd = effect_amplitude(hypothesis, 0)
-    item = search.base.outcome.scores.get(effect.label)
+NO_AMPLITUDE = _Amplitude((), np.zeros(0), np.zeros(0), np.zeros(0))
+
+
+def _quantities(effects: Sequence[Effect]) -> dict[str, tuple[Quantity, ...]]:
+    """Return the amplitudes of each candidate in the order of its columns."""
+    found: dict[str, tuple[Quantity, ...]] = {INITIAL_RATE: tuple(Quantity(axis, "rad/s") for axis in "xyz")}
+    for effect in effects:
+        if not effect.modes_count:
+            units = list(dict.fromkeys(group_names(effect)))
+            found[effect.label] = tuple(sorted(effect.amplitude_quantities, key=lambda item: units.index(item.unit)))
+    return found
+
+
+def _noise(name: str, weighed: WeighedCauses) -> Candidate:
+    """Return a fault of the noise, with its size where it was weighed."""
+    local, adjusted = weighed.alarm.log_p_values()[name]
+    state = next((state for state in weighed.states if name in state.names), None)
+    fault = None if state is None else state.fault
+    mean, sd = (np.zeros(0), np.zeros(0)) if fault is None else (fault.mean, fault.sd)
     return Candidate(
-        effect.label,
-        snr,
-        float(np.exp(log_p)),
-        search.suite.calibration.adjusted(log_p),
-        hypothesis.log_evidence - search.base.log_evidence,
-        tuple(effect.quantities),
-        mean,
-        sd,
-        None if item is None else average_power(effect, item, search),
-        True,
-    )
-
-
-def _linear(effect: Effect, search: CauseSearch) -> Candidate:
-    fit = search.base.fit
-    columns = search.suite.effects[effect.label]
-    item = search.base.outcome.scores[effect.label]
-    linear = effect.in_amplitudes()
-    information = fit.project(columns)
-    gradient = columns.T @ fit.residual
-    if linear.parameters:
-        hessian = information + np.eye(len(information))
-        covariance = np.linalg.inv(hessian)
-        point = start_coordinates(linear, len(fit.posterior.manoeuvres)) - covariance @ gradient
-        mean, sd = _reported(linear, point, covariance)
-        gain = 0.5 * float(gradient @ covariance @ gradient) - 0.5 * float(np.linalg.slogdet(hessian)[1])
-        gain += effect_mixture(linear, point, covariance)
-    else:
-        mean = sd = np.zeros(0)
-        gain = float(-gradient[0] - 0.5 * information[0, 0])  # there at full size, or not
-    return Candidate(
-        effect.label,
-        item.signal_to_noise,
-        float(np.exp(item.log_p)),
-        search.suite.calibration.adjusted(item.log_p),
-        gain,
-        tuple(linear.quantities),
-        mean,
-        sd,
-        average_power(effect, item, search),
-        False,
-    )
-
-
-def _vibrating(effect: Effect, search: CauseSearch) -> Candidate:
-    items = [item for name, item in search.base.outcome.scores.items() if name.startswith("vibration")]
-    best = min(items, key=lambda item: item.log_p)
-    log_p = min(0.0, best.log_p + float(np.log(len(items))))
-    power = vibration_power(effect, search)
-    nothing = np.zeros(0)
-    return Candidate(
-        effect.label,
-        best.signal_to_noise,
-        float(np.exp(log_p)),
-        search.suite.calibration.adjusted(best.log_p),
-        None,
-        (),
-        nothing,
-        nothing,
-        power,
-        False,
-    )
-
-
-def _noise(label: str, log_p: float, hypothesis: Hypothesis | None, search: CauseSearch) -> Candidate:
-    fault = hypothesis.faults[0] if hypothesis is not None and hypothesis.faults else None
-    snr = float(max(stats.norm.isf(np.exp(max(log_p, -700.0))), 0.0))
-    return Candidate(
-        label,
-        significance(hypothesis, search.base)[0] if hypothesis is not None and label == "initial-rate" else snr,
-        float(np.exp(log_p)),
-        search.suite.calibration.adjusted(log_p),
-        None if hypothesis is None else hypothesis.log_evidence - search.base.log_evidence,
+        name,
+        weighed.probabilities.inclusion[name],
+        float(max(stats.norm.isf(np.exp(max(local, -700.0))), 0.0)),
+        float(np.exp(local)),
+        float(np.exp(adjusted)),
+        None if state is None else state.log_nothing - weighed.states[0].log_nothing,
         () if fault is None else fault.quantities,
-        np.zeros(0) if fault is None else fault.mean,
-        np.zeros(0) if fault is None else fault.sd,
+        mean,
+        sd,
+        np.abs(mean) + 1.645 * sd,
         None,
-        hypothesis is not None,
     )

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
-from bayesid.diagnosis.candidate_table import effect_amplitude
-from bayesid.diagnosis.cause_search import Hypothesis
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.hypothesis import Hypothesis
+from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
+from bayesid.diagnosis.perturbation import physical
 from bayesid.simulation.effects.effect import Quantity
 
-__all__ = ["CauseAmplitude", "amplitudes_of"]
+__all__ = ["CauseAmplitude", "amplitudes_of", "effect_amplitude"]
 
 
 class CauseAmplitude(NamedTuple):
@@ -29,12 +33,12 @@ class CauseAmplitude(NamedTuple):
 def amplitudes_of(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:
     """Return the amplitudes of one cause of a hypothesis; of initial rates, one per axis and recording."""
     for index, effect in enumerate(hypothesis.fit.effects):
-        if effect.label == label:
+        if label in (effect.label, effect.name):  # a jump's label holds its instants
             mean, sd = effect_amplitude(hypothesis, index)
             return list(map(CauseAmplitude, effect.quantities, mean.tolist(), sd.tolist()))
-    fault = next(fault for fault in hypothesis.faults if fault.label == label)
-    if label == "initial-rate":
+    if label == INITIAL_RATE:
         return _initial_rates(hypothesis)
+    fault = next(fault for fault in hypothesis.faults if fault.label == label)
     return list(map(CauseAmplitude, fault.quantities, fault.mean.tolist(), fault.sd.tolist()))
 
 
@@ -52,3 +56,24 @@ def _initial_rates(hypothesis: Hypothesis) -> list[CauseAmplitude]:
             mean, sd = sigma * fit.z[place], sigma * spread[free.index(place)]
             amplitudes.append(CauseAmplitude(Quantity(key, "rad/s"), float(mean), float(sd)))
     return amplitudes
+
+
+def effect_amplitude(hypothesis: Hypothesis, index: int) -> tuple[Floats, Floats]:
+    """Return mean and standard deviation of what is reported of one effect of a fit, in the first recording."""
+    fit = hypothesis.fit
+    effect = fit.effects[index]
+    if not effect.parameters:
+        return np.zeros(0), np.zeros(0)
+    first = fit.own.shape[1] + sum(columns.shape[1] for columns in fit.added[:index])
+    count = len(effect.parameters)
+    coordinates, covariance = (
+        fit.coordinates[index][:count],
+        fit.covariance[first : first + count, first : first + count],
+    )
+
+    def report(c: jax.Array) -> jax.Array:
+        return effect.report(physical(effect, c))
+
+    point = jnp.asarray(coordinates)
+    slope = np.asarray(jax.jacfwd(report)(point))
+    return np.asarray(report(point)), np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))

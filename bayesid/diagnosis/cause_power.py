@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bayesid.diagnosis.evidence_alarm import FAMILY_LEVEL, EvidenceAlarm
+from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.set_evidence import SetEvidence
 
 __all__ = ["cause_power"]
@@ -35,16 +36,17 @@ def cause_power(
     draws : int
         Number of draws; 2,000 are good to 0.011.
     """
-    gram, spectra = evidence.gram, evidence.spectra([name])
-    groups = [evidence.causes[name].groups[place].name for _, place in evidence.places([name])]
+    gram, cause = evidence.gram, evidence.causes[name]
+    own_columns = np.unique(np.concatenate([gram.groups[g.name] for v in cause.variants for g in v.groups]))
     scores = np.zeros((draws, len(gram.score)))
-    columns = np.concatenate([own.columns for own in spectra])
-    amplitudes = [
-        np.exp(rng.uniform(np.log(own.range.low), np.log(own.range.high), size=(draws, 1)))
-        * own.root
-        * rng.normal(size=(draws, len(own.columns)))
-        for own in spectra
-    ]
-    signal = np.concatenate(amplitudes, axis=1) @ gram.matrix[np.ix_(columns, columns)]
-    scores[:, columns] = gram.keeping(groups).null_scores(rng, draws) - signal
+    part = Gram(gram.matrix[np.ix_(own_columns, own_columns)], gram.score[own_columns], {})
+    scores[:, own_columns] = part.null_scores(rng, draws)
+    shares = np.exp([variant.log_weight for variant in cause.variants])
+    counts = rng.multinomial(draws, shares / shares.sum())
+    for form, drawn in enumerate(np.split(np.arange(draws), np.cumsum(counts)[:-1])):
+        for own in evidence.spectra([name], {name: form}):
+            scales = np.exp(rng.uniform(np.log(own.range.low), np.log(own.range.high), size=(len(drawn), 1)))
+            amplitudes = scales * own.root * rng.normal(size=(len(drawn), len(own.columns)))
+            amplitudes = np.ones_like(amplitudes) if cause.fixed else amplitudes
+            scores[np.ix_(drawn, own_columns)] -= amplitudes @ gram.matrix[np.ix_(own.columns, own_columns)]
     return float(np.mean(evidence.log_evidences([name], scores) > alarm.largest.threshold(level)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -10,25 +10,34 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from bayesid._io.phase_clock import PhaseClock
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidate_effects import candidates
 from bayesid.diagnosis.candidate_table import Candidate, candidate_table
-from bayesid.diagnosis.cause_search import CauseSearch, Hypothesis
+from bayesid.diagnosis.cause_prior import CausePrior
+from bayesid.diagnosis.cause_weighing import WeighedCauses, weigh_causes
+from bayesid.diagnosis.diagnosis_file import diagnosis_dict
 from bayesid.diagnosis.disturbing_wrench import Unexplained, unexplained_wrench
+from bayesid.diagnosis.family_alarm import FamilyAlarm
 from bayesid.diagnosis.gain import Gain, measure_gain
-from bayesid.diagnosis.verdict import Status, Verdict, judge
+from bayesid.diagnosis.hypothesis import Hypothesis
+from bayesid.diagnosis.hypothesis_fit import fit_hypothesis
+from bayesid.diagnosis.perturbed_fit import Engine
+from bayesid.diagnosis.probable_verdict import UNKNOWN, ProbableVerdict
+from bayesid.diagnosis.set_evidence import SetEvidence
+from bayesid.diagnosis.set_probabilities import SetProbabilities
+from bayesid.diagnosis.status import Status
+from bayesid.diagnosis.verdict_sensitivity import VerdictSensitivity, verdict_sensitivity
 from bayesid.inference import Identification, identify
-from bayesid.inference.body_quantities import quantity
+from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
+from bayesid.simulation.effects import bounds_by_label
 from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model
 
 __all__ = ["Diagnosis", "diagnose", "extended_posterior", "identify_extended"]
-
-
-INNER = ("frequency", "damping")
-"""Quantities that are no amplitude, of which no upper limit is given."""
 
 
 @dataclass(frozen=True)
@@ -37,31 +46,65 @@ class Diagnosis:
 
     Attributes
     ----------
-    search : Search
-        Every hypothesis tried.
-    verdict : Verdict
+    before : Hypothesis
+        The present model.
+    after : Hypothesis
+        The extended model; the present one where nothing is named.
+    weighed : WeighedCauses
+        Every set of causes with its probability.
+    classes : tuple of tuples of str
+        Causes that change the model in the same way.
+    sensitivity : VerdictSensitivity
+        The verdict, and what it would be under other choices.
     candidates : list of Candidate
     gain : Gain
-        Present model against the verdict's best.
+        Present model against the extended one.
+    disturbance : Unexplained
+        What it would take in the present model.
     unexplained : Unexplained
         Left by the named causes, or by the present model where none is named.
+    effects : tuple of Effect
+        Candidates of the catalogue.
+    bounds : mapping of str to tuple of PhysicalBound
+        Largest plausible size of each candidate.
+    seed : int
+    seconds : dict of str to float
+        Time by phase.
     """
 
-    search: CauseSearch
-    verdict: Verdict
+    before: Hypothesis
+    after: Hypothesis
+    weighed: WeighedCauses
+    classes: tuple[tuple[str, ...], ...]
+    sensitivity: VerdictSensitivity
     candidates: list[Candidate]
     gain: Gain
+    disturbance: Unexplained
     unexplained: Unexplained
+    effects: tuple[Effect, ...]
+    bounds: Mapping[str, tuple[PhysicalBound, ...]]
+    seed: int
+    seconds: dict[str, float]
 
     @property
-    def before(self) -> Hypothesis:
-        """The present model."""
-        return self.search.base
+    def verdict(self) -> ProbableVerdict:
+        """Status and named causes."""
+        return self.sensitivity.verdict
 
     @property
-    def after(self) -> Hypothesis:
-        """The extended model; the present one where nothing is named."""
-        return self.verdict.best if self.verdict.causes else self.search.base
+    def probabilities(self) -> SetProbabilities:
+        """Probabilities of all sets."""
+        return self.weighed.probabilities
+
+    @property
+    def alarm(self) -> FamilyAlarm:
+        """Whether data hold more than the declared noise."""
+        return self.weighed.alarm
+
+    @property
+    def evidence(self) -> SetEvidence:
+        """Evidence of sets of causes about the present model's fit."""
+        return self.weighed.base.evidence
 
     @cached_property
     def posterior(self) -> Posterior:
@@ -73,40 +116,13 @@ class Diagnosis:
         """The mode found, as a starting point for `posterior`."""
         return extended_start(self.after, self.posterior)
 
+    def fitted(self, causes: Sequence[str]) -> Hypothesis:
+        """Fit the present model with some causes of the catalogue."""
+        return fit_hypothesis(self.weighed.state(causes), causes, self.effects) if causes else self.before
+
     def to_dict(self, identification: Identification | None = None) -> dict[str, Any]:
         """Content of diagnosis.json."""
-        gain, verdict = self.gain, self.verdict
-        held = {
-            key: None if side.held_out is None else float(side.held_out.sum())
-            for key, side in (("before", gain.before), ("after", gain.after))
-        }
-        return {
-            "status": verdict.status.value,
-            "causes": list(verdict.causes),
-            "equivalent_to": {cause: list(names) for cause, names in verdict.equivalents.items()},
-            "ambiguous_with": [list(rival.labels) for rival in verdict.rivals]
-            if verdict.status is Status.AMBIGUOUS
-            else [],
-            "candidates": [_candidate_dict(row) for row in self.candidates],
-            "unexplained": {
-                "file": "unexplained.csv",
-                "signal_to_noise": self.unexplained.signal_to_noise,
-                "fixed_in": None if self.unexplained.fixed_in is None else self.unexplained.fixed_in.value,
-            },
-            "gain": {
-                "chi2_per_sample": {"before": gain.before.chi2_per_sample, "after": gain.after.chi2_per_sample},
-                "held_out_log_score": held if held["before"] is not None else None,
-                "residual_rms_in_sigma": {"before": gain.before.rms, "after": gain.after.rms},
-                "within_one_sigma": {"before": gain.before.inside, "after": gain.after.inside},
-                "parameter_shift_in_sd": dict(zip(gain.before.bodies.names, gain.shift.tolist(), strict=True)),
-                "parameter_sd_ratio": dict(
-                    zip(gain.before.bodies.names, (gain.after.bodies.sd / gain.before.bodies.sd).tolist(), strict=True)
-                ),
-            },
-            "p_value": {"before": self.before.outcome.p_value, "after": self.after.outcome.p_value},
-            "most_significant": {"before": self.before.outcome.worst, "after": self.after.outcome.worst},
-            "identification": None if identification is None else identification.to_dict(),
-        }
+        return diagnosis_dict(self, identification)
 
 
 def diagnose(
@@ -115,6 +131,8 @@ def diagnose(
     seed: int = 0,
     *,
     effects: Sequence[Effect] | None = None,
+    bounds: Mapping[str, Sequence[PhysicalBound]] | None = None,
+    prior: CausePrior | None = None,
     knows_latitude: bool = True,
     progress: Progress = silent,
 ) -> Diagnosis:
@@ -128,13 +146,17 @@ def diagnose(
         Every random number follows from it.
     effects : sequence of Effect, optional
         Candidates; by default all of the catalogue that could exist (`candidates`).
+    bounds : mapping of str to sequence of PhysicalBound, optional
+        Largest sizes that the user knows better, by the candidates' labels.
+    prior : CausePrior, optional
+        Prior of the number of causes, and of something generic.
     knows_latitude : bool
         Whether the manoeuvres' arguments of latitude are known.
     progress : Progress, optional
     """
     model = model.without_torque  # whose friction no catalogue of causes holds
     with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
-        return _diagnose(model, manoeuvres, seed, effects, knows_latitude, progress)
+        return _diagnose(model, manoeuvres, seed, effects, bounds, prior or CausePrior(), knows_latitude, progress)
 
 
 def _diagnose(
@@ -142,23 +164,61 @@ def _diagnose(
     manoeuvres: Sequence[Manoeuvre],
     seed: int,
     effects: Sequence[Effect] | None,
+    stated: Mapping[str, Sequence[PhysicalBound]] | None,
+    prior: CausePrior,
     knows_latitude: bool,
     progress: Progress,
 ) -> Diagnosis:
+    rng, clock = np.random.default_rng(seed), PhaseClock()
     at_rest = model.rate_sigma == 0.0
     posterior = Posterior.of(replace(model, rate_sigma=RATE_SIGMA, speed_errors=True) if at_rest else model, manoeuvres)
+    clock.ends("load")
     rates = posterior.unknowns.layout.all_rates
-    frozen = range(rates.start, rates.stop) if at_rest else ()
-    catalogue = candidates(model, knows_latitude=knows_latitude) if effects is None else list(effects)
-    search = CauseSearch(posterior, frozen, catalogue, seed, progress)
-    verdict = judge(search)
-    progress(0.8, "measuring the gain")
-    best = verdict.best if verdict.causes else search.base
-    gain = measure_gain(search.base, best)
-    progress(0.9, "reconstructing the disturbance")
+    engine = Engine(posterior, range(rates.start, rates.stop) if at_rest else ())
+    progress(0.0, "compiling the simulation")
+    engine.compile()
+    clock.ends("compile")
+    progress(0.1, "fitting the present model")
+    first = engine.fit()
+    engine = engine.with_posterior(relinearised(posterior, first.z))
+    before = Hypothesis(engine, engine.fit(z=first.z))
+    clock.ends("fit")
+    wheels = any(f"wheel_momentum.{axis}" in item.recording.channels for item in manoeuvres for axis in "xyz")
+    catalogue = (
+        candidates(model, knows_latitude=knows_latitude, records_wheels=wheels) if effects is None else list(effects)
+    )
+    limits = bounds_by_label(catalogue, model, stated)
+    weighed = weigh_causes(engine, before.fit, catalogue, limits, prior, rng, progress)
+    classes = weighed.classes()
+    sensitivity = verdict_sensitivity(weighed.probabilities, classes, weighed.alarm.silent, weighed.widened)
+    verdict = sensitivity.verdict
+    clock.ends("verdict")
+    named = [name for name in verdict.causes if name != UNKNOWN]
+    progress(0.7, "fitting the extended model")
+    after = fit_hypothesis(weighed.state(named), named, catalogue) if named else before
+    progress(0.75, "measuring the gain")
+    gain = measure_gain(before, after)
+    progress(0.85, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
-    unexplained = unexplained_wrench(best, open_question) if verdict.causes or open_question else verdict.disturbance
-    return Diagnosis(search, verdict, candidate_table(search), gain, unexplained)
+    disturbance = unexplained_wrench(before, weighed.base.bank, open_question)
+    unexplained = unexplained_wrench(after, weighed.state(named).point.bank, False) if named else disturbance
+    table = candidate_table(weighed, catalogue, rng)
+    clock.ends("consequences")
+    return Diagnosis(
+        before,
+        after,
+        weighed,
+        classes,
+        sensitivity,
+        table,
+        gain,
+        disturbance,
+        unexplained,
+        tuple(catalogue),
+        limits,
+        seed,
+        clock.seconds,
+    )
 
 
 def extended_posterior(hypothesis: Hypothesis) -> Posterior:
@@ -206,22 +266,3 @@ def _without(manoeuvre: Manoeuvre, posterior: Posterior, index: int) -> Manoeuvr
             if key in channels:
                 channels[key] = np.where(rows, np.nan, channels[key])
     return replace(manoeuvre, recording=replace(manoeuvre.recording, channels=channels))
-
-
-def _candidate_dict(row: Candidate) -> dict[str, Any]:
-    entries = list(zip(row.quantities, row.mean, row.sd, strict=False)) if len(row.mean) else []
-    return {
-        "name": row.name,
-        "signal_to_noise": row.signal_to_noise,
-        "p_value": row.p_value,
-        "p_value_adjusted": row.p_value_adjusted,
-        "log_bayes_factor": row.log_bayes_factor,
-        "amplitude": {key: quantity(mean, sd, unit) for (key, unit), mean, sd in entries},
-        "upper_limit_95": {
-            key: float(limit)
-            for (key, _), limit in (zip(row.quantities, row.upper_limit, strict=False) if len(row.mean) else ())
-            if key not in INNER
-        },
-        "power": row.power,
-        "refitted": row.refitted,
-    }

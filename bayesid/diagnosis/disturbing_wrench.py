@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
 import numpy as np
-from scipy.special import logsumexp
+import scipy.linalg as sla
 
 from bayesid._io.files import write_text
-from bayesid._math.arrays import Floats
-from bayesid.diagnosis.cause_search import Hypothesis
-from bayesid.diagnosis.omnibus_tests import FORCE, TORQUE
+from bayesid._math.arrays import Floats, Integers
+from bayesid.diagnosis.generic_signatures import FORCE, TORQUE, WAVES
+from bayesid.diagnosis.gram import Gram
+from bayesid.diagnosis.hypothesis import Hypothesis
+from bayesid.diagnosis.scale_prior import CandidateCause
+from bayesid.diagnosis.set_evidence import SetEvidence, precision_roots
+from bayesid.diagnosis.signature_bank import SignatureBank
 
 __all__ = ["Frame", "Unexplained", "unexplained_wrench"]
-
-WAVES = 40
-"""Cosines in time per axis and recording."""
-
-SCALES = np.geomspace(1e-4, 1e2, 25)
-"""Prior standard deviations tried for the cosines' amplitudes, in the disturbances' scale."""
 
 DECIDED = 6.0
 """Advantage in twice the log likelihood that names a frame."""
@@ -80,50 +79,55 @@ class Unexplained:
         write_text(file, "\n".join(lines) + "\n")
 
 
-def unexplained_wrench(hypothesis: Hypothesis, name_frame: bool = True) -> Unexplained:
-    """Reconstruct the disturbance that a fit leaves, with a prior whose size the data choose.
+def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: bool = True) -> Unexplained:
+    """Reconstruct the disturbance that a fit leaves.
+
+    Torque and force have the priors of the generic candidates: cosines in time whose variances fall beyond a corner,
+    with corner and scale of either at their most probable values.
 
     Parameters
     ----------
     hypothesis : Hypothesis
+    bank : SignatureBank
+        Bank under the hypothesis' noise, with the responses to cosines of torque and force.
     name_frame : bool
         Whether to look for the axes that it is fixed in.
     """
     fit = hypothesis.fit
     count = len(fit.posterior.manoeuvres)
-    node = fit.operating.node
-    times = np.asarray(node.environment.time)
+    times = np.asarray(fit.operating.node.environment.time)
     rotations = _frames(hypothesis)
-    columns = np.concatenate([_responses(hypothesis, rotations[Frame.BASE][0], kind) for kind in (3, 0)], axis=1)
-    gram, gradient = fit.project(columns), columns.T @ fit.residual
-    values, vectors = np.linalg.eigh(gram)
-    values = np.maximum(values, 0.0)
-    along = vectors.T @ gradient
-    fits = [0.5 * (s**2 * along**2 / (1.0 + s**2 * values) - np.log1p(s**2 * values)).sum() for s in SCALES]
-    scale = SCALES[int(np.argmax(fits))]
-    precision = values + scale**-2
-    amplitude = -vectors @ (along / precision)
-    covariance = (vectors / precision) @ vectors.T
-    used = values * scale**2 > 1.0
-    snr = float(np.sqrt(max((along[used] ** 2 / values[used]).sum() - used.sum(), 0.0))) if used.any() else 0.0
+    names = [name for name in (TORQUE, FORCE) if name in {cause.name for cause in bank.causes}]
+    parts = [_whole_columns(bank, name, count) for name in names]
+    columns = np.concatenate(parts, axis=1)
+    places = np.split(np.arange(columns.shape[1]), np.cumsum([part.shape[1] for part in parts])[:-1])
+    gram = Gram(fit.project(columns), columns.T @ fit.residual, dict(zip(names, places, strict=True)))
+    held, deviations, log_bayes_factor = _most_probable(gram, [c for c in bank.causes if c.name in names])
+    (root,), _ = precision_roots(gram.matrix[np.ix_(held, held)], deviations[None])
+    along = root @ gram.score[held]
+    amplitude, covariance = np.zeros(2 * 3 * WAVES * count), np.zeros((2 * 3 * WAVES * count,) * 2)
+    amplitude[held], covariance[np.ix_(held, held)] = -root.T @ along, root.T @ root
+    freedom = float(np.einsum("ij,ji->", root.T @ root, gram.matrix[np.ix_(held, held)]))
+    snr = float(np.sqrt(max(float(along @ along) - freedom, 0.0)))
+    scale = float(deviations[: 3 * WAVES * count].max())
 
     half = count * WAVES * 3
     time, torque, force, torque_sd, force_sd = [], [], [], [], []
     for r in range(count):
         own = np.concatenate([[True], np.diff(times[r]) > 0.0])
         waves = _waves(times[r][own])
-        parts = []
-        for first, size in ((0, TORQUE), (half, FORCE)):
+        sides = []
+        for first in (0, half):
             block = slice(first + r * WAVES * 3, first + (r + 1) * WAVES * 3)
-            mean = size * np.einsum("kt,ka->ta", waves, amplitude[block].reshape(WAVES, 3))
+            mean = np.einsum("kt,ka->ta", waves, amplitude[block].reshape(WAVES, 3))
             spread = covariance[block, block].reshape(WAVES, 3, WAVES, 3)
-            sd = size * np.sqrt(np.maximum(np.einsum("kt,kala,lt->ta", waves, spread, waves), 0.0))
-            parts.append((mean, sd))
+            sd = np.sqrt(np.maximum(np.einsum("kt,kala,lt->ta", waves, spread, waves), 0.0))
+            sides.append((mean, sd))
         time.append(times[r][own])
-        torque.append(parts[0][0])
-        force.append(parts[1][0])
-        torque_sd.append(parts[0][1])
-        force_sd.append(parts[1][1])
+        torque.append(sides[0][0])
+        force.append(sides[1][0])
+        torque_sd.append(sides[0][1])
+        force_sd.append(sides[1][1])
 
     def turned(series: list[Floats], frame: Frame) -> list[Floats]:
         out = []
@@ -141,7 +145,7 @@ def unexplained_wrench(hypothesis: Hypothesis, name_frame: bool = True) -> Unexp
         torque_sd,
         force_sd,
         _fixed_in(hypothesis, rotations, scale) if name_frame and snr > 0.0 else None,
-        float(logsumexp(fits) - np.log(len(SCALES))),
+        log_bayes_factor,
     )
 
 
@@ -172,32 +176,60 @@ def _frames(hypothesis: Hypothesis) -> dict[Frame, tuple[Floats, Floats]]:
     return {frame: (parts[0], parts[1]) for frame, parts in result.items()}
 
 
-def _responses(hypothesis: Hypothesis, frames: Floats, first: int, samples: Floats | None = None) -> Floats:
-    """Responses to cosines of a torque (first = 3) or force (0) along the axes of frames: (N, R WAVES 3)."""
+def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Integers, Floats, float]:
+    """Return the columns of smooth disturbances, their deviations at the most probable scales, and the log evidence.
+
+    One disturbance is taken after the other, each beside those before at their most probable scales: to integrate over
+    all scales at once would take minutes.
+    """
+    held, deviations, total = np.zeros(0, dtype=int), np.zeros(0), 0.0
+    left = gram
+    for cause in causes:
+        name = cause.groups[0].name
+        own = SetEvidence(left.keeping([name]), [cause])
+        forms = own.forms([cause.name])
+        total += own.log_evidence([cause.name])
+        _, sigma = own.most_probable([cause.name], forms)
+        held, deviations = np.concatenate([held, gram.groups[name]]), np.concatenate([deviations, sigma])
+        information = deviations[:, None] * gram.matrix[np.ix_(held, held)] * deviations + np.eye(len(held))
+        lower = np.linalg.cholesky(information)
+        shared = sla.solve_triangular(lower, deviations[:, None] * gram.matrix[held], lower=True)
+        pull = sla.solve_triangular(lower, deviations * gram.score[held], lower=True)
+        left = Gram(gram.matrix - shared.T @ shared, gram.score - shared.T @ pull, gram.groups)
+    return held, deviations, total
+
+
+def _whole_columns(bank: SignatureBank, name: str, recordings: int) -> Floats:
+    """Return the columns of a group that acts in each recording by itself, (N, R k), zero in the others."""
+    parts = [item for item in bank.signatures if item.name == name]
+    rows = len(parts[0].columns)
+    whole = np.zeros((recordings, rows, sum(item.columns.shape[1] for item in parts)))
+    first = 0
+    for item in parts:
+        whole[item.recording, :, first : first + item.columns.shape[1]] = item.columns
+        first += item.columns.shape[1]
+    return whole.reshape(recordings * rows, -1)
+
+
+def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Floats:
+    """Return the responses to cosines of a torque along the axes of frames, (N, R WAVES 3)."""
     engine, fit = hypothesis.engine, hypothesis.fit
     operating = fit.operating
-    data = engine.data_of(fit)
-    count = len(fit.posterior.manoeuvres)
-    scale = TORQUE if first == 3 else FORCE
-    sides = []
-    for instant, turn in ((operating.node, frames), (operating.sample, samples)):
+    ends = np.asarray(operating.node.environment.time).max(axis=1)
+    wrenches = []
+    for instant, axes in ((operating.node, frames), (operating.sample, samples)):
         time = np.asarray(instant.environment.time)
-        axes = np.broadcast_to(np.eye(3), (*time.shape, 3, 3)) if turn is None else turn
-        sides.append((time, axes, np.asarray(instant.body.com)))
-    found = []
-    for r in range(count):
-        wrenches = []
-        for time, axes, com in sides:
-            waves = np.cos(np.pi * np.arange(WAVES)[:, None] * time[r] / sides[0][0][r].max())
-            wrench = np.zeros((WAVES, 3, *time.shape, 6))
-            direction = scale * np.einsum("kt,tba->katb", waves, axes[r])
-            wrench[:, :, r, :, first : first + 3] = direction
-            if first == 0:
-                wrench[:, :, r, :, 3:] = np.cross(com[r], direction)
-            wrenches.append(wrench.reshape(WAVES * 3, *time.shape, 6))
-        perturbation = engine.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-        found.append(engine.respond(perturbation, fit.z, data))
-    return np.concatenate(found, axis=1)
+        waves = np.cos(np.pi * np.arange(WAVES)[:, None, None] * time / ends[:, None])
+        wrench = np.zeros((WAVES, 3, *time.shape, 6))
+        wrench[..., 3:] = np.einsum("krt,rtba->kartb", waves, axes)
+        wrenches.append(wrench.reshape(WAVES * 3, *time.shape, 6))
+    push = engine.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
+    found = engine.respond(push, fit.z, engine.data_of(fit))
+    rows = len(found) // len(ends)
+    whole = np.zeros((len(ends), rows, len(ends), WAVES * 3))
+    for r, own in enumerate(found.reshape(len(ends), rows, WAVES * 3)):
+        whole[r, :, r] = own
+    return whole.reshape(len(ends) * rows, -1)
 
 
 def _fixed_in(hypothesis: Hypothesis, rotations: dict[Frame, tuple[Floats, Floats]], scale: float) -> Frame | None:
@@ -207,7 +239,7 @@ def _fixed_in(hypothesis: Hypothesis, rotations: dict[Frame, tuple[Floats, Float
     whole = 0.0
     orbit = float(np.linalg.norm(np.asarray(fit.operating.node.environment.zenith)[0, 0])) > 0.5
     for frame in Frame if orbit else (Frame.BASE, Frame.INERTIAL):
-        columns = _responses(hypothesis, rotations[frame][0], 3, rotations[frame][1])
+        columns = _responses(hypothesis, *rotations[frame])
         gram, gradient = fit.project(columns), columns.T @ fit.residual
         courses = gram.shape[0] // 3
         gram = gram.reshape(courses, 3, courses, 3)

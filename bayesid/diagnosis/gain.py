@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.cause_search import Hypothesis
+from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.inference.noise_changes import leaving_out
 from bayesid.robot.inertial_parameters import mass_com_inertia

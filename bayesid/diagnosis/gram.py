@@ -29,6 +29,10 @@ DEPENDENT = 1e-10
 """Fraction of the largest eigenvalue, among columns of unit length, below which a direction counts as dependent."""
 
 
+JITTER = 1e-10
+"""Fraction of the diagonal that makes the matrix of columns of unit length, which may be singular, definite."""
+
+
 def independent_directions(matrix: Floats) -> Floats:
     """Return combinations of columns that are orthonormal in a Gram matrix, one for each independent direction.
 
@@ -159,9 +163,8 @@ class Gram:
 
     @cached_property
     def _root(self) -> Floats:
-        """Matrix, (m, k), whose product with its transpose is ``A``."""
+        """Matrix, (m, m), whose product with its transpose is ``A``, up to a part in 1e10 of its diagonal."""
         length = np.sqrt(np.diag(self.matrix))
         inverse = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
-        values, vectors = np.linalg.eigh(inverse[:, None] * self.matrix * inverse)
-        kept = values > 0.0
-        return length[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+        scaled = inverse[:, None] * self.matrix * inverse
+        return length[:, None] * np.linalg.cholesky(scaled + JITTER * np.eye(len(length)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,7 +29,7 @@ NEIGHBOURS, CLUSTERED = 3, 1e-3
 LONGEST = 0.05
 """Longest correlation time of coloured noise, in lengths of a recording; beyond it is drift."""
 
-TRIALS = 20
+TRIALS = 8
 """Evaluations of the evidence in the search for the size of coloured noise."""
 
 REFITS = 2
@@ -72,11 +72,19 @@ class NoiseFault:
         return SUMMARIES.get(name, SUMMARIES["noise"])
 
 
-def noise_fault(label: str, fit: Fit) -> NoiseFault | None:
-    """Estimate a noise fault from the residual of a fit and put it into the fit's posterior; None if it is no such."""
+def noise_fault(label: str, fit: Fit, least: float = -np.inf) -> NoiseFault | None:
+    """Estimate a noise fault from the residual of a fit and put it into the fit's posterior; None if it is no such.
+
+    Parameters
+    ----------
+    label : str
+    fit : Fit
+    least : float
+        Log likelihood that coloured noise has to gain, by the spectrum of the residual, to be of interest.
+    """
     name, _, place = label.partition(":")
     if name == "coloured-noise":
-        return _coloured(label, Kind.of(place), fit)
+        return _coloured(label, Kind.of(place), fit, least)
     if name == "outliers":
         return _outliers(label, Kind.of(place), fit)
     if name == "quantisation":
@@ -97,10 +105,10 @@ def _understated(label: str, kind: Kind, fit: Fit) -> NoiseFault:
     )
 
 
-def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
+def _coloured(label: str, kind: Kind, fit: Fit, least: float) -> NoiseFault | None:
     slot = _slot(fit.posterior, kind)
     whole, _ = _shaped(fit)
-    powers, angles, interval = [], [], 1.0
+    powers, angles, slow, interval = [], [], [], 1.0
     for r, item in enumerate(fit.posterior.whitenings):
         interval = float(np.median(np.diff(fit.posterior.data.measured(r, kind)[0])))
         for c in range(slot.start, slot.stop):
@@ -108,6 +116,7 @@ def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
             spectrum = np.abs(np.fft.rfft(own)) ** 2 / len(own)
             keep = slice(4, None)  # the slowest waves may have gone into the fit
             powers.append(spectrum[keep])
+            slow.append((spectrum[1:4], 2.0 * np.pi * np.fft.rfftfreq(len(own))[1:4]))
             angles.append(2.0 * np.pi * np.fft.rfftfreq(len(own))[keep])
     longest = _longest(fit, kind)
     power, angle = np.concatenate(powers), np.concatenate(angles)
@@ -119,11 +128,24 @@ def _coloured(label: str, kind: Kind, fit: Fit) -> NoiseFault:
 
     starts = [np.array([a, np.log(b * interval)]) for a in (-1.0, 0.5) for b in (3.0, 12.0)]
     best = min((minimize(whittle, start, method="Nelder-Mead") for start in starts), key=lambda found: float(found.fun))
+    everything = float(power.sum()) - best.fun + _slow_gain(slow, best.x, interval, longest)
+    if everything < least:
+        return None
     steps = 0.1 * np.eye(2)
     curvature = np.array([(whittle(best.x + h) - 2.0 * best.fun + whittle(best.x - h)) / 0.01 for h in steps])
     level, time = best.x[0], np.log(np.clip(np.exp(best.x[1]), 0.2 * interval, longest))
     relative = 1.0 / np.sqrt(np.maximum(curvature, 1.0))
     return _coloured_at(label, kind, fit, np.array([level, time]), relative)
+
+
+def _slow_gain(slow: Sequence[tuple[Floats, Floats]], x: Floats, interval: float, longest: float) -> float:
+    """Return the gain of log likelihood by coloured noise in the slowest waves, of which a fit may have taken some."""
+    level, rho = np.exp(2.0 * x[0]), np.exp(-interval / np.clip(np.exp(x[1]), 0.2 * interval, longest))
+    total = 0.0
+    for power, angle in slow:
+        density = 1.0 + level * (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(angle) + rho**2)
+        total += float((power - power / density - np.log(density)).clip(min=0.0).sum())
+    return total
 
 
 def _longest(fit: Fit, kind: Kind) -> float:

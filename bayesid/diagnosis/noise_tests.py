@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sla
 from scipy import stats
+from scipy.special import gammaln
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.perturbed_fit import Fit
-from bayesid.diagnosis.score_tests import chi2_log_sf
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.sensors import Kind, Quantised
 
-__all__ = ["lattice", "leverage", "noise_tests"]
+__all__ = ["ON_LATTICE", "lattice", "leverage", "noise_tests", "variance_tests"]
 
 CORRELATION = (2.0, 6.0, 20.0)
 """Correlation times that coloured noise is looked for at, in samples."""
@@ -99,3 +99,30 @@ def leverage(fit: Fit) -> Floats:
     factor, lower = fit.hessian
     half = sla.solve_triangular(factor, fit.known.T, trans=0 if lower else 1, lower=lower)
     return (half**2).sum(axis=0)
+
+
+def variance_tests(posterior: Posterior, fit: Fit) -> dict[str, float]:
+    """Logarithms of p-values of the variance in each recording and sensor axis, pooled into one test."""
+    whole = fit.residual.reshape(posterior.residual_shape)
+    taken = leverage(fit).reshape(whole.shape)
+    smallest, count = 0.0, 0
+    for r, item in enumerate(posterior.whitenings):
+        for c in range(whole.shape[2]):
+            there = np.flatnonzero(item.outputs[:, c])
+            if len(there) == 0:
+                continue
+            degrees = len(there) - taken[r, there, c].sum()
+            energy = float((whole[r, there, c] ** 2).sum())
+            both = 2.0 * min(stats.chi2.sf(energy, degrees), stats.chi2.cdf(energy, degrees))
+            smallest, count = min(smallest, float(np.log(max(both, 1e-300)))), count + 1
+    # the smallest of n independent p-values
+    return {"variance by axis": float(np.log(-np.expm1(count * np.log1p(-np.exp(smallest)))))} if smallest < 0.0 else {}
+
+
+def chi2_log_sf(statistic: float, degrees: float) -> float:
+    """Logarithm of the upper tail of chi-square; far out by a continued fraction, where it underflows."""
+    value = float(stats.chi2.logsf(statistic, degrees))
+    if np.isfinite(value):
+        return value
+    a, x = 0.5 * degrees, 0.5 * statistic
+    return float(a * np.log(x) - x - np.log(x - a + 1.0) - gammaln(a))  # the first term of the continued fraction

@@ -83,8 +83,8 @@ def tables_of(effect: Effect, posterior: Posterior) -> Table:
     grid = posterior.data.arrays.grid
 
     def over(times: Array) -> Floats:
-        pairs = zip(posterior.manoeuvres, np.asarray(times), strict=True)
-        return np.stack([effect.table(posterior.model.robot, manoeuvre.motion, own) for manoeuvre, own in pairs])
+        robot, pairs = posterior.model.robot, zip(posterior.manoeuvres, np.asarray(times), strict=True)
+        return np.stack([effect.in_recording(r).table(robot, one.motion, own) for r, (one, own) in enumerate(pairs)])
 
     return Table(over(grid.node.environment.time), over(grid.sample.environment.time))
 

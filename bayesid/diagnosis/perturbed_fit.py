@@ -20,7 +20,6 @@ import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.amplitude_scale import effect_mixture, log_mixture
 from bayesid.diagnosis.perturbation import (
     OperatingTrajectory,
     Table,
@@ -67,6 +66,8 @@ class Fit:
     converged : bool
     released : (k,) array of int
         Which of the model's unknowns the study takes to be zero and this fit does not.
+    frozen : (l,) array of int
+        Which of them are held at zero.
     """
 
     posterior: Posterior
@@ -80,6 +81,12 @@ class Fit:
     operating: OperatingTrajectory
     converged: bool
     released: NDArray[np.intp]
+    frozen: NDArray[np.intp]
+
+    @property
+    def own_coordinates(self) -> Floats:
+        """The model's free unknowns in prior standard deviations, in the order of `own`."""
+        return np.delete(self.z, self.frozen)
 
     @property
     def chi2(self) -> float:
@@ -103,21 +110,9 @@ class Fit:
 
     @cached_property
     def log_evidence(self) -> float:
-        """Laplace approximation of the log evidence; the scale of every group of amplitudes is unknown (`scale`)."""
-        half_logdet = float(np.log(np.diag(self.hessian[0])).sum())
-        unit = -self.cost - half_logdet + float(self.posterior.log_normalisation.sum())
-        return unit + self._mixtures
-
-    @property
-    def _mixtures(self) -> float:
-        covariance, total, first = self.covariance, 0.0, self.own.shape[1]
-        if len(self.released):
-            total += log_mixture(self.z[self.released], covariance[np.ix_(self.released, self.released)])
-        for effect, coordinates in zip(self.effects, self.coordinates, strict=True):
-            own = slice(first, first + len(coordinates))
-            total += effect_mixture(effect, coordinates, covariance[own, own])
-            first += len(coordinates)
-        return total
+        """Laplace approximation of the log evidence under the priors of the unknowns and of the effects fitted."""
+        half_log_det = float(np.log(np.diag(self.hessian[0])).sum())
+        return -self.cost - half_log_det + float(self.posterior.log_normalisation.sum())
 
     def project(self, columns: Floats) -> Floats:
         """Inner products of columns after all that is fitted has taken its share, shape (n, n)."""
@@ -273,6 +268,7 @@ class Engine:
             best.operating,
             converged,
             self._released,
+            self.frozen,
         )
 
     def _point(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from bayesid.diagnosis.set_probabilities import SetProbabilities
-from bayesid.diagnosis.verdict import Status
+from bayesid.diagnosis.status import Status
 
 __all__ = ["UNKNOWN", "ProbableVerdict", "probable_verdict"]
 

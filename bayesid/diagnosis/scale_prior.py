@@ -9,13 +9,15 @@ so that their Occam factors are comparable.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.body_evidence import MissingBody
 from bayesid.diagnosis.gram import Gram
 
-__all__ = ["AmplitudeGroup", "CandidateCause", "ScaleRange", "scale_range"]
+__all__ = ["AmplitudeGroup", "CandidateCause", "ScaleRange", "Variant", "scale_range"]
 
 UNRESOLVED_GAIN = 0.01
 """Square of the scale times the information in the most visible direction, at the floor that the data set: there the
@@ -64,32 +66,80 @@ class AmplitudeGroup:
         return np.sqrt(self.spread)
 
 
+class Variant(NamedTuple):
+    """One of the forms that a cause may take, such as a vibration of one frequency or a jump at one instant.
+
+    Attributes
+    ----------
+    groups : tuple of AmplitudeGroup
+        Groups of amplitudes that come and go together, each with its own scale.
+    log_weight : float
+        Logarithm of the prior probability of this form, given that the cause is at work.
+    """
+
+    groups: tuple[AmplitudeGroup, ...]
+    log_weight: float = 0.0
+
+
 @dataclass(frozen=True)
 class CandidateCause:
-    """What the model may lack: one or more groups of amplitudes that come and go together, each with its own scale.
+    """What the model may lack.
 
     Attributes
     ----------
     name : str
     groups : tuple of AmplitudeGroup
+        Groups of amplitudes of a cause of one form, or of the first of its forms.
     generic : bool
         Whether it stands for something unknown, such as a disturbing torque, rather than for a cause of the catalogue.
+    others : tuple of tuples of AmplitudeGroup
+        Groups of further forms.
+    shares : tuple of float
+        Prior probabilities of all forms, given that the cause is at work; by default they are equal.
+    body : MissingBody, optional
+        Body of positive mass at a bounded place whose moments the amplitudes are.
+    fixed : bool
+        Whether the amplitudes are all exactly one, since physics leaves them no freedom; their scales do not matter.
     """
 
     name: str
     groups: tuple[AmplitudeGroup, ...]
     generic: bool = False
+    others: tuple[tuple[AmplitudeGroup, ...], ...] = ()
+    shares: tuple[float, ...] = ()
+    body: MissingBody | None = None
+    fixed: bool = False
+
+    def __post_init__(self) -> None:
+        if self.shares and (len(self.shares) != 1 + len(self.others) or not all(share > 0.0 for share in self.shares)):
+            raise ValueError(f"{self.name!r}: every form needs a positive share, received {self.shares}")
+        if self.fixed and (self.others or len(self.groups) != 1):
+            raise ValueError(f"{self.name!r}: a cause of fixed size has one form with one group")
+
+    @property
+    def variants(self) -> tuple[Variant, ...]:
+        """All forms, with their prior probabilities."""
+        forms = (self.groups, *self.others)
+        shares = self.shares or (1.0 / len(forms),) * len(forms)
+        return tuple(Variant(groups, float(np.log(share))) for groups, share in zip(forms, shares, strict=True))
 
     def rescaled(self, gram: Gram, bound: float = 1.0, floor: float = 1.0) -> CandidateCause:
         """Return the cause with the bounds of its scales and the floors multiplied by factors.
 
-        A floor that the data would set is written down first, so that it is multiplied, too.
+        A floor that the data would set is written down first, so that it is multiplied, too. What physics fixes keeps
+        its size.
         """
-        groups = []
-        for group in self.groups:
-            low = scale_range(group, gram).low if group.low is None and floor != 1.0 else group.low
-            groups.append(replace(group, high=group.high * bound, low=None if low is None else low * floor))
-        return replace(self, groups=tuple(groups))
+        if self.fixed:
+            return self
+        forms = []
+        for variant in self.variants:
+            groups = []
+            for group in variant.groups:
+                low = scale_range(group, gram).low if group.low is None and floor != 1.0 else group.low
+                groups.append(replace(group, high=group.high * bound, low=None if low is None else low * floor))
+            forms.append(tuple(groups))
+        body = None if self.body is None else replace(self.body, heaviest=self.body.heaviest * bound)
+        return replace(self, groups=forms[0], others=tuple(forms[1:]), body=body)
 
 
 @dataclass(frozen=True)

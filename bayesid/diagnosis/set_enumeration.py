@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import logsumexp
 
 from bayesid.diagnosis.cause_prior import CausePrior
+from bayesid.diagnosis.evidence_beside import evidence_beside
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
 
@@ -19,12 +24,25 @@ FEW = 300
 BEST = 20
 """Most sets of two and more candidates that are extended where there are more extensions than few."""
 
+SINGLES = 16
+"""Most single candidates that are extended to pairs where there are many."""
+
 PROMISING = 1e-4
 """Probability relative to the most probable set so far down to which a set is extended, apart from the best of its
 size: what is added to a less probable one would have to earn some 15 nats to matter."""
 
 
-def enumerate_sets(evidence: SetEvidence, prior: CausePrior | None = None) -> SetProbabilities:
+NEAR = 9.0
+"""Logarithm of the probability relative to the most probable set so far down to which a set that the screening has
+weighed is evaluated in full."""
+
+FORMS_NEAR, MOST_FORMS = 4.0, 4
+"""Nats below a cause's best form down to which its forms are evaluated in full, and how many of them at most."""
+
+
+def enumerate_sets(
+    evidence: SetEvidence, prior: CausePrior | None = None, largest: int = MOST_CAUSES + 1
+) -> SetProbabilities:
     """Return the probabilities of nothing, of all single candidates, all pairs, and larger sets grown from the best.
 
     Sets grow by one candidate at a time, of which at most one is generic. All sets of up to two candidates are
@@ -33,25 +51,86 @@ def enumerate_sets(evidence: SetEvidence, prior: CausePrior | None = None) -> Se
     any size, and of all where their extensions are few. A large set is missed only if none of those within it is among
     these.
 
+    Where there are many, all are weighed first by what their last member adds to the others at the others' most
+    probable scales (`evidence_beside`). Only those whose weight matters are then integrated over all scales.
+
     Parameters
     ----------
     evidence : SetEvidence
     prior : CausePrior, optional
         Prior of sets; by default `CausePrior` with its defaults.
+    largest : int
+        Most candidates in one set.
     """
     prior = CausePrior() if prior is None else prior
     found = [CauseSet((), None, 0.0)]
     last = found
-    for size in range(1, MOST_CAUSES + 2):
+    for size in range(1, largest + 1):
         keys = _extensions(last, evidence)
-        if size > 2 and len(keys) > FEW:
-            keys = _extensions(_best(found, size - 1, evidence, prior), evidence)
-        last = [
-            CauseSet(causes, generic, evidence.log_evidence(causes if generic is None else (*causes, generic)))
-            for causes, generic in keys
-        ]
+        many = size > 1 and sum(_cost(key, evidence) for key in keys) > FEW
+        if many and size == 2:
+            last = _strongest(found, evidence, prior)
+        elif size > 2 and len(keys) > FEW:
+            last = _best(found, size - 1, evidence, prior)
+            keys = _extensions(last, evidence)
+        last = _screened(last, found, evidence, prior) if many else [_whole(key, evidence) for key in keys]
         found = found + last
     return SetProbabilities.of(found, evidence.catalogue, evidence.generics, prior)
+
+
+def _cost(key: tuple[tuple[str, ...], str | None], evidence: SetEvidence) -> int:
+    """Return the number of combinations of forms of a set."""
+    count = 1
+    for name in _names(key):
+        count *= len(evidence.causes[name].variants)
+    return count
+
+
+def _names(key: tuple[tuple[str, ...], str | None]) -> tuple[str, ...]:
+    return key[0] if key[1] is None else (*key[0], key[1])
+
+
+def _whole(key: tuple[tuple[str, ...], str | None], evidence: SetEvidence) -> CauseSet:
+    """Return a set with its evidence integrated over all scales and forms."""
+    return CauseSet(*key, evidence.log_evidence(_names(key)))
+
+
+def _screened(
+    parents: list[CauseSet], found: list[CauseSet], evidence: SetEvidence, prior: CausePrior
+) -> list[CauseSet]:
+    """Return the sets of one candidate more than their parents; those that matter are integrated in full."""
+    weighed: dict[tuple[tuple[str, ...], str | None], tuple[float, list[dict[str, int]]]] = {}
+    for parent in parents:
+        others = [name for name in evidence.catalogue if name not in parent.causes]
+        if len(parent.causes) >= MOST_CAUSES or not others:
+            continue
+        forms = evidence.forms(parent.names)
+        for name, values in evidence_beside(evidence, parent.names, forms, others).items():
+            key = (tuple(sorted((*parent.causes, name))), parent.generic)
+            gain = float(logsumexp(list(values.values()))) + max(evidence.bodily.get(name, 0.0), 0.0)
+            order = [form for form, _ in sorted(values.items(), key=lambda item: -item[1])][:MOST_FORMS]
+            near = [form for form in order if values[form] > values[order[0]] - FORMS_NEAR]
+            choices = [{**forms, name: form} for form in near]
+            before, others_choices = weighed.get(key, (-np.inf, []))
+            weighed[key] = (
+                max(before, parent.log_evidence + gain),
+                others_choices + [choice for choice in choices if choice not in others_choices],
+            )
+    sets = [
+        CauseSet(*key, value)
+        for key, (value, _) in sorted(weighed.items(), key=lambda item: (item[0][0], item[0][1] or ""))
+    ]
+    everything = SetProbabilities.of(found + sets, evidence.catalogue, evidence.generics, prior).sets
+    least = np.exp(-NEAR) * everything[0].probability
+    matter = {(item.causes, item.generic) for item in everything if item.probability >= least}
+    result = []
+    for item in sets:
+        key = (item.causes, item.generic)
+        if key in matter:
+            result.append(replace(item, log_evidence=evidence.log_evidence(item.names, weighed[key][1])))
+        else:
+            result.append(item)
+    return result
 
 
 def _best(found: list[CauseSet], size: int, evidence: SetEvidence, prior: CausePrior) -> list[CauseSet]:
@@ -60,6 +139,12 @@ def _best(found: list[CauseSet], size: int, evidence: SetEvidence, prior: CauseP
     least = PROMISING * ranked[0].probability
     last = [item for item in ranked if len(item.names) == size][:BEST]
     return [item for place, item in enumerate(last) if place == 0 or item.probability >= least]
+
+
+def _strongest(found: list[CauseSet], evidence: SetEvidence, prior: CausePrior) -> list[CauseSet]:
+    """Return the single candidates that are worth extending, the most probable first."""
+    ranked = SetProbabilities.of(found, evidence.catalogue, evidence.generics, prior).sets
+    return [item for item in ranked if len(item.names) == 1][:SINGLES]
 
 
 def _extensions(sets: Iterable[CauseSet], evidence: SetEvidence) -> list[tuple[tuple[str, ...], str | None]]:

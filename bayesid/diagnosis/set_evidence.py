@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
+import scipy.linalg as sla
 from scipy.special import logsumexp
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.scale_integral import MOST_NODES, GroupSpectrum, ScaleAverage, average_over_scales
 from bayesid.diagnosis.scale_nodes import LogNodes, thinning
 from bayesid.diagnosis.scale_prior import CandidateCause
 
 __all__ = ["SetEvidence", "precision_roots"]
+
+MOST_FORMS, BEST_FORMS = 64, 8
+"""Combinations of forms above which only the best forms of each cause by itself are combined, and how many of them."""
 
 BLOCK = 4_000_000
 """Most numbers in one intermediate array where many scores are evaluated at once."""
@@ -67,13 +73,20 @@ class SetEvidence:
         for cause in causes:
             if cause.name in self.causes:
                 raise ValueError(f"two causes have the name {cause.name!r}; names must differ")
-            absent = [group.name for group in cause.groups if group.name not in gram.groups]
-            if absent or not cause.groups:
-                raise ValueError(f"{cause.name!r} needs groups of columns of the Gram, received {absent or 'none'}")
-            if len({group.name for group in cause.groups}) < len(cause.groups):
-                raise ValueError(f"{cause.name!r} names one group of columns twice; each has one scale")
+            for groups, _ in cause.variants:
+                absent = [group.name for group in groups if group.name not in gram.groups]
+                if absent or not groups:
+                    raise ValueError(f"{cause.name!r} needs groups of columns of the Gram, received {absent or 'none'}")
+                if len({group.name for group in groups}) < len(groups):
+                    raise ValueError(f"{cause.name!r} names one group of columns twice; each has one scale")
             self.causes[cause.name] = cause
-        self._spectra = {name: tuple(GroupSpectrum.of(g, gram) for g in c.groups) for name, c in self.causes.items()}
+        self._spectra = {
+            name: tuple(tuple(GroupSpectrum.of(g, gram) for g in variant.groups) for variant in cause.variants)
+            for name, cause in self.causes.items()
+        }
+        self._log_weights = {
+            name: np.array([variant.log_weight for variant in cause.variants]) for name, cause in self.causes.items()
+        }
 
     @cached_property
     def catalogue(self) -> tuple[str, ...]:
@@ -88,28 +101,191 @@ class SetEvidence:
     @property
     def invisible(self) -> tuple[str, ...]:
         """Names of the candidates that the data cannot see within their physical bounds, sorted."""
-        return tuple(sorted(name for name, own in self._spectra.items() if not any(s.range.visible for s in own)))
+        return tuple(
+            sorted(
+                name
+                for name, forms in self._spectra.items()
+                if not any(spectrum.range.visible for form in forms for spectrum in form)
+            )
+        )
 
-    def places(self, names: Iterable[str]) -> list[tuple[str, int]]:
+    def forms(self, names: Iterable[str]) -> dict[str, int]:
+        """Return the most probable form of each cause of a set, by its place among `CandidateCause.variants`."""
+        ordered = sorted(names)
+        choices = self._choices(ordered)
+        if len(choices) == 1:
+            return dict(zip(ordered, choices[0], strict=True))
+        best = max(choices, key=lambda own: self._of(ordered, own).log_evidence + self._log_weight(ordered, own))
+        return dict(zip(ordered, best, strict=True))
+
+    def places(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[tuple[str, int]]:
         """Return the groups of a set, each by its cause and its place in that, in the order of the integration.
 
         The order, and so the last digit of the result, depends neither on the order of the names nor on that of the
         candidates: the group with most columns comes first.
-        """
-        found = [(name, place) for name in sorted(names) for place in range(len(self._spectra[name]))]
-        return sorted(found, key=lambda item: -len(self._spectra[item[0]][item[1]].columns))
 
-    def spectra(self, names: Iterable[str]) -> list[GroupSpectrum]:
+        Parameters
+        ----------
+        names : iterable of str
+        forms : mapping of str to int, optional
+            Form of each cause; by default the most probable ones.
+        """
+        forms = self.forms(names) if forms is None else forms
+        found = [(name, place) for name in sorted(names) for place in range(len(self._spectra[name][forms[name]]))]
+        return sorted(found, key=lambda item: -len(self._spectra[item[0]][forms[item[0]]][item[1]].columns))
+
+    def spectra(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[GroupSpectrum]:
         """Return the spectra of the groups of a set, in the order of `places`."""
-        return [self._spectra[name][place] for name, place in self.places(names)]
+        forms = self.forms(names) if forms is None else forms
+        return [self._spectra[name][forms[name]][place] for name, place in self.places(names, forms)]
 
     def average(self, names: Iterable[str]) -> ScaleAverage:
-        """Return the evidence of a set and the posterior of its scales."""
-        return average_over_scales(self.spectra(names), self.gram)
+        """Return the evidence of a set in its most probable form, and the posterior of its scales."""
+        ordered = sorted(names)
+        forms = self.forms(ordered)
+        return self._of(ordered, tuple(forms[name] for name in ordered))
 
-    def log_evidence(self, names: Iterable[str]) -> float:
-        """Return the logarithm of the evidence of a set, relative to nothing."""
-        return self.average(names).log_evidence
+    def log_evidence(self, names: Iterable[str], choices: Sequence[Mapping[str, int]] | None = None) -> float:
+        """Return the logarithm of the evidence of a set, relative to nothing, averaged over the forms of its causes.
+
+        Parameters
+        ----------
+        names : iterable of str
+        choices : sequence of mappings of str to int, optional
+            Forms of each cause beyond which the evidence is negligible; by default all, or the best of each.
+        """
+        ordered = sorted(names)
+        forms = (
+            self._choices(ordered)
+            if choices is None
+            else [tuple(choice[name] for name in ordered) for choice in choices]
+        )
+        values = [self._of(ordered, own).log_evidence + self._log_weight(ordered, own) for own in forms]
+        best = dict(zip(ordered, forms[int(np.argmax(values))], strict=True))
+        return float(logsumexp(values)) + self._bodily(ordered, best)
+
+    def _bodily(self, ordered: Sequence[str], forms: Mapping[str, int]) -> float:
+        """Return what it adds to the log evidence of a set that some of its amplitudes are moments of a body.
+
+        A body has a positive mass at a place, where the linear prior has ten free moments. Each is weighed beside the
+        others of the set at their most probable scales, both ways.
+        """
+        total = 0.0
+        for name in ordered:
+            cause = self.causes[name]
+            if cause.body is not None:
+                (group,) = cause.variants[forms[name]].groups
+                beside = self.beside([other for other in ordered if other != name], forms, [name])
+                own = beside.groups[group.name]
+                lightest = self._spectra[name][forms[name]][0].range.low
+                body = cause.body.log_evidence(beside.matrix[np.ix_(own, own)], beside.score[own], lightest)
+                alone = SetEvidence(
+                    beside.keeping([group.name]), [replace(cause, groups=(group,), others=(), shares=())]
+                )
+                total += body - alone._of([name], (0,)).log_evidence
+        return total
+
+    @cached_property
+    def bodily(self) -> dict[str, float]:
+        """What it adds to the log evidence of each cause by itself that its amplitudes are moments of a body."""
+        names = [name for name, cause in self.causes.items() if cause.body is not None]
+        return {name: self._bodily([name], self.forms([name])) for name in names}
+
+    def beside(self, names: Iterable[str], forms: Mapping[str, int], others: Iterable[str]) -> Gram:
+        """Return the Gram of other causes after a set at its most probable scales has taken its share.
+
+        Parameters
+        ----------
+        names : iterable of str
+            The set.
+        forms : mapping of str to int
+            Form of each of its causes.
+        others : iterable of str
+        """
+        names = list(names)
+        groups = {group.name for name in others for form in self.causes[name].variants for group in form.groups}
+        part = self.gram.keeping(sorted(groups))
+        if not names:
+            return part
+        kept = np.concatenate([np.zeros(0, dtype=int), *(self.gram.groups[name] for name in part.groups)])
+        score = self.score_beside(names)
+        held, deviations = self.most_probable(names, forms)
+        information = deviations[:, None] * self.gram.matrix[np.ix_(held, held)] * deviations + np.eye(len(held))
+        lower = np.linalg.cholesky(information)
+        shared = sla.solve_triangular(lower, deviations[:, None] * self.gram.matrix[np.ix_(held, kept)], lower=True)
+        pull = sla.solve_triangular(lower, deviations * score[held], lower=True)
+        return Gram(part.matrix - shared.T @ shared, score[kept] - shared.T @ pull, part.groups)
+
+    def _log_weight(self, ordered: Sequence[str], forms: Sequence[int]) -> float:
+        """Return the logarithm of the prior probability of a combination of forms."""
+        return sum(self._log_weights[name][form] for name, form in zip(ordered, forms, strict=True))
+
+    def of_forms(self, name: str) -> Floats:
+        """Return the logarithms of the evidence of each form of one cause, times the form's prior probability."""
+        found = [self._of([name], (place,)).log_evidence for place in range(len(self._spectra[name]))]
+        return np.array(found) + self._log_weights[name]
+
+    def most_probable(self, names: Iterable[str], forms: Mapping[str, int]) -> tuple[Integers, Floats]:
+        """Return the columns of a set and the standard deviations of their amplitudes at the most probable scales.
+
+        What physics fixes is left out.
+        """
+        ordered = sorted(names)
+        average = self._of(ordered, tuple(forms[name] for name in ordered))
+        where = np.unravel_index(int(np.argmax(average.log_posterior)), average.log_posterior.shape)
+        free = [name for name in ordered if not self.causes[name].fixed]
+        spectra = self.spectra(free, forms)
+        empty = np.zeros(0)
+        columns = np.concatenate([empty.astype(int), *(own.columns for own in spectra)])
+        scales = [nodes.scales[index] for nodes, index in zip(average.nodes, where, strict=True)]
+        return columns, np.concatenate([empty, *(scale * own.root for scale, own in zip(scales, spectra, strict=True))])
+
+    def score_beside(self, names: Iterable[str]) -> Floats:
+        """Return the score of all columns after the causes of fixed size among a set are in the model."""
+        return self._with_fixed(sorted(names), self.gram.score[None])[0][0]
+
+    def _choices(self, ordered: Sequence[str]) -> list[tuple[int, ...]]:
+        """Return the combinations of forms that are integrated: all, or of each cause the best by themselves."""
+        counts = [len(self._spectra[name]) for name in ordered]
+        ranges: list[Sequence[int]] = [range(count) for count in counts]
+        if np.prod(counts, dtype=float) > MOST_FORMS:
+            ranges = [
+                self.ranked[name][:BEST_FORMS] if count > BEST_FORMS else range(count)
+                for name, count in zip(ordered, counts, strict=True)
+            ]
+        return list(product(*ranges))
+
+    @cached_property
+    def ranked(self) -> dict[str, tuple[int, ...]]:
+        """Forms of each cause, the most probable by itself first."""
+        found = {}
+        for name in self._spectra:
+            values = self.of_forms(name)
+            found[name] = tuple(int(place) for place in np.argsort(-values, kind="stable"))
+        return found
+
+    def _of(self, ordered: Sequence[str], forms: tuple[int, ...]) -> ScaleAverage:
+        """Return the evidence of causes in given forms."""
+        free = [name for name in ordered if not self.causes[name].fixed]
+        chosen = dict(zip(ordered, forms, strict=True))
+        spectra = self.spectra(free, chosen)
+        if len(free) == len(ordered):
+            return average_over_scales(spectra, self.gram)
+        shifted, gain = self._with_fixed(ordered, self.gram.score[None])
+        score = shifted[0]
+        moved = [replace(own, score=own.vectors.T @ (own.root * score[own.columns])) for own in spectra]
+        average = average_over_scales(moved, replace(self.gram, score=score))
+        return replace(average, log_evidence=average.log_evidence + float(gain[0]))
+
+    def _with_fixed(self, ordered: Sequence[str], scores: Floats) -> tuple[Floats, Floats]:
+        """Return scores, (d, m), after the causes of fixed size are in the model, and what those gain, (d,)."""
+        gain = np.zeros(len(scores))
+        for name in ordered:
+            if self.causes[name].fixed:
+                own = self.gram.groups[self.causes[name].groups[0].name]
+                gain = gain - scores[:, own].sum(axis=1) - 0.5 * self.gram.matrix[np.ix_(own, own)].sum()
+                scores = scores + self.gram.matrix[:, own].sum(axis=1)
+        return scores, gain
 
     def log_evidences(self, names: Iterable[str], scores: Floats) -> Floats:
         """Return the logarithm of the evidence of one set for many scores, shape (d,).
@@ -122,7 +298,17 @@ class SetEvidence:
         scores : (d, m) array
             Scores of all columns of the Gram.
         """
-        spectra = self.spectra(names)
+        ordered = sorted(names)
+        free = [name for name in ordered if not self.causes[name].fixed]
+        shifted, gain = self._with_fixed(ordered, scores)
+        found = []
+        for forms in self._choices(ordered):
+            chosen = dict(zip(ordered, forms, strict=True))
+            found.append(self._many(self.spectra(free, chosen), shifted) + self._log_weight(ordered, forms))
+        return np.asarray(logsumexp(found, axis=0)) + gain
+
+    def _many(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
+        """Return the logarithm of the evidence of groups for many scores."""
         if not spectra:
             return np.zeros(len(scores))
         if len(spectra) > 1:

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from bayesid.diagnosis.cause_prior import CausePrior
-from bayesid.diagnosis.equivalent_causes import classes_of_equivalents
-from bayesid.diagnosis.evidence_alarm import FAMILY_LEVEL, EvidenceAlarm
 from bayesid.diagnosis.probable_verdict import ProbableVerdict, probable_verdict
-from bayesid.diagnosis.set_enumeration import enumerate_sets
-from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import SetProbabilities
 
 __all__ = ["VerdictSensitivity", "verdict_sensitivity"]
@@ -43,43 +37,34 @@ class VerdictSensitivity:
 
 
 def verdict_sensitivity(
-    evidence: SetEvidence,
     probabilities: SetProbabilities,
-    alarm: EvidenceAlarm,
-    rng: np.random.Generator,
-    level: float = FAMILY_LEVEL,
+    classes: Sequence[Sequence[str]],
+    silent: bool,
+    widened: Callable[[float, float], SetProbabilities],
 ) -> VerdictSensitivity:
     """Return the verdict with each prior number halved and doubled, and with scales a decade wider at either end.
 
-    The prior numbers only weigh the sets anew. Other ranges need all evidences, the alarm and the classes of
-    equivalents once more.
+    The prior numbers only weigh the sets anew; other ranges of the scales need their evidence once more.
 
     Parameters
     ----------
-    evidence : SetEvidence
     probabilities : SetProbabilities
-        Of the sets of the same candidates.
-    alarm : EvidenceAlarm
-        Of the same candidates.
-    rng : Generator
-        For the alarms of other ranges.
-    level : float
-        Family-wise level of the alarm.
+    classes : sequence of sequences of str
+        Classes of equivalent causes.
+    silent : bool
+        Whether the alarm is silent.
+    widened : callable
+        Probabilities with the bounds and the floors of all scales multiplied by two factors.
     """
-    classes, prior = classes_of_equivalents(evidence), probabilities.prior
-    silent = alarm.silent(level)
     others = {
         name: probable_verdict(probabilities.under(changed), classes, silent)
-        for name, changed in _other_priors(prior).items()
+        for name, changed in _other_priors(probabilities.prior).items()
     }
     for name, factors in {
         "bounds a decade higher": (DECADE, 1.0),
         "floors a decade lower": (1.0, 1.0 / DECADE),
     }.items():
-        causes = [cause.rescaled(evidence.gram, *factors) for cause in evidence.causes.values()]
-        wider = SetEvidence(evidence.gram, causes)
-        quiet = EvidenceAlarm.of(wider, rng, len(alarm.largest.values)).silent(level)
-        others[name] = probable_verdict(enumerate_sets(wider, prior), classes_of_equivalents(wider), quiet)
+        others[name] = probable_verdict(widened(*factors), classes, silent)
     return VerdictSensitivity(probable_verdict(probabilities, classes, silent), others)
 
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.cause_search import Hypothesis
 from bayesid.diagnosis.disturbing_wrench import Frame, Unexplained
+from bayesid.diagnosis.hypothesis import Hypothesis
 
 __all__ = ["TorqueCorrelation", "torque_correlations"]
 

@@ -94,22 +94,26 @@ def grids_of(
     model: Model, manoeuvres: Sequence[Manoeuvre], recorded: Sequence[RecordedSamples], step: float
 ) -> list[Grid]:
     """Return the grid of integration nodes and samples of every recording, for an integration step [s]."""
-    return [
-        build_grid(
-            model.robot,
-            tuple(prior.name for prior in model.priors),
-            manoeuvre.motion,
-            samples.time,
-            step,
-            orbit=model.orbit,
-            argument_of_latitude=manoeuvre.argument_of_latitude,
-            actions=Actions.from_recording(manoeuvre.recording),
-            effects=model.effects,
-            torques=model.torque is not None,
-            speed_errors=model.has_speed_errors,
+    grids = []
+    for index, (manoeuvre, samples) in enumerate(zip(manoeuvres, recorded, strict=True)):
+        effects = [effect.in_recording(index) for effect in model.effects]
+        grids.append(
+            build_grid(
+                model.robot,
+                tuple(prior.name for prior in model.priors),
+                manoeuvre.motion,
+                samples.time,
+                step,
+                orbit=model.orbit,
+                argument_of_latitude=manoeuvre.argument_of_latitude,
+                actions=Actions.from_recording(manoeuvre.recording),
+                effects=effects,
+                torques=model.torque is not None,
+                speed_errors=model.has_speed_errors,
+                jumps=[instant for effect in effects for instant in effect.jumps(float(samples.time[-1]))],
+            )
         )
-        for manoeuvre, samples in zip(manoeuvres, recorded, strict=True)
-    ]
+    return grids
 
 
 def attitudes_of(manoeuvres: Sequence[Manoeuvre]) -> Floats:

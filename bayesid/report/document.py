@@ -34,6 +34,9 @@ RESOLUTION = 250
 LONG_WORD = 14
 """Number of characters from which on a word in a table may break at its punctuation."""
 
+WHOLE = 24
+"""Number of rows of a table above which it may break between two pages; the caption stays with the first of them."""
+
 _TEMPLATE = """\
 #set page(paper: "a4", margin: (x: 20mm, top: 20mm, bottom: 22mm), numbering: "1 / 1")
 #set text(font: "Libertinus Serif", size: 10.5pt, lang: "en")
@@ -43,14 +46,30 @@ _TEMPLATE = """\
 #set list(indent: 0.4em, spacing: 0.65em)
 #set figure(gap: 0.7em)
 #show figure: set block(above: 1.3em, below: 1.3em)
-#show figure.where(kind: table): set block(breakable: true)
+#show figure.where(kind: table): set block(breakable: false)
 #show figure.where(kind: table): set figure.caption(position: top)
-#show figure.caption: it => block(width: 100%, { set text(size: 9pt); set par(justify: true); set align(left)
+#show figure.caption: it => block(width: 100%, sticky: true, { set text(size: 9pt)
+  set par(justify: true); set align(left)
   strong(it.supplement + " " + context it.counter.display(it.numbering) + ". ") + it.body })
 #set table(stroke: none, inset: (x: 5pt, y: 2.9pt))
 #show table: set text(size: 8.5pt)
 #show table: set par(justify: false, leading: 0.5em)
 #show table.cell.where(y: 0): strong
+#let decision(title, ..cells) = block(width: 100%, stroke: 1pt, radius: 3pt, inset: 9pt, breakable: false, {
+  set text(size: 10pt)
+  set par(justify: false, leading: 0.55em, spacing: 0.5em)
+  text(size: 12.5pt, weight: "bold", title)
+  v(-0.2em)
+  grid(columns: (auto, 1fr), column-gutter: 1em, row-gutter: 0.65em,
+    ..cells.pos().chunks(2).map(pair => (text(fill: luma(35%), pair.at(0)), pair.at(1))).flatten())
+})
+#let foot(small) = context {
+  if counter(page).get().first() == 1 {
+    set par(justify: false, leading: 0.5em)
+    line(length: 100%, stroke: 0.4pt) + v(-0.5em) + text(size: 7.5pt, small) + v(-0.3em)
+  }
+  align(center, counter(page).display("1 / 1", both: true))
+}
 #let title(main, sub, date) = align(left, {
   text(size: 18pt, weight: "bold", main)
   if sub != "" { linebreak() + text(size: 12pt, fill: luma(35%), sub) }
@@ -91,6 +110,19 @@ class Document:
         if texts:
             self._parts.append(f"#list({', '.join(literal(text) for text in texts)})\n")
 
+    def decision(self, title: str, entries: Sequence[tuple[str, str]]) -> None:
+        """Add a framed box with a title and rows of a name and its text."""
+        cells = "".join(f", {literal(text)}" for entry in entries for text in entry)
+        self._parts.append(f"#decision({literal(title)}{cells})\n")
+
+    def foot(self, text: str) -> None:
+        """Put a text in small print at the foot of the first page."""
+        self._parts.insert(1, f"#set page(footer: foot({literal(text)}))\n")
+
+    def page(self) -> None:
+        """Go on at the top of a new page."""
+        self._parts.append("#pagebreak(weak: true)\n")
+
     def formula(self, typst_math: str) -> None:
         """Add a displayed formula in Typst's notation, which is the only text that is read as markup."""
         self._parts.append(f"$ {typst_math} $\n")
@@ -123,6 +155,8 @@ class Document:
             f"{', '.join([*cells, 'table.hline(stroke: 0.8pt)'])})"
         )
         numbered = f"#figure(kind: table, caption: {literal(caption or '')}, {table})\n"
+        if len(rows) > WHOLE:
+            numbered = f"#{{ show figure: set block(breakable: true)\n {numbered[1:]} }}\n"
         self._parts.append(numbered if caption is not None else f"#{table}\n")
 
     def figure(self, fig: Figure, caption: str, width: str = "100%") -> None:

@@ -11,11 +11,14 @@ __all__ = [
     "format_number",
     "format_p_value",
     "format_percent",
+    "format_probability",
     "format_quantity",
     "format_range",
     "format_signed",
+    "format_text",
     "format_unit",
     "format_vector",
+    "relation",
 ]
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -25,6 +28,9 @@ LARGEST, SMALLEST = 6, -3
 
 SMALLEST_P = 1e-12
 """P-value below which only the bound is printed."""
+
+LEAST_PROBABILITY = 0.001
+"""Probability below which only the bound is printed, and the same from one."""
 
 NEARLY_ALL = 0.995
 """Ratio from which on a percentage has three digits, because two would round it to 100 %."""
@@ -93,6 +99,20 @@ def format_p_value(value: float) -> str:
     return "< 10⁻¹²" if value < SMALLEST_P else format_number(value, 2)
 
 
+def format_probability(value: float) -> str:
+    """Return a probability to two decimals, to three within 0.05 of zero and one, or the bound beyond."""
+    if value < LEAST_PROBABILITY:
+        return f"< {LEAST_PROBABILITY:g}"
+    if value > 1.0 - LEAST_PROBABILITY:
+        return f"> {1.0 - LEAST_PROBABILITY:g}"
+    return format_fixed(value, 2 if 0.05 <= value <= 0.95 else 3)
+
+
+def relation(number: str) -> str:
+    """Return a printed number as it follows a symbol in a sentence: ``= 0.3``, or the bound itself."""
+    return number if number.startswith(("<", ">")) else f"= {number}"
+
+
 def format_range(values: Iterable[float], digits: int = 3) -> str:
     """Return the smallest and the largest of some values as ``low to high``, or one number where they print alike."""
     known = list(values)
@@ -108,6 +128,12 @@ def format_vector(values: Iterable[float], digits: int = 3) -> str:
 def format_unit(unit: str) -> str:
     """Return a unit with raised exponents, ``kg m²`` for ``kg m2``; a pure number, ``1``, has none."""
     return "" if unit == "1" else re.sub(r"(?<=[A-Za-z])-?\d+", lambda match: _raise(int(match[0])), unit)
+
+
+def format_text(text: str) -> str:
+    """Return a sentence with numbers and units in it as reports print them: ``kg/m³`` and ``3.6 × 10⁻¹²``."""
+    units = re.sub(r"(?<![A-Za-z])(kg|m|s)([23])(?![0-9A-Za-z])", lambda match: match[1] + _raise(int(match[2])), text)
+    return re.sub(r"(?<=\d)e([-+]?\d+)", lambda match: f" × 10{_raise(int(match[1]))}", units)
 
 
 def _power(value: float) -> int:

@@ -25,6 +25,10 @@ from bayesid.simulation.orbit import Orbit, OrbitState
 __all__ = ["build_grid", "lengthened", "pad_grids", "rounded"]
 
 
+BRIEF = 1e-6
+"""Length of the integration step in which a table jumps [s]."""
+
+
 def build_grid(
     robot: Robot,
     unknown: tuple[str, ...],
@@ -38,6 +42,7 @@ def build_grid(
     effects: Sequence[Effect] = (),
     torques: bool = False,
     speed_errors: bool = False,
+    jumps: Sequence[float] = (),
 ) -> Grid:
     """Return the grid to which one recording is reduced.
 
@@ -64,6 +69,9 @@ def build_grid(
         Whether joint torques are computed at the samples.
     speed_errors : bool
         Whether the grid has tables for errors of the joint speeds at time 0 (`UnitSpeed`).
+    jumps : sequence of float
+        Instants just after which a table of the effects jumps [s]. A step ends at each of them and the next one begins
+        `BRIEF` later, so that no longer step sees a jump and the order of the integration is kept.
 
     Returns
     -------
@@ -71,7 +79,9 @@ def build_grid(
         Arrays of NumPy, or of JAX if the motion is traced.
     """
     actions = Actions.none() if actions is None else actions
-    nodes = _nodes(float(samples[-1]), step, actions.time)
+    instants_of_jumps = np.asarray(jumps, dtype=float)
+    breaks = np.unique(np.concatenate([actions.time, instants_of_jumps, instants_of_jumps + BRIEF]))
+    nodes = _nodes(float(samples[-1]), step, breaks)
     node = np.sort(np.concatenate([nodes, 0.5 * (nodes[1:] + nodes[:-1])]))
     instants = [
         _instants(robot, unknown, effects, motion, time, orbit, argument_of_latitude, actions, sampled)

@@ -17,10 +17,13 @@ from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from studies.blind_injections.trials import Trial, plan, read, run
 from studies.common.command import Command
 
-__all__ = ["confusion", "main", "rates", "write_report"]
+__all__ = ["confusion", "main", "rates", "reliability", "write_report"]
 
 BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, np.inf)
 """Limits of the ranges of signal-to-noise ratio in the table."""
+
+STATED = (0.0, 0.5, 0.7, 0.9, 0.95, 0.99, 0.999, 1.0)
+"""Limits of the ranges of stated probability in the table."""
 
 TICKS = (3, 5, 7, 10, 20, 50)
 """Ticks of the signal-to-noise ratio in the figure."""
@@ -84,6 +87,30 @@ def _row(trials: Sequence[Trial]) -> list[str]:
     ]
 
 
+def reliability(trials: Iterable[Trial]) -> list[list[str]]:
+    """Return how often the named causes were hidden, by their stated probability, with 95 % Wilson intervals."""
+    named = [(trial.probability, trial.holds) for trial in trials if trial.probability is not None]
+    rows = []
+    for low, high in pairwise(STATED):
+        within = [pair for pair in named if low <= pair[0] < high or pair[0] == high == STATED[-1]]
+        if within:
+            rows.append([f"{low:g} to {high:g}", *_reliable(within)])
+    return [*rows, ["all", *_reliable(named)]] if named else rows
+
+
+def _reliable(named: Sequence[tuple[float, bool]]) -> list[str]:
+    right, total = sum(held for _, held in named), len(named)
+    interval = stats.binomtest(right, total).proportion_ci(method="wilson")
+    stated = float(np.mean([probability for probability, _ in named]))
+    return [
+        str(total),
+        f"{stated:.3f}",
+        str(right),
+        f"{right / total:.3f}",
+        f"{interval.low:.3f} to {interval.high:.3f}",
+    ]
+
+
 def confusion(trials: Iterable[Trial]) -> list[list[str]]:
     """Return each hidden case with its answers and their numbers, all strengths and seeds together."""
     said: dict[str, Counter[str]] = {}
@@ -128,6 +155,20 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
         "reported. Misnamed: something was named and the hidden causes are in no set.",
     )
     document.figure(_figure(injected), "Injected causes by signal-to-noise ratio: what was said.")
+    document.section("Stated probabilities")
+    stated = reliability(trials)
+    if stated:
+        document.table(
+            ["stated probability", "trials", "mean stated", "right", "share right", "95 % interval"],
+            stated,
+            "Trials whose verdict names causes, nothing and outside causes hidden included, by the probability stated "
+            "for the named causes together, whatever accompanies them. Right: every named cause is hidden. Intervals "
+            "are Wilson's. The trials hide causes as planned and not as often, nor as large, as the prior of the "
+            "diagnosis says, so that both columns need not agree exactly.",
+            ["left", *["right"] * 5],
+        )
+    else:
+        document.paragraph("No trial has named a cause.")
     document.section("Amplitudes and bodies")
     errors = np.array([error for trial in injected if trial.named_rightly for error in trial.amplitude_errors])
     bodies = np.array([t.body_errors for t in injected if t.named_rightly and t.body_errors]).reshape(-1, 10)
@@ -158,8 +199,8 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
             ]
             for trial in outside
         ],
-        "What was said of causes that the catalogue does not have. Left: signal-to-noise ratio after the best set of "
-        "causes tried has taken its share. Correlation of the torque reconstructed with the true one, base axes. "
+        "What was said of causes that the catalogue does not have. Left: signal-to-noise ratio after the most probable "
+        "set of known causes has taken its share. Correlation: of the torque reconstructed with the true one. "
         "'Orbit' torques are fixed in the orbit axes of each recording's start, from which orbit axes turn by ten "
         "degrees.",
     )
@@ -171,7 +212,7 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
     )
     document.section("Every trial")
     document.table(
-        ["hidden", "seed", "strength", "said", "named", "rivals", "signal-to-noise"],
+        ["hidden", "seed", "strength", "said", "named", "probability", "others", "signal-to-noise", "time [s]"],
         [
             [
                 trial.case,
@@ -179,12 +220,15 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
                 f"{trial.strength:g}",
                 trial.status,
                 " + ".join(trial.causes) or "-",
+                _number(trial.probability, 3),
                 str(max(len(trial.sets) - 1, 0)),
                 _number(trial.signal_to_noise),
+                _number(trial.seconds["total"]),
             ]
             for trial in trials
         ],
-        "Every trial; the seed and the strength repeat it.",
+        "Every trial; the seed and the strength repeat it. The probability is that of the named causes together. "
+        "Others: number of other explanations that the verdict gives, and of other names of the same causes.",
     )
     document.write(file)
 

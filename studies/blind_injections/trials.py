@@ -6,6 +6,7 @@ import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,12 @@ from bayesid._math.arrays import Floats
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Frame, diagnose
-from bayesid.diagnosis.candidate_table import effect_amplitude
-from bayesid.diagnosis.detection_power import detection_power
+from bayesid.diagnosis.cause_amplitudes import effect_amplitude
+from bayesid.diagnosis.family_alarm import FamilyAlarm
 from bayesid.diagnosis.perturbed_fit import Fit
+from bayesid.diagnosis.probable_verdict import UNKNOWN
+from bayesid.diagnosis.scale_prior import AmplitudeGroup
+from bayesid.diagnosis.signature_bank import SignatureBank
 from bayesid.inference.noise_changes import with_manoeuvres
 from studies.common.monte_carlo import read_store, run_trials
 from studies.truth import hidden_causes
@@ -28,6 +32,9 @@ __all__ = ["Plan", "Trial", "make", "plan", "read", "run"]
 
 WEAKER = 0.1
 """Fraction of the strength in the data with which a trial is compared to measure the size of a hidden effect."""
+
+MATTERS = 0.01
+"""Probability above which a cause is kept with its trial."""
 
 SPOILT = ("outliers", "quantisation")
 """Beginnings of the names of causes that do not change the mean of the data."""
@@ -55,13 +62,14 @@ class Trial:
     hidden : tuple of str
         Hidden causes.
     accept : tuple of str
-        Other names by which the hidden causes may be named.
+        Other names by which the hidden causes may be named; outside the catalogue, causes that come close.
     status : str
         Status of the verdict.
     causes : tuple of str
         Named causes.
     sets : tuple of tuple of str
-        Named causes and all rivals, equivalents included.
+        Named causes and all other explanations that the verdict gives, equivalents included; "unknown" among the names
+        stands for something outside the catalogue, and nothing is left out.
     signal_to_noise : float or None
         Root of the noncentrality of what is hidden, after the model's unknowns have taken their share; None for faults
         of the noise, which do not change the mean. For outside effects, what the best set of causes leaves of it.
@@ -70,6 +78,12 @@ class Trial:
         than the closest effect of another name.
     p_value : float
         Family-wise p-value of what the present model leaves.
+    probability : float or None
+        Stated probability that all named causes are at work, each with its equivalents, whatever accompanies them.
+    probabilities : dict of str to float
+        Probability of each cause to be at work, above one per cent.
+    unknown, nothing : float
+        Probabilities of something outside the catalogue, and of nothing.
     amplitude_errors : tuple of float
         Errors of the amplitudes of causes named rightly, in the stated standard deviations.
     body_errors : tuple of float
@@ -78,8 +92,8 @@ class Trial:
         Axes in which an outside wrench is fixed, as the diagnosis says and in truth.
     correlation : float or None
         Correlation of the reconstructed outside torque with the true one.
-    seconds : float
-        Time of the diagnosis [s].
+    seconds : dict of str to float
+        Time of the diagnosis by phase, and "total" with the files read [s].
     """
 
     case: str
@@ -95,12 +109,16 @@ class Trial:
     detection: float | None
     naming: float | None
     p_value: float
+    probability: float | None
+    probabilities: dict[str, float]
+    unknown: float
+    nothing: float
     amplitude_errors: tuple[float, ...]
     body_errors: tuple[float, ...]
     frame: str | None
     true_frame: str | None
     correlation: float | None
-    seconds: float
+    seconds: dict[str, float]
 
     @property
     def alarmed(self) -> bool:
@@ -113,17 +131,24 @@ class Trial:
         return self.status == "explained" and self._right(self.causes)
 
     @property
+    def holds(self) -> bool:
+        """True if the named causes are all hidden, whatever else is hidden, as their stated probability says."""
+        return bool(self.causes) and set(self.causes) <= set(self.hidden) | set(self.accept)
+
+    @property
     def in_set(self) -> bool:
         """True if the hidden set is among those reported."""
         return self.status in ("explained", "ambiguous") and any(self._right(labels) for labels in self.sets)
 
     @property
     def misnamed(self) -> bool:
-        """True if causes are named, but the hidden set is neither named nor among the rivals."""
+        """True if causes are named, but the hidden set is neither named nor among the other explanations."""
         return self.status in ("explained", "ambiguous") and not self.in_set
 
     def _right(self, labels: Sequence[str]) -> bool:
         names = set(self.hidden) | set(self.accept)
+        if self.kind == "unknown":
+            return UNKNOWN in labels or set(labels) <= names
         return len(labels) == len(self.hidden) and set(labels) <= names
 
 
@@ -167,16 +192,16 @@ def run(
     RuntimeError
         If a trial has failed; the others are kept.
     """
-    made = run_trials(_attempt, plans, kept, workers=workers, progress=progress)
+    made = run_trials(_weighed_trial, plans, kept, workers=workers, progress=progress)
     return [_trial(content) for content in made.complete()]
 
 
 def read(kept: Path) -> list[Trial]:
-    """Read the trials made so far; those that failed or were cut off are left out."""
-    return [_trial(line["result"]) for line in read_store(kept) if "result" in line]
+    """Read the trials made so far; those that failed, were cut off or state no probabilities are left out."""
+    return [_trial(line["result"]) for line in read_store(kept) if "probabilities" in line.get("result", {})]
 
 
-def _attempt(item: Plan, rng: np.random.Generator) -> dict[str, Any]:
+def _weighed_trial(item: Plan, rng: np.random.Generator) -> dict[str, Any]:
     """Make a trial, whose random numbers follow from the seed of its plan."""
     return asdict(make(item))
 
@@ -197,7 +222,7 @@ def make(item: Plan) -> Trial:
         model = load_model(study)
         knows = all(section.argument_of_latitude is not None for section in study.recordings)
         result = diagnose(model, load_manoeuvres(study, model.robot), item.seed, knows_latitude=knows)
-        seconds = time.perf_counter() - began
+        total = time.perf_counter() - began
         weaker = case.make(Path(folder) / "weaker", item.seed, WEAKER * item.strength) if _visible(case) else None
         size = (None, None, None) if weaker is None else _limits(result, case, Study.load(weaker))
     return Trial(
@@ -213,13 +238,17 @@ def make(item: Plan) -> Trial:
         signal_to_noise=size[0],
         detection=size[1],
         naming=size[2],
-        p_value=result.before.outcome.p_value,
+        p_value=result.alarm.p_value,
+        probability=_probability(result),
+        probabilities=_inclusion(result),
+        unknown=result.probabilities.unknown,
+        nothing=result.probabilities.nothing,
         amplitude_errors=_amplitude_errors(result, case.amplitudes(item.seed, item.strength)),
         body_errors=_body_errors(result, written),
         frame=None if result.unexplained.fixed_in is None else result.unexplained.fixed_in.value,
         true_frame=case.frame,
         correlation=None if case.frame is None else _correlation(result, case, item, written),
-        seconds=seconds,
+        seconds={**result.seconds, "total": total},
     )
 
 
@@ -239,26 +268,71 @@ def _limits(result: Diagnosis, case: hidden_causes.Case, weaker: Study) -> tuple
     other = like.data.arrays._replace(weights=arrays.weights, start=arrays.start)
     change = (engine.residual(fit.z, arrays) - engine.residual(fit.z, other)) / (1.0 - WEAKER)
     if case.status == "unknown":
-        tried = result.search.tried
-        left = tried[min(1, len(tried) - 1)].fit
-        return float(np.sqrt(left.project(change[:, None])[0, 0])), None, None
+        return float(np.sqrt(_best(result).project(change[:, None])[0, 0])), None, None
     noncentrality = float(fit.project(change[:, None])[0, 0])
-    search = result.search
-    degrees = sum(max(len(search.candidates[c].parameters), 1) if c in search.candidates else 3 for c in case.causes)
+    parameters = {effect.label: max(len(effect.parameters), 1) for effect in result.effects}
+    degrees = sum(parameters.get(cause, 3) for cause in case.causes)
     closest = noncentrality
     names = set(case.causes) | set(case.accept)
-    for label, columns in search.suite.effects.items():
+    for label, columns in _columns(result).items():
         if label not in names and len(case.causes) == 1:
             closest = min(closest, _left(fit, columns, change))
     return (
         float(np.sqrt(noncentrality)),
-        detection_power(degrees, noncentrality, search),
+        _detection(result.alarm, case.causes, degrees, noncentrality),
         float(stats.norm.cdf(0.5 * np.sqrt(max(closest, 0.0)))),
     )
 
 
+def _best(result: Diagnosis) -> Fit:
+    """Return the fit of the most probable set of known causes, beside nothing unknown; of the present model if none."""
+    best = next((item for item in result.probabilities.sets if item.causes and item.generic is None), None)
+    return result.before.fit if best is None or result.alarm.silent else result.fitted(best.causes).fit
+
+
+def _detection(alarm: FamilyAlarm, causes: Sequence[str], degrees: int, noncentrality: float) -> float | None:
+    """Return the power of chi-square at the local level that is family-wise that of the alarm.
+
+    Candidates share half of the family's level. The local level is that at which the evidence of the hidden cause
+    itself, of several the highest, is as rare as the family's largest.
+    """
+    evidence = alarm.candidates
+    least = evidence.largest.threshold(1.0 - np.sqrt(1.0 - alarm.level))
+    local = [evidence.each[cause].log_p(least) for cause in causes if cause in evidence.each]
+    if not local:
+        return None
+    return float(stats.ncx2.sf(stats.chi2.isf(np.exp(max(local)), degrees), degrees, noncentrality))
+
+
+def _columns(result: Diagnosis) -> dict[str, Floats]:
+    """Return the signatures of every cause of the catalogue at its largest plausible scales, in its best form.
+
+    The scales are the prior's widest, so that a cause imitates another as well as physics allows.
+    """
+    base = result.weighed.base
+    rows = len(base.fit.residual)
+    found = {}
+    for name, cause in base.evidence.causes.items():
+        if not cause.generic:
+            groups = cause.variants[base.evidence.forms([name])[name]].groups
+            found[name] = np.concatenate([_scaled(base.bank, group, rows) for group in groups], axis=1)
+    return found
+
+
+def _scaled(bank: SignatureBank, group: AmplitudeGroup, rows: int) -> Floats:
+    blocks = []
+    for item in bank.signatures:
+        if item.name == group.name:
+            block = np.zeros((rows, item.columns.shape[1]))
+            first = (item.recording or 0) * len(item.columns)
+            block[first : first + len(item.columns)] = item.columns
+            blocks.append(block)
+    joined = np.concatenate(blocks, axis=1)
+    return group.high * group.roots(joined.shape[1]) * joined
+
+
 def _left(fit: Fit, columns: Floats, change: Floats) -> float:
-    """Return the noncentrality that a rival effect leaves."""
+    """Return the noncentrality that another cause leaves, its amplitudes normal in the units of its columns."""
     both = fit.project(np.column_stack([change, columns]))
     inner = both[1:, 1:] + np.eye(columns.shape[1])
     return float(both[0, 0] - both[0, 1:] @ np.linalg.solve(inner, both[1:, 0]))
@@ -290,9 +364,23 @@ def _correlation(result: Diagnosis, case: hidden_causes.Case, item: Plan, writte
     return float(np.corrcoef(np.concatenate(estimated), np.concatenate(true))[0, 1])
 
 
+def _probability(result: Diagnosis) -> float | None:
+    """Return the probability that all named causes are at work, by any of their names."""
+    causes = result.verdict.causes
+    if not causes:
+        return None
+    classes = [set(next(members for members in result.classes if cause in members)) for cause in causes]
+    sets = result.probabilities.sets
+    return sum(item.probability for item in sets if not any(members.isdisjoint(item.causes) for members in classes))
+
+
+def _inclusion(result: Diagnosis) -> dict[str, float]:
+    found = result.probabilities
+    return {name: found.inclusion[name] for name in found.causes if found.inclusion[name] > MATTERS}
+
+
 def _sets(result: Diagnosis) -> tuple[tuple[str, ...], ...]:
     verdict = result.verdict
-    sets = [verdict.causes, *(rival.labels for rival in verdict.rivals)]
-    for cause, names in verdict.equivalents.items():
-        sets += [tuple(name if label == cause else label for label in verdict.causes) for name in names]
-    return tuple(labels for labels in sets if labels)
+    sets = [verdict.causes, *verdict.ambiguous_with]
+    choices = [[(name, *verdict.equivalent_to.get(name, ())) for name in labels] for labels in sets if labels]
+    return tuple(labels for each in choices for labels in product(*each))

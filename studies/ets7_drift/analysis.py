@@ -11,16 +11,27 @@ from scipy.spatial.transform import Rotation
 from bayesid import Kind, Model, Posterior, Sensor, White
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis import Diagnosis, Hypothesis, diagnose
+from bayesid.diagnosis import CauseSet, Diagnosis, Hypothesis, diagnose
 from bayesid.diagnosis.cause_amplitudes import amplitudes_of
 from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.simulation.effects import create
 from studies.ets7_drift.world import ATTITUDE_SIGMA, World, model_of
 
-__all__ = ["CAUSES", "Amplitude", "Attitude", "Case", "analyse"]
+__all__ = ["CAUSES", "Amplitude", "Attitude", "Case", "Step", "analyse"]
 
 CAUSES = ("initial-rate", "gravity-gradient", "wheel-momentum")
 """Causes that act in the truth and that the simulation lacks."""
+
+MOST = 3
+"""Largest number of causes of a set that is shown."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """The most probable set of one number of causes, and its fit."""
+
+    found: CauseSet
+    fitted: Hypothesis
 
 
 @dataclass(frozen=True)
@@ -87,9 +98,9 @@ class Case:
         Relative width of the base's prior.
     diagnosis : Diagnosis
         Diagnosis of the rates.
-    steps : tuple of Hypothesis
-        The present model, then the most probable sets of one, two and three causes that were tried; where causes are
-        named, the most probable sets of these.
+    steps : tuple of Step
+        The present model, then the most probable sets of one, two and three causes, without anything unknown; where
+        causes are named, the most probable sets of these.
     amplitudes : tuple of Amplitude
         Amplitudes of the named causes that have any.
     attitudes : tuple of Attitude
@@ -99,7 +110,7 @@ class Case:
     world: World
     spread: float
     diagnosis: Diagnosis
-    steps: tuple[Hypothesis, ...]
+    steps: tuple[Step, ...]
     amplitudes: tuple[Amplitude, ...]
     attitudes: tuple[Attitude, ...]
 
@@ -142,13 +153,18 @@ def analyse(
     return Case(world, spread, result, _steps(result), tuple(_amplitudes(world, result)), attitudes)
 
 
-def _steps(result: Diagnosis) -> tuple[Hypothesis, ...]:
-    """Return the present model and the most probable hypothesis of each number of causes."""
-    best, named = {0: result.search.base}, set(result.verdict.causes)
-    for hypothesis in result.search.tried[1:]:
-        if not named or set(hypothesis.labels) <= named:
-            best.setdefault(len(hypothesis.labels), hypothesis)
-    return tuple(best[count] for count in sorted(best))
+def _steps(result: Diagnosis) -> tuple[Step, ...]:
+    """Return the present model and the most probable set of each number of causes."""
+    best: dict[int, CauseSet] = {}
+    named = set(result.verdict.causes)
+    for item in result.probabilities.sets:
+        if item.generic is None and (not named or set(item.causes) <= named):
+            best.setdefault(len(item.causes), item)
+    return tuple(Step(best[count], _fitted(result, best[count])) for count in sorted(best) if count <= MOST)
+
+
+def _fitted(result: Diagnosis, item: CauseSet) -> Hypothesis:
+    return result.after if set(item.causes) == set(result.verdict.causes) else result.fitted(item.causes)
 
 
 def _amplitudes(world: World, result: Diagnosis) -> Iterator[Amplitude]:

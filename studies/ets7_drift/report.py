@@ -8,20 +8,20 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from bayesid.diagnosis import Status
 from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
-from bayesid.report.numbers import format_number, format_signed, format_unit, format_vector
-from bayesid.report.tables.diagnosis_tables import hypothesis_rows
+from bayesid.report.numbers import format_number, format_probability, format_signed, format_unit, format_vector
+from bayesid.report.sentences.set_words import set_text
+from bayesid.report.tables.probability_tables import set_rows
 from studies.common.ets7 import RADIUS, RAMPS
 from studies.common.report_parts import QUANTITY_TITLES, columns, not_evaluated
-from studies.ets7_drift.analysis import CAUSES, Case
+from studies.ets7_drift.analysis import CAUSES, Case, Step
 from studies.ets7_drift.world import ATTITUDE_SIGMA, ENCODER_SIGMA, INTERVAL, MOMENTUM, RATE, RATE_SIGMA, TRUE_SPREAD
 
 __all__ = ["attitude_figure", "error_figure", "write_report"]
 
-HEADER = ["causes", "log Bayes factor", "chi-square per sample", "p of what it leaves", "worst test", "adequate"]
-"""Titles of the columns of a table of hypotheses."""
+SHOWN = 6
+"""Number of sets in the table of the most probable ones."""
 
 NOISE = float(np.degrees(np.sqrt(3.0) * ATTITUDE_SIGMA))
 """Expected size of the attitude's noise [degrees]."""
@@ -64,12 +64,19 @@ def _verdict(case: Case) -> str:
         missed = [cause for cause in CAUSES if cause not in verdict.causes]
         wrong = [cause for cause in verdict.causes if cause not in CAUSES]
         text += f" Missed: {', '.join(missed) or 'none'}; wrongly named: {', '.join(wrong) or 'none'}."
-    if verdict.rivals and verdict.status in (Status.AMBIGUOUS, Status.UNRESOLVED):
-        text += f" Rivals that do as well: {'; '.join(' + '.join(rival.labels) for rival in verdict.rivals)}."
-    if verdict.equivalents:
-        others = "; ".join(f"{', '.join(names)} for {cause}" for cause, names in verdict.equivalents.items())
+    text += f" The probability of the three together, with nothing beside them, is {format_probability(_true(case))}."
+    if verdict.ambiguous_with:
+        text += f" Other explanations: {'; '.join(map(set_text, verdict.ambiguous_with))}."
+    if verdict.equivalent_to:
+        others = "; ".join(f"{', '.join(names)} for {cause}" for cause, names in verdict.equivalent_to.items())
         text += f" Other names of the same change: {others}."
     return text
+
+
+def _true(case: Case) -> float:
+    """Return the probability of the three true causes and nothing else."""
+    sets = case.diagnosis.probabilities.sets
+    return sum(item.probability for item in sets if item.generic is None and set(item.causes) == set(CAUSES))
 
 
 def _drift(document: Document, case: Case) -> None:
@@ -98,26 +105,43 @@ def _drift(document: Document, case: Case) -> None:
     )
 
 
-def _hypotheses(document: Document, case: Case, caption: str, *, others: bool = False) -> None:
-    """Write a table of the steps of a case, or of the next best sets."""
-    search = case.diagnosis.search
-    rest = [hypothesis for hypothesis in search.tried[1:] if hypothesis not in case.steps][:6]
-    shown = rest if others else case.steps
-    if shown:
-        document.table(HEADER, hypothesis_rows(shown, search.base), caption, columns("lrrrll"))
+def _steps(document: Document, case: Case, caption: str) -> None:
+    """Write a table of the most probable set of each number of causes."""
+    document.table(
+        ["causes", "probability", "log evidence", "chi-square per sample"],
+        [_step_row(step) for step in case.steps],
+        caption,
+        columns("lrrr"),
+    )
+
+
+def _step_row(step: Step) -> list[str]:
+    fit = step.fitted.fit
+    return [
+        set_text(step.found.causes),
+        format_probability(step.found.probability),
+        format_signed(step.found.log_evidence) if step.found.causes else "0",
+        format_number(fit.chi2 / fit.posterior.samples),
+    ]
 
 
 def _causes(document: Document, case: Case) -> None:
     document.section("The causes, one by one")
     named = " of the named causes" if case.diagnosis.verdict.causes else ""
-    _hypotheses(
+    sets = case.diagnosis.probabilities.sets
+    _steps(
         document,
         case,
-        f"The most probable sets{named} with none to three causes ({len(case.diagnosis.search.tried) - 1} sets were "
-        "fitted). The log Bayes factor is against the present model; the p-value is family-wise over all tests of "
-        "what the fit leaves.",
+        f"The most probable sets{named} with none to three causes, each fitted. The probability is that of the set "
+        "alone, and the log evidence is relative to nothing.",
     )
-    _hypotheses(document, case, "The next best of all sets tried.", others=True)
+    document.table(
+        ["causes", "probability", "log evidence", "size", "bound", "share of the bound"],
+        set_rows(case.diagnosis, SHOWN),
+        f"The {min(SHOWN, len(sets))} most probable of all {len(sets)} sets considered. Sizes are root mean squares of "
+        "the amplitudes that share a unit, by the linear model.",
+        columns("lrrlrr"),
+    )
 
 
 def _measured(document: Document, case: Case) -> None:
@@ -177,19 +201,15 @@ def _harder(document: Document, case: Case) -> None:
         f"Here the base is known to a relative width of {100.0 * case.spread:g} %, and the wheel momentum is "
         f"{format_vector(case.world.momentum, 2)} N m s. {_verdict(case)} {_gain_sentence(case)}"
     )
-    _hypotheses(document, case, "The most probable set of each number of causes.")
+    _steps(document, case, "The most probable set of each number of causes.")
     if case.amplitudes:
         distance = max(abs(item.distance) for item in case.amplitudes)
         document.paragraph(f"Amplitudes lie at most {distance:.1f} standard deviations from the truth.")
     if not case.right and not case.diagnosis.verdict.causes:
         off = (case.diagnosis.gain.before.bodies.mean[0] / case.world.base[0] - 1.0) * 100.0
-        tried = {frozenset(hypothesis.labels) for hypothesis in case.diagnosis.search.tried}
-        was = "was fitted" if frozenset(CAUSES) in tried else "was never fitted"
         document.paragraph(
-            "The causes are missed for the following reason. The search fits the present model first and proceeds "
-            f"from there, and that fit lets the base imitate the drift: its mass is {off:+.0f} % wrong. The search "
-            "chooses what to try by the effect of each cause to first order, which is not accurate about a base so "
-            f"far off. The true set {was}."
+            "The fit of the present model, about which the causes are weighed at first, lets the base imitate the "
+            f"drift: its mass is {off:+.0f} % wrong."
         )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import diagnose
 from bayesid.recording.joint_motion import Motion
+from bayesid.report.sentences.set_words import set_text
 from studies.common.monte_carlo import run_trials
 from studies.separating.expected import Expected, Linearised, Pair
 from studies.separating.factors import Flown, Rivalry, Sampled, flown, noisy
@@ -44,11 +45,11 @@ class Realised:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict of the package's diagnosis: its status, the causes that it names, and their rivals."""
+    """Verdict of the package's diagnosis: its status, the causes that it names, and other explanations."""
 
     status: str
     causes: tuple[str, ...]
-    rivals: tuple[str, ...]
+    others: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,7 @@ def diagnosed_causes(
         flights = _flights(motions, duration, truth)
         for stage, names in STAGES.items():
             verdict = diagnose(model, noisy(flights, names, seed), seed, effects=list(CANDIDATES)).verdict
-            rivals = tuple(" + ".join(rival.labels) for rival in verdict.rivals)
-            verdicts[truth, stage] = Verdict(verdict.status.value, tuple(verdict.causes), rivals)
+            others = tuple(map(set_text, verdict.ambiguous_with))
+            verdicts[truth, stage] = Verdict(verdict.status.value, verdict.causes, others)
             progress(f"{truth}, {stage}: {verdicts[truth, stage]}")
     return verdicts

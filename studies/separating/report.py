@@ -22,8 +22,8 @@ from studies.separating.setting import DRIFT, SPREAD, STAGES, TRUTHS
 
 __all__ = ["factor_figure", "write_report"]
 
-RIVALRY = 2.7
-"""Log Bayes factor within which two causes are rivals, as in the package's diagnosis."""
+RIVALRY = 2.2
+"""Log Bayes factor by which a cause must exceed its one rival for a probability of 0.9, from which it is named."""
 
 HIDDEN = {
     "wheel-momentum": f"a wheel momentum of {format_vector(TRUTHS['wheel-momentum'])} N m s",
@@ -194,9 +194,9 @@ def _diagnosed(document: Document, result: Result) -> None:
         document.paragraph("This section was not evaluated: the diagnosis was left out of this run.")
         return
     document.table(
-        ["hidden", "manoeuvres", "status", "named", "rivals"],
+        ["hidden", "manoeuvres", "status", "named", "ambiguous with"],
         [
-            [*key, item.status, ", ".join(item.causes) or "—", "; ".join(item.rivals) or "—"]
+            [*key, item.status, ", ".join(item.causes) or "—", "; ".join(item.others) or "—"]
             for key, item in result.verdicts.items()
         ],
         "The package's diagnosis on the first noise, with the five candidates of the study.",

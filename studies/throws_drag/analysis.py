@@ -68,7 +68,7 @@ class Study:
     ----------
     training : tuple of str
     taken : Hypothesis
-        The verdict's best; where nothing is named, the most probable hypothesis tried.
+        The extended model; where something is there and nothing is named, the most probable set of known causes.
     held_out : HeldOut
     """
 
@@ -128,11 +128,22 @@ def study_body(
     model = plain_model(body, recordings[:training])
     throws = _manoeuvres(model, recordings)
     own = [effect.attach(model.robot) for effect in (GyroCross(), WheelTilt())]
-    found = diagnose(model, throws[:training], seed, effects=[*_rigid(model, names), *own], progress=progress)
-    tried = found.search.tried
-    taken = found.after if found.verdict.causes or len(tried) == 1 else tried[1]
+    effects = [*_rigid(model, names, records_wheels=True), *own]
+    found = diagnose(model, throws[:training], seed, effects=effects, progress=progress)
+    taken = _taken(found)
     names = tuple(recording.name for recording in recordings)
     return Study(body, names[:training], found, taken, predict(model, taken, throws[:training], throws[training:]))
+
+
+def _taken(found: Diagnosis) -> Hypothesis:
+    """Return the extended model, or where nothing is named the most probable one with effects alone.
+
+    Faults of the noise belong to the recordings and not to the bodies, which are compared across recordings.
+    """
+    effects = {effect.label for effect in found.effects}
+    known = (item for item in found.probabilities.sets if item.causes and item.generic is None)
+    best = next((item for item in known if effects.issuperset(item.causes)), None)
+    return found.after if found.verdict.causes or found.alarm.silent or best is None else found.fitted(best.causes)
 
 
 def plain_model(body: str, recordings: Sequence[Recording]) -> Model:
@@ -143,9 +154,9 @@ def plain_model(body: str, recordings: Sequence[Recording]) -> Model:
     return replace(model, priors=(prior,), effects=(FineBias(settings.bias_sigma),))
 
 
-def _rigid(model: Model, names: Sequence[str] | None) -> list[Effect]:
+def _rigid(model: Model, names: Sequence[str] | None, *, records_wheels: bool) -> list[Effect]:
     """Candidates without hidden vibrations: these bodies are stiff, the catalogue's sizes a spacecraft's."""
-    found = [effect for effect in candidates(model) if not effect.modes_count]
+    found = [effect for effect in candidates(model, records_wheels=records_wheels) if not effect.modes_count]
     return [effect for effect in found if names is None or effect.label in names]
 
 
@@ -221,7 +232,9 @@ def find_wheel(
         )
         for recording in recordings
     ]
-    found = diagnose(model, _manoeuvres(model, bare), seed, effects=_rigid(model, names), progress=progress)
+    found = diagnose(
+        model, _manoeuvres(model, bare), seed, effects=_rigid(model, names, records_wheels=False), progress=progress
+    )
     needed = [np.asarray(torque) for torque in found.unexplained.torque[Frame.BASE]]
     recorded = [
         _wheel_torque(recording, time) for recording, time in zip(recordings, found.unexplained.time, strict=True)

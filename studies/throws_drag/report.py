@@ -12,15 +12,15 @@ from bayesid.diagnosis import Diagnosis
 from bayesid.diagnosis.cause_amplitudes import amplitudes_of
 from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
-from bayesid.report.numbers import format_number, format_unit
-from bayesid.report.tables.diagnosis_tables import hypothesis_rows
+from bayesid.report.numbers import format_number, format_p_value, format_unit, relation
+from bayesid.report.tables.diagnosis_tables import candidate_rows
+from bayesid.report.tables.probability_tables import set_rows
 from studies.throws_drag.analysis import SPREAD, Comparison, Study, Wheel
 
 __all__ = ["held_out_figure", "wheel_figure", "write_report"]
 
-HEADER = ["causes", "log Bayes factor", "chi-square per sample", "p of what it leaves", "worst test", "adequate"]
-ALIGN = ["left", "right", "right", "right", "left", "left"]
 SHOWN = 9
+"""Number of sets and of candidates in their tables."""
 
 
 def write_report(result: Any, output: Path) -> None:
@@ -67,7 +67,8 @@ def _body(document: Document, study: Study) -> None:
     document.paragraph(
         f"Training throws: {', '.join(study.training)}. Verdict: {found.verdict.status.value}; named: "
         f"{', '.join(found.verdict.causes) or 'nothing'}. The present model leaves chi-square per sample "
-        f"{found.gain.before.chi2_per_sample:.2f}; no model is adequate unless its p-value exceeds 0.01."
+        f"{found.gain.before.chi2_per_sample:.2f} and is not adequate unless its p-value exceeds "
+        f"{found.alarm.level:g}: p {relation(format_p_value(found.alarm.p_value))}."
     )
     _tried(document, found)
     if study.taken.labels:
@@ -77,7 +78,9 @@ def _body(document: Document, study: Study) -> None:
             for quantity, mean, sd in amplitudes_of(study.taken, label)
         ]
         origin = (
-            "the causes named" if found.verdict.causes else "the most probable set tried, which is not adequate either"
+            "the causes named"
+            if found.verdict.causes
+            else "the most probable set of known causes, which is not probable enough to be named"
         )
         document.table(
             ["cause", "quantity", "unit", "value ± sd"],
@@ -114,15 +117,19 @@ def _body(document: Document, study: Study) -> None:
 
 
 def _tried(document: Document, found: Diagnosis) -> None:
-    search = found.search
+    count = len(found.probabilities.sets)
     document.table(
-        HEADER,
-        hypothesis_rows([search.base, *search.tried[1 : SHOWN + 1]], search.base),
-        f"The present model and the most probable of the {len(search.tried) - 1} sets of causes that were tried.",
-        ALIGN,
+        ["causes", "probability", "log evidence", "size", "bound", "share of the bound"],
+        set_rows(found, SHOWN),
+        f"The {min(SHOWN, count)} most probable of {count} sets of causes. The log evidence is relative to nothing.",
+        ["left", "right", "right", "left", "right", "right"],
     )
-    alone = sorted((h for h in search.tried[1:] if len(h.labels) == 1), key=lambda h: -h.log_evidence)
-    document.table(HEADER, hypothesis_rows(alone[:SHOWN], search.base), "Single causes.", ALIGN)
+    document.table(
+        ["candidate", "probability", "signal-to-noise", "p", "log Bayes factor", "size, or 95 % limit", "power"],
+        candidate_rows(found.candidates[:SHOWN], found.alarm.level),
+        "The most probable candidates. The probability holds whatever accompanies them; all else is of each alone.",
+        ["left", "right", "right", "right", "right", "left", "right"],
+    )
 
 
 def _geometry(document: Document, comparison: Comparison) -> None:
@@ -162,9 +169,8 @@ def _wheel(document: Document, wheel: Wheel) -> None:
     document.paragraph(
         "The recorded momentum of the wheel is dropped from model and recordings. Verdict: "
         f"{found.verdict.status.value}; named: {', '.join(found.verdict.causes) or 'nothing'}. The catalogue's "
-        "wheel-momentum is a wheel at constant speed; this one runs up and down within the half second of a throw. "
-        "Without it the fit of the present model is far from the data (its chi-square per sample is below), and no "
-        "cause can be named from there: what is wrong is seen, the wheel is not found."
+        "wheel-momentum is a wheel at constant speed and its wheel-history one whose speed changes; this wheel runs up "
+        f"and down within the half second of a throw. {_said_of_wheel(found)}"
     )
     _tried(document, found)
     document.figure(
@@ -186,6 +192,13 @@ def _wheel(document: Document, wheel: Wheel) -> None:
         "chi-square per sample of the model without the wheel: "
         f"{format_number(found.gain.before.chi2_per_sample)}."
     )
+
+
+def _said_of_wheel(found: Diagnosis) -> str:
+    if any(cause.startswith("wheel-") for cause in found.verdict.causes):
+        return "A wheel is named."
+    seen = "What is wrong is seen, but no wheel is named" if not found.alarm.silent else "Nothing is seen"
+    return f"{seen}: the fit that the causes are weighed about at first is far from the data."
 
 
 @styled

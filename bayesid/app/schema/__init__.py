@@ -7,6 +7,7 @@ not even NumPy before a body needs it, so that errors in the file are reported a
 """
 
 from bayesid.app.schema.design_section import DesignLimits, DesignSection
+from bayesid.app.schema.diagnosis_section import DiagnosisSection
 from bayesid.app.schema.robot_section import BodySection, LoadSection, OrbitSection, RobotSection
 from bayesid.app.schema.sensor_sections import (
     AccelSensor,
@@ -25,6 +26,7 @@ __all__ = [
     "BodySection",
     "DesignLimits",
     "DesignSection",
+    "DiagnosisSection",
     "EncoderSensor",
     "LoadSection",
     "ModelSection",

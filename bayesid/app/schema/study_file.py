@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, PrivateAttr, ValidationError, model_valida
 
 from bayesid._io.errors import InputError
 from bayesid.app.schema.design_section import DesignSection
+from bayesid.app.schema.diagnosis_section import DiagnosisSection
 from bayesid.app.schema.robot_section import OrbitSection, RobotSection
 from bayesid.app.schema.sensor_sections import SensorsSection
 from bayesid.app.schema.study_sections import ModelSection, RecordingSection, UnknownsSection, check_extended
@@ -39,6 +40,8 @@ class Study(Section):
         Contents of the simulation.
     design : DesignSection or None
         Manoeuvre to design.
+    diagnosis : DiagnosisSection
+        Prior of a diagnosis.
     """
 
     title: str = ""
@@ -49,6 +52,7 @@ class Study(Section):
     unknowns: UnknownsSection
     model: ModelSection = ModelSection()
     design: DesignSection | None = None
+    diagnosis: DiagnosisSection = DiagnosisSection()
     # a private attribute, because it is not a key of the file
     _file: Path | None = PrivateAttr(default=None)
 

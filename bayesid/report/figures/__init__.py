@@ -1,8 +1,10 @@
 """Figures of the reports; every function returns a new matplotlib Figure, and none touches pyplot."""
 
 from bayesid.report.figures.agreement_figures import measured_against_simulated, torques_over_time
+from bayesid.report.figures.cause_picture import cause_picture
 from bayesid.report.figures.design_figures import base_motion, covariance_ellipses, joints_within_limits, tip_motion
 from bayesid.report.figures.diagnosis_figures import candidate_strengths, wrench_histories, wrench_spectrum
+from bayesid.report.figures.forest_figure import parameter_forest
 from bayesid.report.figures.identifiability_figures import direction_widths, displacements
 from bayesid.report.figures.prediction_figures import final_positions, trajectory_bands
 from bayesid.report.figures.residual_figures import residual_histories, residual_spectra, residual_statistics
@@ -13,6 +15,7 @@ from bayesid.report.figures.uncertainty_figures import corner, correlations, pri
 __all__ = [
     "base_motion",
     "candidate_strengths",
+    "cause_picture",
     "convergence",
     "corner",
     "correlations",
@@ -23,6 +26,7 @@ __all__ = [
     "joints_within_limits",
     "manoeuvre",
     "measured_against_simulated",
+    "parameter_forest",
     "prior_to_posterior",
     "residual_histories",
     "residual_spectra",

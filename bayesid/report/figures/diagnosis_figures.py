@@ -40,7 +40,7 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
     figure = wide_figure(0.75 + 0.155 * len(rows))
     axes = figure.subplots()
     place = np.arange(len(rows))[::-1]
-    kinds = {"named": COLOURS[0], "significant": COLOURS[4], "not significant": "#bbbbbb"}
+    kinds = {"named": COLOURS[0], "significant": "#777777", "not significant": "#cccccc"}
     state = [
         "named" if row.name in named else "significant" if row.p_value_adjusted < alarm else "not significant"
         for row in rows
@@ -62,8 +62,16 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
 
 
 @styled
-def wrench_histories(wrench: Unexplained, frame: Frame) -> Figure:
-    """Draw a reconstructed torque and force over time in the axes of one frame, with ± 1 sd in base axes."""
+def wrench_histories(wrench: Unexplained, frame: Frame, cause: Sequence[Floats] | None = None) -> Figure:
+    """Draw a reconstructed torque and force over time in the axes of one frame, with ± 1 sd in base axes.
+
+    Parameters
+    ----------
+    wrench : Unexplained
+    frame : Frame
+    cause : sequence of (S, 3) arrays, optional
+        Torque of the named causes in each recording, in the same axes, drawn over the reconstructed one.
+    """
     figure = wide_figure(3.6)
     panels = figure.subplots(2, 3, squeeze=False, sharex=True)
     families = (
@@ -81,11 +89,15 @@ def wrench_histories(wrench: Unexplained, frame: Frame) -> Figure:
                     sd = spread[index][:, axis] / scale
                     axes.fill_between(time, value - sd, value + sd, color=style["color"], alpha=0.18, linewidth=0.0)
                 axes.plot(time, value, linewidth=0.9, label=name, **style)
+                if cause is not None and title == "torque":
+                    axes.plot(time, cause[index][:, axis] / scale, "--", color="black", linewidth=0.9)
             axes.axhline(0.0, color="black", linewidth=0.5)
             axes.set_title(f"{title} {'xyz'[axis]} [{prefix}{unit}]")
             axes.locator_params(axis="both", nbins=4)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
+    if cause is not None:
+        panels[0, 0].plot([], [], "--", color="black", label="named causes")
     shared_legend(figure, panels[0, 0], columns=4)
     return figure
 

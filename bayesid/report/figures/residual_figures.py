@@ -25,7 +25,7 @@ from bayesid.report.figures.figure_style import (
     wide_figure,
 )
 
-__all__ = ["residual_histories", "residual_spectra", "residual_statistics"]
+__all__ = ["SIDES", "draw_history", "residual_histories", "residual_spectra", "residual_statistics"]
 
 PARTS = 40
 """Number of windows that a recording is cut into for the running mean."""
@@ -59,13 +59,7 @@ def residual_histories(sides: Sequence[Residuals], recording: int) -> Figure:
             for side, (name, colour) in zip(sides, SIDES, strict=False):
                 time, value = side.series(recording, kind, axis)
                 label = "samples and their running mean"
-                axes.plot(time, value, ".", color=colour, markersize=1.2, alpha=0.5)
-                axes.plot(
-                    *_running_mean(time, value),
-                    color=colour,
-                    linewidth=1.0,
-                    label=f"{name}: {label}" if len(sides) > 1 else label,
-                )
+                draw_history(axes, time, value, colour, f"{name}: {label}" if len(sides) > 1 else label)
                 drawn.append(value)
             residual_limits(axes, np.concatenate(drawn))
             axes.set_title(axis_title(kind, axis))
@@ -75,6 +69,12 @@ def residual_histories(sides: Sequence[Residuals], recording: int) -> Figure:
         axes.set_xlabel("time [s]")
     shared_legend(figure, panels[0, 0], columns=2)
     return figure
+
+
+def draw_history(axes: Axes, time: Floats, value: Floats, colour: str, label: str) -> None:
+    """Draw residuals over time as points, with a running mean as a line."""
+    axes.plot(time, value, ".", color=colour, markersize=1.2, alpha=0.5)
+    axes.plot(*_running_mean(time, value), color=colour, linewidth=1.0, label=label)
 
 
 def _running_mean(time: Floats, value: Floats) -> tuple[Floats, Floats]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -15,7 +18,7 @@ from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 
-__all__ = ["equivalent_box", "manoeuvre", "robot_pose"]
+__all__ = ["VIEWS", "draw_box", "draw_sticks", "equivalent_box", "manoeuvre", "robot_pose", "sticks_of"]
 
 
 VIEWS = (("seen along −z", 0, 1), ("seen along y", 0, 2), ("seen along −x", 1, 2))
@@ -64,7 +67,7 @@ def robot_pose(robot: Robot, motion: Motion, times: Floats) -> Figure:
     times = np.atleast_1d(np.asarray(times, dtype=float))
     poses = kinematics(robot, motion.evaluate(times)).pose
     box = equivalent_box(robot.link(robot.base).inertial)
-    paths = [_sticks(robot, pose) for pose in poses]
+    paths = [sticks_of(robot, pose) for pose in poses]
     points = np.concatenate([box, *(np.concatenate(path) for path in paths)])
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.05 * float((high - low).max())
@@ -74,10 +77,9 @@ def robot_pose(robot: Robot, motion: Motion, times: Floats) -> Figure:
     panels = figure.subplots(1, 3, gridspec_kw={"width_ratios": ratios})
     colours = colormaps["cividis_r"](np.linspace(0.25, 1.0, len(times)))
     for axes, (title, across, up) in zip(panels, VIEWS, strict=True):
-        _draw_box(axes, box, (across, up))
+        draw_box(axes, box, (across, up))
         for path, colour, time, pose in zip(paths, colours, times, poses, strict=True):
-            for stick in path:
-                axes.plot(stick[:, across], stick[:, up], "-o", color=colour, markersize=2.2, linewidth=1.2)
+            draw_sticks(axes, path, (across, up), colour)
             centre = _centre_of_mass(robot, pose)
             axes.plot(centre[across], centre[up], "X", color=colour, markersize=5.5, markeredgecolor="white", mew=0.5)
             axes.plot([], [], color=colour, linewidth=1.4, label=f"t = {time:.4g} s")
@@ -102,7 +104,7 @@ def equivalent_box(body: InertialParameters) -> Floats:
     return body.com + (signs * half) @ axes.T
 
 
-def _sticks(robot: Robot, pose: Floats) -> list[Floats]:
+def sticks_of(robot: Robot, pose: Floats) -> list[Floats]:
     """Return one stick to each moving joint from its parent, and one on to the centre of mass of every last link."""
     parents = [robot.model.parents[index + 2] - 2 for index in range(len(robot.joints))]
     origin = [pose[index, :3, 3] for index in range(len(robot.joints))]
@@ -124,7 +126,14 @@ def _centre_of_mass(robot: Robot, pose: Floats) -> Floats:
     return moment / robot.mass
 
 
-def _draw_box(axes: Axes, box: Floats, plane: tuple[int, int]) -> None:
+def draw_sticks(axes: Axes, path: Sequence[Floats], plane: tuple[int, int], colour: Any) -> None:
+    """Draw the sticks of a robot in one projection."""
+    for stick in path:
+        axes.plot(*stick[:, list(plane)].T, "-o", color=colour, markersize=2.2, linewidth=1.2)
+
+
+def draw_box(axes: Axes, box: Floats, plane: tuple[int, int]) -> None:
+    """Draw the box of the base in one projection, and the origin of the base frame."""
     flat = box[:, list(plane)]
     if min(np.ptp(flat, axis=0)) > 1e-9:
         hull = flat[ConvexHull(flat, qhull_options="QJ").vertices]

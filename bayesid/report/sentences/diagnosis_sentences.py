@@ -1,34 +1,43 @@
-"""Sentences of a diagnosis: the verdict, its causes, what they gain, and how the verdict was reached."""
+"""Sentences of a diagnosis: the verdict, its causes and alternatives, what the causes gain, and what is left."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, Status, Unexplained
-from bayesid.diagnosis.amplitude_scale import SCALES
 from bayesid.diagnosis.cause_amplitudes import amplitudes_of
 from bayesid.diagnosis.noise_faults import SUMMARIES
-from bayesid.diagnosis.rival_causes import differing
-from bayesid.diagnosis.test_suite import FALSE_ALARM
-from bayesid.diagnosis.verdict import RIVALRY
-from bayesid.report.numbers import format_fixed, format_number, format_p_value, format_signed
+from bayesid.diagnosis.probable_verdict import COVERED, UNKNOWN
+from bayesid.report.class_probabilities import alternative_probability, alternatives, cause_probability
+from bayesid.report.numbers import (
+    format_fixed,
+    format_number,
+    format_p_value,
+    format_percent,
+    format_probability,
+    format_signed,
+    relation,
+)
 from bayesid.report.sentences.amplitude_words import amplitude_text
-from bayesid.report.sentences.next_experiment import advice
+from bayesid.report.sentences.set_words import NOTHING, probability_text, set_text
 
 __all__ = [
-    "advice_sentences",
     "alarm_sentence",
+    "alternative_sentences",
     "cause_sentences",
+    "cause_summary",
     "diagnosis_sentences",
     "gain_sentence",
-    "method_sentences",
     "verdict_sentence",
     "wrench_sentence",
 ]
 
 AT_MOST = 6
 """Largest number of quantities of one cause in a sentence."""
+
+SHOWN_SETS = 3
+"""Sets named in the sentence of a verdict that names none."""
 
 RELEASED = "The base was already turning when the recordings began, although the study takes it to be at rest."
 """Summary of the cause that the initial rate is not zero."""
@@ -43,11 +52,10 @@ FIXED = {
 
 
 def diagnosis_sentences(result: Diagnosis) -> Iterator[str]:
-    """Return the verdict, its causes, its rivals and its gain, for the terminal."""
+    """Return the verdict, its causes, its alternatives and its gain, for the terminal."""
     yield verdict_sentence(result)
     yield from cause_sentences(result)
-    for rival in result.verdict.rivals:
-        yield f"Rival: {' + '.join(rival.labels)}."
+    yield from alternative_sentences(result)
     yield gain_sentence(result)
     if result.verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
         yield wrench_sentence(result.unexplained)
@@ -56,54 +64,84 @@ def diagnosis_sentences(result: Diagnosis) -> Iterator[str]:
 def verdict_sentence(result: Diagnosis) -> str:
     """Return the verdict and what it means."""
     causes = joined(result.verdict.causes)
-    one = len(result.verdict.causes) == 1
-    return {
-        Status.ADEQUATE: "Adequate: the simulation leaves nothing but the declared noise.",
-        Status.EXPLAINED: f"Explained by {causes}: with {'it' if one else 'them'} the simulation leaves nothing but "
-        "noise, and nothing else in the catalogue does so as well.",
-        Status.AMBIGUOUS: f"Ambiguous: {causes} {'explains' if one else 'explain'} what the simulation leaves, and so "
-        f"do other causes, about as well. These recordings cannot tell them apart.",
-        Status.UNRESOLVED: "Unresolved: the simulation leaves more than noise, but too faintly to name the cause.",
-        Status.UNKNOWN: "Unknown: the simulation leaves more than noise, and no set of up to three causes of the "
-        "catalogue explains it.",
-    }[result.verdict.status]
+    match result.verdict.status:
+        case Status.ADEQUATE:
+            return "Adequate: the simulation leaves nothing but the declared noise."
+        case Status.EXPLAINED:
+            one = len(result.verdict.causes) == 1
+            return (
+                f"Explained by {causes}: with {'it' if one else 'them'} the simulation needs no other explanation. "
+                f"The probability that {'it is' if one else 'all are'} at work is "
+                f"{_is(alternative_probability(result, result.verdict.causes))}."
+            )
+        case Status.AMBIGUOUS:
+            names = "; or ".join(map(set_text, alternatives(result)))
+            return (
+                f"Ambiguous: what the simulation leaves comes from {names}. Together these alternatives have a "
+                f"probability of at least {format_percent(COVERED, 2)}, and the recordings do not decide between them."
+            )
+        case Status.UNRESOLVED:
+            sets = result.probabilities.sets[:SHOWN_SETS]
+            most = "; ".join(f"{set_text(item.names)} ({probability_text(item.probability)})" for item in sets)
+            return (
+                "Unresolved: the simulation leaves more than noise, but the probability is spread over too many "
+                f"explanations to name the cause. The most probable sets are: {most}."
+            )
+    generic, _ = max(
+        ((name, result.probabilities.inclusion[name]) for name in result.probabilities.generics),
+        key=lambda item: item[1],
+        default=(NOTHING, 0.0),
+    )
+    return (
+        "Unknown: what the simulation leaves belongs most probably to no cause of the catalogue "
+        f"({probability_text(result.probabilities.unknown)}). Of what names no cause, the most probable is: {generic}."
+    )
+
+
+def _is(value: float) -> str:
+    """Return a probability after "is": the number, or the bound in words."""
+    text = format_probability(value)
+    return text.replace("> ", "more than ").replace("< ", "less than ")
 
 
 def alarm_sentence(result: Diagnosis) -> str:
-    """Return the most significant test before, and after where causes are named."""
-    before, after = result.before.outcome, result.after.outcome
-    first = (
-        f"Of {len(before.log_p)} tests of what the present simulation leaves, the most significant is "
-        f"that for {before.worst} (p {_relation(before.p_value)}, all tests counted)"
-    )
-    if not result.verdict.causes:
-        return f"{first}; an alarm is raised below {FALSE_ALARM:g}."
+    """Return the loudest test of the present model, with its family-wise p-value and the level of the alarm."""
+    alarm = result.alarm
+    found = "no alarm is raised" if alarm.silent else "an alarm is raised"
     return (
-        f"{first}. With the named cause{'s' if len(result.verdict.causes) > 1 else ''} it is that for {after.worst} "
-        f"(p {_relation(after.p_value)}); an alarm is raised below {FALSE_ALARM:g}."
+        f"Of {alarm.tests} tests of what the present simulation leaves, the loudest is that for {alarm.loudest} "
+        f"(p {relation(format_p_value(alarm.p_value))}, all tests counted). Below {alarm.level:g} the alarm is raised: "
+        f"here {found}."
     )
-
-
-def _relation(p_value: float) -> str:
-    text = format_p_value(p_value)
-    return text if text.startswith("<") else f"= {text}"
 
 
 def cause_sentences(result: Diagnosis) -> Iterator[str]:
-    """Return what each named cause is, how large it is, and by which other names it goes."""
-    best = result.verdict.best
+    """Return what each named cause is, how probable and how large it is, and by which other names it goes."""
     for label in result.verdict.causes:
-        parts = [f"{label}. {_summary(best, label)}"]
-        amplitude = amplitudes_of(best, label)
-        if amplitude:
+        parts = [
+            f"{label}. {cause_summary(result.after, label)}".rstrip(),
+            f"The probability that it is at work is {_is(cause_probability(result, label))}.",
+        ]
+        if amplitude := amplitudes_of(result.after, label):
             rest = "; all are in the table of the named causes" if len(amplitude) > AT_MOST else ""
             parts.append(f"Its size: {amplitude_text(amplitude, AT_MOST)}{rest}.")
-        if others := result.verdict.equivalents.get(label):
+        if others := result.verdict.equivalent_to.get(label):
             parts.append(f"Other names for the same change: {joined(others)}.")
         yield " ".join(parts)
 
 
-def _summary(hypothesis: Hypothesis, label: str) -> str:
+def alternative_sentences(result: Diagnosis) -> Iterator[str]:
+    """Return each alternative to the named causes, with its probability and the other names of its causes."""
+    for names in result.verdict.ambiguous_with:
+        text = f"Alternative: {set_text(names)} ({probability_text(alternative_probability(result, names))})."
+        for name in names:
+            if name != UNKNOWN and (others := result.verdict.equivalent_to.get(name)):
+                text += f" Other names for {name}: {joined(others)}."
+        yield text
+
+
+def cause_summary(hypothesis: Hypothesis, label: str) -> str:
+    """Return what a cause of a hypothesis is, in one sentence."""
     for effect in hypothesis.fit.effects:
         if effect.label == label:
             return effect.summary
@@ -142,38 +180,3 @@ def wrench_sentence(wrench: Unexplained) -> str:
     where = FIXED[wrench.fixed_in] if wrench.fixed_in else "In which axes it keeps its direction is not decided."
     strength = format_fixed(wrench.signal_to_noise, 1)
     return f"As a free torque and force on the base it has a signal-to-noise ratio of {strength}. {where}"
-
-
-def advice_sentences(result: Diagnosis, rivals: Sequence[Hypothesis]) -> Iterator[str]:
-    """Return the manoeuvre that would bring out each cause in which the best hypothesis and its rivals differ."""
-    if not rivals:
-        return
-    leader = result.verdict.best if result.verdict.best.labels else rivals[0]
-    names = [name for rival in rivals for side in differing(leader, rival) for name in side]
-    for name in dict.fromkeys(names):
-        yield f"{name}: {advice(name)}"
-
-
-def method_sentences(result: Diagnosis) -> Iterator[str]:
-    """Return how the verdict was reached."""
-    search = result.search
-    yield (
-        f"An alarm is raised where the smallest p-value of the whole family of {len(search.base.outcome.log_p)} tests "
-        f"is one that noise alone gives in less than {100.0 * FALSE_ALARM:g} % of cases. The family holds every "
-        "candidate, smooth disturbing torques and forces, vibrations, the residual of each channel, and the sensors' "
-        "noise. The distribution of the smallest p-value under noise alone was simulated, with all dependence between "
-        "the tests."
-    )
-    yield (
-        f"{len(search.candidates)} causes of the catalogue are possible here: {', '.join(search.candidates)}. Others "
-        "were not considered."
-    )
-    yield (
-        "Causes are tried one at a time, then the best in pairs, then in threes. The smallest set that leaves nothing "
-        "but noise is named; sets of one size are ranked by their evidence, from the Laplace approximation. Rivals "
-        f"are within {RIVALRY:g} of the best in the logarithm of the Bayes factor. The scale of a cause's amplitudes "
-        f"of one unit is unknown: it is that of the priors shown, or one of {len(SCALES) - 1} smaller scales down to "
-        f"{SCALES[-1]:g} of it, all equally probable."
-    )
-    yield "Faults of the noise are named only where no physical cause explains the residual."
-    yield f"Seed of all random numbers: {search.seed}."

@@ -6,6 +6,8 @@ study files; the class states everything else that the package needs to know of 
 
 from bayesid.simulation.effects.arm_effects import LinkInertia, Payload
 from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointFlexibility, JointLatency
+from bayesid.simulation.effects.attitude_misalignment import AttitudeMisalignment
+from bayesid.simulation.effects.clock_faults import AccelClock, AccelLatency, RateClock, RateLatency
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity
 from bayesid.simulation.effects.environment_effects import (
@@ -19,31 +21,33 @@ from bayesid.simulation.effects.environment_effects import (
 from bayesid.simulation.effects.instant import Instant, Modes, Readings, Resonance, Wrench
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh, WheelMomentum
 from bayesid.simulation.effects.joint_friction import JointFriction, TorqueBias
+from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound, bounds_by_label
 from bayesid.simulation.effects.register import create, known_effects, register
 from bayesid.simulation.effects.sensor_faults import (
     AccelBias,
     AccelDrift,
-    AccelLatency,
     AccelMisalignment,
     AccelPosition,
     AccelScale,
     RateBias,
     RateDrift,
-    RateLatency,
     RateMisalignment,
     RateScale,
     SensorFault,
 )
+from bayesid.simulation.effects.wheel_history import WheelHistory
 
 __all__ = [
     "AccelBias",
+    "AccelClock",
     "AccelDrift",
     "AccelLatency",
     "AccelMisalignment",
     "AccelPosition",
     "AccelScale",
     "AerodynamicDrag",
+    "AttitudeMisalignment",
     "Effect",
     "EncoderOffset",
     "FlexibleAppendage",
@@ -55,6 +59,7 @@ __all__ = [
     "JointLatency",
     "LinkInertia",
     "MagneticDipole",
+    "MassShift",
     "Modes",
     "Parameter",
     "Payload",
@@ -62,6 +67,7 @@ __all__ = [
     "Prior",
     "Quantity",
     "RateBias",
+    "RateClock",
     "RateDrift",
     "RateLatency",
     "RateMisalignment",
@@ -73,6 +79,7 @@ __all__ = [
     "SolarPressure",
     "ThrusterLeak",
     "TorqueBias",
+    "WheelHistory",
     "WheelMomentum",
     "Wrench",
     "bounds_by_label",

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Self
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from bayesid._io.errors import InputError
@@ -26,7 +27,7 @@ from bayesid.simulation.effects.register import register
 if TYPE_CHECKING:
     from bayesid.simulation.model import Model
 
-__all__ = ["LinkInertia", "Payload"]
+__all__ = ["LinkInertia", "LinkMoments", "Payload"]
 
 CHANGES = (
     Quantity("mass", "kg"),
@@ -98,6 +99,14 @@ class _OnLink(Placed):
         """Changes of the ten linear parameters, which are the coefficients that `loads` returns."""
         return LINEAR_CHANGES
 
+    def in_amplitudes(self) -> Effect:
+        """Return the effect with the changes of the ten linear parameters as parameters."""
+        return LinkMoments(self)
+
+    def amplitudes(self, values: Array) -> Array:
+        """Return the changes of the ten linear parameters."""
+        return self.loads(values)
+
     def report(self, values: Array) -> Array:
         """Return the differences of the link from the nominal link."""
         factor, nominal = self._attached
@@ -118,6 +127,47 @@ class _OnLink(Placed):
         if self.factor is None or self.vector is None:
             raise InputError(f"effect {self.label!r} belongs to no model yet", remedy="Put it into a Model")
         return jnp.asarray(self.factor), jnp.asarray(self.vector)
+
+
+class LinkMoments(Placed):
+    """Change of a link's mass, first moment and inertia about the link's origin, in which the motion is linear.
+
+    Nothing keeps the changed link a physical body. The scale of each parameter is that of the link itself.
+    """
+
+    def __init__(self, effect: _OnLink) -> None:
+        super().__init__(effect.place)
+        self.kind = effect
+        _, vector = effect._attached
+        mass = float(vector[0])
+        extent = float(np.sqrt(np.abs(np.asarray(vector)[[4, 6, 9]]).max() / mass))
+        powers = {"kg": 0, "kg m": 1, "kg m2": 2}
+        self.parameters = tuple(
+            Parameter(item.name, item.unit, effect.spread * mass * extent ** powers[item.unit])
+            for item in LINEAR_CHANGES
+        )
+
+    @property
+    def label(self) -> str:
+        """Name of the effect on the link."""
+        return self.kind.label
+
+    @property
+    def link(self) -> str | None:
+        """Link that changes."""
+        return self.place
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the bounds of the effect on the link."""
+        return self.kind.physical_bounds(model)
+
+    def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
+        """Return the kinematic table of the link."""
+        return self.kind.table(robot, motion, time)
+
+    def loads(self, values: Array) -> Array:
+        """Return the parameters, which are the coefficients of the table."""
+        return values
 
 
 @register

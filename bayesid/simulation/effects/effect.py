@@ -97,6 +97,17 @@ class Effect:
         """Return the effect on a robot, and raise an `InputError` if the robot lacks its place."""
         return self
 
+    def in_recording(self, index: int) -> Self:
+        """Return the effect as its `table` and `jumps` are in the recording of an index, by default itself.
+
+        An effect whose constants differ between recordings, such as an instant, overrides this.
+        """
+        return self
+
+    def jumps(self, end: float) -> Sequence[float]:
+        """Return the instants [s] at which `table` jumps in a recording of length ``end``, just after each of them."""
+        return ()
+
     @property
     def starts(self) -> Sequence[Floats]:
         """Starting points of a fit, in coordinates of standard-normal prior, by default zero."""

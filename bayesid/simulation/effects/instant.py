@@ -176,7 +176,10 @@ class Resonance(NamedTuple):
     coupling : (6, 6) array
         Sum over the modes of the outer products of linear and angular momentum per modal speed [sqrt(kg), sqrt(kg) m]
         that fits the residual best, which need not be positive semidefinite.
+    damping : float
+        Damping ratio.
     """
 
     frequency: float
     coupling: Floats
+    damping: float = 0.01

@@ -21,7 +21,7 @@ from bayesid.simulation.effects.register import register
 if TYPE_CHECKING:
     from bayesid.simulation.model import Model
 
-__all__ = ["FlexibleAppendage", "FuelSlosh", "WheelMomentum"]
+__all__ = ["FlexibleAppendage", "FuelSlosh", "WheelMomentum", "wheel_bound"]
 
 FREQUENCY, FREQUENCY_SPREAD = 0.12, 1.0
 """Median of a hidden vibration's frequency [Hz] and standard deviation of its logarithm, for 0.02 to 0.9 Hz at 2 sd."""
@@ -38,8 +38,8 @@ RESONANCES = 2
 SMALLEST_COUPLING = 0.1
 """Smallest squared coupling of a mode at the start of a fit [kg m2]; from zero the fit could not choose its sign."""
 
-SLOSH_FREQUENCIES, SLOSH_MASS = (0.06, 0.25), 5.0
-"""Frequencies [Hz] and mass [kg] from which the fit of slosh starts; two suffice, since it converges from afar."""
+SLOSH_MASS, SMALLEST_MASS = 5.0, 0.1
+"""Mass [kg] from which the fit of slosh starts at further places, and least mass of any start."""
 
 TANK_DISTANCE = 0.4
 """Distance of further starting positions of the tank from the middle of the spacecraft, along each axis [m]."""
@@ -82,13 +82,7 @@ class WheelMomentum(Effect):
 
     def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
         """Return the momentum of all wheels that a robot of this mass and size carries, at full speed."""
-        size = RobotSize.of(model.robot)
-        radius = RIM_RADIUS * size.length
-        reason = (
-            f"Wheels whose rotors are {100.0 * ROTORS:g} % of {three_digits(size.mass)} kg run with {RIM_SPEED:g} m/s "
-            f"at their rims of {radius:.2g} m radius."
-        )
-        return (PhysicalBound("N m s", ROTORS * size.mass * RIM_SPEED * radius, reason),)
+        return (wheel_bound(model.robot),)
 
     def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
         """Return the momentum of the wheels, and a zero derivative."""
@@ -170,10 +164,10 @@ class FlexibleAppendage(_Vibration):
     def starts_near(self, resonances: Sequence[Resonance], alone: bool) -> Sequence[Floats]:
         """Return one start per resonance, with the eigenvector of its coupling of largest eigenvalue as mode."""
         starts = []
-        for frequency, matrix in resonances[:RESONANCES]:
+        for frequency, matrix, damping in resonances[:RESONANCES]:
             values, vectors = np.linalg.eigh(matrix)
             coupling = vectors[:, -1] * np.sqrt(max(values[-1], SMALLEST_COUPLING))
-            starts.append(coordinates_of(self.parameters, [frequency, DAMPING, *coupling]))
+            starts.append(coordinates_of(self.parameters, [frequency, damping, *coupling]))
         return starts
 
 
@@ -223,14 +217,20 @@ class FuelSlosh(_Vibration):
         return changed
 
     def starts_near(self, resonances: Sequence[Resonance], alone: bool) -> Sequence[Floats]:
-        """Return starts at two frequencies in the middle of the spacecraft and, for a fit alone, at other positions."""
+        """Return the start of the strongest resonance and, for a fit alone, starts at other positions.
+
+        The coupling of a mass at ``p`` is its mass times ``[[1, -[p]], [[p], [p][p]']]``, from which both follow.
+        """
         middle = np.array([parameter.mean for parameter in self.parameters[3:]])
-        places = [(frequency, middle) for frequency in SLOSH_FREQUENCIES]
+        first = resonances[0]
+        mass = float(np.trace(first.coupling[:3, :3])) / 3.0
+        turned = first.coupling[3:, :3]
+        moment = 0.5 * np.array([turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]])
+        place = moment / mass if mass > SMALLEST_MASS else middle
+        starts = [(max(mass, SMALLEST_MASS), place)]
         if alone:  # the position may have several optima
-            places += [(resonances[0].frequency, middle + TANK_DISTANCE * corner) for corner in TANK_CORNERS]
-        return [
-            coordinates_of(self.parameters, [SLOSH_MASS, frequency, DAMPING, *place]) for frequency, place in places
-        ]
+            starts += [(SLOSH_MASS, middle + TANK_DISTANCE * corner) for corner in TANK_CORNERS]
+        return [coordinates_of(self.parameters, [own, first.frequency, first.damping, *where]) for own, where in starts]
 
     def modes(self, values: Array) -> Modes:
         """Return three modes, one along each axis."""
@@ -250,3 +250,14 @@ def spacecraft_box(robot: Robot) -> tuple[Floats, Floats]:
     base = robot.link(robot.base).inertial
     second = np.diag(base.pseudo_inertia[:3, :3]) / base.mass - base.com**2
     return base.com, 1.5 * np.sqrt(3.0 * second)
+
+
+def wheel_bound(robot: Robot) -> PhysicalBound:
+    """Return the momentum of all wheels that a robot of this mass and size carries, at full speed [N m s]."""
+    size = RobotSize.of(robot)
+    radius = RIM_RADIUS * size.length
+    reason = (
+        f"Wheels whose rotors are {100.0 * ROTORS:g} % of {three_digits(size.mass)} kg run with {RIM_SPEED:g} m/s "
+        f"at their rims of {radius:.2g} m radius."
+    )
+    return PhysicalBound("N m s", ROTORS * size.mass * RIM_SPEED * radius, reason)

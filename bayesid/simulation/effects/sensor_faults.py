@@ -1,4 +1,4 @@
-"""Faults of sensors, in sensor axes.
+"""Faults of sensors, in sensor axes; those of their clocks are in `bayesid.simulation.effects.clock_faults`.
 
 The reading is ``measured = (1 + scale) * (rotation(misalignment) * true(t - latency)) + bias + drift * t``; with a
 positive latency the sample stamped t shows the past.
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, ClassVar
 import jax.numpy as jnp
 from jax import Array
 
-from bayesid._math.hermite import hermite
 from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter
@@ -27,13 +26,11 @@ if TYPE_CHECKING:
 __all__ = [
     "AccelBias",
     "AccelDrift",
-    "AccelLatency",
     "AccelMisalignment",
     "AccelPosition",
     "AccelScale",
     "RateBias",
     "RateDrift",
-    "RateLatency",
     "RateMisalignment",
     "RateScale",
     "SensorFault",
@@ -46,6 +43,9 @@ RATE_BIAS, ACCEL_BIAS = 1.745e-3, 0.049
 They are the largest of the grades in El-Sheimy and Youssef, Inertial sensors technologies for navigation applications,
 Satellite Navigation 1:2, 2020, table 1.
 """
+
+MISMOUNTED = 0.1, "A sensor that was mounted without a measurement of its axes is within six degrees of them."
+"""Largest rotation of a sensor against its stated mounting [rad], and the reason."""
 
 WARM_UP = 600.0
 """Time within which an instrument that warms up changes by all of its constant error [s]; assumed."""
@@ -130,29 +130,11 @@ class _Scale(_Axes):
 
 class _Misalignment(_Axes):
     unit = "rad"
-    largest, reason = 0.1, "A sensor that was mounted without a measurement of its axes is within six degrees of them."
+    largest, reason = MISMOUNTED
     separated_by = "It mixes the axes: turn about one axis at a time, with large readings."
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         return reading @ _rotation(values).T
-
-
-class _Latency(SensorFault):
-    separated_by = (
-        "It grows with speed: repeat the same motion twice as fast; errors of bodies stay in proportion to the motion, "
-        "those of a delay grow with frequency."
-    )
-
-    def __init__(self, sigma: float = 0.2) -> None:
-        self.parameters = (Parameter("delay", "s", sigma),)
-
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
-        """Return a cycle of slow telemetry."""
-        return (PhysicalBound("s", 1.0, "A slow telemetry stamps its samples once in a second."),)
-
-    def change(self, values: Array, time: Array, reading: Array) -> Array:
-        # written as a change of the reading
-        return reading + _interpolate(time - values[0], time, reading) - reading
 
 
 @register
@@ -260,24 +242,6 @@ class AccelPosition(_Axes):
     read = Effect.read
 
 
-@register
-class RateLatency(_Latency):
-    """Delay of the rate sensor; the prior is a few cycles of a slow data bus."""
-
-    name = "rate-latency"
-    summary = "The rate sensor's samples are stamped late: each shows the past."
-    sensor = Kind.RATE
-
-
-@register
-class AccelLatency(_Latency):
-    """Delay of the accelerometer; the prior is a few cycles of a slow data bus."""
-
-    name = "accel-latency"
-    summary = "The accelerometer's samples are stamped late: each shows the past."
-    sensor = Kind.ACCEL
-
-
 def _rotation(vector: Array) -> Array:
     """Return the rotation matrix of a rotation vector, by a series that is smooth at zero."""
     x, y, z = vector
@@ -289,20 +253,3 @@ def _rotation(vector: Array) -> Array:
         + hat * (1.0 - square / 6.0 + square**2 / 120.0)
         + hat @ hat * (0.5 - square / 24.0 + square**2 / 720.0)
     )
-
-
-def _interpolate(at: Array, time: Array, values: Array) -> Array:
-    """Return the cubic Hermite interpolation of samples (T, C) with parabolic slopes; padding repeats the last time."""
-    step = jnp.diff(time)
-    safe = jnp.where(step > 0.0, step, 1.0)[:, None]
-    slope = jnp.where(step[:, None] > 0.0, jnp.diff(values, axis=0) / safe, 0.0)
-    left, right = safe[:-1], safe[1:]
-    inner = (right * slope[:-1] + left * slope[1:]) / (left + right)
-    inner = jnp.where(step[1:, None] > 0.0, inner, slope[:-1])
-    slopes = jnp.concatenate([slope[:1], inner, slope[-1:]])
-    index = jnp.clip(jnp.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
-    index = jnp.where(step[index] > 0.0, index, jnp.maximum(index - 1, 0))
-    h = safe[index]
-    s = (at - time[index])[:, None] / h
-    a, b, p, q = values[index], values[index + 1], slopes[index] * h, slopes[index + 1] * h
-    return hermite(a, b, p, q, s)

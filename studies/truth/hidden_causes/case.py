@@ -50,7 +50,8 @@ class Case:
     fixed : dict
         Further keywords.
     accept : tuple of str
-        Names that are as right as one of the causes, since they change the model alike.
+        Names that are as right as one of the causes, since they change the model alike; outside the catalogue, causes
+        that come as close as unknown.
     frame : str, optional
         Axes in which an outside wrench is fixed; "orbit" are those of each recording's start.
     """

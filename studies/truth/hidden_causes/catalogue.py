@@ -125,7 +125,7 @@ CASES: tuple[Case, ...] = (
     _outside("thermal-snap", hide.thermal_snap, urdf=SERVICER4, frame="base"),
     _outside("growing-torque", hide.growing_torque, frame="orbit"),
     _outside("swinging-torque", hide.swinging_torque, urdf=SERVICER4, frame="orbit"),
-    _outside("shifting-mass", hide.shifting_mass),
+    _outside("shifting-mass", hide.shifting_mass, accept=("mass-shift",)),
     _null("null, three joints"),
     _null("null, four joints, own sampling rates", urdf=SERVICER4, sensors={"rate_period": 1.0, "accel_period": 0.25}),
     _null(

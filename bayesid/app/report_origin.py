@@ -1,0 +1,22 @@
+"""Where a report comes from: the files with their hashes, version, seed and command."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+from bayesid._io.store import file_key
+from bayesid.app.schema import Study
+
+__all__ = ["report_origin"]
+
+DIGITS = 12
+"""Digits of a hash that are printed."""
+
+
+def report_origin(study: Study, command: str, seed: int) -> str:
+    """Return the files of a study with the beginnings of their SHA-256, the version, the seed and the command."""
+    files = [study.robot.urdf, *(recording.file for recording in study.recordings)]
+    if study.file is not None:
+        files.insert(0, study.file)
+    hashes = ", ".join(f"{file.name} {file_key(file)[:DIGITS]}" for file in files)
+    return f"SHA-256: {hashes}. bayesid {version('bayesid')}, seed {seed}, command: bayesid {command}."

@@ -1,0 +1,112 @@
+"""Fit of named causes with the catalogue's effects themselves, from what the Gram says of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.amplitude_posterior import AmplitudePosterior
+from bayesid.diagnosis.hypothesis import Hypothesis
+from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
+from bayesid.diagnosis.linearisation import Linearisation
+from bayesid.diagnosis.mass_shift_signatures import shift_instants
+from bayesid.diagnosis.noise_states import NoiseState
+from bayesid.diagnosis.perturbed_fit import Fit
+from bayesid.diagnosis.vibration_signatures import coupling_matrix, slosh_entries
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.instant import Resonance
+from bayesid.simulation.effects.mass_shift import MassShift
+
+__all__ = ["fit_hypothesis"]
+
+MOST_STARTS = 6
+"""Most starting points of one fit."""
+
+HELD = (1.0, 0.85)
+"""Frequencies with the base held, from which the fit of a vibration starts, relative to the tone that is seen with the
+base free; the base's yielding raises the tone."""
+
+
+def fit_hypothesis(state: NoiseState, causes: Sequence[str], effects: Sequence[Effect]) -> Hypothesis:
+    """Fit the present model with some causes.
+
+    Parameters
+    ----------
+    state : NoiseState
+        With the fault of the noise that is among the causes, if any.
+    causes : sequence of str
+        Names of effects, of the initial rate and of the fault.
+    effects : sequence of Effect
+        Candidates of the catalogue.
+
+    Raises
+    ------
+    InputError
+        If no start of the fit has a motion.
+    """
+    point, names = state.point, [name for name in causes if name not in state.names]
+    wanted = [effect for effect in effects if effect.label in names]
+    chosen = [_settled(effect, point, names) for effect in wanted]
+    engine = point.engine.released() if INITIAL_RATE in names else point.engine
+    z = point.fit.z.copy()
+    if INITIAL_RATE in names:
+        z[point.engine.frozen] = engine.posterior.starting_point()[point.engine.frozen]
+    starts = [_starts(effect, point, names) for effect in wanted]
+    best: Fit | None = None
+    problem: InputError | None = None
+    for start in list(product(*starts))[:MOST_STARTS]:
+        try:
+            fit = engine.fit(chosen, start, z=z)
+        except InputError as error:  # no motion from this start
+            problem = error
+            continue
+        if best is None or fit.cost < best.cost:
+            best = fit
+    if best is None:
+        raise problem if problem is not None else InputError("a hypothesis cannot be fitted", remedy="Name another")
+    return Hypothesis(engine, best, () if state.fault is None else (state.fault,))
+
+
+def _starts(effect: Effect, point: Linearisation, names: Sequence[str]) -> Sequence[Floats]:
+    """Return starting points of one effect beside the others of a set."""
+    if not effect.modes_count:
+        linear = effect.in_amplitudes()
+        if linear is effect and effect.parameters:
+            mean = _amplitudes(effect.label, point, names)  # recording after recording, where each has its own
+            return [mean / np.resize([parameter.sigma for parameter in effect.parameters], mean.shape)]
+        return effect.starts
+    amplitudes = _amplitudes(effect.label, point, names)
+    entries = slosh_entries() @ amplitudes if len(amplitudes) == slosh_entries().shape[1] else amplitudes
+    forms = point.evidence.forms(names)
+    group = point.evidence.causes[effect.label].variants[forms[effect.label]].groups[0].name
+    tone = next(item.tone for item in point.bank.signatures if item.name == group)
+    frequency, damping = (0.1, 0.01) if tone is None else tone
+    coupling = coupling_matrix(entries)
+    tones = [Resonance(share * frequency, coupling, damping) for share in HELD]
+    return [start for tone in tones for start in effect.starts_near([tone], False)]
+
+
+def _settled(effect: Effect, point: Linearisation, names: Sequence[str]) -> Effect:
+    """Return an effect with what its most probable form settles: the instant of a jump."""
+    if not isinstance(effect, MassShift):
+        return effect
+    form = point.evidence.forms(names)[effect.label]
+    ends = np.asarray(point.fit.operating.node.environment.time).max(axis=1)
+    recording, place = divmod(form, len(shift_instants(1.0)))
+    instants = [np.inf] * len(ends)
+    instants[recording] = float(shift_instants(float(ends[recording]))[place])
+    return MassShift(instants).attach(point.engine.posterior.model.robot)
+
+
+def _amplitudes(label: str, point: Linearisation, names: Sequence[str]) -> Floats:
+    """Return the mean amplitudes of one cause beside the others of a set, in the order of its columns."""
+    free = [name for name in names if not point.evidence.causes[name].fixed]
+    posterior = AmplitudePosterior.of(point.evidence, free)
+    forms = point.evidence.forms(free)
+    groups = point.evidence.causes[label].variants[forms[label]].groups
+    mean = posterior.mean
+    return np.concatenate([mean[posterior.amplitudes[label, group.name]] for group in groups])

@@ -1,0 +1,113 @@
+"""The model linearised about a fit: bank of signatures, its Gram, and the evidence of every set of causes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.catalogue_signatures import catalogue_signatures, group_names
+from bayesid.diagnosis.generic_signatures import generic_signatures
+from bayesid.diagnosis.gram import Gram
+from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE, initial_rate_signatures
+from bayesid.diagnosis.mass_shift_signatures import mass_shift_signatures
+from bayesid.diagnosis.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.set_evidence import SetEvidence
+from bayesid.diagnosis.signature_bank import SignatureBank
+from bayesid.diagnosis.vibration_signatures import vibration_signatures
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.physical_bound import PhysicalBound
+
+__all__ = ["Linearisation", "linearise"]
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """A model and all that it may lack, linear about one fit.
+
+    Attributes
+    ----------
+    engine : Engine
+    fit : Fit
+        With no effect or with some that are linear in their parameters.
+    bank : SignatureBank
+    evidence : SetEvidence
+        Of sets of causes relative to nothing, by the linear model.
+    log_nothing : float
+        Logarithm of the evidence of the present model without any cause, by the linear model.
+    """
+
+    engine: Engine
+    fit: Fit
+    bank: SignatureBank
+    evidence: SetEvidence
+    log_nothing: float
+
+    def with_bank(self, bank: SignatureBank) -> Linearisation:
+        """Return the linearisation with another bank about the same fit."""
+        return _assembled(self.engine, self.fit, bank)
+
+
+def linearise(
+    engine: Engine, fit: Fit, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
+) -> Linearisation:
+    """Linearise the model and all candidates about a fit.
+
+    Where the fit holds effects, their amplitudes there are not zero. The likelihood is quadratic about them, and the
+    linear terms that this leaves at zero belong to the score: with ``a`` the amplitudes at the fit, the score is
+    ``g - A a``, and the evidence of nothing holds ``g'a - a'A a / 2``.
+
+    Parameters
+    ----------
+    engine : Engine
+    fit : Fit
+    effects : sequence of Effect
+        Candidates of the catalogue.
+    bounds : mapping of str to sequence of PhysicalBound
+        Of each candidate, by its label.
+    """
+    bank = SignatureBank.joined(
+        [
+            catalogue_signatures(engine, fit, effects, bounds),
+            initial_rate_signatures(engine, fit),
+            vibration_signatures(engine, fit, effects, bounds),
+            mass_shift_signatures(engine, fit, effects, bounds),
+            generic_signatures(engine, fit),
+        ]
+    )
+    return _assembled(engine, fit, bank)
+
+
+def _assembled(engine: Engine, fit: Fit, bank: SignatureBank) -> Linearisation:
+    gram = bank.gram(fit)
+    amplitudes = _amplitudes(fit, gram)
+    own = fit.own
+    pull = np.linalg.cholesky(own.T @ own + np.eye(own.shape[1]))
+    moved = np.linalg.solve(pull, own.T @ fit.residual + fit.own_coordinates)
+    z = fit.own_coordinates
+    cost = 0.5 * float(fit.residual @ fit.residual + z @ z - moved @ moved)
+    constant = float(fit.posterior.log_normalisation.sum() - np.log(np.diag(pull)).sum())
+    taken = gram.matrix @ amplitudes
+    log_nothing = constant - cost + float(gram.score @ amplitudes - 0.5 * amplitudes @ taken)
+    gram = replace(gram, score=gram.score - taken)
+    return Linearisation(engine, fit, bank, SetEvidence(gram, bank.causes), log_nothing)
+
+
+def _amplitudes(fit: Fit, gram: Gram) -> Floats:
+    """Return the amplitudes of all columns of the Gram at a fit, shape (m,)."""
+    found = np.zeros(len(gram.score))
+    if INITIAL_RATE in gram.groups:
+        found[gram.groups[INITIAL_RATE]] = fit.posterior.unknowns.rate_sigma * fit.z[fit.frozen]
+    for index, effect in enumerate(fit.effects):
+        names = group_names(effect)
+        if not effect.parameters:
+            found[gram.groups[effect.label]] = 1.0
+            continue
+        values = fit.values(index).ravel()
+        units = np.resize([parameter.unit for parameter in effect.parameters], len(values))
+        for name in dict.fromkeys(names.values()):
+            own = np.isin(units, [unit for unit, other in names.items() if other == name])
+            found[gram.groups[name]] += values[own]
+    return found

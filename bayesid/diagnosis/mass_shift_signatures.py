@@ -1,0 +1,76 @@
+"""Signatures of a mass that moves over inside the base, at instants of a grid in each recording."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.mass_shift import MassShift
+from bayesid.simulation.effects.physical_bound import PhysicalBound
+
+__all__ = ["mass_shift_signatures", "shift_instants"]
+
+INSTANTS = 16
+"""Instants of the grid in each recording."""
+
+
+def shift_instants(end: float) -> Floats:
+    """Return the instants of the grid in a recording of some length [s]."""
+    return end * (np.arange(INSTANTS) + 0.5) / INSTANTS
+
+
+def mass_shift_signatures(
+    engine: Engine, fit: Fit, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
+) -> SignatureBank:
+    """Return the bank of jumps of the base's moments; an empty one where such a jump is no candidate.
+
+    Its forms are one jump in one recording, at any instant of the grid. The recordings are independent given the
+    unknowns, so that one push acts on all of them at once.
+
+    Parameters
+    ----------
+    engine : Engine
+    fit : Fit
+        About which the signatures are taken.
+    effects : sequence of Effect
+        Candidates of the catalogue.
+    bounds : mapping of str to sequence of PhysicalBound
+        Of each candidate, by its label.
+    """
+    shift = next((effect for effect in effects if isinstance(effect, MassShift)), None)
+    if shift is None:
+        return SignatureBank()
+    times = [np.asarray(side.environment.time) for side in (fit.operating.node, fit.operating.sample)]
+    ends = times[0].max(axis=1)
+    columns = _columns(engine, fit, times, ends)
+    sizes = {bound.unit: bound.largest for bound in bounds[shift.label]}
+    spread = np.repeat([1.0, (sizes["kg m2"] / sizes["kg m"]) ** 2], [3, 6])
+    signatures = [
+        Signatures(f"{shift.label} at {instant:.5g} s in recording {r + 1}", columns[r, k], r)
+        for r, end in enumerate(ends)
+        for k, instant in enumerate(shift_instants(float(end)))
+    ]
+    forms = [(AmplitudeGroup(item.name, sizes["kg m"], spread=spread),) for item in signatures]
+    return SignatureBank(tuple(signatures), (CandidateCause(shift.label, forms[0], others=tuple(forms[1:])),))
+
+
+def _columns(engine: Engine, fit: Fit, times: Sequence[Floats], ends: Floats) -> Floats:
+    """Return the responses of each recording to unit moments from each instant on, shape (R, INSTANTS, rows, 9)."""
+    tables = []
+    for time in times:
+        own = [
+            [MassShift.table_at(time[r], instant) for r, instant in enumerate(row)]
+            for row in np.stack([shift_instants(float(end)) for end in ends], axis=1)
+        ]
+        tables.append(np.moveaxis(np.array(own), -1, 1))  # (INSTANTS, 9, R, T, 28)
+    count = tables[0].shape[1]
+    rows = [part.reshape(INSTANTS * count, *part.shape[2:]) for part in tables]
+    push = engine.perturbation(INSTANTS * count, node_rows=rows[0], sample_rows=rows[1])
+    found = engine.respond(push, fit.z, engine.data_of(fit))
+    return np.moveaxis(found.reshape(len(ends), -1, INSTANTS, count), 2, 1)

@@ -1,0 +1,137 @@
+"""Faults of the noise as states of the whole problem, each with its own evidence and its own Gram."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesid.diagnosis.linearisation import Linearisation, linearise
+from bayesid.diagnosis.noise_faults import NoiseFault, noise_fault, refined
+from bayesid.diagnosis.noise_tests import ON_LATTICE
+from bayesid.diagnosis.perturbed_fit import Engine, Fit
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.sensors import Kind
+
+__all__ = ["NoiseState", "fault_names", "noise_state"]
+
+DECADES = 3.0
+"""Decades over which the size of a fault is log-uniform beforehand, and the correlation time of coloured noise."""
+
+HOPELESS, BEHIND = 60.0, 20.0
+"""Nats by which a fault alone, as first estimated and refined, may be behind the best explanation to be weighed."""
+
+
+@dataclass(frozen=True)
+class NoiseState:
+    """The model under one fault of its noise, or under none.
+
+    Attributes
+    ----------
+    fault : NoiseFault or None
+    point : Linearisation
+    log_charge : float
+        Logarithm of what the freedom of the fault costs.
+    """
+
+    fault: NoiseFault | None
+    point: Linearisation
+    log_charge: float = 0.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of the fault, if any."""
+        return () if self.fault is None else (self.fault.label,)
+
+    @property
+    def log_nothing(self) -> float:
+        """Logarithm of the evidence of the present model with this fault and no other cause."""
+        return self.point.log_nothing + self.log_charge
+
+
+def fault_names(engine: Engine) -> tuple[str, ...]:
+    """Return the names of all faults of the noise of a model's sensors."""
+    kinds = [sensor.kind.value for sensor in engine.posterior.model.sensors]
+    return tuple(
+        name
+        for kind in kinds
+        for name in (f"{kind}-noise", f"coloured-noise:{kind}", f"outliers:{kind}", f"quantisation:{kind}")
+    )
+
+
+def noise_state(
+    label: str,
+    residual: Fit,
+    base: Linearisation,
+    effects: Sequence[Effect],
+    bounds: Mapping[str, Sequence[PhysicalBound]],
+    best: float,
+) -> NoiseState | None:
+    """Return the state with one fault, whose size is estimated from a residual.
+
+    It is None if the residual shows no such fault, or if the fault was to explain by itself what the present model
+    leaves and is far behind the best explanation.
+
+    Parameters
+    ----------
+    label : str
+        Name of the fault.
+    residual : Fit
+        From whose residual the fault is estimated.
+    base : Linearisation
+        Of the present model, from which its fit under the fault starts.
+    effects : sequence of Effect
+        Candidates of the catalogue.
+    bounds : mapping of str to sequence of PhysicalBound
+    best : float
+        Log evidence of the best explanation so far.
+    """
+    alone = residual is base.fit
+    fault = noise_fault(label, residual, best - base.log_nothing - HOPELESS if alone else -np.inf)
+    if fault is None:
+        return None
+    engine = base.engine.with_posterior(fault.posterior)
+    fit = engine.fit(z=base.fit.z)
+    if alone and fit.log_evidence + _log_charge(fault) < best - HOPELESS:
+        return None
+    if label.startswith("coloured-noise"):
+        fault = refined(fault, engine, residual)
+        engine = engine.with_posterior(fault.posterior)
+        fit = engine.fit(z=base.fit.z)
+    if alone and fit.log_evidence + _log_charge(fault) < best - BEHIND:
+        return None
+    return NoiseState(fault, linearise(engine, fit, effects, bounds), _log_charge(fault))
+
+
+def _log_charge(fault: NoiseFault) -> float:
+    """Return the logarithm of posterior over prior width of a fault's size, and what its samples say by themselves."""
+    width = DECADES * np.log(10.0)
+    name, _, place = fault.label.partition(":")
+    if name == "quantisation":  # that values fall on a lattice by chance
+        return -float(np.log(2.0 * ON_LATTICE)) * fault.posterior.samples / 3.0
+    relative = np.maximum(fault.sd / fault.mean, 1e-6)
+    charge = float(np.minimum(np.log(np.sqrt(2.0 * np.pi) * relative / width), 0.0).sum())
+    if name == "outliers":
+        charge += _contamination(fault, Kind.of(place))
+    return charge
+
+
+def _contamination(fault: NoiseFault, kind: Kind) -> float:
+    """Return the logarithm of the probability density of the samples that count as outliers.
+
+    A sample is contaminated with the probability that the fault states, and then uniform over the range of the readings
+    of its channel; it does not count as certain.
+    """
+    posterior, fraction = fault.posterior, float(fault.mean[0])
+    columns = posterior.model.channels.of(kind)
+    total = 0.0
+    for r, gone in enumerate(posterior.data.left_out):
+        mask = gone[:, columns]
+        span = np.ptp(posterior.data.measured(r, kind)[1], axis=0)[: mask.shape[1]]
+        width = np.maximum(span, posterior.data.sigma(r, kind))
+        total += float((mask.sum(axis=0) * (np.log(max(fraction, 1e-9)) - np.log(width))).sum())
+        kept = int((~mask & posterior.whitenings[r].outputs[:, columns]).sum())
+        total += kept * float(np.log1p(-min(fraction, 0.5)))
+    return total

@@ -1,0 +1,1 @@
+"""Pages of a diagnosis report, one file each."""

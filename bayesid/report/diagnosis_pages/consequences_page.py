@@ -1,0 +1,105 @@
+"""Fourth page of a diagnosis report: the inertial parameters with and without the causes, and the disturbance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from bayesid.diagnosis import Diagnosis, Frame, Status, Unexplained
+from bayesid.diagnosis.wrench_correlations import torque_correlations
+from bayesid.report import figures
+from bayesid.report.cause_torque import cause_torque
+from bayesid.report.document import Document
+from bayesid.report.given_values import ParameterChange
+from bayesid.report.sentences.diagnosis_sentences import wrench_sentence
+from bayesid.report.simulation_errors import simulation_errors
+from bayesid.report.tables import change_tables
+from bayesid.report.tables.diagnosis_tables import correlation_rows
+
+__all__ = ["add_consequences"]
+
+AXES = {Frame.BASE: "base", Frame.ORBIT: "orbit (zenith, along-track, normal)", Frame.INERTIAL: "inertial"}
+"""Names of the axes in which a disturbance is drawn."""
+
+
+def add_consequences(document: Document, result: Diagnosis, changes: Sequence[ParameterChange]) -> None:
+    """Add all inertial parameters and the reconstructed disturbance."""
+    named = bool(result.verdict.causes)
+    document.section("Consequences" if named else "Inertial parameters and the disturbance")
+    if changes:
+        document.table(
+            ["parameter", "unit", "given", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
+            change_tables.change_rows(changes, named),
+            "Inertial parameters, ± sd: given with the prior's width, fitted without the named causes, fitted with "
+            "them. A shift of many standard deviations of the fit without is the error that would have been believed."
+            if named
+            else "Inertial parameters, ± sd: given with the prior's width, and fitted with the present model.",
+            ["left", "left", *["right"] * (4 if named else 2)],
+        )
+    if changes:
+        document.figure(
+            figures.parameter_forest(changes, named),
+            "Inertial parameters about the values given, as multiples of the prior's width; bars hold 95 %. Widths "
+            "without the causes assume that the present model is right.",
+        )
+    document.table(
+        ["sensor", "unit", *(["before", "after"] if named else ["error"]), "noise alone"],
+        change_tables.error_rows(simulation_errors(result), named),
+        "Root mean square error of the simulation, length of all axes, freed of its correlation.",
+        ["left", "left", *["right"] * (3 if named else 2)],
+    )
+    _add_disturbance(document, result)
+
+
+def _add_disturbance(document: Document, result: Diagnosis) -> None:
+    """Add the torque and force that would explain the residual; nothing where only readings are at fault."""
+    named = bool(result.verdict.causes)
+    if result.verdict.status is Status.ADEQUATE or (named and not _may_be_disturbance(result)):
+        return
+    wrench = result.disturbance if named else result.unexplained
+    document.paragraph(
+        f"This disturbance of the base would explain the residual{' without the named causes' if named else ''}: "
+        "torque about and force through the common centre of mass, smooth in time, with a size estimated from the "
+        "data. Bands are ± 1 standard deviation. The part that the model's unknowns can explain is not in it. "
+        f"{wrench_sentence(wrench)}"
+    )
+    if wrench.signal_to_noise == 0.0:
+        return
+    _add_wrench(document, result, wrench, not named)
+    if named:
+        document.paragraph(f"What the named causes leave. {wrench_sentence(result.unexplained)}")
+
+
+def _may_be_disturbance(result: Diagnosis) -> bool:
+    """Return whether a named cause acts on the motion, or is a fault of the noise that could hide a disturbance."""
+    hooks = ("wrench", "momentum", "table", "modes")
+    return bool(result.after.faults) or any(effect.uses(hook) for effect in result.after.fit.effects for hook in hooks)
+
+
+def _add_wrench(document: Document, result: Diagnosis, wrench: Unexplained, whole: bool) -> None:
+    """Add the figures of a wrench and the table of its correlations; the whole of it in further axes too."""
+    in_orbit = result.before.fit.posterior.model.orbit is not None
+    for frame, name in AXES.items():
+        if frame is Frame.BASE or (whole and (in_orbit or frame is Frame.INERTIAL)):
+            cause = cause_torque(result.after) if not whole else None
+            document.figure(
+                figures.wrench_histories(wrench, frame, cause),
+                f"Reconstructed torque and force, {name} axes."
+                + (
+                    " Dashed: the whole torque of the named causes, with what the model's unknowns could explain of it."
+                    if cause is not None
+                    else ""
+                ),
+            )
+    if whole:
+        document.figure(
+            figures.wrench_spectrum(wrench),
+            "Amplitude of the reconstructed torque by frequency, base axes, up to the frequency that is resolved.",
+        )
+    if rows := correlation_rows(torque_correlations(wrench, result.before)):
+        document.table(
+            ["component, base axes", "moves with", "correlation"],
+            rows,
+            "Largest correlations of the reconstructed torque with known series, all recordings pooled. The series are "
+            "smooth, so that a correlation of one half can be chance.",
+            ["left", "left", "right"],
+        )

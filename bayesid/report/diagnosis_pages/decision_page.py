@@ -1,0 +1,145 @@
+"""First page of a diagnosis report: the decision, its probabilities, and what it changes for the user."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from bayesid.diagnosis import Diagnosis, Status
+from bayesid.report import figures
+from bayesid.report.class_probabilities import alternative_probability, cause_probability
+from bayesid.report.document import Document
+from bayesid.report.given_values import ParameterChange
+from bayesid.report.numbers import format_number, format_probability, format_quantity, format_unit
+from bayesid.report.sentences.conditions import conditions_text
+from bayesid.report.sentences.diagnosis_sentences import cause_summary, verdict_sentence, wrench_sentence
+from bayesid.report.sentences.next_steps import action_sentence
+from bayesid.report.sentences.set_words import set_text, verdict_text
+from bayesid.report.sentences.size_words import size_text
+from bayesid.report.simulation_errors import SimulationError, simulation_errors, strongest_recording
+from bayesid.report.tables import change_tables, probability_tables
+
+__all__ = ["add_decision", "decision_entries"]
+
+MOVED = 4
+"""Inertial parameters in the table of the first page."""
+
+CLASSES = 4
+"""Classes of causes in the table of probabilities."""
+
+
+def add_decision(
+    document: Document,
+    result: Diagnosis,
+    changes: Sequence[ParameterChange],
+    record: str | None = None,
+    origin: str | None = None,
+) -> None:
+    """Add the decision, a picture of it, and its tables.
+
+    Parameters
+    ----------
+    document : Document
+    result : Diagnosis
+    changes : sequence of ParameterChange
+        All inertial parameters.
+    record : str, optional
+        How often such a verdict was right where the truth was known.
+    origin : str, optional
+        Files with their hashes, version, seed and command.
+    """
+    errors = simulation_errors(result)
+    document.decision(
+        f"Decision. {_capital(verdict_text(result.verdict))}", decision_entries(result, changes, errors, record)
+    )
+    _add_picture(document, result)
+    _add_changes(document, result, changes)
+    document.table(
+        ["at work", "probability"],
+        probability_tables.probability_rows(result, CLASSES),
+        "Probability of being at work, whatever accompanies it; causes that these data cannot tell apart share a row.",
+        ["left", "right"],
+    )
+    if origin:
+        document.foot(origin)
+
+
+def decision_entries(
+    result: Diagnosis, changes: Sequence[ParameterChange], errors: Sequence[SimulationError], record: str | None = None
+) -> list[tuple[str, str]]:
+    """Return the names and texts of the rows of the box."""
+    verdict = result.verdict
+    entries = [("Verdict", verdict_sentence(result))]
+    for cause in verdict.causes:
+        entries += [
+            ("Cause", _cause_text(result, cause)),
+            ("Size, ± 95 %", size_text(result.after, cause)),
+        ]
+    entries += [
+        ("Alternative", f"{set_text(names)}, probability {format_probability(alternative_probability(result, names))}")
+        for names in verdict.ambiguous_with
+    ]
+    if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
+        entries.append(("What is left", wrench_sentence(result.unexplained)))
+    if record:
+        entries.append(("Record", record))
+    entries += [
+        ("What it changes", _change_text(result, changes, errors)),
+        ("Conditions", conditions_text(result.after)),
+        ("What to do", action_sentence(result)),
+    ]
+    return entries
+
+
+def _cause_text(result: Diagnosis, cause: str) -> str:
+    probability = format_probability(cause_probability(result, cause))
+    return f"{cause}, probability {probability}. {cause_summary(result.after, cause)}".rstrip()
+
+
+def _change_text(result: Diagnosis, changes: Sequence[ParameterChange], errors: Sequence[SimulationError]) -> str:
+    """Return the parameter that moves most and the errors of the simulation, before and after."""
+    if not result.verdict.causes:
+        return "No inertial parameter: nothing is added to the model. " + _errors_text(errors, named=False)
+    text = ""
+    if moved := change_tables.most_moved(changes, 1):
+        item = moved[0]
+        text = (
+            f"{item.name}: given {format_number(item.given, 4)}, fitted without "
+            f"{format_quantity(item.without, item.without_sd)}, with {format_quantity(item.fitted, item.fitted_sd)} "
+            f"{format_unit(item.unit)}. "
+        )
+    return text + _errors_text(errors, named=True)
+
+
+def _errors_text(errors: Sequence[SimulationError], named: bool) -> str:
+    parts = []
+    for item in errors:
+        after = f" before, {format_number(item.after, 2)} after" if named else ""
+        parts.append(f"{item.kind.value} {format_number(item.before, 2)}{after} {format_unit(item.kind.unit)}")
+    return f"Error of the simulation, rms: {'; '.join(parts)}."
+
+
+def _add_picture(document: Document, result: Diagnosis) -> None:
+    document.figure(
+        figures.cause_picture(result, strongest_recording(result)),
+        "Left: the robot as given, with the cause where it acts. Right: what the simulation of "
+        f"{result.before.fit.posterior.manoeuvres[strongest_recording(result)].recording.name} misses on the axis that "
+        "changes most, in standard deviations of the noise, with running means; the grey band is ± 2 σ.",
+    )
+
+
+def _add_changes(document: Document, result: Diagnosis, changes: Sequence[ParameterChange]) -> None:
+    named = bool(result.verdict.causes)
+    if not changes:
+        return
+    document.table(
+        ["parameter", "unit", "given", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
+        change_tables.change_rows(change_tables.most_moved(changes, MOVED), named),
+        "The inertial parameters that move most: given, fitted without the named causes, fitted with them, ± sd."
+        if named
+        else "Inertial parameters: given, and fitted with the present model, ± sd. All are on a later page.",
+        ["left", "left", *["right"] * (4 if named else 2)],
+    )
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,68 @@
+"""Sentences on what to do after a diagnosis: with the model, and in the next manoeuvre."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from bayesid._io.words import joined
+from bayesid.diagnosis import Diagnosis, Status
+from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
+from bayesid.diagnosis.probable_verdict import UNKNOWN
+from bayesid.report.class_probabilities import alternatives
+from bayesid.report.sentences.next_experiment import advice
+
+__all__ = ["SEPARATE_UNKNOWN", "action_sentence", "advice_sentences", "differing_causes"]
+
+SEPARATE_UNKNOWN = (
+    "Repeat a manoeuvre unchanged but later: what depends on the clock then comes back at another instant of the "
+    "motion, what depends on the motion at the same. Then repeat it with the base turned to another attitude, and "
+    "record with the arm at rest."
+)
+"""Advice where no cause of the catalogue is at work."""
+
+
+def action_sentence(result: Diagnosis) -> str:
+    """Return what to do now, in one or two sentences."""
+    match result.verdict.status:
+        case Status.ADEQUATE:
+            return "Use the model as it is."
+        case Status.EXPLAINED:
+            return _addition(result)
+        case Status.AMBIGUOUS:
+            first = next(advice_sentences(result), "")
+            return f"Do not rely on one of the alternatives; fly the manoeuvre that separates them. {first}".rstrip()
+        case Status.UNRESOLVED:
+            return "Record longer, or repeat the manoeuvres: the signal grows with the root of their number."
+    return f"Do not use the present model's values. {SEPARATE_UNKNOWN}"
+
+
+def _addition(result: Diagnosis) -> str:
+    """Return how to put the named causes into the model: effects, faults of the noise, and a base that turned."""
+    causes = result.verdict.causes
+    faults = [fault.label for fault in result.after.faults]
+    steps = []
+    if effects := [name for name in causes if name not in (*faults, INITIAL_RATE)]:
+        steps.append(f"add {joined(effects)} to the model's effects")
+    if INITIAL_RATE in causes:
+        steps.append("let the initial rates be unknown")
+    if named := [name for name in causes if name in faults]:
+        steps.append(f"declare {joined(named)} with the sensors")
+    steps.append(f"use the values fitted with {'it' if len(causes) == 1 else 'them'}")
+    text = f"{joined(steps)}."
+    return text[0].upper() + text[1:]
+
+
+def advice_sentences(result: Diagnosis) -> Iterator[str]:
+    """Return the manoeuvre that would bring out each cause in which the alternatives differ."""
+    for name in differing_causes(result):
+        yield f"{name}: {advice(name)}"
+
+
+def differing_causes(result: Diagnosis) -> tuple[str, ...]:
+    """Return the causes that only some of the alternatives of a verdict hold, the most probable alternative first."""
+    sets = alternatives(result)
+    if len(sets) < 2:
+        return ()
+    common = set.intersection(*map(set, sets))
+    names = (name for own in sets for name in own if name not in common and name != UNKNOWN)
+    return tuple(dict.fromkeys(names))

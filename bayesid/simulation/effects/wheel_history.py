@@ -1,0 +1,105 @@
+"""Effect of a wheel whose momentum changes during a recording and is not recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import Parameter
+from bayesid.simulation.effects.instant import Instant
+from bayesid.simulation.effects.internal_effects import wheel_bound
+from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.placed import Placed
+from bayesid.simulation.effects.register import register
+
+if TYPE_CHECKING:
+    from bayesid.simulation.model import Model
+
+__all__ = ["WheelHistory"]
+
+KNOTS = 12
+"""Number of instants at which the momentum is a parameter."""
+
+AXES = "xyz"
+
+
+@register
+class WheelHistory(Placed):
+    """Momentum of reaction wheels along one base axis as a piecewise linear function of time, in each recording.
+
+    The momentum has values of its own in every recording, at 12 knots from its start to ``end``; by default the knots
+    are 20 s apart. After the last knot the momentum is constant, and knots after the end of a recording keep their
+    prior. While it changes, the wheel drives the base by the negative of its slope, which jumps at the knots. A
+    momentum that is constant in all recordings is `WheelMomentum`.
+
+    A model does not know which channels the recordings have, so that the effect occurs in every model. Where the
+    momentum of the wheels is recorded, the parameters are what the record lacks.
+
+    Parameters
+    ----------
+    place : str
+        Base axis, x, y or z.
+    end : float
+        Time of the last knot [s], best the length of the longest recording.
+    sigma : float
+        Standard deviation of the prior of each value [N m s].
+    """
+
+    name = "wheel-history"
+    summary = (
+        "A reaction wheel about the axis runs up or down without being recorded: it drives the base against itself and "
+        "makes it a gyroscope."
+    )
+    separated_by = (
+        "What it takes from the base it gives back when it stops, and it acts with the arm at rest: record a longer "
+        "rest before and after the motion, and repeat the same motion, which the wheel need not follow."
+    )
+    per_recording: ClassVar[bool] = True
+    constant_names = ("end",)
+
+    def __init__(self, place: str = "", end: float = 220.0, sigma: float = 1.0) -> None:
+        super().__init__(place)
+        if not end > 0.0:
+            raise InputError(f"{self.label}: the last knot is at {end:g} s", remedy="Give the recordings' length")
+        self.end = end
+        self.parameters = tuple(Parameter(f"momentum.{knot}", "N m s", sigma) for knot in range(1, KNOTS + 1))
+
+    @classmethod
+    def instances(cls, model: Model) -> Sequence[Effect]:
+        """Return the effect about every base axis."""
+        return [cls(axis) for axis in AXES]
+
+    def attach(self, robot: Robot) -> Self:
+        """Return the effect after a check of its axis."""
+        if self.place not in tuple(AXES):
+            raise InputError(
+                f"effect {self.label!r}: {self.place!r} is no axis of the base", remedy=f"Axes: {', '.join(AXES)}"
+            )
+        return self
+
+    @property
+    def knots(self) -> Floats:
+        """Times of the parameters, shape (12,) [s]."""
+        return np.linspace(0.0, self.end, KNOTS)
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the momentum of all wheels that a robot of this mass and size carries, at full speed."""
+        return (wheel_bound(model.robot),)
+
+    def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
+        """Return the momentum of the wheels between the knots, and its slope."""
+        spacing = self.end / (KNOTS - 1)
+        knot = jnp.clip(instant.environment.time / spacing, 0.0, KNOTS - 1.0)
+        left = jnp.clip(jnp.floor(knot).astype(int), 0, KNOTS - 2)
+        rise = values[left + 1] - values[left]
+        slope = jnp.where(instant.environment.time < self.end, rise / spacing, 0.0)
+        axis = jnp.eye(3)[AXES.index(self.place)]
+        return (values[left] + (knot - left) * rise) * axis, slope * axis

@@ -1,0 +1,214 @@
+"""A jump of the base's moments: against Pinocchio, a closed form, and MuJoCo with a mass that really moves."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from bayesid._io.errors import InputError
+from bayesid.inference.posterior import Posterior
+from bayesid.robot.composite_tables import composite_rows
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.robot import Load, Robot
+from bayesid.simulation.dynamics import composite
+from bayesid.simulation.effects import MassShift, create
+from bayesid.simulation.model import Model
+from bayesid.simulation.sensors import Kind, Sensor, White
+from studies.truth import mujoco as mj
+from studies.truth import stepwise as ref
+from studies.truth.urdf import SERVICER3
+from tests.simulated import simulated as predicted
+
+POINT, RATE0 = (0.2, -0.1, 0.3), (0.02, -0.03, 0.015)
+TIMES = np.arange(0.0, 40.01, 0.5)
+INSTANT = 16.3
+MOTION = mj.smooth_motion(3, 40.0, 5, amplitude=0.5, frequencies=(0.03, 0.06), ramp=10.0)
+MASS, BEFORE, AFTER = 6.0, np.array([0.4, 0.1, -0.3]), np.array([-0.2, 0.5, 0.2])
+SIX = ((0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2))
+SECOND = MASS * (np.outer(AFTER, AFTER) - np.outer(BEFORE, BEFORE))
+MOMENTS = np.concatenate([MASS * (AFTER - BEFORE), SECOND[SIX]])
+"""Those of a part of 6 kg that moves by 0.9 m."""
+
+
+def simulated(robot: Robot, motion, effect: MassShift | None = None, moments=MOMENTS, rate0=RATE0, **options):
+    """Rate, accelerometer and rotation matrices of the package's simulation, each with the leading axis T."""
+    return predicted(robot, motion, TIMES, rate0, POINT, effect, moments, **options)
+
+
+def stepwise(moments: np.ndarray, step: float = 0.05):
+    """The same by Pinocchio, which at the instant changes the base's body and keeps both momenta of the robot."""
+    reference = ref.Reference(SERVICER3, MOTION, zenith=None, wheel=np.zeros(3), base_force=None, base_torque=None)
+    state, time, rows = reference.initial_state(RATE0, np.eye(3)), 0.0, []
+
+    def momentum():
+        q, v, _ = reference.configuration(time, state)
+        pin.ccrba(reference.model, reference.data, q, v)
+        return reference.data.Ag.copy(), reference.data.hg.vector.copy(), v
+
+    for target in np.sort([*TIMES, INSTANT]):
+        for part in range(count := int(np.ceil((target - time) / step - 1e-9))):
+            state = reference.advance(time + part * (target - time) / count, state, (target - time) / count)
+        time = target
+        if target != INSTANT:
+            rotation = pin.Quaternion(state[3:7] / np.linalg.norm(state[3:7])).toRotationMatrix()
+            rows.append((state[10:].copy(), reference.accelerometer(time, state, np.array(POINT)), rotation))
+            continue
+        kept = momentum()[1]
+        second = np.zeros((3, 3))
+        second[SIX] = second[SIX[::-1]] = moments[3:]
+        inertia = np.trace(second) * np.eye(3) - second
+        change = np.concatenate([[0.0], moments[:3], inertia[(0, 0, 1, 0, 1, 2), (0, 1, 1, 2, 2, 2)]])
+        base = reference.model.inertias[1].toDynamicParameters() + change
+        reference.model.inertias[1] = pin.Inertia.FromDynamicParameters(base)
+        matrix, _, v = momentum()
+        state[7:] = np.linalg.solve(matrix[:, :6], kept - matrix[:, 6:] @ v[6:])
+    return tuple(np.array(column) for column in zip(*rows, strict=True))
+
+
+def largest_error(given, truth) -> list[float]:
+    """Largest errors of rate [rad/s], acceleration [m/s2] and attitude [rad]."""
+    return [float(np.abs(a - b).max()) for a, b in zip(given, truth, strict=True)]
+
+
+@pytest.fixture(scope="module")
+def motion(formula_motion):
+    return formula_motion(MOTION, SERVICER3, Robot.from_urdf(SERVICER3))
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return stepwise(MOMENTS)
+
+
+def test_the_jump_is_that_of_pinocchio_with_momentum_conserved(truth, motion):
+    """The jump changes rate, acceleration and attitude by 3e-4, 3e-5 and 5e-3; the largest error is 3e-5 of that."""
+    robot = Robot.from_urdf(SERVICER3)
+    error = largest_error(simulated(robot, motion, MassShift((INSTANT,))), truth)
+    effect = largest_error(simulated(robot, motion), truth)
+    assert effect[0] > 1e-4
+    assert effect[1] > 1e-5
+    assert effect[2] > 1e-3
+    assert (np.array(error) < 1e-4 * np.array(effect)).all()
+
+
+def test_a_jump_at_the_end_of_a_step_costs_no_accuracy(truth, motion):
+    """The error is that without a jump; in the midst of a step of 0.5 s it would be some thirty times larger."""
+    robot, effect = Robot.from_urdf(SERVICER3), MassShift((INSTANT,))
+    jumps = effect.jumps(TIMES[-1])
+    error = largest_error(simulated(robot, motion, effect, step=0.5), truth)
+    smooth = largest_error(simulated(robot, motion, step=0.5, jumps=jumps), stepwise(0.0 * MOMENTS))
+    through = largest_error(simulated(robot, motion, effect, step=0.5, jumps=()), truth)
+    np.testing.assert_allclose(error, smooth, rtol=0.1)
+    assert (np.array(through) > 10.0 * np.array(error)).all()
+
+
+def test_a_body_that_spins_about_a_principal_axis_turns_as_its_momentum_says(tmp_path, formula_motion):
+    """The rate after the jump is the rate before times the ratio of inertias, for ever."""
+    file = tmp_path / "body.urdf"
+    file.write_text(
+        '<robot name="r"><link name="b"><inertial><origin xyz="0 0 0"/><mass value="50"/><inertia ixx="8" iyy="9" '
+        'izz="11" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>'
+    )
+    robot = Robot.from_urdf(file)
+    nothing = formula_motion(lambda _: (np.zeros(0),) * 3, file, robot)
+    # a ring of 2 kg m2 about z opens to 3.5: second moments of half of that along x and y, and the centre moves along z
+    moments = np.array([0.0, 0.0, 5.0, 0.75, 0.75, 0.0, 0.0, 0.0, 0.0])
+    rate, accel, _ = simulated(robot, nothing, MassShift(), moments, (0.0, 0.0, 0.3))
+    spin = np.where(np.arange(len(TIMES)) > len(TIMES) // 2, 0.3 * 11.0 / 12.5, 0.3)
+    np.testing.assert_allclose(rate[:, 2], spin, rtol=1e-12)
+    np.testing.assert_allclose(rate[:, :2], 0.0, atol=1e-15)
+    radial = -(spin[:, None] ** 2) * np.array(POINT[:2])
+    np.testing.assert_allclose(accel[:, :2], radial, atol=1e-12)
+
+
+def moved_in_mujoco(
+    formula_motion, away: np.ndarray, travel: np.ndarray, rate0, duration: float
+) -> tuple[Robot, mj.Truth, np.ndarray]:
+    """The robot with a part at its centre of mass plus ``away``, MuJoCo's run in which it moves, and its moments."""
+    robot, still = Robot.from_urdf(SERVICER3), lambda _: (np.zeros(3),) * 3
+    rows = composite_rows(robot, kinematics(robot, formula_motion(still, SERVICER3, robot).evaluate(np.zeros(1))))[0]
+    before = rows[1:4] / rows[0] + away
+    body = mj.Body(MASS, before, 1e-3 * np.eye(3))
+    length = float(np.linalg.norm(travel))
+    path = mj.Mover(body, tuple(travel / length), length, INSTANT - duration / 2, duration)
+    model = mj.TruthModel(SERVICER3, movers=[path], accel_position=POINT)
+    run = model.run(still, TIMES, rate0=rate0, step=0.1 * duration)
+    second = MASS * (np.outer(before + travel, before + travel) - np.outer(before, before))
+    loaded = robot.with_load(Load("part", robot.base, InertialParameters(*body)))
+    return loaded, run, np.concatenate([MASS * travel, second[SIX]])
+
+
+def test_a_mass_that_moves_through_the_centre_of_mass_is_a_jump(formula_motion):
+    """What is left of the effect is 0.5 % if it moves in MuJoCo within 0.2 s, and a quarter of that within 0.05 s."""
+    away, still = np.array([0.3, 0.4, -0.2]), lambda _: (np.zeros(3),) * 3
+    left = []
+    for duration in (0.2, 0.05):
+        robot, run, moments = moved_in_mujoco(formula_motion, away, -1.8 * away, RATE0, duration)
+        motion = formula_motion(still, SERVICER3, robot)
+        found, without = simulated(robot, motion, MassShift((INSTANT,)), moments), simulated(robot, motion)
+        triples = zip(found[:2], without[:2], (run.rate, run.accel), strict=True)
+        left.append([np.linalg.norm(f - t) / np.linalg.norm(w - t) for f, w, t in triples])
+    assert np.max(left[0]) < 0.006
+    np.testing.assert_allclose(left[1], np.array(left[0]) / 4.0, rtol=0.05)
+
+
+def test_a_mass_that_moves_elsewhere_turns_the_base_as_the_docstring_says(formula_motion):
+    """A base at rest keeps the angle that the effect leaves out, however fast the mass moves."""
+    away, travel = np.array([0.5, 0.0, 0.0]), np.array([0.0, 0.3, 0.0])
+    robot, run, _ = moved_in_mujoco(formula_motion, away, travel, np.zeros(3), 0.2)
+    np.testing.assert_allclose(run.rate[-1], 0.0, atol=1e-8)
+    row = composite_rows(robot, kinematics(robot, JointState(*np.zeros((3, 1, len(robot.joints))))))[0]
+    body = composite(jnp.asarray(row))
+    turned = -np.asarray(body.inverse) @ np.cross(MASS * away, travel)
+    np.testing.assert_allclose(2.0 * run.attitude[-1][:3], turned, atol=0.02 * np.abs(turned).max())
+
+
+def test_instants_are_those_of_each_recording(planar_case):
+    posterior = planar_case.posterior
+    model = posterior.model.extend(MassShift((10.0, np.inf, -1.0)))
+    three = Posterior.of(model, posterior.manoeuvres * 3, step=0.5)
+    grid = three.data.arrays.grid
+    for part in (grid.node, grid.sample):
+        time = np.asarray(part.environment.time)
+        there = np.abs(np.asarray(part.unknown)[..., -9:]).sum(axis=(2, 3)) > 0.0
+        np.testing.assert_array_equal(there[0], time[0] > 10.0)
+        assert not there[1].any()
+        assert there[2].all()
+
+
+def test_columns_at_an_instant_are_the_table():
+    robot, time = Robot.from_urdf(SERVICER3), np.linspace(0.0, 8.0, 17)
+    columns = MassShift.table_at(time, 3.0)
+    assert columns.shape == (17, 28, 9)
+    np.testing.assert_array_equal(columns, MassShift((3.0,)).table(robot, None, time))
+    np.testing.assert_array_equal(MassShift.table_at(time, 4.0), MassShift().table(robot, None, time))
+    assert not columns[time <= 3.0].any()
+    assert (np.abs(columns[time > 3.0]).sum(axis=1) == 1.0).all()
+
+
+def test_instants_are_written_after_the_name():
+    effect = create("mass-shift:12.5,inf")
+    assert effect.instants == (12.5, np.inf)
+    assert effect.label == "mass-shift:12.5,inf"
+    assert create("mass-shift").label == "mass-shift"
+    assert effect.in_recording(0).jumps(40.0) == (12.5,)
+    assert effect.in_recording(0).jumps(12.0) == effect.in_recording(1).jumps(40.0) == ()
+    assert MassShift().jumps(40.0) == (20.0,)
+    with pytest.raises(InputError, match="there are more recordings"):
+        effect.in_recording(2)
+    with pytest.raises(InputError, match="none is named"):
+        effect.jumps(40.0)
+    with pytest.raises(InputError, match="no list of instants"):
+        create("mass-shift:link2")
+
+
+def test_bounds_are_those_of_a_part_of_the_base():
+    robot = Robot.from_urdf(SERVICER3)
+    model = Model(robot, (Sensor(Kind.RATE, White(1e-5)),), ())
+    first, second = MassShift().physical_bounds(model)
+    assert np.abs(MOMENTS[:3]).max() < first.largest
+    assert np.abs(MOMENTS[3:]).max() < second.largest

@@ -1,0 +1,24 @@
+"""Where a report comes from: every file of the study with its hash, the version, the seed and the command."""
+
+import hashlib
+from importlib.metadata import version
+from types import SimpleNamespace
+
+from bayesid.app.report_origin import report_origin
+
+
+def test_the_origin_names_every_file_with_its_hash(tmp_path):
+    files = [tmp_path / name for name in ("study.toml", "robot.urdf", "one.csv", "two.csv")]
+    for file in files:
+        file.write_text(file.name)
+    study, urdf, *recordings = files
+    made = SimpleNamespace(
+        file=study,
+        robot=SimpleNamespace(urdf=urdf),
+        recordings=[SimpleNamespace(file=file) for file in recordings],
+    )
+    hashes = [f"{file.name} {hashlib.sha256(file.name.encode()).hexdigest()[:12]}" for file in files]
+    tail = f"bayesid {version('bayesid')}, seed 7, command: bayesid diagnose."
+    assert report_origin(made, "diagnose", 7) == f"SHA-256: {', '.join(hashes)}. {tail}"
+    made.file = None
+    assert report_origin(made, "diagnose", 7) == f"SHA-256: {', '.join(hashes[1:])}. {tail}"

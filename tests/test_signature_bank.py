@@ -1,0 +1,195 @@
+"""Signatures are what candidates change in the simulation; their Gram gives the evidence of the full model."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.diagnosis import candidates
+from bayesid.diagnosis.body_evidence import MissingBodyPrior, body_log_evidence, outer_moments, rigid_moments
+from bayesid.diagnosis.catalogue_signatures import catalogue_signatures
+from bayesid.diagnosis.mass_shift_signatures import mass_shift_signatures, shift_instants
+from bayesid.diagnosis.perturbed_fit import Engine
+from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.set_evidence import SetEvidence
+from bayesid.diagnosis.vibration_signatures import PAIRS, slosh_entries
+from bayesid.inference.importance import choose_parameterisation, importance_sample
+from bayesid.inference.mode import maximise
+from bayesid.inference.posterior import Posterior
+from bayesid.simulation.effects import FuelSlosh, MassShift, bounds_by_label
+from studies.truth import hidden_causes
+from tests.gram_problem import LinearProblem
+
+CASES = {case.name: case for case in hidden_causes.CASES}
+
+
+@pytest.fixture(scope="module")
+def null(tmp_path_factory):
+    """Engine and fit of a study of MuJoCo that lacks nothing, with its candidates and their bounds."""
+    study = Study.load(CASES["null, three joints"].make(tmp_path_factory.mktemp("null"), 5))
+    model = load_model(study)
+    engine = Engine(Posterior.of(model, load_manoeuvres(study, model.robot)))
+    effects = candidates(model, knows_latitude=False)
+    return engine, engine.fit(), effects, bounds_by_label(effects, model)
+
+
+def in_simulation(engine, fit, effect, units):
+    """Central differences of the full simulation's residual in the effect's parameters."""
+    posterior = Posterior.of(engine.posterior.model.extend(effect), engine.posterior.manoeuvres, step=None)
+    bare = np.zeros(posterior.size - len(fit.z))
+    columns = []
+    for k, unit in enumerate(units):
+        sides = []
+        for sign in (1.0, -1.0):
+            there = bare.copy()
+            there[k] = sign * unit
+            sides.append(posterior.residuals(np.concatenate([fit.z, there])).ravel())
+        columns.append((sides[0] - sides[1]) / (2.0 * unit))
+    return np.stack(columns, axis=1)
+
+
+def check_columns(null, label):
+    engine, fit, effects, bounds = null
+    effect = next(effect for effect in effects if effect.label == label)
+    bank = catalogue_signatures(engine, fit, [effect], bounds)
+    found = np.concatenate([item.columns for item in bank.signatures], axis=1)
+    linear = effect.in_amplitudes()
+    sigma = np.array([parameter.sigma for parameter in linear.parameters])
+    expected = in_simulation(engine, fit, linear, np.full(len(sigma), 1e-3)) / sigma
+    assert np.linalg.norm(found - expected) < 0.02 * np.linalg.norm(expected), label
+
+
+@pytest.mark.parametrize("label", ["thruster-leak", "payload:link3"])
+def test_signatures_are_what_the_simulation_does(label, null):
+    check_columns(null, label)
+
+
+@pytest.mark.usefixtures("slow")  # one compilation for each effect
+def test_all_signatures_are_what_the_simulation_does(null):
+    _, _, effects, _ = null
+    for effect in effects:
+        several = effect.modes_count or effect.per_recording or isinstance(effect, MassShift)
+        if effect.in_amplitudes().parameters and not several:
+            check_columns(null, effect.label)
+
+
+def test_signatures_of_a_jump_are_what_the_simulation_does(null):
+    engine, fit, effects, bounds = null
+    bank = mass_shift_signatures(engine, fit, effects, bounds)
+    end = float(np.asarray(fit.operating.node.environment.time)[0].max())
+    instant = float(shift_instants(end)[7])
+    recordings = len(engine.posterior.manoeuvres)
+    shift = MassShift([instant] + [np.inf] * (recordings - 1)).attach(engine.posterior.model.robot)
+    expected = in_simulation(engine, fit, shift, np.full(9, 1e-2))
+    found = bank.signatures[7].columns
+    rows = len(found)
+    assert bank.signatures[7].recording == 0
+    assert np.abs(expected[rows:]).max() == 0.0
+    assert np.linalg.norm(found - expected[:rows]) < 0.02 * np.linalg.norm(expected)
+
+
+def test_coupling_of_slosh_is_linear_in_the_moments_of_its_mass():
+    values = np.array([3.0, 0.2, 0.01, 0.4, -0.7, 0.3])
+    modes = FuelSlosh().modes(values)
+    coupling = np.concatenate([np.asarray(modes.linear), np.asarray(modes.angular)], axis=1)
+    matrix = coupling.T @ coupling
+    moments = outer_moments(np.concatenate([[np.log(3.0)], values[3:]]))
+    assert slosh_entries() @ moments == pytest.approx([matrix[i, j] for i, j in PAIRS], abs=1e-12)
+
+
+@pytest.mark.parametrize("moments", [outer_moments, rigid_moments])
+def test_evidence_of_a_body_is_that_of_a_sum_over_its_prior(moments):
+    rng = np.random.default_rng(1)
+    prior = MissingBodyPrior(0.05, 20.0, 2.0)
+    columns = rng.normal(size=(40, 10)) * np.array([1.0, *[2.0] * 3, *[3.0] * 6])
+    true = moments(np.array([np.log(1.5), 0.4, -0.3, 0.2]))
+    residual = rng.normal(size=40) - columns @ true
+    matrix, score = columns.T @ columns, columns.T @ residual
+    draws = prior.mean + prior.sd * rng.normal(size=(400_000, 4))
+    values = np.array([moments(theta) for theta in draws])
+    logs = -values @ score - 0.5 * np.einsum("ni,ij,nj->n", values, matrix, values)
+    expected = float(np.log(np.mean(np.exp(logs - logs.max()))) + logs.max())
+    start = -np.linalg.solve(matrix, score)
+    laplace = body_log_evidence(matrix, score, prior, moments, start)
+    assert laplace == pytest.approx(expected, abs=0.5)  # the moments are not linear in the place
+    assert body_log_evidence(matrix, -score, prior, moments, -start) < expected - 10.0  # a body has no negative mass
+
+
+def test_forms_of_a_cause_are_averaged_and_what_is_fixed_has_no_freedom():
+    rng = np.random.default_rng(2)
+    problem = LinearProblem.random(rng, {"a": 2, "b": 2, "c": 1}).observed(rng, {"c": np.array([1.0])})
+    gram = problem.gram()
+    whole = CandidateCause("forms", (AmplitudeGroup("a", 2.0, 0.1),), others=((AmplitudeGroup("b", 2.0, 0.1),),))
+    single = [CandidateCause(name, (AmplitudeGroup(name, 2.0, 0.1),)) for name in "ab"]
+    fixed = CandidateCause("there", (AmplitudeGroup("c", 1.0),), fixed=True)
+    evidence = SetEvidence(gram, [whole, *single, fixed])
+    parts = [evidence.log_evidence([name]) for name in "ab"]
+    assert evidence.log_evidence(["forms"]) == pytest.approx(np.logaddexp(*parts) - np.log(2.0), abs=1e-9)
+    moved = LinearProblem(problem.fitted, problem.columns, problem.data + problem.columns["c"][:, 0])
+    expected = moved.log_density({}) - problem.log_density({})
+    assert evidence.log_evidence(["there"]) == pytest.approx(expected, abs=1e-6)
+    beside = SetEvidence(moved.gram(), single).log_evidence(["a"])
+    assert evidence.log_evidence(["a", "there"]) == pytest.approx(expected + beside, abs=1e-6)
+    scores = np.stack([gram.score, 0.5 * gram.score])
+    assert evidence.log_evidences(["a", "there"], scores)[0] == pytest.approx(expected + beside, abs=1e-6)
+
+
+SETS = (
+    ("rate-bias",),
+    ("accel-bias",),
+    ("wheel-momentum",),
+    ("thruster-leak",),
+    ("rate-scale",),
+    ("accel-position",),
+    ("rate-drift",),
+    ("encoder-offset:joint1",),
+    ("rate-bias", "wheel-momentum"),
+    ("accel-scale", "rate-drift"),
+)
+"""Sets whose evidence is compared with that of the extended model."""
+
+
+@pytest.mark.usefixtures("slow")  # ten extended models are compiled and sampled
+def test_evidence_of_the_gram_is_that_of_the_extended_model(null):
+    engine, fit, effects, bounds = null
+    labels = {effect.label: effect for effect in effects}
+    bank = catalogue_signatures(engine, fit, [labels[name] for name in {n for own in SETS for n in own}], bounds)
+    gram = bank.gram(fit)
+    scales = {name: 4.0 / np.sqrt(np.diag(gram.matrix)[own].max()) for name, own in gram.groups.items()}
+    causes = [
+        CandidateCause(
+            cause.name,
+            tuple(AmplitudeGroup(group.name, scales[group.name], scales[group.name]) for group in cause.groups),
+        )
+        for cause in bank.causes
+    ]
+    evidence = SetEvidence(gram, causes)
+    base = sampled_evidence(engine.posterior.model, engine.posterior)
+    for names in SETS:
+        model = engine.posterior.model
+        for name in names:
+            model = model.extend(with_scales(labels[name], scales))
+        expected = sampled_evidence(model, engine.posterior) - base
+        assert evidence.log_evidence(names) == pytest.approx(expected, abs=0.3), names
+
+
+def with_scales(effect, scales):
+    """Return an effect with the standard deviations of its groups."""
+    changed = copy.copy(effect)
+    changed.parameters = tuple(
+        p._replace(sigma=scales.get(f"{effect.label} [{p.unit}]", scales.get(effect.label))) for p in effect.parameters
+    )
+    return changed
+
+
+def sampled_evidence(model, like: Posterior) -> float:
+    """Log evidence by importance sampling of the model in the full simulation."""
+    rng = np.random.default_rng(0)
+    posterior, optimum = maximise(Posterior.of(model, like.manoeuvres), rng)
+    found = importance_sample(choose_parameterisation(posterior, optimum, rng), optimum, rng, draws=8000)
+    assert found.error < 0.1
+    return found.value
