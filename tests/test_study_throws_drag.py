@@ -35,10 +35,17 @@ def test_throws_left_out_are_predicted_better(result):
     assert np.isfinite(held.chi2["extended"]).all()
 
 
-def test_the_bodies_stay_near_their_geometry(result):
-    for model in ("rigid", "extended"):
-        for errors in result.comparison.errors[model].values():
-            assert np.abs(errors).max() < 15.0
+def test_the_rigid_bodies_stay_near_their_geometry(result):
+    for errors in result.comparison.errors["rigid"].values():
+        assert np.abs(errors).max() < 15.0
+
+
+def test_nothing_is_named_that_leaves_a_torque_unexplained(result):
+    """The most probable set of known causes takes the bodies off their geometry: it must not be a verdict."""
+    found = result.studies[0].diagnosis
+    errors = [np.abs(np.concatenate(list(result.comparison.errors[name].values()))) for name in ("rigid", "extended")]
+    assert errors[1].mean() < errors[0].mean() or not found.verdict.causes
+    assert found.probabilities.unknown > 0.9
 
 
 def test_the_report_is_written(result, tmp_path):

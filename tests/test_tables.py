@@ -1,11 +1,12 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from bayesid.robot.composite_tables import composite_rows, link_table
 from bayesid.robot.joint_state import JointState
-from bayesid.robot.kinematics import kinematics
+from bayesid.robot.kinematics import configuration, kinematics
 from bayesid.robot.robot import Robot
 
 BRANCHED = """<robot name="branched">
@@ -27,8 +28,39 @@ BRANCHED = """<robot name="branched">
 </robot>"""
 
 
-@pytest.mark.parametrize("robot", [Robot.shipped("ets7"), Robot.from_string(BRANCHED)], ids=["chain", "tree"])
-def test_traced_kinematics_are_pinocchios(robot: Robot) -> None:
+ROBOTS = pytest.mark.parametrize(
+    "robot", [Robot.shipped("ets7"), Robot.from_string(BRANCHED)], ids=["chain", "tree"]
+)
+
+
+@ROBOTS
+def test_kinematics_are_pinocchios(robot: Robot) -> None:
+    """Poses, spatial velocities and spatial accelerations of all joint frames, base at rest."""
+    state = JointState(*np.random.default_rng(3).normal(size=(3, 7, len(robot.joints))))
+    moved = kinematics(robot, state)
+    data = robot.model.createData()
+    for row in range(7):
+        still = np.zeros(6)
+        velocity, acceleration = (np.concatenate([still, part[row]]) for part in state[1:])
+        pin.forwardKinematics(robot.model, data, configuration(robot, state.position[row]), velocity, acceleration)
+        for joint in range(len(robot.joints)):
+            pose = data.oMi[joint + 2].homogeneous
+            twist, change = hat(data.v[joint + 2].vector), hat(data.a[joint + 2].vector)
+            np.testing.assert_allclose(moved.pose[row, joint], pose, atol=1e-14)
+            np.testing.assert_allclose(moved.rate[row, joint], pose @ twist, atol=1e-13)
+            np.testing.assert_allclose(moved.acceleration[row, joint], pose @ (change + twist @ twist), atol=1e-12)
+
+
+def hat(twist):
+    """Matrix (4, 4) of a spatial velocity, linear part first."""
+    matrix = np.zeros((4, 4))
+    matrix[:3, :3] = pin.skew(twist[3:])
+    matrix[:3, 3] = twist[:3]
+    return matrix
+
+
+@ROBOTS
+def test_traced_tables_are_those_of_numpy(robot: Robot) -> None:
     rng = np.random.default_rng(3)
     state = JointState(*rng.normal(size=(3, 7, len(robot.joints))))
 
@@ -37,5 +69,5 @@ def test_traced_kinematics_are_pinocchios(robot: Robot) -> None:
         return moved, composite_rows(robot, moved), link_table(robot, list(robot.links)[-1], moved)
 
     traced = jax.jit(rows)(*(jnp.asarray(part) for part in state))
-    for ours, pinocchios in zip(jax.tree.leaves(traced), jax.tree.leaves(rows(*state)), strict=True):
-        np.testing.assert_allclose(ours, pinocchios, rtol=1e-12, atol=1e-12 * np.abs(pinocchios).max())
+    for ours, plain in zip(jax.tree.leaves(traced), jax.tree.leaves(rows(*state)), strict=True):
+        np.testing.assert_allclose(ours, plain, rtol=1e-12, atol=1e-12 * np.abs(plain).max())

@@ -69,16 +69,13 @@ def diagnose_study(
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_model import load_manoeuvres, load_model
     from bayesid.diagnosis import CausePrior, diagnose, identify_extended
-    from bayesid.inference.posterior import Posterior
     from bayesid.inference.posterior_file import write_netcdf
-    from bayesid.inference.recording_check import refuse_wrong_units
     from bayesid.report import diagnosis_report
     from bayesid.report.sentences.diagnosis_sentences import diagnosis_sentences
     from bayesid.simulation.effects import PhysicalBound
 
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
-    refuse_wrong_units(Posterior.of(model, manoeuvres))
     knows = all(section.argument_of_latitude is not None for section in study.recordings)
     said = study.diagnosis
     result = diagnose(

@@ -32,6 +32,7 @@ from bayesid.diagnosis.verdict_sensitivity import VerdictSensitivity, verdict_se
 from bayesid.inference import Identification, identify
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.recording_check import refuse_wrong_units
 from bayesid.simulation.effects import bounds_by_label
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
@@ -153,6 +154,11 @@ def diagnose(
     knows_latitude : bool
         Whether the manoeuvres' arguments of latitude are known.
     progress : Progress, optional
+
+    Raises
+    ------
+    InputError
+        If the numbers of a recording cannot be in the units of the format.
     """
     model = model.without_torque  # whose friction no catalogue of causes holds
     with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
@@ -172,6 +178,7 @@ def _diagnose(
     rng, clock = np.random.default_rng(seed), PhaseClock()
     at_rest = model.rate_sigma == 0.0
     posterior = Posterior.of(replace(model, rate_sigma=RATE_SIGMA, speed_errors=True) if at_rest else model, manoeuvres)
+    refuse_wrong_units(posterior)
     clock.ends("load")
     rates = posterior.unknowns.layout.all_rates
     engine = Engine(posterior, range(rates.start, rates.stop) if at_rest else ())

@@ -14,10 +14,8 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy.linalg as sla
 from jax import Array
 from numpy.typing import NDArray
-from scipy import sparse
 from threadpoolctl import threadpool_limits
 
 from bayesid._io.errors import InputError
@@ -32,6 +30,10 @@ WINDOWS = (0, 2, 4, 8, 16, 32)
 
 TOLERANCE = 2e-4
 """Change of log standard deviation per scalar below which a longer window does not justify its cost."""
+
+
+LARGEST = 4_000_000
+"""Number of entries of the covariances that are factorised together."""
 
 
 class NoiseChannel(NamedTuple):
@@ -191,31 +193,26 @@ def _filtered(time: Floats, channel: NoiseChannel, index: int) -> list[_Output]:
 
 def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: int) -> Whitening:
     channels = len(noise.channels)
-    sigma = np.array([channel.sigma for channel in noise.channels])
     spans = [(min(o.rows[0] for o in group), max(o.rows[-1] for o in group)) for _, group in blocks]
     first = np.minimum.accumulate(np.array([span[0] for span in spans])[::-1])[::-1]
     starts = [int(first[max(0, number - window)]) for number in range(len(blocks))]
     width = max(spans[number][1] - starts[number] + 1 for number in range(len(blocks)))
     weights = np.zeros((len(blocks), channels, width, channels))
     present = np.zeros((len(blocks), channels), dtype=bool)
-    covariance, coloured = _Band(noise), _is_coloured(noise)
+    covariance = _Covariance(noise)
     log_sigma = 0.0
-    for number, (_, group) in enumerate(blocks):
-        start, stop = starts[number], max(spans[k][1] for k in range(max(0, number - window), number + 1)) + 1
-        local = [output for k in range(max(0, number - window), number + 1) for output in blocks[k][1]]
-        raw = covariance.between(start, stop) + np.diag(np.tile(sigma**2, stop - start))
-        if coloured:
-            raw = raw + _correlated(noise, start, stop)
-        combine = _combination(local, start, stop, channels)
-        factor = np.linalg.cholesky(combine @ raw @ combine.T)
-        unit = np.eye(len(local))[:, -len(group) :]
-        # the last rows of the inverse factor whiten this block given those before it
-        last = sla.solve_triangular(factor, unit, lower=True, trans="T", check_finite=False).T
-        rows = (combine.T @ last.T).T.reshape(len(group), stop - start, channels)
+    for local, numbers in _alike(blocks, starts, window, channels):
+        group = blocks[numbers[0]][1]
+        rows = 1 + int(local.columns.max()) // channels
         slots = [output.channel for output in group]
-        weights[number, slots, : stop - start] = rows
-        present[number, slots] = True
-        log_sigma += float(np.log(np.diag(factor)[-len(group) :]).sum())
+        count = max(1, LARGEST // (rows * channels) ** 2)
+        for part in (numbers[k : k + count] for k in range(0, len(numbers), count)):
+            raw = covariance.between(np.array([starts[number] for number in part]), rows)
+            whitened, logs = _given_earlier(raw, local, len(group))
+            places = np.ix_(part, slots, range(rows))
+            weights[places] = whitened.reshape(len(part), len(group), rows, channels)
+            present[np.ix_(part, slots)] = True
+            log_sigma += logs
     return Whitening(
         weights,
         np.array(starts, dtype=np.int32),
@@ -227,56 +224,123 @@ def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: 
     )
 
 
+class _Local(NamedTuple):
+    """Scalars of a window.
+
+    Attributes
+    ----------
+    columns, taps : (n,) array
+        Columns of the window's flattened residual that enter the scalars, one scalar after the other, and weights.
+    scalar : (n,) integer array
+        Scalar that each of them enters.
+    """
+
+    columns: Integers
+    taps: Floats
+    scalar: Integers
+
+    @classmethod
+    def of(cls, outputs: Sequence[_Output], channels: int) -> _Local:
+        """Return scalars with the columns of the whole recording's residual."""
+        columns = np.concatenate([output.rows * channels + output.channel for output in outputs])
+        taps = np.concatenate([output.taps for output in outputs])
+        return cls(columns, taps, np.repeat(np.arange(len(outputs)), [len(output.rows) for output in outputs]))
+
+    @classmethod
+    def joined(cls, parts: Sequence[_Local], before: int) -> _Local:
+        """Return the scalars of successive blocks, ``before`` columns taken from their columns."""
+        if len(parts) == 1:
+            return parts[0]._replace(columns=parts[0].columns - before)
+        counts = np.cumsum([0, *(part.scalar[-1] + 1 for part in parts[:-1])])
+        scalar = np.concatenate([part.scalar + count for part, count in zip(parts, counts, strict=True)])
+        columns = np.concatenate([part.columns for part in parts]) - before
+        return cls(columns, np.concatenate([part.taps for part in parts]), scalar)
+
+    @property
+    def key(self) -> bytes:
+        """Content, to compare by."""
+        return b"|".join(part.tobytes() for part in self)
+
+
+def _alike(
+    blocks: list[tuple[int, list[_Output]]], starts: Sequence[int], window: int, channels: int
+) -> list[tuple[_Local, list[int]]]:
+    """Return the windows that differ, each with the numbers of the blocks that have it."""
+    single = [_Local.of(group, channels) for _, group in blocks]
+    found: dict[tuple[bytes, int], tuple[_Local, list[int]]] = {}
+    for number, start in enumerate(starts):
+        local = _Local.joined(single[max(0, number - window) : number + 1], start * channels)
+        key = (local.key, len(blocks[number][1]))
+        found.setdefault(key, (local, []))[1].append(number)
+    return list(found.values())
+
+
+def _given_earlier(raw: Floats, local: _Local, new: int) -> tuple[Floats, float]:
+    """Return the weights (B, new, n) that whiten the last scalars of windows given the others, and their log sigma.
+
+    Parameters
+    ----------
+    raw : (B, n, n) array
+        Covariance of each window's flattened residual.
+    local : _Local
+        All scalars of a window.
+    new : int
+        Number of scalars of the last block.
+    """
+    count = int(local.scalar[-1]) + 1
+    combine = np.zeros((count, raw.shape[-1]))
+    combine[local.scalar, local.columns] = local.taps
+    if len(local.columns) == count and (local.taps == 1.0).all():
+        among = raw[:, local.columns][:, :, local.columns]
+    else:
+        among = combine @ raw @ combine.T
+    old = count - new
+    gain = np.linalg.solve(among[:, :old, :old], among[:, :old, old:])
+    left = among[:, old:, old:] - np.swapaxes(among[:, :old, old:], 1, 2) @ gain
+    factor = np.linalg.cholesky(left)
+    identity = np.broadcast_to(np.eye(new), left.shape)
+    rows = np.linalg.solve(factor, np.concatenate([-np.swapaxes(gain, 1, 2), identity], axis=2))
+    return rows @ combine, float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
+
+
 def _is_coloured(noise: NoiseModel) -> bool:
     return any(channel.coloured[0] > 0.0 for channel in noise.channels)
 
 
-def _correlated(noise: NoiseModel, start: int, stop: int) -> Floats:
-    """Return the covariance of the channels' exponentially correlated noise, rows start to stop."""
-    time = noise.time[start:stop]
-    apart = np.abs(time[:, None] - time[None, :])
-    count = len(noise.channels)
-    result = np.zeros((len(time), count, len(time), count))
-    for index, channel in enumerate(noise.channels):
-        level, memory = channel.coloured
-        result[:, index, :, index] = level**2 * np.exp(-apart / memory)
-    return result.reshape(len(time) * count, -1)
-
-
-def _combination(outputs: list[_Output], start: int, stop: int, channels: int) -> sparse.csr_array:
-    """Return the matrix from the flattened residual rows start to stop to the filtered scalars."""
-    columns = np.concatenate([(output.rows - start) * channels + output.channel for output in outputs])
-    row = np.repeat(np.arange(len(outputs)), [len(output.rows) for output in outputs])
-    taps = np.concatenate([output.taps for output in outputs])
-    return sparse.csr_array((taps, (row, columns)), shape=(len(outputs), (stop - start) * channels))
-
-
-class _Band:
-    """Covariance of the residual due to errors of the joint motion, between rows of the sample grid."""
+class _Covariance:
+    """Covariance of the residual between rows of the sample grid: sensors' noise and errors of the joint motion."""
 
     def __init__(self, noise: NoiseModel) -> None:
-        self.lags = noise.joint_covariance.shape[1] - 1
-        count, channels = noise.sensitivity.shape[2:]
-        self.channels = channels
-        self.blocks = np.zeros((self.lags + 1, count, channels, channels))
+        self._noise = noise
+        self._lags = noise.joint_covariance.shape[1] - 1
+        count, self._channels = noise.sensitivity.shape[2:]
+        self._blocks = np.zeros((self._lags + 1, count, self._channels, self._channels))
         g = noise.sensitivity
-        for lag in range(min(self.lags, count - 1) + 1):
-            self.blocks[lag, lag:] = np.einsum(
+        for lag in range(min(self._lags, count - 1) + 1):
+            self._blocks[lag, lag:] = np.einsum(
                 "jatc,jtab,jbtd->tcd",
                 g[:, :, lag:],
                 noise.joint_covariance[:, lag, lag:],
                 g[:, :, : count - lag],
                 optimize=True,
             )
+        self._blocks[0, :, range(self._channels), range(self._channels)] += np.array(
+            [[channel.sigma**2] for channel in noise.channels]
+        )
 
-    def between(self, start: int, stop: int) -> Floats:
-        """Return the dense covariance of the rows start to stop."""
-        row = np.arange(start, stop)
-        later = np.maximum(row[:, None], row[None, :])
-        lag = np.abs(row[:, None] - row[None, :])
-        block = self.blocks[np.minimum(lag, self.lags), later]
-        block[lag > self.lags] = 0.0
-        upper = row[:, None] < row[None, :]
-        block[upper] = np.swapaxes(block[upper], -1, -2)
-        size = len(row) * self.channels
-        return np.swapaxes(block, 1, 2).reshape(size, size)
+    def between(self, starts: Integers, rows: int) -> Floats:
+        """Return the dense covariances (B, n, n) of some rows from each of the starts on, row by row of C channels."""
+        row = starts[:, None] + np.arange(rows)
+        apart = np.arange(rows)[:, None] - np.arange(rows)[None, :]
+        lag = np.abs(apart)
+        block = self._blocks[np.minimum(lag, self._lags), np.maximum(row[:, :, None], row[:, None, :])]
+        block[:, lag > self._lags] = 0.0
+        block[:, apart < 0] = np.swapaxes(block[:, apart < 0], -1, -2)
+        time = self._noise.time[row]
+        for index, channel in enumerate(self._noise.channels):
+            level, memory = channel.coloured
+            if level > 0.0:
+                between = np.abs(time[:, :, None] - time[:, None, :])
+                block[..., index, index] += level**2 * np.exp(-between / memory)
+        size = rows * self._channels
+        return np.swapaxes(block, 2, 3).reshape(len(starts), size, size)

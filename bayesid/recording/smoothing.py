@@ -113,6 +113,17 @@ class SmoothedJoint:
             Covariance ``[l, i]`` of the three errors at ``time[i]`` with those at ``time[i - l]``, zero where there
             is no such time.
         """
+        key = (time.tobytes(), lags)
+        if key not in self._last_covariance:  # the same times are asked for whenever noise is linearised anew
+            self._last_covariance.clear()
+            self._last_covariance[key] = self._lag_covariance(time, lags)
+        return self._last_covariance[key]
+
+    @cached_property
+    def _last_covariance(self) -> dict[tuple[bytes, int], Floats]:
+        return {}
+
+    def _lag_covariance(self, time: Floats, lags: int) -> Floats:
         left, weights = self._interpolation(time)
         # the curve at a time depends on the states of the nodes left and right of it
         states = left[:, None] * self.order + np.arange(2 * self.order)

@@ -1,19 +1,17 @@
-"""Motion of the joint frames relative to the base: poses with two derivatives, by Pinocchio or in JAX."""
+"""Motion of the joint frames relative to the base: poses with two derivatives."""
 
 from __future__ import annotations
 
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 import pinocchio as pin
-from jax import Array
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, namespace
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
 
-__all__ = ["Kinematics", "configuration", "joint_motion", "joint_twist", "kinematics", "traced_kinematics"]
+__all__ = ["Kinematics", "configuration", "joint_motion", "joint_twist", "kinematics"]
 
 
 class Kinematics(NamedTuple):
@@ -25,51 +23,29 @@ class Kinematics(NamedTuple):
 
 
 def kinematics(robot: Robot, state: JointState) -> Kinematics:
-    """Return the motion of the joint frames: by Pinocchio, or of arrays of JAX by `traced_kinematics`."""
-    return _kinematics(robot, state) if isinstance(state.position, np.ndarray) else traced_kinematics(robot, state)
-
-
-def _kinematics(robot: Robot, state: JointState) -> Kinematics:
-    """Return the motion of the joint frames by Pinocchio's second-order forward kinematics, with the base at rest."""
-    model, data = robot.model, robot.model.createData()
-    count, joints = state.position.shape
-    pose = np.tile(np.eye(4), (count, joints, 1, 1))
-    motion = np.zeros((2, count, joints, 6))
-    velocity, acceleration = np.zeros(model.nv), np.zeros(model.nv)
-    for row in range(count):
-        q = configuration(robot, state.position[row])
-        velocity[6:], acceleration[6:] = state.velocity[row], state.acceleration[row]
-        pin.forwardKinematics(model, data, q, velocity, acceleration)
-        for joint in range(joints):
-            placement = data.oMi[joint + 2]
-            pose[row, joint, :3, :3], pose[row, joint, :3, 3] = placement.rotation, placement.translation
-            motion[0, row, joint], motion[1, row, joint] = data.v[joint + 2].vector, data.a[joint + 2].vector
-    twist, twist_rate = _hat(motion)  # in the axes of the joint itself
-    return Kinematics(pose, pose @ twist, pose @ (twist_rate + twist @ twist))
-
-
-def traced_kinematics(robot: Robot, state: JointState) -> Kinematics:
-    """Return the motion of the joint frames by products of exponentials in JAX, which can be differentiated.
+    """Return the motion of the joint frames by products of exponentials, of arrays of NumPy or of JAX.
 
     The pose of each joint is that of its parent, times a constant placement, times the exponential of its axis (Lynch &
-    Park 2017, section 4.1); the derivatives follow by the product rule.
+    Park 2017, section 4.1); the derivatives follow by the product rule. Placements, axes and tree are Pinocchio's.
     """
-    frames: list[tuple[Array, ...]] = []
-    still = jnp.zeros((len(state.position), 4, 4))
-    for index in range(len(robot.joints)):
-        axis = jnp.asarray(_hat(joint_twist(robot, index)))
+    xp = namespace(state.position)
+    frames: list[tuple[Any, ...]] = []
+    count = len(state.position)
+    fixed, still = xp.broadcast_to(xp.eye(4), (count, 4, 4)), xp.zeros((count, 4, 4))
+    for index, joint in enumerate(robot.joints):
+        axis = xp.asarray(_hat(joint_twist(robot, index)))
         q, speed, change = (part[:, index, None, None] for part in state)
-        turn = jnp.eye(4) + jnp.sin(q) * axis + (1.0 - jnp.cos(q)) * (axis @ axis)
-        if robot.joints[index].kind == "prismatic":
-            turn = jnp.eye(4) + q * axis
+        square = axis @ axis
+        if joint.kind == "prismatic":
+            turn = xp.eye(4) + q * axis
+        else:
+            turn = xp.eye(4) + xp.sin(q) * axis + (1.0 - xp.cos(q)) * square
         turn_rate = turn @ axis * speed
-        turn_acceleration = turn @ axis @ axis * speed**2 + turn @ axis * change
+        turn_acceleration = turn @ (square * speed**2 + axis * change)
         parent = robot.model.parents[index + 2] - 2
-        pose, rate, acceleration = frames[parent] if parent >= 0 else (still + jnp.eye(4), still, still)
-        pose, rate, acceleration = (
-            part @ jnp.asarray(robot.model.jointPlacements[index + 2].homogeneous)
-            for part in (pose, rate, acceleration)
-        )
+        placement = xp.asarray(robot.model.jointPlacements[index + 2].homogeneous)
+        pose, rate, acceleration = frames[parent] if parent >= 0 else (fixed, still, still)
+        pose, rate, acceleration = pose @ placement, rate @ placement, acceleration @ placement
         frames.append(
             (
                 pose @ turn,
@@ -77,8 +53,10 @@ def traced_kinematics(robot: Robot, state: JointState) -> Kinematics:
                 acceleration @ turn + 2.0 * rate @ turn_rate + pose @ turn_acceleration,
             )
         )
-    pose, rate, acceleration = (jnp.stack(parts, axis=1) for parts in zip(*frames, strict=True))
-    return Kinematics(*cast("tuple[Floats, Floats, Floats]", (pose, rate, acceleration)))
+    if not frames:
+        return Kinematics(*np.zeros((3, count, 0, 4, 4)))
+    pose, rate, acceleration = (xp.stack(parts, axis=1) for parts in zip(*frames, strict=True))
+    return Kinematics(pose, rate, acceleration)
 
 
 def configuration(robot: Robot, position: Floats) -> Floats:
