@@ -28,9 +28,7 @@ BRANCHED = """<robot name="branched">
 </robot>"""
 
 
-ROBOTS = pytest.mark.parametrize(
-    "robot", [Robot.shipped("ets7"), Robot.from_string(BRANCHED)], ids=["chain", "tree"]
-)
+ROBOTS = pytest.mark.parametrize("robot", [Robot.shipped("ets7"), Robot.from_string(BRANCHED)], ids=["chain", "tree"])
 
 
 @ROBOTS
