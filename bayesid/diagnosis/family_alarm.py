@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesid.diagnosis.encoder_fault import encoder_test
 from bayesid.diagnosis.evidence_alarm import FAMILY_LEVEL, EvidenceAlarm
 from bayesid.diagnosis.linearisation import Linearisation
 from bayesid.diagnosis.noise_tests import noise_tests, variance_tests
@@ -35,7 +36,7 @@ class FamilyAlarm:
     def of(point: Linearisation, rng: np.random.Generator, draws: int = 2000) -> FamilyAlarm:
         """Test the present model at its fit."""
         posterior = point.engine.posterior
-        tests = noise_tests(posterior, point.fit) | variance_tests(posterior, point.fit)
+        tests = noise_tests(posterior, point.fit) | variance_tests(posterior, point.fit) | encoder_test(posterior)
         return FamilyAlarm(EvidenceAlarm.of(point.evidence, rng, draws), tests)
 
     @property

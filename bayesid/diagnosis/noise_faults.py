@@ -11,6 +11,7 @@ from scipy import stats
 from scipy.optimize import minimize
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.encoder_fault import ENCODER_NOISE, encoder_ratios, with_encoder_noise
 from bayesid.diagnosis.noise_tests import lattice, leverage
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.inference.noise_changes import leaving_out, with_sensors
@@ -37,6 +38,7 @@ REFITS = 2
 
 SUMMARIES = {
     "noise": "The sensor is noisier than its data sheet: every sample's error is larger by one factor.",
+    ENCODER_NOISE: "The encoders are noisier than their data sheet: every sample's error is larger by one factor.",
     "coloured-noise": "The sensor's error at one sample resembles that at the next: it wanders beside its white noise.",
     "initial-rate": "The base was already turning when the recording began; the model lets it start from rest.",
     "outliers": "Some samples are far off, more than noise allows: lost or garbled readings.",
@@ -57,6 +59,8 @@ class NoiseFault:
         Of the quantities.
     posterior : Posterior
         With the fault in its noise.
+    log_gain : float
+        What the fault adds to the log likelihood of samples that the posterior does not hold: the joints'.
     """
 
     label: str
@@ -64,6 +68,7 @@ class NoiseFault:
     mean: Floats
     sd: Floats
     posterior: Posterior
+    log_gain: float = 0.0
 
     @property
     def summary(self) -> str:
@@ -89,6 +94,8 @@ def noise_fault(label: str, fit: Fit, least: float = -np.inf) -> NoiseFault | No
         return _outliers(label, Kind.of(place), fit)
     if name == "quantisation":
         return _quantisation(label, Kind.of(place), fit)
+    if name == ENCODER_NOISE:
+        return _encoders(fit)
     return _understated(label, Kind.of(name.removesuffix("-noise")), fit)
 
 
@@ -103,6 +110,14 @@ def _understated(label: str, kind: Kind, fit: Fit) -> NoiseFault:
     return NoiseFault(
         label, (Quantity("factor", "1"),), np.array([factor]), np.array([factor / np.sqrt(2.0 * degrees)]), posterior
     )
+
+
+def _encoders(fit: Fit) -> NoiseFault:
+    ratios = encoder_ratios(fit.posterior)
+    factor, relative = float(np.exp(ratios.mean())), float(ratios.std(ddof=1) / np.sqrt(len(ratios)))
+    posterior, gain = with_encoder_noise(fit.posterior, factor, fit.z)
+    size = np.array([factor])
+    return NoiseFault(ENCODER_NOISE, (Quantity("factor", "1"),), size, size * relative, posterior, gain)
 
 
 def _coloured(label: str, kind: Kind, fit: Fit, least: float) -> NoiseFault | None:

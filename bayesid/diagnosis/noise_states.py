@@ -7,10 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bayesid.diagnosis.encoder_fault import ENCODER_NOISE
 from bayesid.diagnosis.linearisation import Linearisation, linearise
 from bayesid.diagnosis.noise_faults import NoiseFault, noise_fault, refined
 from bayesid.diagnosis.noise_tests import ON_LATTICE
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
+from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.sensors import Kind
@@ -52,13 +54,15 @@ class NoiseState:
 
 
 def fault_names(engine: Engine) -> tuple[str, ...]:
-    """Return the names of all faults of the noise of a model's sensors."""
+    """Return the names of all faults of the noise of a model's sensors and encoders."""
     kinds = [sensor.kind.value for sensor in engine.posterior.model.sensors]
-    return tuple(
+    found = [
         name
         for kind in kinds
         for name in (f"{kind}-noise", f"coloured-noise:{kind}", f"outliers:{kind}", f"quantisation:{kind}")
-    )
+    ]
+    measured = any(isinstance(item.motion, MeasuredMotion) for item in engine.posterior.manoeuvres)
+    return (*found, ENCODER_NOISE) if measured else tuple(found)
 
 
 def noise_state(
@@ -112,7 +116,7 @@ def _log_charge(fault: NoiseFault) -> float:
     if name == "quantisation":  # that values fall on a lattice by chance
         return -float(np.log(2.0 * ON_LATTICE)) * fault.posterior.samples / 3.0
     relative = np.maximum(fault.sd / fault.mean, 1e-6)
-    charge = float(np.minimum(np.log(np.sqrt(2.0 * np.pi) * relative / width), 0.0).sum())
+    charge = float(np.minimum(np.log(np.sqrt(2.0 * np.pi) * relative / width), 0.0).sum()) + fault.log_gain
     if name == "outliers":
         charge += _contamination(fault, Kind.of(place))
     return charge

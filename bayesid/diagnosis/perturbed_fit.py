@@ -157,9 +157,10 @@ class Engine:
         self._tables: dict[str, Table] = {}
 
     def with_posterior(self, posterior: Posterior) -> Engine:
-        """Return an engine for the same data under another noise; tables are shared."""
+        """Return an engine for the same data under another noise; tables are shared where the motion is the same."""
         new = Engine(posterior, self.frozen, self._released)
-        new._tables = self._tables
+        if all(a.motion is b.motion for a, b in zip(posterior.manoeuvres, self.posterior.manoeuvres, strict=True)):
+            new._tables = self._tables
         return new
 
     @property

@@ -6,7 +6,7 @@ A motion gives the positions, velocities and accelerations of all joints at any 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -144,6 +144,15 @@ class MeasuredMotion:
         if not self.joints:
             return JointState(*np.zeros((3, len(time), 0)))
         return JointState(*np.stack([joint.evaluate(time) for joint in self.joints], axis=-1))
+
+    def with_noise(self, factor: float) -> MeasuredMotion:
+        """Return the motion smoothed anew with the declared noise of the encoders times a factor."""
+        return replace(self, joints=tuple(joint.with_noise(factor) for joint in self.joints))
+
+    @property
+    def log_likelihood(self) -> float:
+        """Logarithm of the marginal likelihood of all samples of the joints."""
+        return sum(joint.log_likelihood for joint in self.joints)
 
     def lag_covariance(self, time: Floats, lags: int) -> Floats:
         """Return the covariances of `SmoothedJoint.lag_covariance` for all joints, (joints, lags + 1, T, 3, 3)."""

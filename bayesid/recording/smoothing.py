@@ -10,7 +10,7 @@ is banded.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -68,6 +68,10 @@ class SmoothedJoint:
         Square root of the spectral density of that derivative.
     chi2, samples : float, int
         Chi-square of the samples and their number. A ratio well above one says that the spline does not follow them.
+    series : tuple of JointSamples
+        Samples.
+    start : float or None
+        Exact position at time 0, if known.
     """
 
     nodes: Floats
@@ -81,6 +85,25 @@ class SmoothedJoint:
     log_likelihood: float
     chi2: float
     samples: int
+    series: tuple[JointSamples, ...]
+    start: float | None
+
+    def with_noise(self, factor: float) -> SmoothedJoint:
+        """Smooth the samples anew with the declared noise times a factor; estimated noise is estimated again."""
+        return smooth(
+            [replace(one, sigma=None if one.sigma is None else factor * one.sigma) for one in self.series], self.start
+        )
+
+    def declared_noise_error(self) -> Floats:
+        """Return the logarithm of estimated over declared noise of each series whose noise is declared.
+
+        The estimate is that of the largest marginal likelihood for the order that was chosen.
+        """
+        free = _fit([replace(one, sigma=None) for one in self.series], self.nodes, self.scale, self.start, self.order)
+        ratios = [
+            np.log(new / one.sigma) for one, new in zip(self.series, free.sigmas, strict=True) if one.sigma is not None
+        ]
+        return np.array(ratios)
 
     @property
     def _units(self) -> Floats:
@@ -237,6 +260,8 @@ def _fit(samples: list[JointSamples], nodes: Floats, scale: float, start: float 
         log_likelihood=log_likelihood,
         chi2=chi2,
         samples=sum(len(series.time) for series in samples),
+        series=tuple(samples),
+        start=start,
     )
 
 

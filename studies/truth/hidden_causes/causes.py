@@ -8,10 +8,22 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
 
 from studies.truth import mujoco as mj
 from studies.truth.hidden_causes.case import Generator, Options, direction
-from studies.truth.hidden_causes.sensor_faults import ColouredNoise, EncoderOffset, Outliers, Quantisation, VectorFault
+from studies.truth.hidden_causes.sensor_faults import (
+    Backlash,
+    BiasJump,
+    ColouredNoise,
+    CurvedGyro,
+    EncoderOffset,
+    Outliers,
+    Quantisation,
+    TurnedStarSensor,
+    VectorFault,
+    WrongClock,
+)
 from studies.truth.urdf import link_body
 
 
@@ -115,9 +127,27 @@ def encoder_offset(joint: str, size: float, draw: Generator, strength: float) ->
     return {"distort": EncoderOffset(joint, float(draw.choice([-1.0, 1.0])) * size * strength)}
 
 
-def understated(sensor: str, draw: Generator, strength: float) -> Options:
+def clock(sensor: str, size: float, draw: Generator, strength: float) -> Options:
+    """Clock of a sensor that runs fast or slow."""
+    return {"distort": WrongClock(sensor, float(draw.choice([-1.0, 1.0])) * size * strength)}
+
+
+def turned_star_sensor(draw: Generator, strength: float) -> Options:
+    """Star sensor that is mounted otherwise than stated."""
+    return {"distort": TurnedStarSensor(direction(draw, 2e-4 * strength))}
+
+
+def changing_wheel(draw: Generator, strength: float) -> Options:
+    """Wheel along z whose momentum goes up and down in straight lines, and is not recorded."""
+    times = np.concatenate([[0.0], np.sort(draw.uniform(20.0, 130.0, 4)), [200.0]])
+    levels = 0.06 * strength * draw.uniform(-1.0, 1.0, len(times))
+    return _hide(fields=[mj.spun_wheel([0.0, 0.0, 1.0], times, levels)])
+
+
+def understated(sensor: str, size: float, draw: Generator, strength: float) -> Options:
     """Noise that is stronger than the study says."""
-    return {"declared": {f"{sensor}_sigma": 1e-5 / (1.0 + 0.35 * strength)}}
+    true = {"rate": 1e-5, "accel": 1e-5, "encoder": 1e-6}[sensor]
+    return {"declared": {f"{sensor}_sigma": true / (1.0 + size * strength)}}
 
 
 def coloured(sensor: str, draw: Generator, strength: float) -> Options:
@@ -163,3 +193,29 @@ def shifting_mass(draw: Generator, strength: float) -> Options:
     body = mj.Body(3.0, direction(draw, 0.4), 0.01 * np.eye(3))
     start = float(draw.integers(60, 80))
     return _hide(movers=[mj.Mover(body, tuple(direction(draw).tolist()), 0.015 * strength, start)]) | {"step": 0.125}
+
+
+def bias_jump(draw: Generator, strength: float) -> Options:
+    """Bias of the rate sensor that jumps once."""
+    return {"distort": BiasJump("rate", direction(draw, 4e-5 * strength), float(draw.uniform(40.0, 100.0)))}
+
+
+def curved_gyro(draw: Generator, strength: float) -> Options:
+    """Rate sensor whose error goes with the square of the rate."""
+    return {"distort": CurvedGyro(direction(draw, 10.0 * strength))}
+
+
+def backlash(joint: str, draw: Generator, strength: float) -> Options:
+    """Gear of a joint with a gap."""
+    return {"distort": Backlash(joint, 1e-3 * strength)}
+
+
+def wandering_torque(draw: Generator, strength: float) -> Options:
+    """Torque that wanders at random with a memory of 15 s, fixed in orbit axes."""
+    times = np.arange(0.0, 400.0, 5.0)
+    decay = np.exp(-5.0 / 15.0)
+    values = np.zeros((len(times), 3))
+    for row in range(1, len(times)):
+        values[row] = decay * values[row - 1] + np.sqrt(1.0 - decay**2) * draw.normal(size=3)
+    history = CubicSpline(times, 4e-4 * strength * values)
+    return _hide(fields=[mj.outer_torque(history)])

@@ -2,7 +2,18 @@
 
 from studies.truth.bodies import Body, join, nearby, wrong_guess
 from studies.truth.motions import Manoeuvres, Motion, smooth_motion
-from studies.truth.mujoco.fields import Field, braking, drag, leak, magnet, outer_torque, pulses, snap, sunlight
+from studies.truth.mujoco.fields import (
+    Field,
+    braking,
+    drag,
+    leak,
+    magnet,
+    outer_torque,
+    pulses,
+    snap,
+    spun_wheel,
+    sunlight,
+)
 from studies.truth.mujoco.model import TruthModel
 from studies.truth.mujoco.parts import Appendage, Flexibility, Mover, Rotor, Thrust, panel, slosh
 from studies.truth.mujoco.rollout import rollout
@@ -48,6 +59,7 @@ __all__ = [
     "slosh",
     "smooth_motion",
     "snap",
+    "spun_wheel",
     "sunlight",
     "write_study",
     "write_urdf",

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from studies.truth.numerics import Array, cross
 from studies.truth.orbit import Orbit
 
-__all__ = ["Field", "braking", "drag", "leak", "magnet", "outer_torque", "pulses", "snap", "sunlight"]
+__all__ = ["Field", "braking", "drag", "leak", "magnet", "outer_torque", "pulses", "snap", "spun_wheel", "sunlight"]
 
 Field = Callable[[float, Array, Array], tuple[Array, Array]]
 """Time, rotation matrix base -> orbit axes, rate in base axes -> force and torque at the base origin, base axes."""
@@ -82,3 +82,16 @@ def snap(torque: ArrayLike, *, start: float, decay: float) -> Field:
 def outer_torque(history: Callable[[float], ArrayLike]) -> Field:
     """Torque of any history in orbit axes [N m], which do not rotate."""
     return lambda time, attitude, rate: (np.zeros(3), attitude.T @ np.asarray(history(time), dtype=float))
+
+
+def spun_wheel(axis: ArrayLike, times: ArrayLike, momentum: ArrayLike) -> Field:
+    """Reaction of a wheel whose momentum [N m s] along an axis of the base is piecewise linear in time."""
+    unit, knots, levels = (np.asarray(part, dtype=float) for part in (axis, times, momentum))
+    slopes = np.diff(levels) / np.diff(knots)
+
+    def react(time: float, attitude: Array, rate: Array) -> tuple[Array, Array]:
+        piece = min(max(int(np.searchsorted(knots, time, side="right")) - 1, 0), len(slopes) - 1)
+        spin = levels[piece] + slopes[piece] * (time - knots[piece])
+        return np.zeros(3), -slopes[piece] * unit - cross(rate, spin * unit)
+
+    return react
