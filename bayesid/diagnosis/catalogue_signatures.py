@@ -63,9 +63,10 @@ def catalogue_signatures(
     data = engine.data_of(fit)
     signatures: dict[str, Signatures] = {}
     causes = []
-    for effect in effects:
-        if effect.modes_count or isinstance(effect, MassShift):
-            continue
+    wanted = [effect for effect in effects if not effect.modes_count and not isinstance(effect, MassShift)]
+    others = [effect for effect in wanted if effect.amplitude_units != MOMENT_UNITS]
+    columns = iter(_linear(engine, fit, others, data))
+    for effect in wanted:
         sizes = {bound.unit: bound.largest for bound in bounds[effect.label]}
         if effect.amplitude_units == MOMENT_UNITS:
             name = group_names(effect)[MOMENT_UNITS[0]]
@@ -78,7 +79,7 @@ def catalogue_signatures(
             body = MissingBody(sizes["kg"], reach, radii, rigid_moments) if isinstance(effect, Payload) else None
             causes.append(CandidateCause(effect.label, groups[0], others=tuple(groups[1:]), body=body))
             continue
-        found = _linear(engine, fit, effect, data)
+        found = _by_unit(engine, effect, next(columns))
         signatures |= {item.name: item for item in found.values()}
         if not sizes:
             (item,) = found.values()
@@ -89,14 +90,22 @@ def catalogue_signatures(
     return SignatureBank(tuple(signatures.values()), tuple(causes))
 
 
-def _linear(engine: Engine, fit: Fit, effect: Effect, data: Arrays) -> dict[str, Signatures]:
+def _linear(engine: Engine, fit: Fit, effects: Sequence[Effect], data: Arrays) -> list[Floats]:
+    """Return the derivatives of the residual in the coordinates of each effect in amplitudes, (N, n)."""
+    points = [(effect.in_amplitudes(), _start(engine, effect.in_amplitudes())) for effect in effects]
+    return engine.columns(points, fit.operating, fit.z, data)
+
+
+def _start(engine: Engine, linear: Effect) -> Floats:
+    return np.tile(linear.starts[0], len(engine.posterior.manoeuvres) if linear.per_recording else 1)
+
+
+def _by_unit(engine: Engine, effect: Effect, columns: Floats) -> dict[str, Signatures]:
     """Return the signatures of an effect by the unit of their amplitudes."""
     linear = effect.in_amplitudes()
-    recordings = len(engine.posterior.manoeuvres) if effect.per_recording else 1
-    start = np.tile(linear.starts[0], recordings)
-    columns = engine.columns(linear, start, fit.operating, fit.z, data)
     if not linear.parameters:
         return {"1": Signatures(effect.label, columns)}
+    recordings = len(engine.posterior.manoeuvres) if effect.per_recording else 1
     columns = columns / np.tile([parameter.sigma for parameter in linear.parameters], recordings)
     units = np.tile([parameter.unit for parameter in linear.parameters], recordings)
     return {unit: Signatures(name, columns[:, units == unit]) for unit, name in group_names(effect).items()}

@@ -85,7 +85,7 @@ class WeighedCauses:
         sets = []
         for item in self.probabilities.sets:
             state = self.state(item.causes)
-            names = [name for name in item.names if name not in state.names]
+            names = [name for name in item.names if name in state.point.evidence.causes]
             if item.probability >= MATTERS and names:
                 change = wider[state.names].log_evidence(names) - state.point.evidence.log_evidence(names)
                 item = replace(item, log_evidence=item.log_evidence + change)
@@ -143,8 +143,9 @@ def weigh_causes(
         highest = point.log_nothing + max(item.log_evidence for item in found.sets)
         state = noise_state(label, residual, base, effects, bounds, highest)
         if state is not None:
-            states.append(state)
-            sets.append(list(enumerate_sets(state.point.evidence, prior).sets))
+            settled, own, _ = _settled(_with_bursts(state.point), effects, bounds, prior)
+            states.append(replace(state, point=settled))
+            sets.append(list(own.sets))
     return WeighedCauses(base, alarm, tuple(states), _joined(states, sets, found, faults))
 
 

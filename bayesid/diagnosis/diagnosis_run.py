@@ -23,6 +23,7 @@ from bayesid.diagnosis.family_alarm import FamilyAlarm
 from bayesid.diagnosis.gain import Gain, measure_gain
 from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.hypothesis_fit import fit_hypothesis
+from bayesid.diagnosis.left_over import with_left_over
 from bayesid.diagnosis.perturbed_fit import Engine
 from bayesid.diagnosis.probable_verdict import UNKNOWN, ProbableVerdict
 from bayesid.diagnosis.set_evidence import SetEvidence
@@ -196,13 +197,17 @@ def _diagnose(
     )
     limits = bounds_by_label(catalogue, model, stated)
     weighed = weigh_causes(engine, before.fit, catalogue, limits, prior, rng, progress)
+    progress(0.65, "fitting the most probable causes")
+    weighed, fitted = with_left_over(weighed, catalogue)
     classes = weighed.classes()
     sensitivity = verdict_sensitivity(weighed.probabilities, classes, weighed.alarm.silent, weighed.widened)
     verdict = sensitivity.verdict
     clock.ends("verdict")
     named = [name for name in verdict.causes if name != UNKNOWN]
     progress(0.7, "fitting the extended model")
-    after = fit_hypothesis(weighed.state(named), named, catalogue) if named else before
+    after = before
+    if named:
+        after = fitted.get(frozenset(named)) or fit_hypothesis(weighed.state(named), named, catalogue)
     progress(0.75, "measuring the gain")
     gain = measure_gain(before, after)
     progress(0.85, "reconstructing the disturbance")

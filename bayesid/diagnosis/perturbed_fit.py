@@ -30,13 +30,24 @@ from bayesid.diagnosis.perturbation import (
     physical,
     tables_of,
 )
-from bayesid.inference.perturbed_posterior import Arrays, Perturbation, perturbed, responses, trace
+from bayesid.inference.perturbed_posterior import (
+    Arrays,
+    Perturbation,
+    jacobian_of,
+    perturbed,
+    residual_of,
+    responses,
+    trace,
+)
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["Engine", "Fit"]
 
 ITERATIONS = 25
+TOGETHER = 32
+"""Columns from which on those of several effects are not evaluated together, for the sake of memory."""
+
 CLOSE = 0.02
 """Change of the cost at which a fit has converged."""
 
@@ -186,6 +197,8 @@ class Engine:
         with ThreadPoolExecutor(1) as other:
             derivatives = other.submit(responses, self.posterior, z, data, self.perturbation(1))
             trace(self.posterior, z, data)
+            residual_of(self.posterior, z, data)
+            jacobian_of(self.posterior, z, data)
             derivatives.result()
 
     def fit(
@@ -278,10 +291,8 @@ class Engine:
         """Residual and derivatives at one point."""
         data = self._pushed(self._pushes(effects, coordinates, operating))
         residual = self.residual(z, data)
-        columns = [self.own_columns(z, data)]
-        for effect, c in zip(effects, coordinates, strict=True):
-            empty = np.zeros((len(residual), 0))
-            columns.append(self.columns(effect, c, operating, z, data) if len(c) else empty)
+        sized = [(effect, c) for effect, c in zip(effects, coordinates, strict=True) if len(c)]
+        columns = [self.own_columns(z, data), *self.columns(sized, operating, z, data)]
         cost = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in coordinates))
         return _Point(z, list(coordinates), operating, residual, np.concatenate(columns, axis=1), cost)
 
@@ -298,21 +309,32 @@ class Engine:
 
     def residual(self, z: Floats, data: Arrays) -> Floats:
         """Return the whitened residual, (N,)."""
-        return np.asarray(trace(self.posterior, z, data).residual).ravel()
+        return residual_of(self.posterior, z, data).ravel()
 
     def own_columns(self, z: Floats, data: Arrays) -> Floats:
         """Return derivatives of the residual in the model's free coordinates, (N, n)."""
-        free = self.free
-        unit = np.zeros((len(free), self.posterior.size))
-        unit[np.arange(len(free)), free] = 1.0
-        return responses(self.posterior, z, data, self.perturbation(len(free), z=unit)).reshape(len(free), -1).T
+        return jacobian_of(self.posterior, z, data).reshape(-1, self.posterior.size)[:, self.free]
 
     def columns(
-        self, effect: Effect, coordinates: Floats, operating: OperatingTrajectory, z: Floats, data: Arrays
-    ) -> Floats:
-        """Return derivatives of the residual in an effect's coordinates, (N, n)."""
-        perturbations = linear_perturbation(effect, coordinates, operating, self._table(effect))
-        return self.respond(perturbations, z, data)
+        self, effects: Iterable[tuple[Effect, Floats]], operating: OperatingTrajectory, z: Floats, data: Arrays
+    ) -> list[Floats]:
+        """Return derivatives of the residual in the coordinates of each effect, (N, n)."""
+        found: list[Floats] = []
+        waiting: list[Perturbation] = []
+        for effect, coordinates in effects:
+            waiting.append(linear_perturbation(effect, coordinates, operating, self._table(effect)))
+            if sum(len(one.z) for one in waiting) >= TOGETHER:
+                found += self._respond_to_each(waiting, z, data)
+                waiting = []
+        return found + self._respond_to_each(waiting, z, data)
+
+    def _respond_to_each(self, pushes: Sequence[Perturbation], z: Floats, data: Arrays) -> list[Floats]:
+        """Return what `respond` says of several, evaluated together, since full batches cost as much as others."""
+        if not pushes:
+            return []
+        joined = jax.tree.map(lambda *parts: np.concatenate(parts), *pushes)
+        ends = np.cumsum([len(one.z) for one in pushes])[:-1]
+        return np.split(self.respond(joined, z, data), ends, axis=1)
 
     def respond(self, perturbations: Perturbation, z: Floats, data: Arrays) -> Floats:
         """Return derivatives of the residual along pushes with leading axis n, (N, n)."""

@@ -11,12 +11,22 @@ from bayesid.inference import compiled
 from bayesid.inference.compiled import Arrays, Perturbation, Traced, perturbed
 from bayesid.inference.posterior import BATCH, Posterior
 
-__all__ = ["Arrays", "Perturbation", "Traced", "perturbed", "responses", "trace"]
+__all__ = ["Arrays", "Perturbation", "Traced", "jacobian_of", "perturbed", "residual_of", "responses", "trace"]
 
 
 def trace(posterior: Posterior, z: Floats, arrays: Arrays) -> Traced:
     """Return the simulated motion, readings and residual at ``z`` for arrays that may be `perturbed`."""
     return compiled.traced(posterior.structure, posterior.numbers, jnp.asarray(z), arrays)
+
+
+def residual_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
+    """Return the whitened residual (R, O, C) at ``z`` for arrays that may be `perturbed`."""
+    return np.asarray(compiled.residuals(posterior.structure, posterior.numbers, jnp.asarray(z), arrays))
+
+
+def jacobian_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
+    """Return the derivatives of the whitened residual in ``z``, (R, O, C, size), for arrays that may be `perturbed`."""
+    return np.asarray(compiled.jacobian(posterior.structure, posterior.numbers, jnp.asarray(z), arrays))
 
 
 def responses(posterior: Posterior, z: Floats, arrays: Arrays, perturbations: Perturbation) -> Floats:
