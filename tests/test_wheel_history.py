@@ -8,6 +8,7 @@ import pytest
 from bayesid._io.errors import InputError
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import WheelHistory, WheelMomentum, create
+from bayesid.simulation.effects.wheel_history import KNOTS
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Kind, Sensor, White
 from studies.truth import mujoco as mj
@@ -15,9 +16,9 @@ from studies.truth import stepwise as ref
 from studies.truth.urdf import SERVICER3
 from tests.simulated import simulated
 
-END, TIMES = 44.0, np.arange(0.0, 60.01, 0.5)
-KNOTS = np.linspace(0.0, END, 12)
-MOMENTUM = np.array([0.3, 0.1, -0.4, -0.2, 0.5, 0.6, 0.0, -0.3, -0.1, 0.2, 0.4, 0.35])
+END, TIMES = 46.0, np.arange(0.0, 60.01, 0.5)
+TURNS = np.linspace(0.0, END, KNOTS)
+MOMENTUM = np.random.default_rng(3).uniform(-0.6, 0.6, KNOTS)
 POINT, RATE0 = (0.2, -0.1, 0.3), (0.02, -0.03, 0.015)
 MOTION = mj.smooth_motion(3, 60.0, 5, amplitude=0.5, frequencies=(0.03, 0.06), ramp=10.0)
 
@@ -28,9 +29,9 @@ def test_the_history_is_that_of_pinocchio(axis, formula_motion):
     unit = np.eye(3)["xyz".index(axis)]
 
     def wheel(time: float) -> tuple[np.ndarray, np.ndarray]:
-        piece = np.searchsorted(KNOTS, time, side="right") - 1
-        slope = np.diff(MOMENTUM)[piece] / KNOTS[1] if piece < len(KNOTS) - 1 else 0.0
-        return np.interp(time, KNOTS, MOMENTUM) * unit, slope * unit
+        piece = np.searchsorted(TURNS, time, side="right") - 1
+        slope = np.diff(MOMENTUM)[piece] / TURNS[1] if piece < KNOTS - 1 else 0.0
+        return np.interp(time, TURNS, MOMENTUM) * unit, slope * unit
 
     options = {"rate0": RATE0, "accel_position": POINT, "gradient": False}
     truth = ref.simulate(SERVICER3, MOTION, TIMES, 0.05, wheel=wheel, **options)
@@ -45,7 +46,7 @@ def test_the_history_is_that_of_pinocchio(axis, formula_motion):
 def test_a_constant_history_is_a_wheel_momentum(formula_motion):
     robot = Robot.from_urdf(SERVICER3)
     motion = formula_motion(MOTION, SERVICER3, robot)
-    history = simulated(robot, motion, TIMES, RATE0, POINT, WheelHistory("y"), np.full(12, 0.4))
+    history = simulated(robot, motion, TIMES, RATE0, POINT, WheelHistory("y"), np.full(KNOTS, 0.4))
     constant = simulated(robot, motion, TIMES, RATE0, POINT, WheelMomentum(), np.array([0.0, 0.4, 0.0]))
     for left, right in zip(history, constant, strict=True):
         np.testing.assert_allclose(left, right, atol=1e-14)

@@ -10,7 +10,9 @@ from bayesid.simulation.model import Model
 __all__ = ["candidates"]
 
 
-def candidates(model: Model, *, knows_latitude: bool = True, records_wheels: bool = False) -> list[Effect]:
+def candidates(
+    model: Model, *, knows_latitude: bool = True, records_wheels: bool = False, longest: float | None = None
+) -> list[Effect]:
     """Return every effect that the model does not have and that could exist in its situation.
 
     Where an effect could exist its class states (`Effect.instances`).
@@ -22,12 +24,18 @@ def candidates(model: Model, *, knows_latitude: bool = True, records_wheels: boo
         Whether the recordings say where on the orbit they were made.
     records_wheels : bool
         Whether the momentum of the wheels is recorded, so that none runs unseen.
+    longest : float, optional
+        Length of the longest recording [s], over which the history of a wheel is resolved.
     """
     present = {effect.label for effect in model.effects}
     return [
-        effect.attach(model.robot)
+        (_over(effect, longest) if isinstance(effect, WheelHistory) else effect).attach(model.robot)
         for kind in known_effects().values()
         if (knows_latitude or not kind.needs_latitude) and not (records_wheels and kind is WheelHistory)
         for effect in kind.instances(model)
         if effect.label not in present
     ]
+
+
+def _over(effect: WheelHistory, longest: float | None) -> WheelHistory:
+    return effect if longest is None else WheelHistory(effect.place, longest)

@@ -192,9 +192,9 @@ def _diagnose(
     before = Hypothesis(engine, engine.fit(z=first.z))
     clock.ends("fit")
     wheels = any(f"wheel_momentum.{axis}" in item.recording.channels for item in manoeuvres for axis in "xyz")
-    catalogue = (
-        candidates(model, knows_latitude=knows_latitude, records_wheels=wheels) if effects is None else list(effects)
-    )
+    longest = max(float(item.recording.time[-1]) for item in manoeuvres)
+    possible = candidates(model, knows_latitude=knows_latitude, records_wheels=wheels, longest=longest)
+    catalogue = possible if effects is None else list(effects)
     limits = bounds_by_label(catalogue, model, stated)
     weighed = weigh_causes(engine, before.fit, catalogue, limits, prior, rng, progress)
     progress(0.65, "fitting the most probable causes")

@@ -36,6 +36,12 @@ WEAKER = 0.1
 MATTERS = 0.01
 """Probability above which a cause is kept with its trial."""
 
+WEAK_TO_STRONG, OUTSIDE = (0.1, 1.5), (0.3, 2.0)
+"""Least and largest strength of causes of the catalogue and of others."""
+
+FIRST_SEED = {False: 200, True: 60_000}
+"""Seed of the first trial of the small and of the full plan; those of tests and of development are others."""
+
 SPOILT = ("outliers", "quantisation")
 """Beginnings of the names of causes that do not change the mean of the data."""
 
@@ -153,22 +159,30 @@ class Trial:
 
 
 def plan(full: bool) -> list[Plan]:
-    """Return the plans of all trials.
+    """Return the plans of all trials, each with a seed of its own, in random order.
 
-    Every effect, pair and outside effect has two strengths, and thirty trials hide nothing (about an hour on two
-    cores). A full campaign has five strengths (three outside the catalogue), four seeds, and a thousand nulls.
+    A run that was stopped has thus made a random sample of its plan. The small plan has one trial of every case; the
+    full one has 1,000 with something hidden, every fifth of them outside the catalogue, and 1,000 with nothing. The
+    strengths are log-uniform between ends that give signal-to-noise ratios of about 3 to 80.
     """
-    strengths, seeds, nulls = ((0.1, 0.2, 0.4, 0.7, 1.5), 4, 1000) if full else ((0.2, 0.6), 1, 30)
-    outside = (0.5, 1.0, 2.0) if full else (0.5, 1.0)
-    plans = [
-        Plan(case.name, 200 + 100 * seed + number, strength)
-        for seed in range(seeds)
-        for number, case in enumerate(hidden_causes.CASES)
-        if case.status != "adequate"
-        for strength in (outside if case.status == "unknown" else strengths)
+    draw = np.random.default_rng(2)
+    effects, outside, quiet = (_names(status) for status in ("effect", "unknown", "adequate"))
+    counts = (800, 200, 1000) if full else (len(effects), len(outside), len(quiet))
+    cases = [
+        (names[index % len(names)], ends)
+        for names, count, ends in zip((effects, outside, quiet), counts, (WEAK_TO_STRONG, OUTSIDE, None), strict=True)
+        for index in range(count)
     ]
-    quiet = [case.name for case in hidden_causes.CASES if case.status == "adequate"]
-    return plans + [Plan(quiet[index % len(quiet)], 1000 + index) for index in range(nulls)]
+    first = FIRST_SEED[full]
+    plans = [
+        Plan(name, first + number, 1.0 if ends is None else float(f"{np.exp(draw.uniform(*np.log(ends))):.3g}"))
+        for number, (name, ends) in enumerate(cases)
+    ]
+    return [plans[number] for number in draw.permutation(len(plans))]
+
+
+def _names(status: str) -> list[str]:
+    return [case.name for case in hidden_causes.CASES if case.status == status]
 
 
 def run(

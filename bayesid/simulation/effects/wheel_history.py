@@ -23,9 +23,9 @@ from bayesid.simulation.effects.register import register
 if TYPE_CHECKING:
     from bayesid.simulation.model import Model
 
-__all__ = ["WheelHistory"]
+__all__ = ["KNOTS", "WheelHistory"]
 
-KNOTS = 12
+KNOTS = 24
 """Number of instants at which the momentum is a parameter."""
 
 AXES = "xyz"
@@ -35,8 +35,8 @@ AXES = "xyz"
 class WheelHistory(Placed):
     """Momentum of reaction wheels along one base axis as a piecewise linear function of time, in each recording.
 
-    The momentum has values of its own in every recording, at 12 knots from its start to ``end``; by default the knots
-    are 20 s apart. After the last knot the momentum is constant, and knots after the end of a recording keep their
+    The momentum has values of its own in every recording, at 24 knots from its start to ``end``, by default ten
+    seconds apart. After the last knot the momentum is constant, and knots after the end of a recording keep their
     prior. While it changes, the wheel drives the base by the negative of its slope, which jumps at the knots. A
     momentum that is constant in all recordings is `WheelMomentum`.
 
@@ -65,7 +65,7 @@ class WheelHistory(Placed):
     per_recording: ClassVar[bool] = True
     constant_names = ("end",)
 
-    def __init__(self, place: str = "", end: float = 220.0, sigma: float = 1.0) -> None:
+    def __init__(self, place: str = "", end: float = 230.0, sigma: float = 1.0) -> None:
         super().__init__(place)
         if not end > 0.0:
             raise InputError(f"{self.label}: the last knot is at {end:g} s", remedy="Give the recordings' length")
@@ -87,7 +87,7 @@ class WheelHistory(Placed):
 
     @property
     def knots(self) -> Floats:
-        """Times of the parameters, shape (12,) [s]."""
+        """Times of the parameters, shape (24,) [s]."""
         return np.linspace(0.0, self.end, KNOTS)
 
     def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:

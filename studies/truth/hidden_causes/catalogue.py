@@ -95,8 +95,8 @@ CASES: tuple[Case, ...] = (
     _effect("quantisation:rate", partial(hide.rounded, "rate")),
     _effect("quantisation:accel", partial(hide.rounded, "accel"), urdf=SERVICER4),
     _effect("encoder-noise", partial(hide.understated, "encoder", 1.5), urdf=SERVICER4),
-    _effect("rate-clock", partial(hide.clock, "rate", 1e-3)),
-    _effect("accel-clock", partial(hide.clock, "accel", 2e-3), urdf=SERVICER4),
+    _effect("rate-clock", partial(hide.clock, "rate", 5e-5)),
+    _effect("accel-clock", partial(hide.clock, "accel", 1e-4), urdf=SERVICER4),
     _effect(
         "attitude-misalignment",
         hide.turned_star_sensor,

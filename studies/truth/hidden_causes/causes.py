@@ -134,13 +134,13 @@ def clock(sensor: str, size: float, draw: Generator, strength: float) -> Options
 
 def turned_star_sensor(draw: Generator, strength: float) -> Options:
     """Star sensor that is mounted otherwise than stated."""
-    return {"distort": TurnedStarSensor(direction(draw, 2e-4 * strength))}
+    return {"distort": TurnedStarSensor(direction(draw, 5e-5 * strength))}
 
 
 def changing_wheel(draw: Generator, strength: float) -> Options:
     """Wheel along z whose momentum goes up and down in straight lines, and is not recorded."""
     times = np.concatenate([[0.0], np.sort(draw.uniform(20.0, 130.0, 4)), [200.0]])
-    levels = 0.06 * strength * draw.uniform(-1.0, 1.0, len(times))
+    levels = 0.02 * strength * draw.uniform(-1.0, 1.0, len(times))
     return _hide(fields=[mj.spun_wheel([0.0, 0.0, 1.0], times, levels)])
 
 
@@ -202,12 +202,12 @@ def bias_jump(draw: Generator, strength: float) -> Options:
 
 def curved_gyro(draw: Generator, strength: float) -> Options:
     """Rate sensor whose error goes with the square of the rate."""
-    return {"distort": CurvedGyro(direction(draw, 10.0 * strength))}
+    return {"distort": CurvedGyro(direction(draw, 0.1 * strength))}
 
 
 def backlash(joint: str, draw: Generator, strength: float) -> Options:
     """Gear of a joint with a gap."""
-    return {"distort": Backlash(joint, 1e-3 * strength)}
+    return {"distort": Backlash(joint, 6e-4 * strength)}
 
 
 def wandering_torque(draw: Generator, strength: float) -> Options:
