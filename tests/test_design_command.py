@@ -17,7 +17,7 @@ from bayesid.app import study_to_design
 from bayesid.app.schema import Study
 from bayesid.app.study_to_design import load_problem
 from bayesid.app.study_to_encoders import assume_missing, encoder_noise
-from bayesid.design import Store
+from bayesid.design import Store, expected_probability, noncentrality_for
 from bayesid.design.extended_posture import extended_posture
 from bayesid.design.trajectory_search import _Run
 from bayesid.recording.recording import Recording
@@ -261,3 +261,29 @@ def test_state_of_another_question_is_not_used(tmp_path: Path):
     (tmp_path / "search.json").write_text("{")
     with pytest.raises(InputError, match="Delete the file"):
         Store.open(tmp_path / "search.json", "one")
+
+
+@pytest.mark.usefixtures("slow")
+def test_two_effects_are_told_apart_by_hand(tmp_path: Path):
+    """The option stands for rivals and their separation alone; the file holds neither."""
+    file = write(tmp_path)
+    effort = ("--starts", 1, "--iterations", 3, "--seed", 3)
+    status, text = run("design", file, "--output", tmp_path / "out", *effort, "--separate", "rate-bias", "rate-scale")
+    assert status == 0, text
+    content = json.loads((tmp_path / "out" / "design.json").read_text())
+    assert [item["criterion"] for item in content["manoeuvres"]] == ["separation"]
+    assert "separation tells rate-bias and rate-scale apart" in " ".join(text.split())
+    status, text = run("design", file, "--output", tmp_path / "out2", *effort, "--separate", "rate-bias", "rate-bias")
+    assert status != 0
+    assert "cannot be told from itself" in " ".join(text.split())
+
+
+def test_the_expected_probability_is_that_of_simulated_rivals():
+    """Against draws of the log Bayes factor, and its inverse."""
+    rng = np.random.default_rng(4)
+    for noncentrality in (0.5, 4.0, 16.0):
+        factors = 0.5 * noncentrality + np.sqrt(noncentrality) * rng.normal(size=400_000)
+        drawn = 1.0 / (1.0 + np.exp(-factors))
+        assert expected_probability(noncentrality) == pytest.approx(drawn.mean(), abs=4.0 * drawn.std() / 632.0)
+    assert expected_probability(0.0) == pytest.approx(0.5)
+    assert expected_probability(noncentrality_for(0.95)) == pytest.approx(0.95)

@@ -2,10 +2,11 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from studies.blind_injections import Trial, plan, run, write_report
-from studies.blind_injections.report import confusion, rates, reliability
+from studies.blind_injections.report import confusion, rates, reliability, scores, statements
 from studies.blind_injections.trials import Plan, read
 from studies.common.monte_carlo import read_store
 
@@ -118,6 +119,21 @@ def test_the_plans_hide_everything_and_nothing():
         assert len({(item.case, item.seed, item.strength) for item in plans}) == len(plans)
         assert len({item.case for item in plans}) == 57
     assert sum(item.case.startswith("null") for item in plans) == 1000
+
+
+@pytest.mark.usefixtures("slow")
+def test_statements_are_scored(trials):
+    """Against the definition, by hand."""
+    bias, null = trials
+    sure = replace(bias, probabilities={"rate-bias": 0.8, "rate-drift": 0.1}, unknown=0.05, nothing=0.0)
+    quiet = replace(null, probabilities={}, unknown=0.2, nothing=0.8)
+    said = statements([sure, quiet])
+    assert said["causes"] == [(0.8, True), (0.1, False)]
+    assert said["unknown"] == [(0.05, False), (0.2, False)]
+    assert said["nothing"] == [(0.0, False), (0.8, True)]
+    rows = {row[0]: row for row in scores([sure, quiet])}
+    assert rows["causes"][2].startswith(f"{(0.04 + 0.01) / 2.0:.4f}")
+    assert rows["nothing"][3].startswith(f"{np.log(0.8) / 2.0:.3f}")
 
 
 @pytest.mark.usefixtures("slow")

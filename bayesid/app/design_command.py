@@ -21,6 +21,10 @@ def run(
     seed: Seed = 0,
     starts: Annotated[int, typer.Option(min=1, help="Number of random starts for every criterion.")] = 2,
     iterations: Annotated[int, typer.Option(min=1, help="Iterations of the optimiser per start.")] = 60,
+    separate: Annotated[
+        tuple[str, str] | None,
+        typer.Option(metavar="A B", help="Two effects of the catalogue that the manoeuvre is to tell apart."),
+    ] = None,
 ) -> Iterator[str]:
     """Design manoeuvres by several criteria, within limits: design.json, a CSV file for each, and report.pdf."""
     from bayesid.app.schema import Study
@@ -29,13 +33,15 @@ def run(
 
     from bayesid._io.files import complete_folder, write_json
     from bayesid._io.store import content_key
-    from bayesid.app.study_to_design import defining_files, load_problem
+    from bayesid.app.study_to_design import defining_files, load_problem, separating
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
     from bayesid.design import Search, Store, best_design, design
     from bayesid.recording.recording import Recording
     from bayesid.report import design_report
     from bayesid.report.sentences.design_sentences import design_sentences
 
+    if separate is not None:
+        study = separating(study, separate)
     problem = load_problem(study)
     noise, assumed = assume_missing(encoder_noise(study, problem.plan.model.robot))
     yield (
@@ -45,7 +51,9 @@ def run(
     if assumed:
         yield f"The study gives no sensors.encoder.sigma of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
     progress(0.0, "compiling")
-    store = Store.open(output / "search.json", content_key(*defining_files(study), seed, starts, iterations))
+    store = Store.open(
+        output / "search.json", content_key(*defining_files(study), seed, starts, iterations, *(separate or ()))
+    )
     try:
         designs = design(problem, seed, noise, Search(starts, iterations), store=store, progress=progress)
         best = best_design(designs)

@@ -36,7 +36,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import create
 from bayesid.simulation.model import Model
 
-__all__ = ["defining_files", "load_loop_problem", "load_problem"]
+__all__ = ["defining_files", "load_loop_problem", "load_problem", "separating"]
 
 SAMPLES = 120
 """Largest number of samples that are simulated; in longer manoeuvres each of them stands for several."""
@@ -113,6 +113,23 @@ def load_loop_problem(study: Study) -> Problem:
         update |= {key: getattr(first, key) for key in BASE_AT_START}
         update["argument_of_latitude"] = first.argument_of_latitude or 0.0
     return load_problem(study.model_copy(update={"design": section.model_copy(update=update)}))
+
+
+def separating(study: Study, rivals: tuple[str, str]) -> Study:
+    """Return a study whose design tells two effects apart, whatever its section ``[design]`` says of criteria.
+
+    Raises
+    ------
+    InputError
+        If both are the same.
+    """
+    if rivals[0] == rivals[1]:
+        raise InputError(
+            f"{rivals[0]!r} cannot be told from itself", place="--separate", remedy="Name two different effects"
+        )
+    section = study.design or DesignSection()
+    chosen = section.model_copy(update={"criteria": (Separation.name,), "rivals": rivals})
+    return study.model_copy(update={"design": chosen})
 
 
 def defining_files(study: Study) -> list[Path | None]:

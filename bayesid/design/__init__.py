@@ -20,6 +20,7 @@ from bayesid.design.criteria import (
 from bayesid.design.design_problem import Problem
 from bayesid.design.designed import Design, best_design, design, evaluate
 from bayesid.design.excitation_loop import Loop, NotFlown
+from bayesid.design.expected_probability import expected_probability, noncentrality_for
 from bayesid.design.knowledge_update import Laplace, Sampled, worst_relative_sd
 from bayesid.design.motion_limits import Limit, Limits
 from bayesid.design.plan import Plan
@@ -65,6 +66,8 @@ __all__ = [
     "best_design",
     "design",
     "evaluate",
+    "expected_probability",
+    "noncentrality_for",
     "optimise",
     "planned_manoeuvre",
     "planned_posterior",

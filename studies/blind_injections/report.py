@@ -17,7 +17,7 @@ from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from studies.blind_injections.trials import Trial, plan, read, run
 from studies.common.command import Command
 
-__all__ = ["confusion", "main", "rates", "reliability", "write_report"]
+__all__ = ["confusion", "main", "rates", "reliability", "scores", "statements", "write_report"]
 
 BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, np.inf)
 """Limits of the ranges of signal-to-noise ratio in the table."""
@@ -27,6 +27,9 @@ STATED = (0.0, 0.5, 0.7, 0.9, 0.95, 0.99, 0.999, 1.0)
 
 TICKS = (3, 5, 7, 10, 20, 50)
 """Ticks of the signal-to-noise ratio in the figure."""
+
+LEAST = 1e-6
+"""Probability below which a statement that comes true is not counted as worse."""
 
 CLEAR = 7.0
 """Signal-to-noise ratio from which the hidden causes should be in the reported set."""
@@ -96,6 +99,43 @@ def reliability(trials: Iterable[Trial]) -> list[list[str]]:
         if within:
             rows.append([f"{low:g} to {high:g}", *_reliable(within)])
     return [*rows, ["all", *_reliable(named)]] if named else rows
+
+
+def statements(trials: Iterable[Trial]) -> dict[str, list[tuple[float, bool]]]:
+    """Return the stated probabilities with whether they came true: of causes, of the unknown, and of nothing.
+
+    A cause counts where it is stated with more than one per cent, under any name that is accepted for what is hidden;
+    the names of one class of equivalents count each by itself.
+    """
+    found: dict[str, list[tuple[float, bool]]] = {"causes": [], "unknown": [], "nothing": []}
+    for trial in trials:
+        true = set(trial.hidden) | set(trial.accept)
+        found["causes"] += [(value, name in true) for name, value in trial.probabilities.items()]
+        found["unknown"].append((trial.unknown, trial.kind == "unknown"))
+        found["nothing"].append((trial.nothing, trial.kind == "adequate"))
+    return found
+
+
+def scores(trials: Iterable[Trial]) -> list[list[str]]:
+    """Return number, Brier score and mean logarithmic score of the stated probabilities, with standard errors."""
+    rows = []
+    for name, pairs in statements(trials).items():
+        if pairs:
+            p, true = np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])
+            brier = (p - true) ** 2
+            logs = np.log(np.clip(np.where(true, p, 1.0 - p), LEAST, None))
+            error = np.sqrt(len(p))
+            rows.append(
+                [
+                    name,
+                    str(len(p)),
+                    f"{brier.mean():.4f} ± {brier.std() / error:.4f}",
+                    f"{logs.mean():.3f} ± {logs.std() / error:.3f}",
+                    f"{p.mean():.3f}",
+                    f"{true.mean():.3f}",
+                ]
+            )
+    return rows
 
 
 def _reliable(named: Sequence[tuple[float, bool]]) -> list[str]:
@@ -169,6 +209,14 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
         )
     else:
         document.paragraph("No trial has named a cause.")
+    if trials:
+        document.table(
+            ["stated of", "statements", "Brier score", "log score", "mean stated", "share true"],
+            scores(trials),
+            "Scores of all stated probabilities, those of causes from one per cent up; zero would be perfect in both. "
+            f"A statement counts as no worse than {LEAST:g} in the log score.",
+            ["left", *["right"] * 5],
+        )
     document.section("Amplitudes and bodies")
     errors = np.array([error for trial in injected if trial.named_rightly for error in trial.amplitude_errors])
     bodies = np.array([t.body_errors for t in injected if t.named_rightly and t.body_errors]).reshape(-1, 10)

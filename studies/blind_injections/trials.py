@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,8 @@ from bayesid.diagnosis.perturbed_fit import Fit
 from bayesid.diagnosis.probable_verdict import UNKNOWN
 from bayesid.diagnosis.scale_prior import AmplitudeGroup
 from bayesid.diagnosis.signature_bank import SignatureBank
-from bayesid.inference.noise_changes import with_manoeuvres
+from bayesid.inference.perturbed_posterior import residual_of
+from bayesid.inference.posterior import Posterior
 from studies.common.monte_carlo import read_store, run_trials
 from studies.truth import hidden_causes
 from studies.truth.mujoco import Study as Written
@@ -277,10 +278,12 @@ def _limits(result: Diagnosis, case: hidden_causes.Case, weaker: Study) -> tuple
     The signal is the difference to data with the same noise and less hidden.
     """
     fit, engine = result.before.fit, result.before.engine
-    arrays = fit.posterior.data.arrays
-    like = with_manoeuvres(fit.posterior, load_manoeuvres(weaker, fit.posterior.model.robot))
+    arrays, model = fit.posterior.data.arrays, fit.posterior.model
+    # what is hidden may lie in the study's own words, such as the place of a sensor
+    model = replace(model, sensors=load_model(weaker).sensors)
+    like = Posterior.of(model, load_manoeuvres(weaker, model.robot), step=fit.posterior.step)
     other = like.data.arrays._replace(weights=arrays.weights, start=arrays.start)
-    change = (engine.residual(fit.z, arrays) - engine.residual(fit.z, other)) / (1.0 - WEAKER)
+    change = (engine.residual(fit.z, arrays) - residual_of(like, fit.z, other).ravel()) / (1.0 - WEAKER)
     if case.status == "unknown":
         return float(np.sqrt(_best(result).project(change[:, None])[0, 0])), None, None
     noncentrality = float(fit.project(change[:, None])[0, 0])

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from bayesid._io.words import counted, joined, ordinal
-from bayesid.design import Design
-from bayesid.report.numbers import format_number, format_range, format_unit
+from bayesid.design import Design, Separation, expected_probability, noncentrality_for
+from bayesid.report.numbers import format_number, format_percent, format_range, format_unit
 from bayesid.report.sentences.model_assumptions import planning_sentences
 
-__all__ = ["MEANING", "assumption_sentences", "design_sentences", "reference_design", "summary"]
+__all__ = [
+    "MEANING",
+    "assumption_sentences",
+    "design_sentences",
+    "reference_design",
+    "separation_sentence",
+    "summary",
+]
+
+SURE = 0.95
+"""Probability of the right one of two rivals at which they count as told apart."""
 
 REFERENCE = "paper-26"
 """Name of the design that the others are compared with."""
@@ -67,7 +79,32 @@ def design_sentences(designs: Sequence[Design], best: Design) -> list[str]:
         f"times those of {reference.name}; {'go' if design.go else 'no go'} under the present uncertainty."
         for design in designs
     ]
-    return [*lines, f"Best: {best.name}."]
+    return [*lines, *map(separation_sentence, filter(_separates, designs)), f"Best: {best.name}."]
+
+
+def _separates(design: Design) -> bool:
+    return isinstance(_separation(design), Separation)
+
+
+def _separation(design: Design) -> Separation | None:
+    criteria = (item for item in design.problem.criteria if item.name == design.criterion)
+    return next((item for item in criteria if isinstance(item, Separation)), None)
+
+
+def separation_sentence(design: Design) -> str:
+    """Return how well a manoeuvre that was designed to tell effects apart does so, and down to which size."""
+    criterion = _separation(design)
+    if criterion is None:
+        raise ValueError(f"{design.name} was not designed to tell effects apart")
+    noncentrality = float(np.exp(-2.0 * design.costs[criterion.name]))
+    share = float(np.sqrt(noncentrality_for(SURE) / noncentrality))
+    return (
+        f"{design.name} tells {joined(criterion.rivals)} apart: of the size of their priors, the least distinct has a "
+        f"signal-to-noise ratio of {format_number(float(np.sqrt(noncentrality)))} that no other can imitate. Of two "
+        f"causes that are equally probable before, the right one is expected to have a probability of "
+        f"{format_number(SURE)} afterwards if its size is {format_percent(share, 2)} of its prior's, and "
+        f"{format_number(expected_probability(0.25 * noncentrality_for(SURE)))} if half of that."
+    )
 
 
 def assumption_sentences(best: Design) -> list[str]:

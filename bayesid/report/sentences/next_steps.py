@@ -54,8 +54,12 @@ def _addition(result: Diagnosis) -> str:
 
 def advice_sentences(result: Diagnosis) -> Iterator[str]:
     """Return the manoeuvre that would bring out each cause in which the alternatives differ."""
-    for name in differing_causes(result):
+    differing = differing_causes(result)
+    for name in differing:
         yield f"{name}: {advice(name)}"
+    sized = {effect.label for effect in result.effects if effect.parameters}
+    if len(pair := [name for name in differing if name in sized][:2]) == 2:
+        yield f"A manoeuvre that tells them apart is designed by: bayesid design STUDY.toml --separate {' '.join(pair)}"
 
 
 def differing_causes(result: Diagnosis) -> tuple[str, ...]:

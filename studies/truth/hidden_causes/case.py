@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from studies.truth.hidden_causes.sensor_faults import EncoderOffset, VectorFault
+from studies.truth.hidden_causes.sensor_faults import EncoderOffset, TurnedStarSensor, VectorFault, WrongClock
 from studies.truth.motions import Manoeuvres
 from studies.truth.mujoco.study import Hidden, Study, write_study
 from studies.truth.numerics import Array
@@ -86,6 +86,10 @@ class Case:
                 true |= {f"{fault.sensor}-{key}": value for key, value in sizes.items() if value.any()}
             if isinstance(fault, EncoderOffset):
                 true[f"encoder-offset:{fault.joint}"] = np.array([fault.offset])
+            if isinstance(fault, WrongClock):
+                true[f"{fault.sensor}-clock"] = np.array([fault.rate])
+            if isinstance(fault, TurnedStarSensor):
+                true["attitude-misalignment"] = np.asarray(fault.vector)
             for key, value in options.get("sensors", {}).items():
                 name = key.removesuffix("_delay").replace("encoder", "joint")
                 true[f"{name}-latency"] = np.array([value])

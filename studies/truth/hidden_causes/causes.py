@@ -141,7 +141,7 @@ def changing_wheel(draw: Generator, strength: float) -> Options:
     """Wheel along z whose momentum goes up and down in straight lines, and is not recorded."""
     times = np.concatenate([[0.0], np.sort(draw.uniform(20.0, 130.0, 4)), [200.0]])
     levels = 0.02 * strength * draw.uniform(-1.0, 1.0, len(times))
-    return _hide(fields=[mj.spun_wheel([0.0, 0.0, 1.0], times, levels)])
+    return _hide(fields=[mj.SpunWheel(np.array([0.0, 0.0, 1.0]), times, levels)])
 
 
 def understated(sensor: str, size: float, draw: Generator, strength: float) -> Options:

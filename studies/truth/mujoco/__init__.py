@@ -4,6 +4,7 @@ from studies.truth.bodies import Body, join, nearby, wrong_guess
 from studies.truth.motions import Manoeuvres, Motion, smooth_motion
 from studies.truth.mujoco.fields import (
     Field,
+    SpunWheel,
     braking,
     drag,
     leak,
@@ -11,7 +12,6 @@ from studies.truth.mujoco.fields import (
     outer_torque,
     pulses,
     snap,
-    spun_wheel,
     sunlight,
 )
 from studies.truth.mujoco.model import TruthModel
@@ -40,6 +40,7 @@ __all__ = [
     "Rotor",
     "Sensors",
     "Spoiling",
+    "SpunWheel",
     "Study",
     "Thrust",
     "Truth",
@@ -59,7 +60,6 @@ __all__ = [
     "slosh",
     "smooth_motion",
     "snap",
-    "spun_wheel",
     "sunlight",
     "write_study",
     "write_urdf",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 from studies.truth.numerics import Array, cross
 from studies.truth.orbit import Orbit
 
-__all__ = ["Field", "braking", "drag", "leak", "magnet", "outer_torque", "pulses", "snap", "spun_wheel", "sunlight"]
+__all__ = ["Field", "SpunWheel", "braking", "drag", "leak", "magnet", "outer_torque", "pulses", "snap", "sunlight"]
 
 Field = Callable[[float, Array, Array], tuple[Array, Array]]
 """Time, rotation matrix base -> orbit axes, rate in base axes -> force and torque at the base origin, base axes."""
@@ -84,14 +85,17 @@ def outer_torque(history: Callable[[float], ArrayLike]) -> Field:
     return lambda time, attitude, rate: (np.zeros(3), attitude.T @ np.asarray(history(time), dtype=float))
 
 
-def spun_wheel(axis: ArrayLike, times: ArrayLike, momentum: ArrayLike) -> Field:
-    """Reaction of a wheel whose momentum [N m s] along an axis of the base is piecewise linear in time."""
-    unit, knots, levels = (np.asarray(part, dtype=float) for part in (axis, times, momentum))
-    slopes = np.diff(levels) / np.diff(knots)
+@dataclass(frozen=True)
+class SpunWheel:
+    """Reaction of a wheel whose momentum [N m s] along an axis of the base is piecewise linear in time; a `Field`."""
 
-    def react(time: float, attitude: Array, rate: Array) -> tuple[Array, Array]:
-        piece = min(max(int(np.searchsorted(knots, time, side="right")) - 1, 0), len(slopes) - 1)
-        spin = levels[piece] + slopes[piece] * (time - knots[piece])
-        return np.zeros(3), -slopes[piece] * unit - cross(rate, spin * unit)
+    axis: Array
+    times: Array
+    momentum: Array
 
-    return react
+    def __call__(self, time: float, attitude: Array, rate: Array) -> tuple[Array, Array]:
+        """Return no force, and what the wheel takes from the base's momentum."""
+        piece = min(max(int(np.searchsorted(self.times, time, side="right")) - 1, 0), len(self.times) - 2)
+        slope = (self.momentum[piece + 1] - self.momentum[piece]) / (self.times[piece + 1] - self.times[piece])
+        spin = self.momentum[piece] + slope * (time - self.times[piece])
+        return np.zeros(3), -slope * self.axis - cross(rate, spin * self.axis)
