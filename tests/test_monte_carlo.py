@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import subprocess
 import sys
@@ -116,6 +117,15 @@ def test_more_trials_go_on_from_fewer(tmp_path):
     run_trials(draw, range(2), store, seed=5)
     assert run_trials(draw, range(4), store, seed=5) == run_trials(draw, range(4), seed=5)
     assert len(read_store(store)) == 4
+
+
+def test_a_compressed_store_is_read(tmp_path):
+    store = tmp_path / "store.jsonl"
+    run_trials(draw, [1, 2], store)
+    packed = tmp_path / "store.jsonl.gz"
+    packed.write_bytes(gzip.compress(store.read_bytes()))
+    assert read_store(packed) == read_store(store)
+    assert len(read_store(packed)) == 2
 
 
 def test_a_trial_that_raises_is_recorded_and_tried_again(tmp_path):

@@ -6,6 +6,7 @@ A line is appended in one write when its trial ends, so that a kill loses the tr
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import time
@@ -123,7 +124,10 @@ def run_trials(
 
 
 def read_store(store: str | Path) -> list[dict[str, Any]]:
-    """Lines of a store after the first: number, task, and result or error; a line that was cut off is left out."""
+    """Lines of a store after the first: number, task, and result or error; a line that was cut off is left out.
+
+    A store whose name ends with ``.gz`` is a finished one that was compressed.
+    """
     file = Path(store)
     return _lines(file)[1:] if file.is_file() else []
 
@@ -181,7 +185,8 @@ def _resume(file: Path, header: dict[str, Any], tasks: Sequence[Any]) -> dict[in
 
 def _lines(file: Path) -> list[dict[str, Any]]:
     """Objects of the lines that were written to their end."""
-    *whole, _ = file.read_text(encoding="utf-8").split("\n")
+    text = gzip.decompress(file.read_bytes()).decode() if file.suffix == ".gz" else file.read_text(encoding="utf-8")
+    *whole, _ = text.split("\n")
     try:
         lines = [json.loads(line) for line in whole]
     except json.JSONDecodeError as error:
