@@ -342,7 +342,9 @@ def test_an_unknown_cause_gets_the_general_advice():
 
 def test_the_advice_is_on_the_causes_in_which_the_alternatives_differ(biased):
     result = judged(biased, Status.AMBIGUOUS, ("accel-bias", "rate-bias"), ("wheel-momentum", "accel-bias", "unknown"))
-    assert list(advice_sentences(result)) == [f"{name}: {advice(name)}" for name in ("rate-bias", "wheel-momentum")]
+    *said, design = advice_sentences(result)
+    assert said == [f"{name}: {advice(name)}" for name in ("rate-bias", "wheel-momentum")]
+    assert design.endswith("bayesid design STUDY.toml --separate rate-bias wheel-momentum")
     assert f"rate-bias: {advice('rate-bias')}" in action_sentence(result)
     assert list(advice_sentences(judged(biased, Status.EXPLAINED))) == []
 

@@ -24,7 +24,7 @@ class GroupSize(NamedTuple):
     cause : str
     size : float or None
         Root mean square of the amplitudes, each relative to its own width at a scale of one; of a fault of the noise
-        its first quantity. None where physics fixes them.
+        its first quantity. None where physics fixes them, and of something without a form.
     unit : str or None
         Unit; None where the amplitudes have none in common.
     largest : float or None
@@ -55,8 +55,9 @@ def set_sizes(result: Diagnosis, item: CauseSet) -> list[GroupSize]:
     found = (
         [] if state.fault is None else [_of_fault(state.fault.label, state.fault.mean[0], state.fault.quantities[0])]
     )
+    rest = [GroupSize(name) for name in item.names if name not in evidence.causes and name not in state.names]
     if not ordered:
-        return found
+        return found + rest
     forms = evidence.forms(ordered)
     columns, deviations = evidence.most_probable(ordered, forms)
     roots, _ = precision_roots(evidence.gram.matrix[np.ix_(columns, columns)], deviations[None])
@@ -71,7 +72,7 @@ def set_sizes(result: Diagnosis, item: CauseSet) -> list[GroupSize]:
             own = evidence.gram.groups[group.name]
             values = np.array([amplitude[place] for place in own.tolist()]) / group.roots(len(own))
             found.append(GroupSize(name, float(np.sqrt(np.mean(values**2))), _unit_of(result, name, group), group.high))
-    return found
+    return found + rest
 
 
 def _of_fault(label: str, mean: float, quantity: tuple[str, str]) -> GroupSize:
