@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from bayesid._io.progress import Progress, silent
+from bayesid._io.progress import Progress, part_of, silent
 from bayesid.app.options import Output, Samples, Seed, StudyFile
 
 if TYPE_CHECKING:
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from bayesid.diagnosis import Diagnosis
 
 __all__ = ["diagnose_study", "run"]
+
+VERDICT = 0.3
+"""Share of the time until the verdict where the extended model is sampled afterwards."""
 
 
 def run(
@@ -88,14 +91,15 @@ def diagnose_study(
         },
         prior=CausePrior(said.one_more_cause, said.outside_catalogue),
         knows_latitude=knows,
-        progress=progress,
+        progress=progress if effective_samples is None else part_of(progress, 0.0, VERDICT),
     )
     keep(result)
     yield from diagnosis_sentences(result)
     clock, identification = PhaseClock(), None
     if effective_samples is not None and result.posterior.size:
-        progress(0.9, "sampling the extended model")
-        identification = identify_extended(result, seed, effective_samples=effective_samples)
+        sampling = part_of(progress, VERDICT, 1.0)
+        sampling(0.0, "sampling the extended model")
+        identification = identify_extended(result, seed, effective_samples=effective_samples, progress=sampling)
     clock.ends("sample")
     with complete_folder(output) as folder:
         result.unexplained.write(folder / "unexplained.csv")
