@@ -11,7 +11,7 @@ from scipy import stats
 from scipy.optimize import minimize
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.encoder_fault import ENCODER_NOISE, encoder_ratios, with_encoder_noise
+from bayesid.diagnosis.encoder_fault import ENCODER_NOISE, encoder_noise, with_encoder_noise
 from bayesid.diagnosis.noise_tests import lattice, leverage
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.inference.noise_changes import leaving_out, with_sensors
@@ -112,9 +112,11 @@ def _understated(label: str, kind: Kind, fit: Fit) -> NoiseFault:
     )
 
 
-def _encoders(fit: Fit) -> NoiseFault:
-    ratios = encoder_ratios(fit.posterior)
-    factor, relative = float(np.exp(ratios.mean())), float(ratios.std(ddof=1) / np.sqrt(len(ratios)))
+def _encoders(fit: Fit) -> NoiseFault | None:
+    found = encoder_noise(fit.posterior)
+    if found is None:
+        return None
+    factor, relative = float(np.sqrt(found.ratio)), float(np.sqrt(0.5 / found.degrees))
     posterior, gain = with_encoder_noise(fit.posterior, factor, fit.z)
     size = np.array([factor])
     return NoiseFault(ENCODER_NOISE, (Quantity("factor", "1"),), size, size * relative, posterior, gain)

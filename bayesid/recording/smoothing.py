@@ -94,17 +94,6 @@ class SmoothedJoint:
             [replace(one, sigma=None if one.sigma is None else factor * one.sigma) for one in self.series], self.start
         )
 
-    def declared_noise_error(self) -> Floats:
-        """Return the logarithm of estimated over declared noise of each series whose noise is declared.
-
-        The estimate is that of the largest marginal likelihood for the order that was chosen.
-        """
-        free = _fit([replace(one, sigma=None) for one in self.series], self.nodes, self.scale, self.start, self.order)
-        ratios = [
-            np.log(new / one.sigma) for one, new in zip(self.series, free.sigmas, strict=True) if one.sigma is not None
-        ]
-        return np.array(ratios)
-
     @property
     def _units(self) -> Floats:
         return self.scale ** -np.arange(self.order, dtype=float)
