@@ -58,8 +58,8 @@ def noise_of(series: Iterable[JointSamples]) -> EncoderNoise | None:
 
     A difference of order k of white noise has ``comb(2k, k)`` times its variance. Unlike the likelihood of smoothing,
     it needs no model of the motion, which smoothing takes for integrated noise; and as motion only adds to it, the
-    least of some orders is taken. The median over the samples leaves out where the motion is rough, and the median over the
-    joints those of which other things are wrong.
+    least of some orders is taken. The median over the samples leaves out where the motion is rough, and the median
+    over the joints those of which other things are wrong.
     """
     found = [own for one in series if one.sigma is not None and (own := _of(one, one.sigma)).degrees >= FEWEST]
     if not found:
