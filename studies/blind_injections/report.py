@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from scipy import stats
 
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
+from studies.blind_injections.goals import goal_rows, share_text
 from studies.blind_injections.trials import Trial, plan, read, run
 from studies.common.command import Command
 
@@ -30,10 +32,6 @@ TICKS = (3, 5, 7, 10, 20, 50)
 
 LEAST = 1e-6
 """Probability below which a statement that comes true is not counted as worse."""
-
-CLEAR = 7.0
-"""Signal-to-noise ratio from which the hidden causes should be in the reported set."""
-
 
 COMMAND = Command(
     "blind_injections",
@@ -183,7 +181,23 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
             f"Incomplete: {planned} trials are planned, and these were made first, in random order. Read the rates "
             "with their intervals."
         )
-    document.items(_findings(injected, outside, nulls))
+    document.table(
+        ["goal", "reached, 95 % interval", ""],
+        goal_rows(trials),
+        "Goals. PASS where the interval lies within the goal, FAIL where it lies outside; NOT DECIDED where it holds "
+        "both, because too few trials were made.",
+        ["left", "left", "left"],
+    )
+    document.items(_findings(trials, outside))
+    seconds = np.array([trial.seconds["total"] for trial in trials])
+    if len(seconds):
+        document.paragraph(
+            "Valid for a base body with an arm of three to five joints, links exact or known to 2 %, white noise of "
+            "1e-5 rad/s and 1e-5 m/s² at 0.5 s, encoders of 1e-6 rad; seeds "
+            f"{min(t.seed for t in trials)} to {max(t.seed for t in trials)}, of which none was used in development. "
+            f"bayesid {version('bayesid')}. Time per trial, flight and diagnosis on one loaded core: median "
+            f"{np.median(seconds):.0f} s, longest {seconds.max():.0f} s."
+        )
     document.section("By signal-to-noise ratio")
     document.table(
         ["signal-to-noise", "trials", "alarm", "limit", "in the set", "named alone", "limit", "misnamed"],
@@ -281,32 +295,19 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
     document.write(file)
 
 
-def _findings(injected: Sequence[Trial], outside: Sequence[Trial], nulls: Sequence[Trial]) -> list[str]:
-    alarms = sum(trial.alarmed for trial in nulls)
-    clear = [t for t in injected if t.signal_to_noise is not None and t.signal_to_noise >= CLEAR]
-    left = [t for t in outside if t.signal_to_noise is not None and t.signal_to_noise >= 10.0]
+def _findings(trials: Sequence[Trial], outside: Sequence[Trial]) -> list[str]:
+    wrong = [trial for trial in trials if trial.misnamed or (trial.kind == "adequate" and trial.alarmed)]
     sentences = [
-        f"Nothing hidden: {_share(alarms, len(nulls))} raised an alarm; declared is 1 % (binomial p "
-        f"{stats.binomtest(alarms, len(nulls), 0.01).pvalue:.2f})."
-        if nulls
-        else "No trial without anything hidden.",
-        f"Catalogue, signal-to-noise {CLEAR:g} and more: {_share(sum(t.in_set for t in clear), len(clear))} had the "
-        f"hidden causes in the reported set (goal 97 %), {_share(sum(t.named_rightly for t in clear), len(clear))} "
-        f"named them alone, {_share(sum(t.misnamed for t in clear), len(clear))} named something else.",
+        "Wrong: "
+        + "; ".join(f"{t.case} (seed {t.seed}) was called {' + '.join(t.causes) or t.status}" for t in wrong)
+        + "."
+        if wrong
+        else "No trial was misnamed, and none without anything hidden raised an alarm."
     ]
-    limit = sum(t.detection * t.naming for t in clear if t.detection is not None and t.naming is not None)
-    if limit > 0.0:
-        ratio = sum(t.named_rightly for t in clear) / limit
-        sentences.append(f"Named alone, relative to theory's limit for the same trials: {ratio:.2f} (goal 0.95).")
-    sentences.append(
-        f"Outside the catalogue, 10 sigma and more left: {_share(sum(t.status == 'unknown' for t in left), len(left))} "
-        f"called unknown (goal 95 %), {_share(sum(t.misnamed for t in left), len(left))} named as something of the "
-        f"catalogue (goal at most 5 %); of all {len(outside)}, {sum(t.misnamed for t in outside)} were."
-    )
     framed = [t for t in outside if t.true_frame is not None and t.status == "unknown"]
     if framed:
         sentences.append(
-            f"Axes of an outside torque: {_share(sum(t.frame == t.true_frame for t in framed), len(framed))} named "
+            f"Axes of an outside torque: {share_text(sum(t.frame == t.true_frame for t in framed), len(framed))} named "
             f"rightly, {sum(t.frame not in (None, t.true_frame) for t in framed)} wrongly, the others not at all; "
             f"median correlation with the true torque {np.median([t.correlation or 0.0 for t in framed]):.2f} (goal "
             f"0.9)."
@@ -323,14 +324,6 @@ def _errors(label: str, errors: np.ndarray) -> list[str]:
 
 def _number(value: float | None, digits: int = 1) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
-
-
-def _share(count: int, total: int) -> str:
-    if total == 0:
-        return "none"
-    low = stats.beta.ppf(0.025, count, total - count + 1) if count else 0.0
-    high = stats.beta.ppf(0.975, count + 1, total - count) if count < total else 1.0
-    return f"{count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
 
 
 @styled
