@@ -22,6 +22,7 @@ CATALOGUE = {
     *("joint-flexibility", "rate-bias", "rate-drift", "rate-scale", "rate-misalignment", "accel-bias", "accel-drift"),
     *("accel-scale", "accel-misalignment", "accel-position", "rate-latency", "accel-latency", "joint-latency"),
     *("encoder-offset", "rate-noise", "accel-noise", "coloured-noise", "outliers", "quantisation"),
+    *("encoder-noise", "rate-clock", "accel-clock", "attitude-misalignment", "wheel-history"),
 }
 
 
