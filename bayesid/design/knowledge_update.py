@@ -84,10 +84,10 @@ class Laplace:
     Parameters
     ----------
     draws : int
-        Number of draws to write.
+        Number of draws to write. The next step's prior is made of them: 4,000 lose up to 5 % of some widths there.
     """
 
-    draws: int = 4000
+    draws: int = 40_000
 
     def identify(self, posterior: Posterior, seed: int, file: Path) -> dict[str, Any]:
         """Write draws of the bodies alone, and return the entry of the fit."""
