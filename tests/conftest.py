@@ -12,6 +12,7 @@ import jax
 import numpy as np
 import pytest
 
+from bayesid._math.kept_jit import forget_executables
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -81,6 +82,7 @@ def _forget_compiled() -> Iterator[None]:
     """Compiled functions of past files would fill the memory; those on disk stay."""
     yield
     jax.clear_caches()
+    forget_executables()
 
 
 class FormulaMotion:

@@ -75,7 +75,10 @@ class Gram:
 
     def __post_init__(self) -> None:
         for name in ("matrix", "score"):
-            locked = np.array(getattr(self, name), dtype=float)
+            given = getattr(self, name)
+            if isinstance(given, np.ndarray) and not given.flags.writeable and given.dtype == float:
+                continue  # of another Gram, which has seen to it
+            locked = np.array(given, dtype=float)
             if not np.isfinite(locked).all():
                 raise ValueError(f"the {name} of a Gram must be finite; a signature or the residual is not")
             locked.setflags(write=False)

@@ -15,6 +15,7 @@ from jax import Array
 from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from bayesid._math.arrays import Floats
+from bayesid._math.kept_jit import kept_jit
 from bayesid._math.runge_kutta import runge_kutta_step
 from bayesid._math.small_matrices import inverse_small
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
@@ -148,7 +149,7 @@ def _yielding(mass: Floats, com: Floats, inverse: Floats) -> Floats:
     return result
 
 
-@jax.jit
+@kept_jit()
 def _oscillate(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, compliance: Array) -> Array:
     """Speeds and accelerations of modal amplitudes, shape (n, R, N, 2, m)."""
     one = jax.vmap(jax.vmap(_run, (None, None, None, None, 0, 0)), (0, 0, 0, 0, None, None))

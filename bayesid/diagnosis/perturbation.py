@@ -16,6 +16,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.kept_jit import kept_jit
 from bayesid._math.runge_kutta import runge_kutta_step
 from bayesid.diagnosis.hidden_vibration import Vibration
 from bayesid.inference.perturbed_posterior import Perturbation
@@ -251,8 +252,12 @@ def _reading(
     return jnp.concatenate([*parts, torques], axis=-1)
 
 
-_evaluate = jax.jit(_hooks, static_argnums=(0, 1))
-_differentiate = jax.jit(jax.jacfwd(_hooks, argnums=3), static_argnums=(0, 1))
+_evaluate = kept_jit(static=2)(_hooks)
+
+
+@kept_jit(static=2)
+def _differentiate(key: EffectKey, kinds: tuple[Kind, ...], *numbers: Any) -> dict[str, Array]:
+    return jax.jacfwd(partial(_hooks, key, kinds), argnums=1)(*numbers)
 
 
 def _couple(momentum: Array, rate: Array) -> Array:

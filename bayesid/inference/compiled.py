@@ -8,7 +8,6 @@ about the same length therefore needs no new compilation.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -16,6 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from bayesid._math.arrays import Traceable
+from bayesid._math.kept_jit import kept_jit
 from bayesid.inference import whitening
 from bayesid.inference.layout import Layout, PriorNumbers
 from bayesid.simulation.dynamics import Grid
@@ -147,32 +147,32 @@ class Simulated(NamedTuple):
     rate: Array
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def simulated(structure: Structure, numbers: Numbers, z: Array, grid: Grid, attitude: Array) -> Simulated:
     """Simulate all recordings at the coordinates ``z`` (size,)."""
     values = structure.layout.values(numbers.prior, z)
     return Simulated(*structure.simulator.readings(numbers.model, values, grid, attitude))
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def residuals(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
     """Return the whitened residual of all recordings, shape (R, O, C)."""
     return _whitened(structure, simulated(structure, numbers, z, arrays.grid, arrays.attitude).readings, arrays)
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def jacobian(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
     """Return the derivative of the whitened residual by forward-mode differentiation, shape (R, O, C, size)."""
     return jax.jacfwd(lambda z: residuals(structure, numbers, z, arrays))(z)
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def chi2(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
     """Return the chi-square of every recording at many points, shape (n, size) -> (n, R)."""
     return jax.vmap(lambda z: jnp.sum(residuals(structure, numbers, z, arrays) ** 2, axis=(1, 2)))(z)
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def traced(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Traced:
     """Simulate all recordings and return the motion of the robot with the readings and the residual."""
     values = structure.layout.values(numbers.prior, z)
@@ -180,7 +180,7 @@ def traced(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> 
     return Traced(node, sample, read, _whitened(structure, read, arrays))
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def responses(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays, along: Perturbation) -> Array:
     """Return the derivatives of the whitened residual along n stacked perturbations, shape (n, R, O, C)."""
 

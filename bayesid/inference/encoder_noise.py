@@ -19,6 +19,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.kept_jit import kept_jit
 from bayesid._math.rotation import rotation, tilted
 from bayesid._math.small_matrices import cross
 from bayesid.robot.composite_tables import WIDTH, composite_rows
@@ -124,17 +125,17 @@ class _Reading(NamedTuple):
     torque: Array
 
 
-@jax.jit
+@kept_jit()
 @jax.vmap
 def _momentum(row: Array, rate: Array) -> Array:
     body = composite(row)
     return body.inertia @ rate + body.spin
 
 
-_turned = jax.jit(jax.vmap(tilted))
+_turned = kept_jit()(jax.vmap(tilted))
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def _difference(kinds: tuple[Kind, ...], before: _Reading, after: _Reading) -> Array:
     """Return the changes of all readings in the columns of `Channels`, with the torques of all joints, (T, C)."""
     parts = [
@@ -143,7 +144,7 @@ def _difference(kinds: tuple[Kind, ...], before: _Reading, after: _Reading) -> A
     return jnp.concatenate([*parts, after.torque - before.torque], axis=1)
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def _read(
     kinds: tuple[Kind, ...],
     mounted: _Mounted,

@@ -18,6 +18,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.kept_jit import kept_jit
 from bayesid.inference.layout import EffectLayout, Layout, PriorNumbers
 from bayesid.robot.body_prior import BodyPrior, Mixing, coordinates_of
 from bayesid.robot.inertial_parameters import PARAMETERS, InertialParameters
@@ -196,26 +197,26 @@ class Unknowns:
         return jax.tree.map(lambda *x: np.concatenate([np.asarray(part) for part in x])[: len(z)], *parts)
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def _values(layout: Layout, numbers: PriorNumbers, z: Array) -> Values:
     return jax.vmap(partial(layout.values, numbers))(z)
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def _to_linear(layout: Layout, numbers: PriorNumbers, z: Array) -> Array:
     return jax.vmap(partial(layout.to_linear, numbers))(z)
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def _from_linear(layout: Layout, numbers: PriorNumbers, y: Array) -> Array:
     return jax.vmap(partial(layout.from_linear, numbers))(y)
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def _log_volume(layout: Layout, numbers: PriorNumbers, z: Array) -> Array:
     return jax.vmap(partial(layout.log_volume, numbers))(z)
 
 
-@partial(jax.jit, static_argnums=0)
+@kept_jit(static=1)
 def _linear_slope(layout: Layout, numbers: PriorNumbers, z: Array) -> Array:
     return jax.jacfwd(partial(layout.to_linear, numbers))(z)

@@ -19,7 +19,9 @@ class EffectKey:
 
     def __init__(self, effect: Effect) -> None:
         self.effect = effect
-        self._key = (type(effect), *_attributes(effect))
+        attributes = _attributes(effect)
+        self._portable = attributes is not None
+        self._key = (type(effect), *(attributes or (id(effect),)))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, EffectKey) and self._key == other._key
@@ -27,13 +29,18 @@ class EffectKey:
     def __hash__(self) -> int:
         return hash(self._key)
 
+    def description(self) -> tuple[object, ...] | None:
+        """Return what the key is made of, None where that has a meaning in this process alone."""
+        return self._key if self._portable else None
 
-def _attributes(effect: Effect) -> tuple[Hashable, ...]:
+
+def _attributes(effect: Effect) -> tuple[Hashable, ...] | None:
+    """Return what decides the operations of an effect, None if an attribute cannot be hashed."""
     free = {"parameters", *effect.constant_names}
     rest = tuple(sorted((name, value) for name, value in vars(effect).items() if name not in free))
     shape = tuple((parameter.name, parameter.unit, parameter.prior) for parameter in effect.parameters)
     try:
         hash(rest)
     except TypeError:
-        return (shape, id(effect))
+        return None
     return (shape, rest)

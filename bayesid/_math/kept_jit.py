@@ -1,0 +1,187 @@
+"""Compiled functions that are kept between processes together with their tracing.
+
+JAX's own cache keeps what XLA compiles, under a key that only tracing and lowering give. For the functions of a
+diagnosis those two take several seconds in every process. Here the key is what decides the operations instead: the
+static arguments, the shapes of the others, and the source of this package.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import platform
+from collections.abc import Callable, Hashable
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from functools import cache, update_wrapper
+from pathlib import Path
+from threading import Lock
+from typing import Any, Generic, ParamSpec, Protocol, TypeVar, runtime_checkable
+from weakref import WeakSet
+
+import jax
+from jax.api_util import shaped_abstractify
+from jax.core import Tracer
+from jax.experimental import serialize_executable
+
+from bayesid._io.files import complete_file
+
+__all__ = ["Describable", "KeptJit", "forget_executables", "kept_jit"]
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+PACKAGE = __name__.partition(".")[0]
+SUFFIX = ".executable"
+NEVER = 1e9
+"""Time of compilation that none reaches [s]."""
+
+_compiling = Lock()
+_known: WeakSet[KeptJit[Any, Any]] = WeakSet()
+
+
+@runtime_checkable
+class Describable(Protocol):
+    """A static argument that says itself what it is made of."""
+
+    def description(self) -> tuple[object, ...] | None:
+        """Return everything that decides the operations, None if only this process knows it."""
+        ...
+
+
+def kept_jit(static: int = 0) -> Callable[[Callable[P, R]], KeptJit[P, R]]:
+    """Return a decorator that compiles a function as `jax.jit` does and keeps the result in the folder of JAX's cache.
+
+    Parameters
+    ----------
+    static : int
+        Number of leading arguments that are static.
+    """
+    return lambda function: KeptJit(function, static)
+
+
+def forget_executables() -> None:
+    """Release the memory of all executables; those on disk stay."""
+    for function in _known:
+        function._ready.clear()
+
+
+class KeptJit(Generic[P, R]):
+    """A compiled function of positional arguments, see `kept_jit`."""
+
+    def __init__(self, function: Callable[P, R], static: int) -> None:
+        self._jit = jax.jit(function, static_argnums=tuple(range(static)))
+        self._static = static
+        self._name = f"{function.__module__}.{function.__qualname__}"
+        self._ready: dict[Hashable, Callable[..., R]] = {}
+        update_wrapper(self, function)
+        _known.add(self)
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Evaluate the function."""
+        static, others = args[: self._static], args[self._static :]
+        leaves, tree = jax.tree.flatten(others)
+        if kwargs or any(isinstance(leaf, Tracer) for leaf in leaves):
+            return self._jit(*args, **kwargs)  # part of a larger function
+        key = (static, tree, tuple(leaf.aval if isinstance(leaf, jax.Array) else _shape(leaf) for leaf in leaves))
+        if key in self._ready:
+            return self._ready[key](*others)
+        file = self._file(*key)
+        if file is not None and file.is_file():
+            try:
+                executable = serialize_executable.deserialize_and_load(*pickle.loads(file.read_bytes()))
+                result = jax.block_until_ready(executable(*others))
+            except Exception:  # whatever is wrong with a file of a cache, another one takes its place
+                file.unlink(missing_ok=True)
+            else:
+                self._ready[key] = executable
+                return result
+        self._ready[key] = self._jit.lower(*args).compile() if file is None else self._kept(file, args)
+        return self._ready[key](*others)
+
+    def _kept(self, file: Path, args: tuple[Any, ...]) -> Callable[..., R]:
+        """Compile the function and write the executable.
+
+        JAX's own cache must neither give nor take it, since an executable that comes out of a file cannot be written to
+        another. Therefore its name, which is part of JAX's key, is unique, and nothing is written there meanwhile.
+        """
+
+        def unique(*args: Any) -> Any:
+            return self.__wrapped__(*args)
+
+        unique.__name__ = f"kept_{file.stem}"
+        with _compiling:
+            least = jax.config.jax_persistent_cache_min_compile_time_secs
+            jax.config.update("jax_persistent_cache_min_compile_time_secs", NEVER)
+            try:
+                executable = jax.jit(unique, static_argnums=tuple(range(self._static))).lower(*args).compile()
+            finally:
+                jax.config.update("jax_persistent_cache_min_compile_time_secs", least)
+            try:
+                content = pickle.dumps(serialize_executable.serialize(executable))
+                with complete_file(file) as part:
+                    part.write_bytes(content)
+            except (OSError, ValueError, TypeError, pickle.PicklingError):  # not kept, which only costs time
+                pass
+        return executable
+
+    def _file(self, static: tuple[Any, ...], tree: Any, shapes: tuple[Any, ...]) -> Path | None:
+        """Return the file of the executable, None if none can be kept."""
+        folder = jax.config.jax_compilation_cache_dir
+        described = _described(static)
+        if not folder or described is None or jax.default_backend() != "cpu":
+            return None
+        parts = (_surroundings(), self._name, described, str(tree), str([(s, s.weak_type) for s in shapes]))
+        return Path(folder) / (hashlib.sha256(repr(parts).encode()).hexdigest() + SUFFIX)
+
+
+def _shape(leaf: object) -> Any:
+    return shaped_abstractify(leaf)
+
+
+def _described(value: object) -> str | None:
+    """Return a description of a static argument that is the same in every process, None if there is none.
+
+    Types from outside this package have none, since their source is not part of the key.
+    """
+    if isinstance(value, bool | int | float | str | bytes | None):
+        return repr(value)
+    if isinstance(value, tuple) and type(value) is tuple:
+        return _joined("tuple", value)
+    if isinstance(value, type):
+        own = value.__module__.partition(".")[0] in (PACKAGE, "builtins")
+        return f"{value.__module__}.{value.__qualname__}" if own else None
+    name = _described(type(value))
+    if name is None:
+        return None
+    if isinstance(value, Enum):
+        return f"{name}.{value.name}"
+    if isinstance(value, Describable):
+        content = value.description()
+        return None if content is None else _joined(name, content)
+    if isinstance(value, tuple):
+        return _joined(name, tuple(value))
+    if is_dataclass(value):
+        return _joined(name, tuple(getattr(value, field.name) for field in fields(value)))
+    return name if not getattr(value, "__dict__", {"unknown": None}) else None
+
+
+def _joined(name: str, parts: tuple[object, ...]) -> str | None:
+    found = [_described(part) for part in parts]
+    return None if None in found else f"{name}({', '.join(str(part) for part in found)})"
+
+
+@cache
+def _surroundings() -> str:
+    """Return everything outside the arguments that decides an executable: versions, processor and source."""
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parents[1].rglob("*.py")):
+        digest.update(file.read_bytes())
+    processor = Path("/proc/cpuinfo")
+    lines = processor.read_text().splitlines() if processor.is_file() else [platform.processor()]
+    flags = [line for line in lines if line.startswith(("flags", "model name", "Features"))] or lines
+    device = jax.devices()[0]
+    outside = (jax.__version__, jax.lib.__version__, device.device_kind, os.cpu_count(), sorted(set(flags)))
+    outside += (os.environ.get("XLA_FLAGS"), jax.config.jax_enable_x64)
+    return repr((digest.hexdigest(), outside))
