@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from jax import monitoring
 
+from bayesid._math.kept_jit import OBTAINED
 from bayesid.inference.importance import importance_sample
 from bayesid.inference.mode import maximise
 from bayesid.inference.noise_changes import relinearised
@@ -35,11 +36,17 @@ def counted() -> Iterator[list[str]]:
         if event == COMPILED:
             seen.append(event)
 
+    def note(event: str, **_: object) -> None:
+        if event == OBTAINED:
+            seen.append(event)
+
     monitoring.register_event_duration_secs_listener(listen)
+    monitoring.register_event_listener(note)
     try:
         yield seen
     finally:
         monitoring.unregister_event_duration_listener(listen)
+        monitoring.unregister_event_listener(note)
 
 
 def exercised(posterior: Posterior) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from jax import Array
+from bayesid._math.arrays import Traceable
 
 __all__ = ["hermite"]
 
 
-def hermite(left: Array, right: Array, left_slope: Array, right_slope: Array, s: Array) -> Array:
+def hermite(
+    left: Traceable, right: Traceable, left_slope: Traceable, right_slope: Traceable, s: Traceable
+) -> Traceable:
     """Return the cubic at the fraction ``s`` of an interval, given values and slopes at both ends.
 
     Slopes are derivatives multiplied by the length of the interval.

@@ -17,28 +17,31 @@ from enum import Enum
 from functools import cache, update_wrapper
 from pathlib import Path
 from threading import Lock
-from typing import Any, Generic, ParamSpec, Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 from weakref import WeakSet
 
 import jax
+from jax import monitoring
 from jax.api_util import shaped_abstractify
 from jax.core import Tracer
 from jax.experimental import serialize_executable
 
 from bayesid._io.files import complete_file
 
-__all__ = ["Describable", "KeptJit", "forget_executables", "kept_jit"]
-
-P = ParamSpec("P")
-R = TypeVar("R")
+__all__ = ["OBTAINED", "Describable", "KeptJit", "forget_executables", "kept_jit"]
 
 PACKAGE = __name__.partition(".")[0]
+OBTAINED = "/bayesid/executable"
+"""Name of the event, for `jax.monitoring`, that an executable is compiled or read from its file."""
+
 SUFFIX = ".executable"
+LEAST = "jax_persistent_cache_min_compile_time_secs"
+"""Name of the option of JAX for the shortest compilation whose result its cache keeps."""
+
 NEVER = 1e9
 """Time of compilation that none reaches [s]."""
 
-_compiling = Lock()
-_known: WeakSet[KeptJit[Any, Any]] = WeakSet()
+_known: WeakSet[KeptJit] = WeakSet()
 
 
 @runtime_checkable
@@ -50,7 +53,7 @@ class Describable(Protocol):
         ...
 
 
-def kept_jit(static: int = 0) -> Callable[[Callable[P, R]], KeptJit[P, R]]:
+def kept_jit(static: int = 0) -> Callable[[Callable[..., Any]], KeptJit]:
     """Return a decorator that compiles a function as `jax.jit` does and keeps the result in the folder of JAX's cache.
 
     Parameters
@@ -61,32 +64,57 @@ def kept_jit(static: int = 0) -> Callable[[Callable[P, R]], KeptJit[P, R]]:
     return lambda function: KeptJit(function, static)
 
 
+class _BesideTheCache:
+    """While any thread is inside, JAX's own cache keeps nothing."""
+
+    def __init__(self) -> None:
+        self._lock, self._inside, self._least = Lock(), 0, 0.0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._inside:
+                self._least = _setting(LEAST)
+                jax.config.update(LEAST, NEVER)
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if not self._inside:
+                jax.config.update(LEAST, self._least)
+
+
+_BESIDE = _BesideTheCache()
+
+
 def forget_executables() -> None:
     """Release the memory of all executables; those on disk stay."""
     for function in _known:
         function._ready.clear()
 
 
-class KeptJit(Generic[P, R]):
+class KeptJit:
     """A compiled function of positional arguments, see `kept_jit`."""
 
-    def __init__(self, function: Callable[P, R], static: int) -> None:
+    def __init__(self, function: Callable[..., Any], static: int) -> None:
+        self._function = function
         self._jit = jax.jit(function, static_argnums=tuple(range(static)))
         self._static = static
         self._name = f"{function.__module__}.{function.__qualname__}"
-        self._ready: dict[Hashable, Callable[..., R]] = {}
+        self._ready: dict[Hashable, Callable[..., Any]] = {}
         update_wrapper(self, function)
         _known.add(self)
 
-    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+    def __call__(self, *args: Any) -> Any:
         """Evaluate the function."""
         static, others = args[: self._static], args[self._static :]
         leaves, tree = jax.tree.flatten(others)
-        if kwargs or any(isinstance(leaf, Tracer) for leaf in leaves):
-            return self._jit(*args, **kwargs)  # part of a larger function
+        if any(isinstance(leaf, Tracer) for leaf in leaves):
+            return self._jit(*args)  # part of a larger function
         key = (static, tree, tuple(leaf.aval if isinstance(leaf, jax.Array) else _shape(leaf) for leaf in leaves))
         if key in self._ready:
             return self._ready[key](*others)
+        monitoring.record_event(OBTAINED)
         file = self._file(*key)
         if file is not None and file.is_file():
             try:
@@ -100,7 +128,7 @@ class KeptJit(Generic[P, R]):
         self._ready[key] = self._jit.lower(*args).compile() if file is None else self._kept(file, args)
         return self._ready[key](*others)
 
-    def _kept(self, file: Path, args: tuple[Any, ...]) -> Callable[..., R]:
+    def _kept(self, file: Path, args: tuple[Any, ...]) -> Callable[..., Any]:
         """Compile the function and write the executable.
 
         JAX's own cache must neither give nor take it, since an executable that comes out of a file cannot be written to
@@ -108,27 +136,22 @@ class KeptJit(Generic[P, R]):
         """
 
         def unique(*args: Any) -> Any:
-            return self.__wrapped__(*args)
+            return self._function(*args)
 
         unique.__name__ = f"kept_{file.stem}"
-        with _compiling:
-            least = jax.config.jax_persistent_cache_min_compile_time_secs
-            jax.config.update("jax_persistent_cache_min_compile_time_secs", NEVER)
-            try:
-                executable = jax.jit(unique, static_argnums=tuple(range(self._static))).lower(*args).compile()
-            finally:
-                jax.config.update("jax_persistent_cache_min_compile_time_secs", least)
-            try:
-                content = pickle.dumps(serialize_executable.serialize(executable))
-                with complete_file(file) as part:
-                    part.write_bytes(content)
-            except (OSError, ValueError, TypeError, pickle.PicklingError):  # not kept, which only costs time
-                pass
+        with _BESIDE:
+            executable = jax.jit(unique, static_argnums=tuple(range(self._static))).lower(*args).compile()
+        try:
+            content = pickle.dumps(serialize_executable.serialize(executable))
+            with complete_file(file) as part:
+                part.write_bytes(content)
+        except (OSError, ValueError, TypeError, pickle.PicklingError):  # not kept, which only costs time
+            pass
         return executable
 
     def _file(self, static: tuple[Any, ...], tree: Any, shapes: tuple[Any, ...]) -> Path | None:
         """Return the file of the executable, None if none can be kept."""
-        folder = jax.config.jax_compilation_cache_dir
+        folder = _setting("jax_compilation_cache_dir")
         described = _described(static)
         if not folder or described is None or jax.default_backend() != "cpu":
             return None
@@ -182,6 +205,12 @@ def _surroundings() -> str:
     lines = processor.read_text().splitlines() if processor.is_file() else [platform.processor()]
     flags = [line for line in lines if line.startswith(("flags", "model name", "Features"))] or lines
     device = jax.devices()[0]
-    outside = (jax.__version__, jax.lib.__version__, device.device_kind, os.cpu_count(), sorted(set(flags)))
-    outside += (os.environ.get("XLA_FLAGS"), jax.config.jax_enable_x64)
-    return repr((digest.hexdigest(), outside))
+    versions = (jax.__version__, jax.lib.__version__)
+    machine = (device.device_kind, os.cpu_count(), sorted(set(flags)))
+    options = (os.environ.get("XLA_FLAGS"), _setting("jax_enable_x64"))
+    return repr((digest.hexdigest(), versions, machine, options))
+
+
+def _setting(name: str) -> Any:
+    """Return the value of an option of JAX."""
+    return getattr(jax.config, name)

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-__all__ = ["runge_kutta_step"]
+__all__ = ["STAGE_TIMES", "TABLEAU", "runge_kutta_stages", "runge_kutta_step", "stage_inputs"]
 
 G = TypeVar("G")
 """Type of the derivative's inputs at an instant."""
@@ -26,14 +26,14 @@ TABLEAU = np.array(
 )
 """Weights of the four slopes in the state at which each slope is taken; the fifth state is that at the end."""
 
+STAGE_TIMES = (0, 1, 1, 2, 2)
+"""Time of each stage in halves of the step."""
+
 
 def runge_kutta_step(
     derivative: Callable[[Array, Any], Array], state: Array, size: Array, start: G, middle: G, end: G
 ) -> tuple[Array, Array, Array]:
     """Advance a state by one step.
-
-    The slopes are taken in a loop: the derivative then stands once in the compiled code and not five times, which
-    halves the time of its compilation.
 
     Parameters
     ----------
@@ -51,15 +51,38 @@ def runge_kutta_step(
     state, first, last : arrays
         State at the end of the step, and its derivatives at the beginning and at the end.
     """
+    states, slopes = runge_kutta_stages(derivative, state, size, stage_inputs(start, middle, end))
+    return states[-1], slopes[0], slopes[-1]
 
-    def stage(slopes: Array, given: tuple[Array, Array, G]) -> tuple[Array, tuple[Array, Array]]:
+
+def stage_inputs(start: G, middle: G, end: G) -> G:
+    """Return the inputs of the derivative at the five stages of a step, leading axis 5."""
+    return jax.tree.map(lambda *parts: jnp.stack(parts), start, middle, middle, end, end)
+
+
+def runge_kutta_stages(
+    derivative: Callable[[Array, Any], Array], state: Array, size: Array, inputs: Any
+) -> tuple[Array, Array]:
+    """Return the states at the five stages of a step and the slopes there, each with the leading axis 5.
+
+    The slopes are taken in a loop: the derivative then stands once in the compiled code and not five times, which
+    halves the time of its compilation.
+
+    Parameters
+    ----------
+    derivative, state, size
+        As of `runge_kutta_step`.
+    inputs
+        Inputs of the derivative at the stages (`stage_inputs`).
+    """
+
+    def stage(slopes: Array, given: tuple[Array, Array, Any]) -> tuple[Array, tuple[Array, Array]]:
         weights, index, inputs = given
         here = state + size * jnp.tensordot(weights, slopes, 1)
         slope = derivative(here, inputs)
         # the slope at the end belongs to no further state
         return slopes.at[index].set(slope, mode="drop"), (here, slope)
 
-    inputs = jax.tree.map(lambda *parts: jnp.stack(parts), start, middle, middle, end, end)
     given = (jnp.asarray(TABLEAU), jnp.arange(len(TABLEAU)), inputs)
     _, (states, slopes) = jax.lax.scan(stage, jnp.zeros((4, *state.shape)), given)
-    return states[-1], slopes[0], slopes[-1]
+    return states, slopes

@@ -12,7 +12,6 @@ from bayesid.diagnosis.perturbation import tables_of
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
-from bayesid.inference.compiled import Arrays
 from bayesid.simulation.effects.arm_effects import Payload
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
@@ -60,18 +59,17 @@ def catalogue_signatures(
     bounds : mapping of str to sequence of PhysicalBound
         Of each effect, by its label (`bounds_by_label`).
     """
-    data = engine.data_of(fit)
     signatures: dict[str, Signatures] = {}
     causes = []
     wanted = [effect for effect in effects if not effect.modes_count and not isinstance(effect, MassShift)]
     others = [effect for effect in wanted if effect.amplitude_units != MOMENT_UNITS]
-    columns = iter(_linear(engine, fit, others, data))
+    columns = iter(_linear(engine, fit, others))
     for effect in wanted:
         sizes = {bound.unit: bound.largest for bound in bounds[effect.label]}
         if effect.amplitude_units == MOMENT_UNITS:
             name = group_names(effect)[MOMENT_UNITS[0]]
             if name not in signatures:
-                signatures[name] = Signatures(name, _moments(engine, fit, effect, data))
+                signatures[name] = Signatures(name, _moments(engine, fit, effect))
             units = [quantity.unit for quantity in effect.amplitude_quantities]
             reach = sizes["kg m"] / sizes["kg"]
             groups = [(AmplitudeGroup(name, sizes["kg"], spread=own),) for own in moment_spreads(units, reach)]
@@ -90,10 +88,10 @@ def catalogue_signatures(
     return SignatureBank(tuple(signatures.values()), tuple(causes))
 
 
-def _linear(engine: Engine, fit: Fit, effects: Sequence[Effect], data: Arrays) -> list[Floats]:
+def _linear(engine: Engine, fit: Fit, effects: Sequence[Effect]) -> list[Floats]:
     """Return the derivatives of the residual in the coordinates of each effect in amplitudes, (N, n)."""
     points = [(effect.in_amplitudes(), _start(engine, effect.in_amplitudes())) for effect in effects]
-    return engine.columns(points, fit.operating, fit.z, data)
+    return engine.columns(points, fit.operating, fit.z, fit.data)
 
 
 def _start(engine: Engine, linear: Effect) -> Floats:
@@ -122,8 +120,8 @@ def group_names(effect: Effect) -> dict[str, str]:
     return {unit: f"{effect.label} [{unit}]" if len(units) > 1 else effect.label for unit in units}
 
 
-def _moments(engine: Engine, fit: Fit, effect: Effect, data: Arrays) -> Floats:
+def _moments(engine: Engine, fit: Fit, effect: Effect) -> Floats:
     """Return the signatures of the ten linear parameters of a link."""
     table = tables_of(effect, engine.posterior)
     rows, samples = np.moveaxis(table.node, -1, 0), np.moveaxis(table.sample, -1, 0)
-    return engine.respond(engine.perturbation(len(rows), node_rows=rows, sample_rows=samples), fit.z, data)
+    return engine.respond(engine.perturbation(len(rows), node_rows=rows, sample_rows=samples), fit.z, fit.data)

@@ -224,7 +224,7 @@ def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Float
         wrench[..., 3:] = np.einsum("krt,rtba->kartb", waves, axes)
         wrenches.append(wrench.reshape(WAVES * 3, *time.shape, 6))
     push = engine.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-    found = engine.respond(push, fit.z, engine.data_of(fit))
+    found = engine.respond(push, fit.z, fit.data)
     rows = len(found) // len(ends)
     whole = np.zeros((len(ends), rows, len(ends), WAVES * 3))
     for r, own in enumerate(found.reshape(len(ends), rows, WAVES * 3)):

@@ -119,7 +119,7 @@ def _wrenches(
             wrench[..., 3:] = np.cross(np.asarray(instant.body.com), wrench[..., :3])
         wrenches.append(wrench.reshape(3 * count, *time.shape, 6))
     push = engine.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-    found = engine.respond(push, fit.z, engine.data_of(fit))
+    found = engine.respond(push, fit.z, fit.data)
     return list(found.reshape(len(times[0]), -1, 3 * count))
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
+from bayesid.inference.perturbed_posterior import jacobian_of
 
 __all__ = ["INITIAL_RATE", "initial_rate_signatures"]
 
@@ -22,8 +21,7 @@ def initial_rate_signatures(engine: Engine, fit: Fit) -> SignatureBank:
     frozen = engine.frozen
     if not len(frozen):
         return SignatureBank()
-    unit = np.zeros((len(frozen), engine.posterior.size))
-    unit[np.arange(len(frozen)), frozen] = 1.0 / engine.posterior.unknowns.rate_sigma
-    columns = engine.respond(engine.perturbation(len(frozen), z=unit), fit.z, engine.data_of(fit))
+    derivatives = jacobian_of(engine.posterior, fit.z, fit.data).reshape(-1, engine.posterior.size)
+    columns = derivatives[:, frozen] / engine.posterior.unknowns.rate_sigma
     cause = CandidateCause(INITIAL_RATE, (AmplitudeGroup(INITIAL_RATE, LARGEST),))
     return SignatureBank((Signatures(INITIAL_RATE, columns),), (cause,))

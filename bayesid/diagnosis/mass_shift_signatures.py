@@ -72,5 +72,5 @@ def _columns(engine: Engine, fit: Fit, times: Sequence[Floats], ends: Floats) ->
     count = tables[0].shape[1]
     rows = [part.reshape(INSTANTS * count, *part.shape[2:]) for part in tables]
     push = engine.perturbation(INSTANTS * count, node_rows=rows[0], sample_rows=rows[1])
-    found = engine.respond(push, fit.z, engine.data_of(fit))
+    found = engine.respond(push, fit.z, fit.data)
     return np.moveaxis(found.reshape(len(ends), -1, INSTANTS, count), 2, 1)

@@ -148,7 +148,6 @@ def _nothing(operating: OperatingTrajectory, lead: Sequence[int] = ()) -> Pertur
     samples = operating.sample.rate.shape[1]
     channels = posterior.data.arrays.offset.shape[-1]
     return Perturbation(
-        np.zeros((*lead, posterior.size)),
         np.zeros((*lead, recordings, nodes, WIDTH)),
         np.zeros((*lead, recordings, samples, WIDTH)),
         np.zeros((*lead, recordings, nodes, 6)),

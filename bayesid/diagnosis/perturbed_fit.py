@@ -30,13 +30,13 @@ from bayesid.diagnosis.perturbation import (
     physical,
     tables_of,
 )
+from bayesid.inference.linear_responses import LinearResponses
 from bayesid.inference.perturbed_posterior import (
     Arrays,
     Perturbation,
     jacobian_of,
     perturbed,
     residual_of,
-    responses,
     trace,
 )
 from bayesid.inference.posterior import Posterior
@@ -45,8 +45,6 @@ from bayesid.simulation.effects.effect import Effect
 __all__ = ["Engine", "Fit"]
 
 ITERATIONS = 25
-TOGETHER = 32
-"""Columns from which on those of several effects are not evaluated together, for the sake of memory."""
 
 CLOSE = 0.02
 """Change of the cost at which a fit has converged."""
@@ -65,6 +63,8 @@ class Fit:
         Of each effect, prior standard deviations.
     z : (size,) array
         The model's own unknowns.
+    data : Arrays
+        The data with the effects pushed.
     residual : (N,) array
         Whitened, all recordings.
     own : (N, n) array
@@ -85,6 +85,7 @@ class Fit:
     effects: tuple[Effect, ...]
     coordinates: tuple[Floats, ...]
     z: Floats
+    data: Arrays
     residual: Floats
     own: Floats
     added: tuple[Floats, ...]
@@ -141,6 +142,7 @@ class _Point(NamedTuple):
     """One point of a fit."""
 
     z: Floats
+    data: Arrays
     coordinates: list[Floats]
     operating: OperatingTrajectory
     residual: Floats
@@ -166,6 +168,7 @@ class Engine:
         self.frozen = np.array(sorted(frozen), dtype=int)
         self._released = np.array(sorted(released), dtype=int)
         self._tables: dict[str, Table] = {}
+        self._linear: LinearResponses | None = None  # about the last point
 
     def with_posterior(self, posterior: Posterior) -> Engine:
         """Return an engine for the same data under another noise; tables are shared where the motion is the same."""
@@ -195,7 +198,7 @@ class Engine:
         """Compile simulation and derivatives, side by side."""
         z, data = self.start(), self.posterior.data.arrays
         with ThreadPoolExecutor(1) as other:
-            derivatives = other.submit(responses, self.posterior, z, data, self.perturbation(1))
+            derivatives = other.submit(self.respond, self.perturbation(1), z, data)
             trace(self.posterior, z, data)
             residual_of(self.posterior, z, data)
             jacobian_of(self.posterior, z, data)
@@ -275,6 +278,7 @@ class Engine:
             tuple(effects),
             tuple(best.coordinates),
             best.z,
+            best.data,
             best.residual,
             own,
             tuple(added),
@@ -294,7 +298,7 @@ class Engine:
         sized = [(effect, c) for effect, c in zip(effects, coordinates, strict=True) if len(c)]
         columns = [self.own_columns(z, data), *self.columns(sized, operating, z, data)]
         cost = 0.5 * float(residual @ residual + z @ z + sum(c @ c for c in coordinates))
-        return _Point(z, list(coordinates), operating, residual, np.concatenate(columns, axis=1), cost)
+        return _Point(z, data, list(coordinates), operating, residual, np.concatenate(columns, axis=1), cost)
 
     def _cost(
         self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, operating: OperatingTrajectory
@@ -319,37 +323,19 @@ class Engine:
         self, effects: Iterable[tuple[Effect, Floats]], operating: OperatingTrajectory, z: Floats, data: Arrays
     ) -> list[Floats]:
         """Return derivatives of the residual in the coordinates of each effect, (N, n)."""
-        found: list[Floats] = []
-        waiting: list[Perturbation] = []
-        for effect, coordinates in effects:
-            waiting.append(linear_perturbation(effect, coordinates, operating, self._table(effect)))
-            if sum(len(one.z) for one in waiting) >= TOGETHER:
-                found += self._respond_to_each(waiting, z, data)
-                waiting = []
-        return found + self._respond_to_each(waiting, z, data)
-
-    def _respond_to_each(self, pushes: Sequence[Perturbation], z: Floats, data: Arrays) -> list[Floats]:
-        """Return what `respond` says of several, evaluated together, since full batches cost as much as others."""
-        if not pushes:
-            return []
-        joined = jax.tree.map(lambda *parts: np.concatenate(parts), *pushes)
-        ends = np.cumsum([len(one.z) for one in pushes])[:-1]
-        return np.split(self.respond(joined, z, data), ends, axis=1)
+        pushes = [linear_perturbation(effect, own, operating, self._table(effect)) for effect, own in effects]
+        return [self.respond(push, z, data) for push in pushes]
 
     def respond(self, perturbations: Perturbation, z: Floats, data: Arrays) -> Floats:
         """Return derivatives of the residual along pushes with leading axis n, (N, n)."""
-        return responses(self.posterior, z, data, perturbations).reshape(len(perturbations.z), -1).T
+        if self._linear is None or self._linear.arrays is not data or not np.array_equal(self._linear.z, z):
+            self._linear = LinearResponses.about(self.posterior, z, data)
+        return self._linear.along(perturbations).reshape(len(perturbations.reading), -1).T
 
     def perturbation(self, count: int, **parts: Floats) -> Perturbation:
         """Return ``count`` pushes with the named parts, the others zero."""
-        empty = Perturbation(
-            np.zeros((count, self.posterior.size)), *(np.zeros((count, *shape)) for shape in self._push_shapes())
-        )
+        empty = Perturbation(*(np.zeros((count, *shape)) for shape in self._push_shapes()))
         return empty._replace(**parts)
-
-    def data_of(self, fit: Fit) -> Arrays:
-        """Return the data with a fit's effects pushed."""
-        return self._pushed(self._pushes(fit.effects, fit.coordinates, fit.operating))
 
     def _pushes(
         self,

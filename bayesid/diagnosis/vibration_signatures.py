@@ -162,4 +162,4 @@ def _couplings(engine: Engine, fit: Fit, frequency: float, damping: float) -> Fl
             flow_rate[row, ..., a] += change[..., b]
     rows = fit.operating.vibration.flow_rows(flow, flow_rate)
     perturbation = engine.perturbation(len(PAIRS), node_rows=rows[0], sample_rows=rows[1])
-    return engine.respond(perturbation, fit.z, engine.data_of(fit))
+    return engine.respond(perturbation, fit.z, fit.data)

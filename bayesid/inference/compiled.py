@@ -18,7 +18,7 @@ from bayesid._math.arrays import Traceable
 from bayesid._math.kept_jit import kept_jit
 from bayesid.inference import whitening
 from bayesid.inference.layout import Layout, PriorNumbers
-from bayesid.simulation.dynamics import Grid
+from bayesid.simulation.dynamics import Grid, LinearMotion
 from bayesid.simulation.effects.instant import Instant, Readings
 from bayesid.simulation.simulator import ModelConstants, Simulator
 
@@ -31,9 +31,10 @@ __all__ = [
     "Traced",
     "chi2",
     "jacobian",
+    "linearised",
     "perturbed",
+    "read_out",
     "residuals",
-    "responses",
     "simulated",
     "traced",
 ]
@@ -90,14 +91,12 @@ class Arrays(NamedTuple):
 
 
 class Perturbation(NamedTuple):
-    """Perturbation of the unknowns, and of what acts on the robot and its sensors from outside the model.
+    """Perturbation of what acts on the robot and its sensors from outside the model.
 
     There are R recordings, S integration nodes, T samples and C columns of `Channels`.
 
     Attributes
     ----------
-    z : (size,) array
-        Change of the coordinates.
     node_rows, sample_rows : (R, S, 28) and (R, T, 28) arrays
         Change of the rows of the kinematic tables.
     node_wrench, sample_wrench : (R, S, 6) and (R, T, 6) arrays
@@ -106,7 +105,6 @@ class Perturbation(NamedTuple):
         Change of the sensors' readings, sensor axes.
     """
 
-    z: Traceable
     node_rows: Traceable
     sample_rows: Traceable
     node_wrench: Traceable
@@ -181,14 +179,36 @@ def traced(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> 
 
 
 @kept_jit(static=1)
-def responses(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays, along: Perturbation) -> Array:
-    """Return the derivatives of the whitened residual along n stacked perturbations, shape (n, R, O, C)."""
+def linearised(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> LinearMotion:
+    """Linearise the simulation of all recordings in what may act from outside the model, leading axis R."""
+    values = structure.layout.values(numbers.prior, z)
+    return structure.simulator.linearise(numbers.model, values, arrays.grid, arrays.attitude)
 
-    def shifted(z: Array, perturbation: Perturbation) -> Array:
-        return residuals(structure, numbers, z, perturbed(arrays, perturbation))
 
-    at = jax.tree.map(lambda x: jnp.zeros(x.shape[1:]), along)
-    return jax.vmap(lambda one: jax.jvp(shifted, (z, at), (one.z, one))[1])(along)
+@kept_jit(static=1)
+def read_out(
+    structure: Structure, numbers: Numbers, z: Array, arrays: Arrays, raw: Array, along: Array, offset: Array
+) -> Array:
+    """Return the derivatives of the whitened residual along n changes of the readings, shape (n, R, O, C).
+
+    Parameters
+    ----------
+    structure, numbers, z, arrays
+    raw : (R, T, q) array
+        Readings of sensors without a fault.
+    along : (n, R, T, q) array
+        Changes of them.
+    offset : (n, R, T, C) array
+        Changes of the faulty readings.
+    """
+    values = structure.layout.values(numbers.prior, z)
+
+    def whitened(raw: Array, offset: Array) -> Array:
+        read = structure.simulator.faulty(numbers.model, values, arrays.grid, raw)
+        return _whitened(structure, read, arrays._replace(offset=arrays.offset + offset))
+
+    at = (raw, jnp.zeros_like(arrays.offset))
+    return jax.vmap(lambda *one: jax.jvp(whitened, at, one)[1])(along, offset)
 
 
 def _whitened(structure: Structure, read: Readings, arrays: Arrays) -> Array:

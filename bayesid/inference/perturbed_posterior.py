@@ -1,17 +1,16 @@
-"""Responses of a posterior's residual to perturbations from outside its model."""
+"""Simulation, residual and derivatives of a posterior whose data may be perturbed from outside its model."""
 
 from __future__ import annotations
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Arrays, Perturbation, Traced, perturbed
-from bayesid.inference.posterior import BATCH, Posterior
+from bayesid.inference.posterior import Posterior
 
-__all__ = ["Arrays", "Perturbation", "Traced", "jacobian_of", "perturbed", "residual_of", "responses", "trace"]
+__all__ = ["Arrays", "Perturbation", "Traced", "jacobian_of", "perturbed", "residual_of", "trace"]
 
 
 def trace(posterior: Posterior, z: Floats, arrays: Arrays) -> Traced:
@@ -27,22 +26,3 @@ def residual_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
 def jacobian_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
     """Return the derivatives of the whitened residual in ``z``, (R, O, C, size), for arrays that may be `perturbed`."""
     return np.asarray(compiled.jacobian(posterior.structure, posterior.numbers, jnp.asarray(z), arrays))
-
-
-def responses(posterior: Posterior, z: Floats, arrays: Arrays, perturbations: Perturbation) -> Floats:
-    """Return the derivatives of the whitened residual along n stacked perturbations, shape (n, R, O, C)."""
-    count = len(perturbations.z)
-    padded = jax.tree.map(lambda x: np.concatenate([x, np.zeros((-count % BATCH, *x.shape[1:]))]), perturbations)
-    parts = [
-        np.asarray(
-            compiled.responses(
-                posterior.structure,
-                posterior.numbers,
-                jnp.asarray(z),
-                arrays,
-                jax.tree.map(lambda x, i=i: x[i : i + BATCH], padded),
-            )
-        )
-        for i in range(0, count, BATCH)
-    ]
-    return np.concatenate(parts)[:count] if parts else np.zeros((0, *posterior.residual_shape))

@@ -7,7 +7,7 @@ axes, ``L = I w + spin + h`` and ``dL/dt = N - w x L``; the attitude quaternion 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
@@ -20,17 +20,31 @@ from jax import Array
 from bayesid._math.arrays import Traceable
 from bayesid._math.hermite import hermite
 from bayesid._math.rotation import quaternion_rate, rotation
-from bayesid._math.runge_kutta import runge_kutta_step
+from bayesid._math.runge_kutta import runge_kutta_stages, runge_kutta_step, stage_inputs
 from bayesid._math.small_matrices import cross, inverse, solve_small, symmetric, trace_less
-from bayesid.robot.composite_tables import ENTRIES
+from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.instant import Composite, Environment, Instant, Modes, Wrench
 from bayesid.simulation.joint_torques import BaseMotion, Beyond, joint_torques
 
-__all__ = ["Grid", "Samples", "Start", "TimeTables", "UnitSpeed", "composite", "simulate", "trace"]
+__all__ = [
+    "Grid",
+    "LinearMotion",
+    "Samples",
+    "Start",
+    "TimeTables",
+    "UnitSpeed",
+    "composite",
+    "linearise",
+    "simulate",
+    "trace",
+]
 
 ATTITUDE, MOMENTUM, INNER = slice(0, 4), slice(4, 7), slice(7, None)
 """Parts of the state: attitude quaternion, angular momentum [N m s], and inner states of the effects."""
+
+INPUTS = WIDTH + 6
+"""Number of inputs from outside the model: a row of a table, force and torque on the base."""
 
 
 class TimeTables(NamedTuple):
@@ -189,6 +203,92 @@ def trace(
         trajectory.at(index, fraction), (bodies, grid.node.environment), grid.zero_order_hold[index]
     )
     return motion[0], _sample(grid, points, system, loads, trajectory)
+
+
+class LinearMotion(NamedTuple):
+    """Derivatives of a simulated recording with K steps of five stages and T samples; n states and q raw readings.
+
+    The inputs are what may act from outside the model: the 28 entries of a table's row, and the force and torque on the
+    base about its origin, base axes [N, N m].
+
+    Attributes
+    ----------
+    state : (K, 5, n, n) array
+        Derivatives of the slope at each stage in the state there.
+    input : (K, 5, n, 34) array
+        And in the inputs there.
+    initial : (n, 34) array
+        Derivatives of the state at time 0 in the inputs at the first node.
+    reading_state, reading_input : (T, q, n) and (T, q, 34) arrays
+        Derivatives of the raw readings.
+    reading : (T, q) array
+        Raw readings.
+    """
+
+    state: Traceable
+    input: Traceable
+    initial: Traceable
+    reading_state: Traceable
+    reading_input: Traceable
+    reading: Traceable
+
+
+def linearise(
+    grid: Grid,
+    inertial: Array,
+    start: Start,
+    effects: Sequence[Effect],
+    values: Sequence[Array],
+    points: Array,
+    read: Callable[[Samples], Array],
+) -> LinearMotion:
+    """Linearise the simulation of one recording; parameters as of `simulate`.
+
+    Parameters
+    ----------
+    read : callable
+        Function of the motion at one sample time that returns the raw readings (q,).
+    """
+    system, loads, trajectory = _integrate(grid, inertial, start, effects, values)
+    nothing = jnp.zeros(INPUTS)
+
+    def pushed(row: Array, environment: Environment, push: Array) -> tuple[Composite, Environment]:
+        acting = environment._replace(wrench=environment.wrench + push[WIDTH:])
+        return composite(row + push[:WIDTH]), acting
+
+    def slope(state: Array, push: Array, row: Array, environment: Environment, hold: Array) -> Array:
+        return system.derivative(state, pushed(row, environment, push), hold)
+
+    def stages(state: Array, size: Array, hold: Array, *nodes: tuple[Array, Environment]) -> tuple[Array, Array]:
+        inputs = stage_inputs(*nodes)
+        states, _ = runge_kutta_stages(lambda s, at: slope(s, nothing, at[0], at[1], hold), state, size, inputs)
+        both = jax.vmap(jax.jacfwd(slope, argnums=(0, 1)), (0, None, 0, 0, None))
+        return both(states, nothing, *inputs, hold)
+
+    def beginning(push: Array) -> Array:
+        at = pushed(rows[0], jax.tree.map(lambda x: x[0], grid.node.environment), push)
+        return system.initial(at, start, _spin_error(grid.unit_speed, loads, start))
+
+    def sampled(state: Array, push: Array, row: Array, hold: Array, tables: TimeTables) -> Array:
+        return read(system.sample(state, pushed(row, tables.environment, push), hold, points, tables, loads))
+
+    rows = grid.node.known + grid.node.unknown @ loads
+    nodes = (rows, grid.node.environment)
+    first, middle, last = (
+        jax.tree.map(lambda x, s=s: x[s], nodes) for s in (slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2))
+    )
+    by_state, by_input = jax.vmap(stages)(trajectory.left, grid.step, grid.zero_order_hold, first, middle, last)
+    at = (
+        trajectory.at(grid.step_of, grid.fraction),
+        grid.sample.known + grid.sample.unknown @ loads,
+        grid.zero_order_hold[grid.step_of],
+        grid.sample,
+    )
+    reading_state, reading_input = jax.vmap(jax.jacfwd(sampled, argnums=(0, 1)), (0, None, 0, 0, 0))(
+        at[0], nothing, *at[1:]
+    )
+    reading = jax.vmap(sampled, (0, None, 0, 0, 0))(at[0], nothing, *at[1:])
+    return LinearMotion(by_state, by_input, jax.jacfwd(beginning)(nothing), reading_state, reading_input, reading)
 
 
 class _StateTrajectory(NamedTuple):

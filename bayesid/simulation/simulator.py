@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -13,7 +15,7 @@ from jax import Array
 from bayesid._math.arrays import Traceable
 from bayesid._math.rotation import tilted
 from bayesid.simulation.channels import Channels
-from bayesid.simulation.dynamics import Grid, Samples, Start, simulate, trace
+from bayesid.simulation.dynamics import Grid, LinearMotion, Samples, Start, linearise, simulate, trace
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_key import EffectKey
 from bayesid.simulation.effects.instant import Instant, Readings
@@ -148,9 +150,44 @@ class Simulator:
         start = Start(tilted(attitude, values.tilt), values.rate, values.speed)
         return grid, values.inertial, start, self._effects(constants), values.effects, constants.point
 
+    def linearise(self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array) -> LinearMotion:
+        """Linearise the simulation in what may act from outside; raw readings are those of `faulty`'s argument."""
+
+        def one(values: Values, grid: Grid, attitude: Array) -> LinearMotion:
+            def read(sample: Samples) -> Array:
+                alone = jax.tree.map(lambda x: x[None], sample)
+                return jnp.concatenate([part[0] for part in self._raw(constants, alone)])
+
+            return partial(linearise, read=read)(*self._arguments(constants, values, grid, attitude))
+
+        return jax.lax.map(lambda given: one(*given), (self._repeated(values, len(attitude)), grid, attitude))
+
+    def faulty(self, constants: ModelConstants, values: Values, grid: Grid, raw: Array) -> Readings:
+        """Return the readings of sensors without a fault, (R, T, q), with the faults that effects add; no torques."""
+
+        def one(values: Values, grid: Grid, raw: Array) -> Readings:
+            ends = np.cumsum([len(kind.rest) for kind in self.channels.kinds])
+            parts = jnp.split(raw, ends[:-1], axis=-1)
+            return self._with_faults(constants, values, grid, parts, jnp.zeros((len(raw), 0)))
+
+        return jax.vmap(one, (self._axes, 0, 0))(values, grid, raw)
+
+    def _repeated(self, values: Values, recordings: int) -> Values:
+        """Return the values with a leading axis of recordings throughout."""
+        return jax.tree.map(
+            lambda axis, x: jnp.broadcast_to(x, (recordings, *x.shape)) if axis is None else x,
+            self._axes,
+            values,
+            is_leaf=lambda axis: axis is None,
+        )
+
     def _read(self, constants: ModelConstants, values: Values, grid: Grid, samples: Samples) -> Readings:
         """Return the readings of the sensors in one recording, with the faults and friction that effects add."""
-        channels = {}
+        return self._with_faults(constants, values, grid, self._raw(constants, samples), samples.torque)
+
+    def _raw(self, constants: ModelConstants, samples: Samples) -> list[Array]:
+        """Return the readings of each sensor without a fault, sensor axes."""
+        found = []
         for index, kind in enumerate(self.channels.kinds):
             sensed = Sensed(
                 samples.instant,
@@ -159,8 +196,15 @@ class Simulator:
                 samples.specific_force[:, index],
             )
             reading = jax.vmap(kind.read)(sensed)
-            channels[kind.value] = reading @ constants.rotation[index] if kind.mounted else reading
-        readings = Readings(samples.instant.environment.time, channels, samples.torque)
+            found.append(reading @ constants.rotation[index] if kind.mounted else reading)
+        return found
+
+    def _with_faults(
+        self, constants: ModelConstants, values: Values, grid: Grid, raw: Sequence[Array], torque: Array
+    ) -> Readings:
+        """Return the readings of one recording with the faults and friction that effects add."""
+        channels = {kind.value: own for kind, own in zip(self.channels.kinds, raw, strict=True)}
+        readings = Readings(grid.sample.environment.time, channels, torque)
         for effect, parameters in zip(self._effects(constants), values.effects, strict=True):
             readings = effect.read(parameters, readings)
             if self.torques and effect.uses("friction"):

@@ -1,0 +1,127 @@
+"""Executables come back from disk without tracing, and whatever is wrong there costs no more than time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from bayesid._math.kept_jit import forget_executables, kept_jit
+from bayesid.simulation.effects import AerodynamicDrag, WheelMomentum
+from bayesid.simulation.effects.effect_key import EffectKey
+from bayesid.simulation.sensors import Kind
+
+TRACED: list[object] = []
+
+
+@kept_jit(static=1)
+def scaled(power: object, x: dict[str, jax.Array]) -> jax.Array:
+    TRACED.append(power)
+    return jnp.sum(x["a"] ** 2) * len(str(power))
+
+
+@dataclass(frozen=True)
+class Foreign:
+    """Its source is no part of the package."""
+
+    power: int
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[Path]:
+    before = jax.config.jax_compilation_cache_dir
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path))
+    TRACED.clear()
+    forget_executables()
+    yield tmp_path
+    jax.config.update("jax_compilation_cache_dir", before)
+    forget_executables()
+
+
+def kept(folder: Path) -> list[Path]:
+    return sorted(folder.glob("*.executable"))
+
+
+X = {"a": np.arange(4.0)}
+
+
+def test_another_process_need_not_trace(folder):
+    assert float(scaled(10, X)) == 28.0
+    assert TRACED == [10]
+    forget_executables()
+    jax.clear_caches()
+    assert float(scaled(10, {"a": 2.0 * X["a"]})) == 112.0
+    assert TRACED == [10]
+    assert len(kept(folder)) == 1
+
+
+def test_other_static_arguments_and_other_shapes_are_other_executables(folder):
+    for power, x in ((10, X), (100, X), (10, {"a": np.arange(5.0)}), (10, {"a": np.arange(4)})):
+        assert float(scaled(power, x)) == len(str(power)) * float(np.sum(x["a"] ** 2))
+    assert len(kept(folder)) == 4
+
+
+def test_a_damaged_file_is_replaced(folder):
+    scaled(10, X)
+    (file,) = kept(folder)
+    good = file.stat().st_size
+    file.write_bytes(b"damaged")
+    forget_executables()
+    assert float(scaled(10, X)) == 28.0
+    assert TRACED == [10, 10]
+    assert file.stat().st_size > good / 2
+    forget_executables()
+    assert float(scaled(10, X)) == 28.0
+    assert TRACED == [10, 10]
+
+
+def test_an_executable_of_jaxs_own_cache_is_not_kept_in_its_place(folder):
+    """One that comes from a file cannot be written to another: its functions are not in there."""
+    plain = jax.jit(lambda x: jnp.sum(x["a"] ** 2) * 2)
+    plain(X)
+    jax.clear_caches()
+    scaled(10, X)
+    forget_executables()
+    jax.clear_caches()
+    assert float(scaled(10, X)) == 28.0
+    assert TRACED == [10]
+
+
+def test_what_is_not_of_the_package_is_not_kept(folder):
+    assert float(scaled(Foreign(3), X)) == 14.0 * len(str(Foreign(3)))
+    assert float(scaled(Foreign(3), X)) == 14.0 * len(str(Foreign(3)))
+    assert [Foreign(3)] == TRACED
+    assert kept(folder) == []
+
+
+def test_effects_and_sensors_are_described_by_what_they_are(folder):
+    class Own(AerodynamicDrag):
+        """An effect of a user."""
+
+    keys = [EffectKey(WheelMomentum()), EffectKey(AerodynamicDrag()), (Kind.RATE, Kind.ACCEL)]
+    for key in keys:
+        scaled(key, X)
+    assert len(kept(folder)) == 3
+    scaled(EffectKey(WheelMomentum()), X)
+    assert len(kept(folder)) == 3
+    scaled(EffectKey(Own()), X)
+    assert len(kept(folder)) == 3
+
+
+def test_inside_another_function_it_is_part_of_that(folder):
+    def twice(x: jax.Array) -> jax.Array:
+        return 2.0 * scaled(10, {"a": x})
+
+    np.testing.assert_allclose(jax.jit(jax.grad(twice))(X["a"]), 8.0 * X["a"])
+    assert kept(folder) == []
+
+
+def test_without_a_folder_nothing_is_written(folder):
+    jax.config.update("jax_compilation_cache_dir", None)
+    assert float(scaled(10, X)) == 28.0
+    assert kept(folder) == []

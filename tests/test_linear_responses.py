@@ -1,0 +1,79 @@
+"""Responses by the linear time-varying motion are the derivatives of the simulation itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from bayesid.inference.linear_responses import LinearResponses
+from bayesid.inference.perturbed_posterior import Perturbation, perturbed, residual_of
+from bayesid.inference.posterior import Posterior
+from bayesid.simulation.effects import (
+    AccelBias,
+    AccelLatency,
+    FlexibleAppendage,
+    FuelSlosh,
+    RateScale,
+    WheelMomentum,
+)
+
+
+def pushes_of(posterior: Posterior, rng: np.random.Generator, count: int) -> Perturbation:
+    arrays = posterior.data.arrays
+    node, sample = arrays.grid.node.known.shape, arrays.grid.sample.known.shape
+    shapes = (node, sample, (*node[:2], 6), (*sample[:2], 6), arrays.offset.shape)
+    return Perturbation(*(rng.normal(size=(count, *shape)) for shape in shapes))
+
+
+def by_differences(posterior: Posterior, z: np.ndarray, arrays, push: Perturbation, size: float) -> np.ndarray:
+    """Central differences of the whole simulation."""
+    ends = [
+        residual_of(posterior, z, perturbed(arrays, jax.tree.map(lambda x, s=s: jnp.asarray(s * x), push)))
+        for s in (size, -size)
+    ]
+    return (ends[0] - ends[1]) / (2.0 * size)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        (),
+        (WheelMomentum(), AccelBias(1e-3), RateScale(), AccelLatency()),
+        (FuelSlosh(), FlexibleAppendage()),
+    ],
+    ids=["rigid", "sensors and wheels", "vibrations"],
+)
+def test_responses_are_derivatives_of_the_residual(planar_posterior: Callable[..., Posterior], effects):
+    rng = np.random.default_rng(5)
+    base = planar_posterior(rng, step=0.5)
+    posterior = Posterior.of(replace(base.model, effects=(*base.model.effects, *effects)), base.manoeuvres, step=0.5)
+    z = 0.3 * rng.normal(size=posterior.size)
+    # about data that something acts on already, as a fit's effects do
+    already = jax.tree.map(lambda x: jnp.asarray(1e-4 * x[0]), pushes_of(posterior, rng, 1))
+    arrays = perturbed(posterior.data.arrays, already)
+    pushes = pushes_of(posterior, rng, 34)  # more than a batch
+    found = LinearResponses.about(posterior, z, arrays).along(pushes)
+    for k in (0, 33):
+        own = jax.tree.map(lambda x, k=k: x[k], pushes)
+        expected = by_differences(posterior, z, arrays, own, 1e-6)
+        np.testing.assert_allclose(found[k], expected, atol=2e-6 * np.abs(expected).max())
+
+
+def test_each_part_of_a_push_alone_adds_up(planar_posterior: Callable[..., Posterior]):
+    rng = np.random.default_rng(6)
+    posterior = planar_posterior(rng, step=0.5)
+    linear = LinearResponses.about(posterior, np.zeros(posterior.size), posterior.data.arrays)
+    pushes = pushes_of(posterior, rng, 2)
+    parts = [
+        linear.along(Perturbation(*(x if i == k else 0.0 * x for i, x in enumerate(pushes))))
+        for k in range(len(pushes))
+    ]
+    whole = linear.along(pushes)
+    np.testing.assert_allclose(np.sum(parts, axis=0), whole, atol=1e-12 * np.abs(whole).max())
+    assert all(np.abs(part).max() > 0.0 for part in parts)
+    assert linear.along(jax.tree.map(lambda x: x[:0], pushes)).shape == (0, *posterior.residual_shape)
