@@ -72,12 +72,14 @@ class WeighedCauses:
 
         Only sets that matter are evaluated anew; the others keep their evidence.
         """
+        matter = {name for item in self.probabilities.sets if item.probability >= MATTERS for name in item.names}
         wider = {
             state.names: SetEvidence(
                 state.point.evidence.gram,
                 [
                     cause.rescaled(state.point.evidence.gram, bound, floor)
-                    for cause in state.point.evidence.causes.values()
+                    for name, cause in state.point.evidence.causes.items()
+                    if name in matter
                 ],
             )
             for state in self.states

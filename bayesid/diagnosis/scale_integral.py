@@ -22,7 +22,7 @@ from scipy.special import logsumexp
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.scale_nodes import LogNodes, log_nodes, thinning
-from bayesid.diagnosis.scale_prior import AmplitudeGroup, ScaleRange, scale_range
+from bayesid.diagnosis.scale_prior import AmplitudeGroup, ScaleRange, range_of
 
 __all__ = ["GroupSpectrum", "ScaleAverage", "average_over_scales", "log_ratios"]
 
@@ -52,8 +52,6 @@ class GroupSpectrum:
     vectors : (k, k) array
     score : (k,) array
         Score along the eigenvectors.
-    cross : (k, m) array
-        Products of the eigenvectors' signatures with all columns of the Gram.
     """
 
     columns: Integers
@@ -62,18 +60,16 @@ class GroupSpectrum:
     values: Floats
     vectors: Floats
     score: Floats
-    cross: Floats
 
     @staticmethod
     def of(group: AmplitudeGroup, gram: Gram) -> GroupSpectrum:
         """Return the spectrum of a group."""
         own = gram.groups[group.name]
         root = group.roots(len(own))
-        rows = root[:, None] * gram.matrix[own]
-        values, vectors = np.linalg.eigh(rows[:, own] * root)
+        values, vectors = np.linalg.eigh(root[:, None] * gram.matrix[np.ix_(own, own)] * root)
         score = vectors.T @ (root * gram.score[own])
         values = np.maximum(values, 0.0)
-        return GroupSpectrum(own, root, scale_range(group, gram), values, vectors, score, vectors.T @ rows)
+        return GroupSpectrum(own, root, range_of(group, float(values.max(initial=0.0))), values, vectors, score)
 
     def nodes(self, thinned: float = 1.0) -> LogNodes:
         """Return nodes over the whole range of the scale."""
@@ -109,7 +105,8 @@ def log_ratios(groups: Sequence[GroupSpectrum], gram: Gram, nodes: Sequence[LogN
     matrix = (root[:, None] * gram.matrix[np.ix_(columns, columns)] * root)[None]  # (b, m, m), b scales so far
     score = (root * gram.score[columns])[None]
     gain = np.zeros(1)
-    values, along, cross = first.values[None], first.score[None], (first.cross[:, columns] * root)[None]
+    shared = first.root[:, None] * gram.matrix[np.ix_(first.columns, columns)] * root
+    values, along, cross = first.values[None], first.score[None], (first.vectors.T @ shared)[None]
     for index, own in enumerate(nodes):
         if index:
             size = len(groups[index].columns)

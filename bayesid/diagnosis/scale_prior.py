@@ -17,7 +17,7 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.body_evidence import MissingBody
 from bayesid.diagnosis.gram import Gram
 
-__all__ = ["AmplitudeGroup", "CandidateCause", "ScaleRange", "Variant", "scale_range"]
+__all__ = ["AmplitudeGroup", "CandidateCause", "ScaleRange", "Variant", "range_of", "scale_range"]
 
 UNRESOLVED_GAIN = 0.01
 """Square of the scale times the information in the most visible direction, at the floor that the data set: there the
@@ -160,15 +160,20 @@ class ScaleRange:
 
 
 def scale_range(group: AmplitudeGroup, gram: Gram) -> ScaleRange:
-    """Return the range of a group's scale.
+    """Return the range of a group's scale (`range_of`)."""
+    own = gram.groups[group.name]
+    root = group.roots(len(own))
+    values = np.linalg.eigvalsh(root[:, None] * gram.matrix[np.ix_(own, own)] * root)
+    return range_of(group, float(values.max(initial=0.0)))
+
+
+def range_of(group: AmplitudeGroup, largest: float) -> ScaleRange:
+    """Return the range of a group's scale, given the largest eigenvalue of its information in units of the scale.
 
     The floor that the data set is the scale at which its square times the largest eigenvalue of
     ``Lambda^1/2 A Lambda^1/2`` is 0.01. A group whose bound is below that floor is invisible: its evidence is that of
     nothing, whatever the data.
     """
-    own = gram.groups[group.name]
-    root = group.roots(len(own))
-    largest = float(np.linalg.eigvalsh(root[:, None] * gram.matrix[np.ix_(own, own)] * root).max(initial=0.0))
     floor = np.sqrt(UNRESOLVED_GAIN / largest) if largest > 0.0 else np.inf
     low = min(floor, group.high) if group.low is None else group.low
     return ScaleRange(float(low), group.high, bool(floor <= group.high))
