@@ -6,6 +6,7 @@ they are at each instant. What is left out is of second order in the parts' mome
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -96,8 +97,13 @@ class Vibration(NamedTuple):
             self._at(self.times[1], self.com[1], flow, flow_rate),
         )
 
-    def responses(self, frequency: float, damping: float) -> tuple[Floats, Floats]:
-        """Return modal speed per unit coupling to each of six forcings, and its derivative: fine grid, (R, N, 6)."""
+    def coupling_rows(
+        self, frequency: float, damping: float, pairs: Sequence[tuple[int, int]]
+    ) -> tuple[Floats, Floats]:
+        """Return changes of the tables by unit entries of a symmetric coupling matrix: (n, R, S, 28), (n, R, T, 28).
+
+        The oscillator that the motion along axis ``j`` drives pushes along axis ``i``, and the other way round.
+        """
         coupling = np.eye(6)
         omega = 2.0 * np.pi * frequency
         found = _oscillate(
@@ -109,32 +115,48 @@ class Vibration(NamedTuple):
             jnp.zeros_like(jnp.asarray(self.compliance)),
         )
         speed, change = np.moveaxis(np.asarray(found), -2, 0)
-        return np.moveaxis(speed[..., 0], 0, -1), np.moveaxis(change[..., 0], 0, -1)
-
-    def flow_rows(self, flow: Floats, flow_rate: Floats) -> tuple[Floats, Floats]:
-        """Return changes of the tables by momenta given on the fine grid, (n, R, N, 6) each."""
-        return (
-            self._at(self.times[0], self.com[0], flow, flow_rate),
-            self._at(self.times[1], self.com[1], flow, flow_rate),
-        )
+        driven = (np.moveaxis(part[..., 0], 0, -1)[None] for part in (speed, change))
+        flow, flow_rate = driven  # (1, R, N, 6), by the axis that drives
+        rows = []
+        for times, com in zip(self.times, self.com, strict=True):
+            moving = [np.zeros((len(pairs), *times.shape, 6)) for _ in range(2)]
+            for part, values in zip(moving, _interpolated(times, flow, flow_rate), strict=True):
+                for row, (i, j) in enumerate(pairs):
+                    for a, b in {(i, j), (j, i)}:
+                        part[row, ..., a] += values[0, ..., b]
+            rows.append(_rows(moving[0], moving[1], com))
+        return rows[0], rows[1]
 
     def _at(self, times: Floats, com: Floats, flow: Floats, flow_rate: Floats) -> Floats:
-        fine = FINE * np.arange(flow.shape[2])
-        rows = np.zeros((len(flow), *times.shape, WIDTH))
         if not np.isfinite(flow).all():  # more swings than there is: the fit refuses such a step
-            return np.full_like(rows, np.nan)
-        for r in range(len(times)):
-            curve = CubicHermiteSpline(fine, flow[:, r], flow_rate[:, r], axis=1)
-            p, q = curve(times[r]), curve.derivative()(times[r])
-            rows[:, r, :, ENTRIES["first_rate"]] = p[..., :3]
-            rows[:, r, :, ENTRIES["first_acceleration"]] = q[..., :3]
-            rows[:, r, :, ENTRIES["spin"]] = p[..., 3:]
-            rows[:, r, :, ENTRIES["spin_rate"]] = q[..., 3:]
-            # the flow carries no second moment: its rate about the centre of mass must not change with it
-            outer = com[r][:, :, None] * p[..., None, :3]
-            both = outer + np.swapaxes(outer, -1, -2)
-            rows[:, r, :, ENTRIES["second_rate"]] = both[..., [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-        return rows
+            return np.full((len(flow), *times.shape, WIDTH), np.nan)
+        momentum, change = _interpolated(times, flow, flow_rate)
+        return _rows(momentum, change, com)
+
+
+def _interpolated(times: Floats, flow: Floats, flow_rate: Floats) -> tuple[Floats, Floats]:
+    """Return momenta (n, R, N, 6) on the fine grid, and their derivatives, at other times (R, S)."""
+    fine = FINE * np.arange(flow.shape[2])
+    found = []
+    for r, own in enumerate(times):
+        curve = CubicHermiteSpline(fine, flow[:, r], flow_rate[:, r], axis=1)
+        found.append((curve(own), curve.derivative()(own)))
+    momentum, change = (np.stack(part, axis=1) for part in zip(*found, strict=True))
+    return momentum, change
+
+
+def _rows(p: Floats, q: Floats, com: Floats) -> Floats:
+    """Return changes of the tables by momenta (n, R, S, 6) and their derivatives, (n, R, S, 28)."""
+    rows = np.zeros((*p.shape[:-1], WIDTH))
+    rows[..., ENTRIES["first_rate"]] = p[..., :3]
+    rows[..., ENTRIES["first_acceleration"]] = q[..., :3]
+    rows[..., ENTRIES["spin"]] = p[..., 3:]
+    rows[..., ENTRIES["spin_rate"]] = q[..., 3:]
+    # the flow carries no second moment: its rate about the centre of mass must not change with it
+    outer = com[..., :, None] * p[..., None, :3]
+    both = outer + np.swapaxes(outer, -1, -2)
+    rows[..., ENTRIES["second_rate"]] = both[..., [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return rows
 
 
 def _yielding(mass: Floats, com: Floats, inverse: Floats) -> Floats:

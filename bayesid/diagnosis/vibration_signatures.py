@@ -153,13 +153,6 @@ def slosh_entries() -> Floats:
 
 def _couplings(engine: Engine, fit: Fit, frequency: float, damping: float) -> Floats:
     """Return the responses to unit entries of the coupling matrix, (N, 21)."""
-    speed, change = fit.operating.vibration.responses(frequency, damping)
-    flow = np.zeros((len(PAIRS), *speed.shape))
-    flow_rate = np.zeros_like(flow)
-    for row, (i, j) in enumerate(PAIRS):
-        for a, b in {(i, j), (j, i)}:
-            flow[row, ..., a] += speed[..., b]
-            flow_rate[row, ..., a] += change[..., b]
-    rows = fit.operating.vibration.flow_rows(flow, flow_rate)
+    rows = fit.operating.vibration.coupling_rows(frequency, damping, PAIRS)
     perturbation = engine.perturbation(len(PAIRS), node_rows=rows[0], sample_rows=rows[1])
     return engine.respond(perturbation, fit.z, fit.data)
