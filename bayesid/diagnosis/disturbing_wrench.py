@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.scale_prior import CandidateCause
 from bayesid.diagnosis.set_evidence import SetEvidence, precision_roots
 from bayesid.diagnosis.signature_bank import SignatureBank
+from bayesid.diagnosis.torque_events import ChosenEvents, EventCandidates, Held
 
 __all__ = ["Frame", "Unexplained", "unexplained_wrench"]
 
@@ -83,7 +84,8 @@ def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: 
     """Reconstruct the disturbance that a fit leaves.
 
     Torque and force have the priors of the generic candidates: cosines in time whose variances fall beyond a corner,
-    with corner and scale of either at their most probable values.
+    with corner and scale of either at their most probable values. Where the disturbance itself is the answer, the
+    torque may hold events, too (`bayesid.diagnosis.torque_events`).
 
     Parameters
     ----------
@@ -91,7 +93,7 @@ def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: 
     bank : SignatureBank
         Bank under the hypothesis' noise, with the responses to cosines of torque and force.
     name_frame : bool
-        Whether to look for the axes that it is fixed in.
+        Whether the disturbance itself is the answer: its events and the axes that it is fixed in are looked for.
     """
     fit = hypothesis.fit
     count = len(fit.posterior.manoeuvres)
@@ -102,27 +104,35 @@ def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: 
     columns = np.concatenate(parts, axis=1)
     places = np.split(np.arange(columns.shape[1]), np.cumsum([part.shape[1] for part in parts])[:-1])
     gram = Gram(fit.project(columns), columns.T @ fit.residual, dict(zip(names, places, strict=True)))
-    held, deviations, log_bayes_factor = _most_probable(gram, [c for c in bank.causes if c.name in names])
-    (root,), _ = precision_roots(gram.matrix[np.ix_(held, held)], deviations[None])
-    along = root @ gram.score[held]
-    amplitude, covariance = np.zeros(2 * 3 * WAVES * count), np.zeros((2 * 3 * WAVES * count,) * 2)
-    amplitude[held], covariance[np.ix_(held, held)] = -root.T @ along, root.T @ root
-    freedom = float(np.einsum("ij,ji->", root.T @ root, gram.matrix[np.ix_(held, held)]))
+    disturbance = _composed(hypothesis, gram, columns, [c for c in bank.causes if c.name in names], name_frame)
+    held = disturbance.held
+    (root,), _ = precision_roots(disturbance.matrix, disturbance.deviations[None])
+    along = root @ disturbance.score
+    smooth, size = 2 * 3 * WAVES * count, len(disturbance.deviations)
+    where = np.concatenate([held, smooth + np.arange(size - len(held))])
+    amplitude, covariance = np.zeros(smooth + size - len(held)), np.zeros((smooth + size - len(held),) * 2)
+    amplitude[where], covariance[np.ix_(where, where)] = -root.T @ along, root.T @ root
+    freedom = float(np.einsum("ij,ji->", root.T @ root, disturbance.matrix))
     snr = float(np.sqrt(max(float(along @ along) - freedom, 0.0)))
-    scale = float(deviations[: 3 * WAVES * count].max())
+    scale = float(disturbance.deviations[: 3 * WAVES * count].max())
 
-    half = count * WAVES * 3
     time, torque, force, torque_sd, force_sd = [], [], [], [], []
     for r in range(count):
         own = np.concatenate([[True], np.diff(times[r]) > 0.0])
         waves = _waves(times[r][own])
+        events = [k for k, (recording, _) in enumerate(disturbance.events) if recording == r]
+        sudden = np.array([disturbance.events[k][1][own] for k in events]).reshape(len(events), len(waves[0]))
         sides = []
-        for first in (0, half):
-            block = slice(first + r * WAVES * 3, first + (r + 1) * WAVES * 3)
-            mean = np.einsum("kt,ka->ta", waves, amplitude[block].reshape(WAVES, 3))
-            spread = covariance[block, block].reshape(WAVES, 3, WAVES, 3)
-            sd = np.sqrt(np.maximum(np.einsum("kt,kala,lt->ta", waves, spread, waves), 0.0))
-            sides.append((mean, sd))
+        for first, courses, more in ((0, np.concatenate([waves, sudden]), events), (smooth // 2, waves, [])):
+            even = np.arange(first + r * WAVES * 3, first + (r + 1) * WAVES * 3)
+            block = np.concatenate([even, *(smooth + 3 * k + np.arange(3) for k in more)])
+            spread = covariance[np.ix_(block, block)].reshape(len(courses), 3, len(courses), 3)
+            mean = np.einsum("kt,ka->ta", waves, amplitude[even].reshape(WAVES, 3))
+            variance = np.maximum(np.einsum("kt,kala,lt->ta", courses, spread, courses), 0.0)
+            for k in more:
+                _, event, over_shapes = disturbance.averaged[k]
+                mean, variance = mean + event[own], variance + over_shapes[own] ** 2
+            sides.append((mean, np.sqrt(variance)))
         time.append(times[r][own])
         torque.append(sides[0][0])
         force.append(sides[1][0])
@@ -145,7 +155,7 @@ def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: 
         torque_sd,
         force_sd,
         _fixed_in(hypothesis, rotations, scale) if name_frame and snr > 0.0 else None,
-        log_bayes_factor,
+        disturbance.log_evidence,
     )
 
 
@@ -174,6 +184,107 @@ def _frames(hypothesis: Hypothesis) -> dict[Frame, tuple[Floats, Floats]]:
         result[Frame.ORBIT].append(to_base @ local)
         result[Frame.INERTIAL].append(to_base @ node)
     return {frame: (parts[0], parts[1]) for frame, parts in result.items()}
+
+
+@dataclass(frozen=True)
+class _Composed:
+    """Composition of a disturbance: columns of the smooth one, then three of each event.
+
+    Attributes
+    ----------
+    held : (h,) array of int
+        Columns of the smooth disturbance.
+    deviations : (h + 3 e,) array
+        Most probable standard deviations of all amplitudes.
+    matrix, score : arrays
+        Information on them, and score.
+    events : sequence of pairs of int and (S,) array
+        Recording and course of each event.
+    chosen : ChosenEvents or None
+        The events among their candidates.
+    log_evidence : float
+        Relative to nothing.
+    averaged : sequence of tuples of int, (S, 3) array and (S, 3) array
+        Recording, torque and standard deviation over the shapes of each event (`EventCandidates.averaged`).
+    """
+
+    held: Integers
+    deviations: Floats
+    matrix: Floats
+    score: Floats
+    events: Sequence[tuple[int, Floats]]
+    chosen: ChosenEvents | None
+    log_evidence: float
+    averaged: Sequence[tuple[int, Floats, Floats]] = ()
+
+
+def _composed(
+    hypothesis: Hypothesis, gram: Gram, columns: Floats, causes: Sequence[CandidateCause], sudden: bool
+) -> _Composed:
+    """Return the most probable of a smooth disturbance, one with events beside it, and events with one beside them."""
+    held, deviations, log_evidence = _most_probable(gram, causes)
+    matrix = gram.matrix[np.ix_(held, held)]
+    smooth = _Composed(held, deviations, matrix, gram.score[held], (), None, log_evidence)
+    largest = next((cause.groups[0].high for cause in causes if cause.name == TORQUE), 0.0)
+    if not sudden or not largest:
+        return smooth
+    candidates = EventCandidates.of(hypothesis, columns, largest)
+    options = [smooth, *_with_events(gram, smooth, candidates, causes)]
+    best = max(options, key=lambda option: option.log_evidence)
+    if best.chosen is None:
+        return best
+    finer = EventCandidates.of(hypothesis, columns, largest, candidates.nearby(best.chosen))
+    known = slice(0, len(best.held))
+    deviations = best.deviations[known]
+    lower, pull = _share(best.matrix[known, known], deviations, best.score[known])
+    shared = deviations[:, None] * finer.shared[:, best.held].T
+    beside = Held(sla.solve_triangular(lower, shared, lower=True), pull)
+    return replace(best, averaged=finer.averaged(beside, finer.like(candidates, best.chosen)))
+
+
+def _with_events(
+    gram: Gram, smooth: _Composed, candidates: EventCandidates, causes: Sequence[CandidateCause]
+) -> list[_Composed]:
+    """Return events beside a smooth disturbance, and a smooth disturbance beside events."""
+    options = []
+    lower, pull = _share(smooth.matrix, smooth.deviations, smooth.score)
+    shared = smooth.deviations[:, None] * candidates.shared[:, smooth.held].T
+    beside = candidates.chosen(Held(sla.solve_triangular(lower, shared, lower=True), pull))
+    if beside.places:
+        total = smooth.log_evidence + beside.log_evidence
+        options.append(_joined(gram, smooth.held, smooth.deviations, candidates, beside, total))
+    alone = candidates.chosen(Held.nothing(len(candidates.score)))
+    if alone.places:
+        own = alone.columns
+        lower, pull = _share(candidates.matrix[np.ix_(own, own)], alone.deviations, candidates.score[own])
+        taken = sla.solve_triangular(lower, alone.deviations[:, None] * candidates.shared[own], lower=True)
+        left = Gram(gram.matrix - taken.T @ taken, gram.score - taken.T @ pull, gram.groups)
+        held, deviations, more = _most_probable(left, causes)
+        options.append(_joined(gram, held, deviations, candidates, alone, alone.log_evidence + more))
+    return options
+
+
+def _share(matrix: Floats, deviations: Floats, score: Floats) -> tuple[Floats, Floats]:
+    """Return the root of the information on scaled amplitudes with their prior, and its solution for the score."""
+    lower = np.linalg.cholesky(deviations[:, None] * matrix * deviations + np.eye(len(score)))
+    return lower, sla.solve_triangular(lower, deviations * score, lower=True)
+
+
+def _joined(
+    gram: Gram, held: Integers, deviations: Floats, candidates: EventCandidates, events: ChosenEvents, total: float
+) -> _Composed:
+    own = events.columns
+    shared = candidates.shared[np.ix_(own, held)]
+    matrix = np.block([[gram.matrix[np.ix_(held, held)], shared.T], [shared, candidates.matrix[np.ix_(own, own)]]])
+    return _Composed(
+        held,
+        np.concatenate([deviations, events.deviations]),
+        matrix,
+        np.concatenate([gram.score[held], candidates.score[own]]),
+        [(int(candidates.recording[k]), candidates.course[k]) for k in events.places],
+        events,
+        total,
+    )
 
 
 def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Integers, Floats, float]:

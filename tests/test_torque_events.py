@@ -1,0 +1,106 @@
+"""Events of a disturbing torque are found where they are, and none where there is noise alone."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.diagnosis.disturbing_wrench import Frame, unexplained_wrench
+from bayesid.diagnosis.generic_signatures import generic_signatures
+from bayesid.diagnosis.hypothesis import Hypothesis
+from bayesid.diagnosis.perturbed_fit import Engine
+from bayesid.diagnosis.torque_events import EventCandidates, Held
+from bayesid.inference.noise_changes import relinearised
+from bayesid.inference.posterior import Posterior
+from studies.truth import hidden_causes
+
+TIME = np.linspace(0.0, 100.0, 201)
+SHAPES = np.array([(k / 20, decay) for decay in (0.05, np.inf) for k in range(20)])
+LARGEST = 10.0
+
+
+def candidates(residual: np.ndarray, columns: np.ndarray) -> EventCandidates:
+    """One recording; the residual is linear in the amplitudes."""
+    since = TIME - 100.0 * SHAPES[:, :1]
+    courses = (since >= 0.0) * np.exp(-np.maximum(since, 0.0) / (100.0 * SHAPES[:, 1:]))
+    empty = np.zeros((columns.shape[1], 0))
+    place = np.zeros(len(SHAPES), dtype=int)
+    score = columns.T @ residual
+    return EventCandidates(place, SHAPES, tuple(courses), columns.T @ columns, empty, score, LARGEST, len(SHAPES))
+
+
+def columns(rng: np.random.Generator) -> np.ndarray:
+    """Responses to the three axes of every event: its course, seen by three sensors at some angle to the axes."""
+    since = TIME - 100.0 * SHAPES[:, :1]
+    courses = (since >= 0.0) * np.exp(-np.maximum(since, 0.0) / (100.0 * SHAPES[:, 1:]))
+    axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return np.einsum("kt,sa->tska", courses, axes).reshape(3 * len(TIME), 3 * len(SHAPES))
+
+
+def test_two_events_are_found_with_their_torques():
+    rng = np.random.default_rng(1)
+    matrix = columns(rng)
+    truth = np.zeros(3 * len(SHAPES))
+    truth[3 * 6 : 3 * 6 + 3], truth[3 * 33 : 3 * 33 + 3] = (3.0, -2.0, 1.0), (0.0, 1.5, -1.0)
+    found = candidates(-matrix @ truth + rng.normal(size=len(matrix)), matrix)
+    nothing = Held.nothing(matrix.shape[1])
+    events = found.chosen(nothing)
+    assert set(events.places) == {6, 33}
+    assert events.log_evidence > 50.0
+    torque = sum(own for _, own, _ in found.averaged(nothing, events))
+    expected = np.outer(found.course[6], truth[18:21]) + np.outer(found.course[33], truth[99:102])
+    assert np.corrcoef(torque.ravel(), expected.ravel())[0, 1] > 0.95  # the noise leaves 0.98
+
+
+def test_noise_alone_has_no_event():
+    rng = np.random.default_rng(2)
+    matrix = columns(rng)
+    found = [candidates(rng.normal(size=len(matrix)), matrix).chosen(Held.nothing(matrix.shape[1])) for _ in range(40)]
+    assert sum(bool(events.places) for events in found) <= 2  # the cost makes it one in fifty or fewer
+    assert all(events.log_evidence >= 0.0 for events in found)
+
+
+def test_what_is_held_is_not_found_again():
+    rng = np.random.default_rng(3)
+    matrix = columns(rng)
+    truth = np.zeros(3 * len(SHAPES))
+    truth[18:21] = 3.0
+    found = candidates(-matrix @ truth + rng.normal(size=len(matrix)), matrix)
+    # a column that takes the same share as the event, with a wide prior
+    own = matrix[:, 18:21]
+    lower = np.linalg.cholesky(own.T @ own + 1e-6 * np.eye(3))
+    held = Held(np.linalg.solve(lower, own.T @ matrix), np.linalg.solve(lower, found.score[18:21]))
+    assert 6 not in found.chosen(held).places
+    assert 6 in found.chosen(Held.nothing(matrix.shape[1])).places
+
+
+@pytest.mark.usefixtures("slow")
+@pytest.mark.parametrize("seed", [5, 91006])
+def test_a_snap_in_mujoco_is_drawn_better_with_events(seed, tmp_path):
+    case = next(case for case in hidden_causes.CASES if case.name == "thermal-snap")
+    written = case.write(tmp_path / "study", seed, 1.5)
+    study = Study.load(written.file)
+    model = load_model(study)
+    posterior = Posterior.of(model, load_manoeuvres(study, model.robot))
+    engine = Engine(posterior)
+    first = engine.fit()
+    engine = engine.with_posterior(relinearised(posterior, first.z))
+    hypothesis = Hypothesis(engine, engine.fit(z=first.z))
+    bank = generic_signatures(engine, hypothesis.fit)
+    smooth, sudden = (unexplained_wrench(hypothesis, bank, wanted) for wanted in (False, True))
+    assert sudden.log_bayes_factor > smooth.log_bayes_factor + 10.0
+
+    def correlation(found: SimpleNamespace) -> float:
+        true = []
+        for time, truth in zip(found.time, written.truths, strict=True):
+            torque = case.torque(seed, 1.5, truth)
+            true.append(np.stack([np.interp(time, truth.times, torque[:, axis]) for axis in range(3)], axis=1))
+        estimated = np.concatenate(found.torque[Frame.BASE])
+        return float(np.corrcoef(estimated.ravel(), np.concatenate(true).ravel())[0, 1])
+
+    assert correlation(sudden) > max(0.7, correlation(smooth) + 0.1)
+    assert sudden.fixed_in is not None
