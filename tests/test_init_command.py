@@ -122,6 +122,7 @@ def test_the_attitude_at_the_start_is_the_first_that_was_measured(flown, tmp_pat
     for item, file in zip(content["recordings"], files[1:], strict=True):
         _, quaternion = Recording.read(file).vector("attitude", ("x", "y", "z", "w"))
         np.testing.assert_allclose(item["attitude"], quaternion[0], atol=1e-8)
+        assert item["attitude_sigma"] == pytest.approx(1e-4, rel=0.4)
 
 
 def test_a_sensor_that_only_some_recordings_have_is_left_out(flown, tmp_path):

@@ -21,6 +21,9 @@ __all__ = ["channel_noise", "vector_noise"]
 LEAST = 1e-9
 """Noise relative to the range of the samples below which there is none: it is the rounding of their digits."""
 
+FEWEST = 3.0
+"""Degrees of freedom of the differences from which on they are taken, since smoothing takes some noise for motion."""
+
 MOST = 500
 """Number of samples that are smoothed at most, because more make the estimate slow and no better."""
 
@@ -59,7 +62,7 @@ def _turned(time: Floats, quaternion: Floats) -> tuple[Floats, Floats]:
 
 
 def _noise(time: Floats, values: Floats) -> float | None:
-    differences = noise_of([JointSamples(0, time, values, 1.0)])
+    differences = noise_of([JointSamples(0, time, values, 1.0)], FEWEST)
     if differences is not None:
         sigma = float(np.sqrt(differences.ratio))
     else:

@@ -185,10 +185,12 @@ def _recording(recording: Recording, folder: Path) -> str:
     if "attitude.x" in recording.channels:
         time, quaternion = recording.vector("attitude", ("x", "y", "z", "w"))
         first = ", ".join(f"{value:.9g}" for value in quaternion[0])
-        lines.append(_unsure(f"attitude = [{first}]", f"base to orbit axes at time 0; the sample at {time[0]:.3g} s"))
+        sigma = max(vector_noise([recording], "attitude") or (UNSEEN["attitude"],))
+        lines.append(f"attitude = [{first}]")
+        lines.append(_unsure(f"attitude_sigma = {sigma:.1e}", f"rad; attitude is the sample at {time[0]:.3g} s"))
     else:
         lines.append(_unsure("attitude = [0.0, 0.0, 0.0, 1.0]", "base to orbit axes at time 0"))
-    lines.append(_unsure("attitude_sigma = 0.0", "rad; 0 = exact"))
+        lines.append(_unsure("attitude_sigma = 0.0", "rad; 0 = exact"))
     lines.append(_line("# argument_of_latitude = 0.0", "rad at time 0, for effects that need the place on the orbit"))
     driven = [name for name in recording.joints if f"position.{name}" not in recording.channels]
     if driven:
