@@ -14,7 +14,7 @@ __all__ = ["run"]
 
 
 def run(
-    robot: Annotated[Path, typer.Argument(metavar="ROBOT.urdf", help="Robot.")],
+    robot: Annotated[Path, typer.Argument(metavar="ROBOT.urdf", help="Robot, as URDF or MJCF.")],
     recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING...", help="CSV or Parquet files.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="STUDY.toml", help="Study file to write.")],
 ) -> Iterator[str]:
