@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sqlite3
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -24,8 +25,8 @@ TOPICS = ("--joints", "/joint_states", "--imu", "/imu")
 
 
 @pytest.fixture(scope="module")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    """What MuJoCo's flight of the four-joint servicer reads, with gaps and sensors that sample at different times."""
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A flight of the four-joint servicer in MuJoCo, with gaps and sensors that sample at different times."""
     made = write_study(
         tmp_path_factory.mktemp("flown"),
         SERVICER4,
@@ -34,7 +35,18 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Recording:
         manoeuvres=Manoeuvres(count=1, duration=30.0, ramp=10.0),
         gaps={"position.joint1": [(10.0, 12.0)], "rate": [(20.0, 23.0)], "accel": [(20.0, 23.0)]},
     )
-    read = Recording.read(made.file.parent / "manoeuvre-1.csv")
+    return made.file.parent
+
+
+@pytest.fixture(scope="module")
+def robot(folder: Path) -> Path:
+    return folder / "robot.urdf"
+
+
+@pytest.fixture(scope="module")
+def flown(folder: Path) -> Recording:
+    """The recording of the flight."""
+    read = Recording.read(folder / "manoeuvre-1.csv")
     # a message holds all joints or none
     present = np.isfinite(read.channels["position.joint1"])
     channels = {c: np.where(present, v, np.nan) if c.startswith("position") else v for c, v in read.channels.items()}
@@ -65,6 +77,35 @@ def test_a_recording_comes_back_with_its_times_and_gaps(flown, writer, tmp_path,
         # header stamps count, not the arrival, which is up to 0.2 s later
         np.testing.assert_allclose(read.series(column)[0], times, atol=1e-8, err_msg=column)
         np.testing.assert_allclose(read.series(column)[1], values, rtol=1e-10, atol=1e-14, err_msg=column)
+
+
+def test_a_bag_of_an_older_release_without_definitions_of_types_is_read(writer, tmp_path):
+    bag = writer.write(tmp_path, "sqlite3")
+    with sqlite3.connect(bag / "flight.db3") as database:
+        database.execute("DELETE FROM message_definitions")
+    database.close()
+    status, output = run(bag, *TOPICS, "--output", tmp_path / "out")
+    assert status == 0, output
+    assert (tmp_path / "out" / "flight.csv").is_file()
+
+
+def test_the_file_within_the_folder_of_a_bag_will_do(writer, tmp_path):
+    bag = writer.write(tmp_path, "mcap")
+    status, output = run(bag / "flight.mcap", *TOPICS, "--output", tmp_path / "out")
+    assert status == 0, output
+    assert Recording.read(tmp_path / "out" / "flight.csv").joints
+
+
+def test_a_drafted_study_of_an_imported_bag_passes_check(writer, robot, tmp_path, slow):
+    bag = writer.write(tmp_path, "ros1")
+    status, output = run(bag, *TOPICS, "--attitude", "/star", "--output", tmp_path / "out")
+    assert status == 0, output
+    for call in (
+        ("init", robot, tmp_path / "out" / "flight.csv", "--output", tmp_path / "study.toml"),
+        ("check", tmp_path / "study.toml", "--output", tmp_path / "check"),
+    ):
+        result = CliRunner().invoke(app, [str(word) for word in call])
+        assert result.exit_code == 0, result.output
 
 
 def test_where_a_recording_comes_from_is_stated(writer, tmp_path):

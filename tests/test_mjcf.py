@@ -8,8 +8,13 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from typer.testing import CliRunner
 
 from bayesid._io.errors import InputError
+from bayesid.app.command_line import app
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_model
+from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 
 CHASER = """\
@@ -17,6 +22,7 @@ CHASER = """\
   <compiler angle="ANGLE"/>
   <default>
     <default class="arm"><joint range="-RANGE RANGE"/></default>
+    <default class="loose"/>
   </default>
   <worldbody>
     <body name="bus" pos="0 0 1">
@@ -24,20 +30,22 @@ CHASER = """\
       <inertial pos="0.02 -0.01 0.05" mass="400" diaginertia="60 70 50"/>
       <geom type="box" size="0.5 0.5 0.5"/>
       <site name="imu" pos="0.1 0 0"/>
-      <body name="shoulder" pos="0.5 0 0.2" quat="0.70710678118654757 0 0.70710678118654757 0">
-        <joint name="yaw" axis="0 0 1" class="arm"/>
+      <body name="shoulder" pos="0.5 0 0.2" quat="1 0 1 0" childclass="arm">
+        <joint name="yaw" axis="0 0 1"/>
         <inertial pos="0 0 0.2" mass="8" fullinertia="0.3 0.3 0.05 0.01 0 0.02"/>
         <body name="boom" pos="0 0 0.4">
-          <joint name="pitch" axis="0 1 0" pos="0 0 0.05" class="arm"/>
+          <joint name="pitch" axis="0 1 0" pos="0 0 0.05"/>
           <inertial pos="0 0 0.3" quat="0.9 0.4 0.1 0" mass="6" diaginertia="0.25 0.24 0.03"/>
           <body name="slider" pos="0 0 0.6">
             <joint name="extend" type="slide" axis="0 0 1" range="-0.1 0.3"/>
             <geom type="cylinder" size="0.05 0.2" mass="4"/>
             <body name="tool" pos="0 0 0.25" quat="0.8 0 0.6 0">
               <inertial pos="0.05 0 0" mass="1.5" diaginertia="0.01 0.02 0.02"/>
-              <body name="finger" pos="0.1 0 0">
-                <joint name="grip" axis="1 2 0"/>
-                <inertial pos="0 0.03 0" mass="0.2" diaginertia="1e-4 1e-4 1e-4"/>
+              <body name="flange" pos="0.02 0 0" quat="0.9 0 0 -0.4">
+                <body name="finger" pos="0.1 0 0" childclass="loose">
+                  <joint name="grip" axis="1 2 0"/>
+                  <inertial pos="0 0.03 0" mass="0.2" diaginertia="1e-4 1e-4 1e-4"/>
+                </body>
               </body>
             </body>
           </body>
@@ -61,13 +69,17 @@ def written(folder: Path, text: str, name: str = "chaser.xml") -> Path:
 
 
 @pytest.mark.parametrize("text", [CHASER, RADIANS], ids=["degrees", "radians"])
-def test_the_mass_matrix_is_that_of_mujoco(tmp_path, text):
+def test_mass_matrix_and_limits_are_those_of_mujoco(tmp_path, text):
     file = written(tmp_path, text)
     robot = Robot.from_urdf(file)
     truth = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(truth)
     names = [joint.name for joint in robot.joints]
     assert sorted(names) == ["extend", "grip", "pitch", "yaw"]
+    for joint in robot.joints:
+        limited = bool(truth.jnt_limited[truth.joint(joint.name).id])
+        limits = truth.joint(joint.name).range if limited else (-np.inf, np.inf)
+        assert (joint.lower, joint.upper) == pytest.approx(tuple(limits)), joint
     order = [truth.joint(name).dofadr[0] for name in names]
     rng = np.random.default_rng(0)
     for _ in range(5):
@@ -125,6 +137,37 @@ def test_a_base_without_free_joint_is_the_first_body(tmp_path):
     np.testing.assert_allclose(fixed.link("panel").placement, free.link("panel").placement, atol=1e-12)
 
 
+def test_a_study_may_name_an_mjcf(tmp_path):
+    file = written(tmp_path, CHASER)
+    rng = np.random.default_rng(0)
+    time = np.arange(0.0, 40.0, 0.5)
+    channels = {f"rate.{axis}": 1e-5 * rng.normal(size=len(time)) for axis in "xyz"}
+    for joint in ("yaw", "pitch", "extend", "grip"):
+        channels[f"position.{joint}"] = 0.1 + 0.1 * np.sin(0.2 * time) + 1e-6 * rng.normal(size=len(time))
+    Recording("swing", None, time, channels).write(tmp_path / "swing.csv")
+    study = tmp_path / "study.toml"
+    result = CliRunner().invoke(app, ["init", str(file), str(tmp_path / "swing.csv"), "--output", str(study)])
+    assert result.exit_code == 0, result.output
+    assert 'urdf = "chaser.xml"' in study.read_text(encoding="utf-8")
+    model = load_model(Study.load(study))
+    assert model.robot.base == "bus"
+    assert model.robot.mass == pytest.approx(429.7)
+
+
+def test_what_has_no_part_in_a_measured_motion_is_left_out(tmp_path):
+    visible = CHASER.replace(
+        '<geom type="box" size="0.5 0.5 0.5"/>', '<geom type="mesh" mesh="bus" contype="0" conaffinity="0"/>'
+    )
+    driven = visible.replace(
+        "</mujoco>",
+        '<asset><mesh name="bus" file="absent.obj"/></asset>'
+        '<equality><joint joint1="yaw" joint2="pitch"/></equality>'
+        '<actuator><position joint="yaw" kp="3500"/></actuator></mujoco>',
+    )
+    plain, whole = (Robot.from_urdf(written(tmp_path, text)) for text in (CHASER, driven))
+    assert whole.urdf == plain.urdf
+
+
 TARGET = '<body name="target"><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>'
 
 
@@ -138,13 +181,14 @@ TARGET = '<body name="target"><freejoint/><inertial pos="0 0 0" mass="1" diagine
         ("<joint name=", '<joint name="roll" axis="1 0 0"/><joint name=', ("Composite", "at most one joint")),
         (
             "</mujoco>",
-            '<equality><joint joint1="yaw" joint2="pitch"/></equality></mujoco>',
-            ("<joint>", "independent joints"),
+            '<equality><connect body1="tool" body2="panel" anchor="0 0 0"/></equality></mujoco>',
+            ("<connect>", "tree of bodies"),
         ),
+        ('name="pitch"', 'name="pitch" class="loose"', ("class 'loose'", "childclass 'arm'", "joint pitch")),
         ("</mujoco>", "", ("not well-formed XML",)),
         ('type="slide"', 'type="screw"', ("Pinocchio cannot read the robot: Unknown joint type. Correct",)),
     ],
-    ids=["ball", "two trees", "include", "ref", "two joints", "coupled", "no XML", "screw"],
+    ids=["ball", "two trees", "include", "ref", "two joints", "loop", "class", "no XML", "screw"],
 )
 def test_what_pinocchio_reads_otherwise_is_refused(tmp_path, old, new, words):
     file = written(tmp_path, CHASER.replace(old, new, 1))

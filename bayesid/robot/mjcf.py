@@ -1,13 +1,15 @@
 """Robots in MuJoCo's format MJCF, read by Pinocchio and rewritten as URDF.
 
-What Pinocchio reads otherwise than MuJoCo, or leaves out without a word, is refused. Masses, places and axes are those
-of the file; actuators, contacts, damping and armature have no part in a measured motion and are left out.
+What Pinocchio is known to read otherwise than MuJoCo, or to leave out without a word, is refused. Masses, places and
+axes are those of the file. Actuators, contacts and damping have no part in a measured motion; armature, the inertia of
+spinning rotors, is left out too.
 """
 
 from __future__ import annotations
 
 import tempfile
 import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +24,8 @@ FLATTEN = "Let MuJoCo write the model without it: mujoco.mj_saveLastXML after lo
 UNREAD = ("include", "frame", "replicate", "attach", "composite", "flexcomp")
 """Elements by which a file adds bodies that Pinocchio does not see."""
 
-LOOPS = ("connect", "weld", "joint")
-"""Constraints by which the joints are not independent."""
+LOOPS = ("connect", "weld")
+"""Constraints that close a loop of bodies. Coupled joints are no matter, since each is recorded."""
 
 BOUNDLESS = 1e9
 """Limit of what has none, since URDF demands a number for a prismatic joint."""
@@ -97,7 +99,7 @@ def _refuse_unread(root: ET.Element, file: Path) -> None:
                 f"the constraint <{constraint.tag}> is not supported",
                 file=file,
                 place="equality",
-                remedy="Leave a tree of independent joints",
+                remedy="Leave a tree of bodies",
             )
     for joint in root.iter("joint"):
         if joint.get("ref", "0").strip(" 0."):
@@ -107,6 +109,34 @@ def _refuse_unread(root: ET.Element, file: Path) -> None:
                 place=f"joint {joint.get('name', joint.get('class', ''))}".rstrip(),
                 remedy="Count the joint's position from the pose in which the bodies are written",
             )
+    for body in root.iterfind("worldbody/body"):
+        _refuse_mixed_classes(body, body.get("childclass"), _lineages(root.findall("default")), file)
+
+
+def _lineages(defaults: Sequence[ET.Element], above: tuple[str, ...] = ()) -> dict[str, tuple[str, ...]]:
+    """Return the names of every class of defaults and of those that it inherits from."""
+    found: dict[str, tuple[str, ...]] = {}
+    for default in defaults:
+        lineage = (default.get("class", "main"), *above)
+        found |= {lineage[0]: lineage, **_lineages(default.findall("default"), lineage)}
+    return found
+
+
+def _refuse_mixed_classes(
+    body: ET.Element, childclass: str | None, lineages: Mapping[str, tuple[str, ...]], file: Path
+) -> None:
+    """Refuse joints whose class does not inherit from that of the bodies: Pinocchio takes both, MuJoCo the first."""
+    for joint in body.iterfind("joint"):
+        own = joint.get("class")
+        if own is not None and childclass is not None and childclass not in lineages.get(own, ()):
+            raise InputError(
+                f"the class {own!r} does not inherit from the childclass {childclass!r} of its body",
+                file=file,
+                place=f"joint {joint.get('name', '')}".rstrip(),
+                remedy=FLATTEN,
+            )
+    for child in body.iterfind("body"):
+        _refuse_mixed_classes(child, child.get("childclass", childclass), lineages, file)
 
 
 def _slide_scale(root: ET.Element) -> float:
