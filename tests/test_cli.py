@@ -221,6 +221,7 @@ HEAVY = ("jax", "pinocchio", "arviz", "scipy", "matplotlib", "emcee", "h5py", "p
 """Packages that take seconds to import; help and errors in a study file do without."""
 
 WITH_STUDY = ("check", "design", "diagnose", "identifiability", "identify", "loop", "predict", "simulate")
+WITHOUT_STUDY = ("catalogue", "demo", "import", "init", "schema")
 
 
 def imported(code: str, packages: tuple[str, ...] = HEAVY) -> list[str]:
@@ -251,7 +252,7 @@ def test_help_version_and_errors_in_a_study_are_light(tmp_path: Path):
     bad = {"key.toml": "[robot]\nurdff = 'x'\n", "type.toml": SHORT.replace("1e-5", "'small'"), "syntax.toml": "[robot"}
     for name, text in bad.items():
         (tmp_path / name).write_text(text)
-    calls = [[], ["--help"], ["--version"], *([name, "--help"] for name in (*WITH_STUDY, "demo"))]
+    calls = [[], ["--help"], ["--version"], *([name, "--help"] for name in (*WITH_STUDY, *WITHOUT_STUDY))]
     for name in (*bad, "absent.toml"):
         calls += [[command, str(tmp_path / name), "--output", str(tmp_path / "out")] for command in WITH_STUDY]
     code = f"""
@@ -291,7 +292,7 @@ def test_every_command_is_one_file_and_shows_its_first_sentence():
     files = sorted(
         file.name.removesuffix("_command.py") for file in Path(app_room.__file__).parent.glob("*_command.py")
     )
-    assert files == sorted((*WITH_STUDY, "demo"))
+    assert files == sorted((*WITH_STUDY, *WITHOUT_STUDY))
     for name in files:
         status, text = run(name, "--help")
         assert status == 0

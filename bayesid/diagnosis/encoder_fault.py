@@ -53,15 +53,16 @@ def encoder_noise(posterior: Posterior) -> EncoderNoise | None:
     return noise_of([one for motion in motions for joint in motion.joints for one in joint.series])
 
 
-def noise_of(series: Iterable[JointSamples]) -> EncoderNoise | None:
+def noise_of(series: Iterable[JointSamples], fewest: float = FEWEST) -> EncoderNoise | None:
     """Estimate the noise of samples by one factor, from their high differences; None where none is declared.
 
     A difference of order k of white noise has ``comb(2k, k)`` times its variance. Unlike the likelihood of smoothing,
     it needs no model of the motion, which smoothing takes for integrated noise; and as motion only adds to it, the
     least of some orders is taken. The median over the samples leaves out where the motion is rough, and the median
-    over the joints those of which other things are wrong.
+    over the joints those of which other things are wrong. Series of fewer degrees of freedom than ``fewest`` are not
+    used.
     """
-    found = [own for one in series if one.sigma is not None and (own := _of(one, one.sigma)).degrees >= FEWEST]
+    found = [own for one in series if one.sigma is not None and (own := _of(one, one.sigma)).degrees >= fewest]
     if not found:
         return None
     # the median of many has 2 / pi of the degrees of freedom of the mean

@@ -20,7 +20,7 @@ from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
 
-__all__ = ["Excitation", "MeasuredMotion", "Motion"]
+__all__ = ["Excitation", "MeasuredMotion", "Motion", "check_joints"]
 
 
 class Motion(Protocol):
@@ -129,7 +129,7 @@ class MeasuredMotion:
         InputError
             If a joint of the robot is not recorded, or the recording holds a joint that the robot lacks.
         """
-        _check_names(recording, robot)
+        check_joints(recording, robot)
         joints = tuple(
             smooth(
                 _samples(recording, joint.name, sigma or {}),
@@ -176,7 +176,8 @@ def _samples(
     return samples
 
 
-def _check_names(recording: Recording, robot: Robot) -> None:
+def check_joints(recording: Recording, robot: Robot) -> None:
+    """Refuse a recording that lacks a joint of the robot or holds one that the robot lacks."""
     known = [joint.name for joint in robot.joints]
     missing = [name for name in known if not {f"position.{name}", f"velocity.{name}"} & set(recording.channels)]
     strangers = [name for name in recording.joints if name not in known]

@@ -17,6 +17,7 @@ from bayesid._io.files import write_text
 from bayesid._math.arrays import Floats
 from bayesid.robot.body_prior import draw_inertial
 from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.mjcf import urdf_of_mjcf
 
 __all__ = ["Joint", "Link", "Load", "Robot"]
 
@@ -95,17 +96,34 @@ class Robot:
 
     @classmethod
     def from_urdf(cls, file: str | Path) -> Robot:
-        """Read a robot from a URDF; the root link is the base body.
+        """Read a robot from a URDF, or from an MJCF, which is rewritten as URDF; the root link is the base body.
 
         Raises
         ------
         InputError
-            If the file cannot be read, a joint type is not supported or a link is not a physical body.
+            If the file cannot be read or has another format, a joint type is not supported or a link is not a physical
+            body.
         """
         path = Path(file)
         if not path.is_file():
             raise InputError("no such file", file=path, remedy="Correct the path of the URDF")
-        return cls.from_string(path.read_text(encoding="utf-8"), file=path)
+        text = path.read_text(encoding="utf-8")
+        root = _parsed(text, path)
+        if root.tag == "sdf":
+            raise InputError(
+                "this is SDF, which the installed Pinocchio does not read",
+                file=path,
+                remedy="Convert it to URDF or MJCF",
+            )
+        if root.tag == "mujoco":
+            text = urdf_of_mjcf(root, path)
+        elif root.tag != "robot":
+            raise InputError(
+                f"the root element is <{root.tag}>",
+                file=path,
+                remedy="Give a URDF, whose root is <robot>, or an MJCF, whose root is <mujoco>",
+            )
+        return cls.from_string(text, file=path)
 
     @classmethod
     def shipped(cls, name: str) -> Robot:
@@ -119,10 +137,7 @@ class Robot:
     @classmethod
     def from_string(cls, urdf: str, file: Path | None = None) -> Robot:
         """Read a robot from the text of a URDF (`from_urdf`)."""
-        try:
-            root = ET.fromstring(urdf)
-        except ET.ParseError as error:
-            raise InputError(f"not well-formed XML: {error}", file=file, remedy="Correct the URDF") from error
+        root = _parsed(urdf, file)
         inertials = _inertials(root, file)
         _check_joints(root, file)
         try:
@@ -236,6 +251,13 @@ class Robot:
             for name, other in self.links.items()
             if name not in self.loads and other.joint == link.joint and np.array_equal(other.placement, link.placement)
         )
+
+
+def _parsed(text: str, file: Path | None) -> ET.Element:
+    try:
+        return ET.fromstring(text)
+    except ET.ParseError as error:
+        raise InputError(f"not well-formed XML: {error}", file=file, remedy="Correct the URDF") from error
 
 
 def _numbers(text: str) -> list[float]:

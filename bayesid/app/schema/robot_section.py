@@ -84,7 +84,7 @@ class RobotSection(Section):
     Parameters
     ----------
     urdf : Path
-        URDF of the robot, whose root link is the base body.
+        URDF of the robot, whose root link is the base body, or its MJCF, which is rewritten as URDF.
     link_spread : float, optional
         Relative uncertainty of all links that are not unknowns, by default 0, which means known exactly.
     loads : sequence of LoadSection, optional

@@ -59,7 +59,7 @@ def no_less_than(limit: float, remedy: str) -> AfterValidator:
 
 
 def list_of(size: int, *, or_number: bool = False) -> BeforeValidator:
-    """Return a validator that requires a list of ``size`` numbers, or with ``or_number`` one number for all of them."""
+    """Return a validator that requires a list of ``size`` numbers, or with ``or_number`` one positive for all."""
 
     def check(value: Any) -> Any:
         if or_number and isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -71,7 +71,9 @@ def list_of(size: int, *, or_number: bool = False) -> BeforeValidator:
             )
         return value
 
-    return BeforeValidator(check)
+    # the schema for editors does not see the validator, and has to be told that one number will do
+    accepted = Positive | Annotated[list[Positive], Field(min_length=size, max_length=size)]
+    return BeforeValidator(check, json_schema_input_type=accepted) if or_number else BeforeValidator(check)
 
 
 def _unit(value: tuple[float, ...]) -> tuple[float, ...]:

@@ -1,0 +1,33 @@
+"""Command ``bayesid catalogue``, which prints what is known of the effects that a model can have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["run"]
+
+
+def run(
+    name: Annotated[str | None, typer.Argument(help="Effect, by default all of them.")] = None,
+    study: Annotated[
+        Path | None,
+        typer.Option(metavar="STUDY.toml", help="Study whose robot, orbit and plugins apply, by default ETS-VII."),
+    ] = None,
+) -> Iterator[str]:
+    """Print every effect with its parameters, units and priors, the reason of its size, and what it needs."""
+    from bayesid.app.schema import Study
+
+    loaded = None if study is None else Study.load(study)
+
+    from bayesid.app.study_to_model import load_model
+    from bayesid.report.effect_catalogue import catalogue, entry_of
+
+    entries = catalogue(None if loaded is None else load_model(loaded))
+    shown = entries if name is None else [entry_of(name, entries)]
+    typer.echo("\n\n".join(str(entry) for entry in shown))
+    if name is None:
+        yield f"{len(entries)} effects. `bayesid catalogue NAME` prints one."

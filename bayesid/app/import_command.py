@@ -1,0 +1,82 @@
+"""Command ``bayesid import``, which makes a recording from a bag of ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from bayesid.app.options import Output
+
+if TYPE_CHECKING:
+    from bayesid.recording.bag_import import ImportedTopic
+
+__all__ = ["run"]
+
+
+def run(
+    bag: Annotated[Path, typer.Argument(metavar="BAG", help="File .bag of ROS 1, or folder of ROS 2.")],
+    joints: Annotated[str, typer.Option(metavar="TOPIC", help="Joints, sensor_msgs/JointState.")],
+    output: Output,
+    imu: Annotated[str | None, typer.Option(metavar="TOPIC", help="IMU of the base, sensor_msgs/Imu.")] = None,
+    attitude: Annotated[
+        str | None,
+        typer.Option(metavar="TOPIC", help="Star sensor, geometry_msgs/QuaternionStamped or PoseStamped."),
+    ] = None,
+    without: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Joint to leave out; repeatable.")] = None,
+    velocity: Annotated[
+        bool, typer.Option("--velocity", help="Take velocities beside positions: they are measured on their own.")
+    ] = False,
+    effort: Annotated[bool, typer.Option("--effort", help="Take efforts as joint torques.")] = False,
+    accel: Annotated[bool, typer.Option(help="Take the accelerations of the IMU.")] = True,
+) -> Iterator[str]:
+    """Make a recording from a bag of ROS 1 or ROS 2: NAME.csv, and NAME.import.json on where it comes from."""
+    from bayesid._io.files import complete_folder, write_json
+    from bayesid.recording.bag_import import BagTopics, import_bag
+    from bayesid.recording.ros_bag import format_stamp
+
+    wanted = BagTopics(joints, imu, attitude, tuple(without or ()), velocity, effort, accel)
+    imported = import_bag(bag, wanted)
+    recording = imported.recording
+    file = output / f"{recording.name}.csv"
+    with complete_folder(output) as folder:
+        recording.write(folder / file.name)
+        content = {
+            "bag": str(bag),
+            "file": file.name,
+            "clock": "stamps of the headers",
+            "stamp_of_time_0_ns": imported.start,
+            "duration": float(recording.time[-1]),
+            "joints": list(recording.joints),
+            "topics": [{**asdict(topic), "meaning": _meaning(topic)} for topic in imported.topics],
+        }
+        write_json(folder / f"{recording.name}.import.json", content)
+    yield f"Time 0 is the stamp {format_stamp(imported.start)} s; the recording lasts {recording.time[-1]:.6g} s."
+    for topic in imported.topics:
+        yield (
+            f"{topic.name}: {topic.used} of {topic.messages} messages, every {topic.interval:.4g} s, "
+            f"longest gap {topic.longest_gap:.4g} s. {_meaning(topic)}"
+        )
+    yield f"Wrote {file}."
+
+
+def _meaning(topic: ImportedTopic) -> str:
+    """Return units and axes of a topic in one sentence or two."""
+    families = list(dict.fromkeys(column.partition(".")[0] for column in topic.columns))
+    frame = f"frame '{topic.frame}'" if topic.frame else "a frame without a name"
+    if "attitude" in families:
+        return (
+            f"Taken as the rotation from base axes to {frame}, which must be orbit axes: they do not rotate, x is the "
+            "zenith at time 0, z the orbit normal."
+        )
+    if "rate" in families or "accel" in families:
+        units = {"rate": "angular velocity in rad/s", "accel": "acceleration without gravity in m/s2"}
+        quantities = " and ".join(units[family] for family in families)
+        return f"Taken as {quantities}, in the axes of {frame}; the study gives their mounting on the base."
+    units = {"position": "rad or m", "velocity": "rad/s or m/s", "torque": "N m or N"}
+    joints = dict.fromkeys(column.partition(".")[2] for column in topic.columns)
+    quantities = ", ".join(f"{family} in {units[family]}" for family in families)
+    return f"Taken as {quantities} of {', '.join(joints)}."

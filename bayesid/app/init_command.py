@@ -1,0 +1,47 @@
+"""Command ``bayesid init``, which drafts the study file of a robot and its recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bayesid._io.errors import InputError
+
+__all__ = ["run"]
+
+
+def run(
+    robot: Annotated[Path, typer.Argument(metavar="ROBOT.urdf", help="Robot, as URDF or MJCF.")],
+    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING...", help="CSV or Parquet files.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="STUDY.toml", help="Study file to write.")],
+) -> Iterator[str]:
+    """Draft a study file for a robot and its recordings, with marks where something could not be known."""
+    if output.exists():
+        raise InputError("the file exists", file=output, remedy="Choose another output; init overwrites nothing")
+    if output.suffix != ".toml":
+        raise InputError("a study is a TOML file", file=output, remedy=f"Name it {output.with_suffix('.toml')}")
+
+    import tomllib
+
+    from bayesid._io.files import create_folder, write_text
+    from bayesid.app.schema import Study
+    from bayesid.app.study_draft import CHECK, draft_study
+    from bayesid.recording.recording import Recording
+    from bayesid.robot.robot import Robot
+
+    known = Robot.from_urdf(robot)
+    read = [Recording.read(file) for file in recordings]
+    text = draft_study(known, robot, read, output.parent, output.stem)
+    try:
+        Study.from_mapping(tomllib.loads(text))
+    except InputError as error:
+        problem = f"the recordings give no valid study: {error.problem}"
+        raise InputError(problem, place=error.place, remedy=error.remedy) from None
+    create_folder(output.parent)
+    write_text(output, text)
+    yield f"Matched {len(known.joints)} joints of {known.name} in {len(read)} recordings."
+    yield f"Wrote {output}, with {text.count(CHECK)} places marked `{CHECK}`."
+    yield f"Next: bayesid check {output} --output {output.with_name(output.stem + '-check')}"

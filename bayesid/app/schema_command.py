@@ -1,0 +1,32 @@
+"""Command ``bayesid schema``, which writes the JSON Schema of the study file for editors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = ["run"]
+
+
+def run(
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="File to write; by default the schema is printed.")
+    ] = None,
+) -> Iterator[str]:
+    """Write the JSON Schema of the study file, with which editors complete and check it."""
+    import json
+
+    from bayesid.app.schema.editor_schema import editor_schema
+
+    if output is None:
+        typer.echo(json.dumps(editor_schema(), indent=1))
+        return
+
+    from bayesid._io.files import create_folder, write_json
+
+    create_folder(output.parent)
+    write_json(output, editor_schema())
+    yield f"Wrote {output}. Name it in the first line of a study: #:schema {output.name}"

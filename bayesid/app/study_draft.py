@@ -1,0 +1,222 @@
+"""First study file of a robot and its recordings, with what they show filled in and the rest marked for the user."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid.app.noise_estimates import channel_noise, vector_noise
+from bayesid.recording.joint_motion import check_joints
+from bayesid.recording.plausibility import refuse_impossible_joints
+from bayesid.recording.recording import Recording
+from bayesid.robot.robot import Joint, Robot
+
+__all__ = ["CHECK", "draft_study"]
+
+CHECK = "# please check"
+"""Mark of every value that recordings cannot tell."""
+
+UNSEEN = {"rate": 1e-5, "accel": 1e-5, "attitude": 1e-5}
+"""Noise of a sensor whose readings show none [rad/s, m/s2, rad]."""
+
+ALIKE = 1.5
+"""Ratio up to which the noises of several axes or joints are written as one number."""
+
+NOTES = 32
+"""Column at which the notes begin, unless a value is longer."""
+
+UNITS = {"rate": "rad/s", "accel": "m/s2", "attitude": "rad, small rotation in base axes"}
+"""Sensors of the base, with the units of their noise."""
+
+
+def draft_study(robot: Robot, urdf: Path, recordings: Sequence[Recording], folder: Path, title: str) -> str:
+    """Return the text of a study file.
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot, all of whose moving joints are recorded.
+    urdf : Path
+        File of the robot.
+    recordings : sequence of Recording
+        Recordings with their files.
+    folder : Path
+        Folder of the study file, to which its paths are relative.
+    title : str
+        Title of the study.
+
+    Raises
+    ------
+    InputError
+        If a recording lacks a joint, holds an unknown one, or moves one beyond all limits, or if no sensor of the base
+        is in all of them.
+    """
+    for recording in recordings:
+        check_joints(recording, robot)
+        refuse_impossible_joints(recording, robot)
+    _require_base_sensor(recordings)
+    sections = [
+        _head(title),
+        _robot(robot, urdf, folder),
+        ORBIT,
+        *(_vector_sensor(recordings, family) for family in UNITS),
+        _encoder(robot, recordings),
+        _torque(recordings),
+        *(_recording(recording, folder) for recording in recordings),
+        _unknowns(robot),
+        MODEL,
+    ]
+    return "\n".join(section for section in sections if section)
+
+
+def _line(content: str, note: str = "") -> str:
+    """Return a line of the file with a note, all of which begin at one column."""
+    return f"{content:<{NOTES}} # {note}" if note else content
+
+
+def _unsure(content: str, note: str) -> str:
+    """Return a line whose value the user has to check."""
+    return f"{content:<{NOTES}} {CHECK}: {note}"
+
+
+def _section(*lines: str) -> str:
+    return "\n".join((*lines, ""))
+
+
+def _head(title: str) -> str:
+    return _section(
+        "# Study for bayesid, drafted from its recordings. SI units, radians, quaternions x, y, z, w.",
+        "# Editors complete and check it after `bayesid schema --output study.schema.json`, with the first line",
+        "# #:schema study.schema.json",
+        f"title = {_quoted(title)}",
+    )
+
+
+def _robot(robot: Robot, urdf: Path, folder: Path) -> str:
+    return _section(
+        _line("[robot]", f"base {robot.base}, {len(robot.joints)} moving joints, {robot.mass:.6g} kg"),
+        f"urdf = {_path(urdf, folder)}",
+        _unsure("link_spread = 0.0", "relative uncertainty of all links that are not unknown; 0 = known exactly"),
+        "# joints, all of them recorded:" if robot.joints else "# no moving joints",
+        *(f"#   {joint.name}: {joint.kind}, {_limits(joint)}" for joint in robot.joints),
+    )
+
+
+def _limits(joint: Joint) -> str:
+    if not np.isfinite([joint.lower, joint.upper]).all():
+        return f"no limits, in {joint.unit}"
+    return f"limits {joint.lower:.4g} to {joint.upper:.4g} {joint.unit}"
+
+
+ORBIT = _section(
+    _unsure("# [orbit]", "where the robot is in orbit, remove the marks of these two lines"),
+    _line("# radius = 6.916e6", "m, from the Earth's centre"),
+)
+
+MODEL = _section(
+    "[model]",
+    _unsure("effects = []", 'in orbit ["gravity-gradient"]; `bayesid catalogue` prints all'),
+    _unsure('initial_rate = "unknown"', '"zero" where the base rests at time 0'),
+)
+
+
+def _holding(recordings: Sequence[Recording], family: str) -> list[Recording]:
+    return [recording for recording in recordings if f"{family}.x" in recording.channels]
+
+
+def _require_base_sensor(recordings: Sequence[Recording]) -> None:
+    if not any(len(_holding(recordings, family)) == len(recordings) for family in UNITS):
+        raise InputError(
+            f"no sensor of the base is in all recordings ({', '.join(recording.name for recording in recordings)})",
+            remedy="Give recordings that all have rate.x|y|z, accel.x|y|z or attitude.x|y|z|w",
+        )
+
+
+def _vector_sensor(recordings: Sequence[Recording], family: str) -> str:
+    """Return the section of a sensor of the base, commented out where only some recordings hold it."""
+    holding = _holding(recordings, family)
+    if not holding:
+        return ""
+    sigma = vector_noise(holding, family)
+    source = "estimated from the recordings" if sigma else "a guess, as the readings show no noise"
+    shown = _one_or_each(sigma or (UNSEEN[family],) * 3)
+    lines = [f"[sensors.{family}]", _unsure(f"sigma = {shown}", f"{UNITS[family]}, per sample, {source}")]
+    if family == "accel":
+        lines.append(_unsure("position = [0.0, 0.0, 0.0]", "m, of the accelerometer from the base origin"))
+        lines.append(_line("# bias_sigma = 1e-4", "m/s2, for a model with a constant bias"))
+    if family != "attitude":
+        lines.append(_unsure("mounting = [0.0, 0.0, 0.0, 1.0]", "quaternion from sensor to base axes"))
+    if len(holding) < len(recordings):
+        missing = ", ".join(recording.name for recording in recordings if recording not in holding)
+        lines = [f"{CHECK}: the sensor is left out, since {missing} lacks it", *(f"# {line}" for line in lines)]
+    return _section(*lines)
+
+
+def _encoder(robot: Robot, recordings: Sequence[Recording]) -> str:
+    lines = [_line("[sensors.encoder]", "what is left out is estimated whenever the recordings are read")]
+    for key, family, unit in (("sigma", "position", "rad or m"), ("velocity_sigma", "velocity", "rad/s or m/s")):
+        seen = {joint.name: channel_noise(recordings, f"{family}.{joint.name}") for joint in robot.joints}
+        found = {name: sigma for name, sigma in seen.items() if sigma is not None}
+        if not found:
+            continue
+        alike = len(found) == len(robot.joints) and max(found.values()) <= ALIKE * min(found.values())
+        each = ", ".join(f"{_quoted(name)} = {sigma:.1e}" for name, sigma in found.items())
+        value = f"{np.median(list(found.values())):.1e}" if alike else f"{{ {each} }}"
+        lines.append(_unsure(f"{key} = {value}", f"{unit}, per sample, estimated from the recordings"))
+    return _section(*lines)
+
+
+def _torque(recordings: Sequence[Recording]) -> str:
+    if not any(column.startswith("torque.") for recording in recordings for column in recording.channels):
+        return ""
+    return _section(
+        _unsure("# [sensors.torque]", "joint torques are recorded, and used only where this section stands"),
+        _line("# sigma = 0.1", "N m or N"),
+    )
+
+
+def _recording(recording: Recording, folder: Path) -> str:
+    lines = ["[[recordings]]", f"file = {_path(recording.file or Path(recording.name), folder)}"]
+    if "attitude.x" in recording.channels:
+        time, quaternion = recording.vector("attitude", ("x", "y", "z", "w"))
+        first = ", ".join(f"{value:.9g}" for value in quaternion[0])
+        sigma = max(vector_noise([recording], "attitude") or (UNSEEN["attitude"],))
+        lines.append(f"attitude = [{first}]")
+        lines.append(_unsure(f"attitude_sigma = {sigma:.1e}", f"rad; attitude is the sample at {time[0]:.3g} s"))
+    else:
+        lines.append(_unsure("attitude = [0.0, 0.0, 0.0, 1.0]", "base to orbit axes at time 0"))
+        lines.append(_unsure("attitude_sigma = 0.0", "rad; 0 = exact"))
+    lines.append(_line("# argument_of_latitude = 0.0", "rad at time 0, for effects that need the place on the orbit"))
+    driven = [name for name in recording.joints if f"position.{name}" not in recording.channels]
+    if driven:
+        start = ", ".join(f"{_quoted(name)} = 0.0" for name in driven)
+        lines.append(_unsure(f"start = {{ {start} }}", "positions at time 0 of joints recorded by speed alone"))
+    return _section(*lines)
+
+
+def _unknowns(robot: Robot) -> str:
+    return _section(
+        "[unknowns]",
+        _unsure(f"bodies = [{_quoted(robot.base)}]", "links or loads whose ten inertial parameters are sought"),
+        _unsure("spread = 1.0", "relative width of their prior about the values of the robot's file"),
+    )
+
+
+def _one_or_each(sigma: Sequence[float]) -> str:
+    if max(sigma) <= ALIKE * min(sigma):
+        return f"{np.sqrt(np.mean(np.square(sigma))):.1e}"
+    return f"[{', '.join(f'{value:.1e}' for value in sigma)}]"
+
+
+def _path(file: Path, folder: Path) -> str:
+    return _quoted(Path(os.path.relpath(file, folder)).as_posix())
+
+
+def _quoted(text: str) -> str:
+    """Return text as a string of TOML, which takes the escapes of JSON."""
+    return json.dumps(text, ensure_ascii=False)

@@ -1,0 +1,161 @@
+"""Recordings made from bags of ROS.
+
+Time is that of the headers' stamps, from the first message of the joints. Every message keeps its own time and none is
+interpolated, so that gaps stay gaps. Readings of the base before the first and after the last message of the joints are
+left out, since nothing is known of the motion there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.recording.bag_channels import (
+    ATTITUDES,
+    IMU,
+    JOINTS,
+    attitude_channels,
+    imu_channels,
+    joint_channels,
+    of_joints,
+)
+from bayesid.recording.bag_clocks import refuse_mixed_clocks
+from bayesid.recording.recording import Recording
+from bayesid.recording.ros_bag import StampedTopic, read_topics
+
+__all__ = ["BagTopics", "ImportedBag", "ImportedTopic", "import_bag"]
+
+
+@dataclass(frozen=True)
+class BagTopics:
+    """What to take from a bag.
+
+    Parameters
+    ----------
+    joints : str
+        Topic of the joints.
+    imu, attitude : str, optional
+        Topics of the base's sensors, at least one of them.
+    without : sequence of str, optional
+        Joints to leave out.
+    velocity, effort : bool
+        Whether to take the joints' velocities beside their positions, and their efforts.
+    accel : bool
+        Whether to take the accelerations of the IMU.
+    """
+
+    joints: str
+    imu: str | None = None
+    attitude: str | None = None
+    without: Sequence[str] = ()
+    velocity: bool = False
+    effort: bool = False
+    accel: bool = True
+
+    def __post_init__(self) -> None:
+        named = [topic for topic in (self.joints, self.imu, self.attitude) if topic is not None]
+        if len(named) < 2:
+            raise InputError("no sensor of the base is named", remedy="Give --imu TOPIC, --attitude TOPIC or both")
+        if len(set(named)) < len(named):
+            raise InputError(f"one topic is named twice: {', '.join(named)}", remedy="Name a topic for each sensor")
+
+
+@dataclass(frozen=True)
+class ImportedTopic:
+    """What became of a topic.
+
+    Attributes
+    ----------
+    name, kind, frame : str
+        Name, type and frame of the topic.
+    columns : tuple of str
+        Columns of the recording that hold it.
+    messages, used : int
+        Number of messages in the bag, and of those in the recording.
+    interval, longest_gap : float
+        Median and longest time between the used messages [s].
+    """
+
+    name: str
+    kind: str
+    frame: str
+    columns: tuple[str, ...]
+    messages: int
+    used: int
+    interval: float
+    longest_gap: float
+
+
+@dataclass(frozen=True)
+class ImportedBag:
+    """A recording made from a bag, the stamp of its time 0 [ns], and what became of the topics."""
+
+    recording: Recording
+    start: int
+    topics: tuple[ImportedTopic, ...]
+
+
+def import_bag(bag: Path, wanted: BagTopics) -> ImportedBag:
+    """Return the recording of a bag.
+
+    Raises
+    ------
+    InputError
+        If the bag or a topic cannot be read, the topics are stamped by different clocks, a value is not finite, a joint
+        is in some messages only, or the IMU feels gravity.
+    """
+    kinds = {wanted.joints: JOINTS, wanted.imu: IMU, wanted.attitude: ATTITUDES}
+    read = read_topics(bag, {name: allowed for name, allowed in kinds.items() if name is not None})
+    refuse_mixed_clocks(list(read.values()))
+    joints, names = of_joints(read[wanted.joints], wanted.without)
+    found = [(joints, joint_channels(joints, names, velocity=wanted.velocity, effort=wanted.effort))]
+    if wanted.imu is not None:
+        imu = _during(joints, read[wanted.imu])
+        found.append((imu, imu_channels(imu, accel=wanted.accel)))
+    if wanted.attitude is not None:
+        attitude = _during(joints, read[wanted.attitude])
+        found.append((attitude, attitude_channels(attitude)))
+    topics = tuple(_described(topic, channels, len(read[topic.name].messages)) for topic, channels in found)
+    return ImportedBag(_recording(bag, found), int(joints.stamps[0]), topics)
+
+
+def _during(joints: StampedTopic, topic: StampedTopic) -> StampedTopic:
+    """Return the messages of a topic from the first to the last of the joints."""
+    inside = topic.kept([joints.stamps[0] <= stamp <= joints.stamps[-1] for stamp in topic.stamps])
+    if not inside.messages:
+        raise topic.error(f"it has no message during those of {joints.name}", remedy="Record both at the same time")
+    return inside
+
+
+def _recording(bag: Path, found: Sequence[tuple[StampedTopic, Mapping[str, Floats]]]) -> Recording:
+    """Return a recording with one row for every stamp; a channel without a message then has no sample."""
+    stamps = np.unique(np.concatenate([topic.stamps for topic, _ in found]))
+    columns = {}
+    for topic, channels in found:
+        rows = np.searchsorted(stamps, topic.stamps)
+        for name, values in channels.items():
+            columns[name] = np.full(len(stamps), np.nan)
+            columns[name][rows] = values
+    try:
+        return Recording(bag.stem, None, (stamps - stamps[0]) / 1e9, columns)
+    except InputError as error:
+        raise InputError(error.problem, file=bag, place=error.place, remedy=error.remedy) from None
+
+
+def _described(topic: StampedTopic, channels: Mapping[str, Floats], messages: int) -> ImportedTopic:
+    steps = np.diff(topic.stamps) / 1e9 if len(topic.stamps) > 1 else np.zeros(1)
+    return ImportedTopic(
+        name=topic.name,
+        kind=topic.kind,
+        frame=topic.frame,
+        columns=tuple(channels),
+        messages=messages,
+        used=len(topic.messages),
+        interval=float(np.median(steps)),
+        longest_gap=float(steps.max()),
+    )

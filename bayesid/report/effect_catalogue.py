@@ -1,0 +1,241 @@
+"""The catalogue of effects as text: of each its explanation, its parameters with their priors, and what it needs."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+from bayesid._io.errors import InputError
+from bayesid.diagnosis.encoder_fault import ENCODER_NOISE
+from bayesid.diagnosis.noise_faults import SUMMARIES
+from bayesid.report.numbers import format_number, format_text, format_unit
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.robot import Robot
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import Parameter, Prior
+from bayesid.simulation.effects.register import known_effects
+from bayesid.simulation.joint_torques import TorqueSensor
+from bayesid.simulation.model import Model
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Kind, Sensor, White
+
+__all__ = ["CatalogueEntry", "catalogue", "entry_of", "example_model"]
+
+WIDTH = 100
+"""Width of the text in characters."""
+
+EXAMPLE = "ets7"
+"""Robot of the package for which sizes are given where there is no study."""
+
+FAULT_OF_NOISE = "It is sought in the residual, from which its size follows too; no study file can put it into a model"
+
+
+@dataclass(frozen=True)
+class CatalogueEntry:
+    """What the catalogue says of one effect.
+
+    Attributes
+    ----------
+    name : str
+        Name as in study files, with LINK, JOINT or AXIS where a place follows.
+    summary, separated_by : str
+        What the effect is, and what tells it from others.
+    parameters : tuple of str
+        Parameters with units and priors.
+    sizes : tuple of str
+        Largest plausible sizes, up to which a diagnosis takes every power of ten as equally probable, with reasons.
+    needs : tuple of str
+        What a study must have for the effect to exist or to show.
+    """
+
+    name: str
+    summary: str
+    separated_by: str = ""
+    parameters: tuple[str, ...] = ()
+    sizes: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        blocks = [
+            ("", self.summary),
+            ("", self.separated_by),
+            *(("Parameter: ", line) for line in self.parameters),
+            *(("Largest size ", line) for line in self.sizes),
+            ("Needs: ", "; ".join(self.needs) or "nothing beyond a recording of the base"),
+        ]
+        return "\n".join([self.name, *(_indented(head, format_text(text)) for head, text in blocks if text)])
+
+
+def catalogue(model: Model | None = None) -> list[CatalogueEntry]:
+    """Return what is known of every effect, with sizes for a model's robot and orbit, or else for an example."""
+    chosen = example_model() if model is None else model
+    effects = [_entry(kind, chosen) for kind in known_effects().values()]
+    return [*effects, *_entries_of_noise()]
+
+
+def entry_of(name: str, entries: Sequence[CatalogueEntry]) -> CatalogueEntry:
+    """Return the entry of an effect, whose name may have a place, such as ``payload:link6``.
+
+    Raises
+    ------
+    InputError
+        If there is no such effect.
+    """
+    known = {entry.name.partition(":")[0]: entry for entry in entries}
+    key = name.partition(":")[0]
+    if key not in known:
+        raise InputError(f"unknown effect {name!r}", remedy=f"Choose from {', '.join(sorted(known))}")
+    return known[key]
+
+
+def example_model(*, torque: bool = False) -> Model:
+    """Return a model in which effects can occur: ETS-VII in orbit with all sensors, those of the torques if wanted."""
+    robot = Robot.shipped(EXAMPLE)
+    joints = tuple(joint.name for joint in robot.joints)
+    return Model(
+        robot,
+        tuple(Sensor(kind, White(1e-5)) for kind in (Kind.RATE, Kind.ACCEL, Kind.ATTITUDE)),
+        (BodyPrior(robot.base, robot.link(robot.base).inertial, 1.0),),
+        Orbit(6.916e6, inclination=0.6, sun=(1.0, 0.0, 0.0)),
+        torque=TorqueSensor(joints, (0.1,) * len(joints)) if torque else None,
+    )
+
+
+def _indented(head: str, text: str) -> str:
+    return textwrap.fill(head + text, WIDTH, initial_indent="  ", subsequent_indent="    ")
+
+
+def _entry(kind: type[Effect], model: Model) -> CatalogueEntry:
+    examples = kind.instances(model) or kind.instances(_example_with(kind))
+    effect = examples[0] if examples else None
+    return CatalogueEntry(
+        name=kind.name if effect is None else _name(effect, model.robot),
+        summary=kind.summary or " ".join((kind.__doc__ or "").partition("\n\n")[0].split()),
+        separated_by=kind.separated_by,
+        parameters=() if effect is None else _parameters(effect),
+        sizes=() if effect is None else _sizes(effect, model if kind.instances(model) else _example_with(kind)),
+        needs=_needs(kind),
+    )
+
+
+def _example_with(kind: type[Effect]) -> Model:
+    """Return the example in which an effect occurs: some show only in torques, others are not carried into them."""
+    plain = example_model()
+    return plain if kind.instances(plain) else example_model(torque=True)
+
+
+def _name(effect: Effect, robot: Robot) -> str:
+    """Return the name of an effect with the sort of its place."""
+    name, colon, place = effect.label.partition(":")
+    if not colon:
+        return name
+    if place in robot.links:
+        return f"{name}:LINK"
+    return f"{name}:JOINT" if place in [joint.name for joint in robot.joints] else f"{name}:AXIS"
+
+
+def _parameters(effect: Effect) -> tuple[str, ...]:
+    """Return the parameters in lines, one for those that share unit and prior."""
+    if not effect.parameters:
+        return ("none, its size is physics",)
+    groups = groupby(effect.parameters, key=lambda parameter: parameter[1:])
+    lines = [_group(list(group)) for _, group in groups]
+    if effect.per_recording:
+        lines.append("all of them anew in every recording")
+    if [quantity.name for quantity in effect.quantities] != [parameter.name for parameter in effect.parameters]:
+        reported = ", ".join(f"{quantity.name} [{_unit(quantity.unit)}]" for quantity in effect.quantities)
+        lines.append(f"reported as {reported}")
+    return tuple(lines)
+
+
+def _group(group: Sequence[Parameter]) -> str:
+    names = [parameter.name for parameter in group]
+    shown = ", ".join(names) if len(names) <= 10 else f"{names[0]} to {names[-1]}"
+    return f"{shown} [{_unit(group[0].unit)}]: {_prior(group[0])}"
+
+
+def _unit(unit: str) -> str:
+    return format_unit(unit) or "1"
+
+
+def _prior(parameter: Parameter) -> str:
+    mean, sigma = parameter.mean, parameter.sigma
+    if parameter.prior is Prior.LOG_NORMAL:
+        return f"log-normal, median {format_number(mean)}, standard deviation of the logarithm {format_number(sigma)}"
+    if parameter.prior is Prior.UNIFORM:
+        return f"uniform from {format_number(mean - sigma)} to {format_number(mean + sigma)}"
+    return f"normal, mean {format_number(mean)}, standard deviation {format_number(sigma)}"
+
+
+def _sizes(effect: Effect, model: Model) -> tuple[str, ...]:
+    place = effect.label.partition(":")[2]
+    where = f"{place} of {model.robot.name}" if place else model.robot.name
+    return tuple(
+        f"for {where}: {f'{format_number(bound.largest)} {format_unit(bound.unit)}'.rstrip()}. {bound.reason}"
+        for bound in effect.physical_bounds(model)
+    )
+
+
+def _without(kind: Kind) -> Callable[[Model], Model]:
+    return lambda model: replace(model, sensors=tuple(sensor for sensor in model.sensors if sensor.kind != kind))
+
+
+def _in_orbit(change: Callable[[Orbit], Orbit]) -> Callable[[Model], Model]:
+    return lambda model: replace(model, orbit=model.orbit and change(model.orbit))
+
+
+TAKEN_AWAY: dict[str, Callable[[Model], Model]] = {
+    "[orbit]": lambda model: replace(model, orbit=None),
+    "inclination in [orbit]": _in_orbit(lambda orbit: replace(orbit, inclination=None)),
+    "sun in [orbit]": _in_orbit(lambda orbit: replace(orbit, sun=None)),
+    "[sensors.rate]": _without(Kind.RATE),
+    "[sensors.accel]": _without(Kind.ACCEL),
+    "[sensors.attitude]": _without(Kind.ATTITUDE),
+    "[sensors.torque]": lambda model: replace(model, torque=None),
+}
+"""Parts of a study, and how a model loses them."""
+
+
+def _needs(kind: type[Effect]) -> tuple[str, ...]:
+    """Return the parts of a study without which the effect does not occur, found by taking each away."""
+    whole = _example_with(kind)
+    if not kind.instances(whole):
+        return ("arguments of its own, since it does not occur in the example by itself",)
+    needs = [part for part, take in TAKEN_AWAY.items() if not kind.instances(take(whole))]
+    if kind.needs_latitude:
+        needs.append("argument_of_latitude in every recording")
+    return tuple(needs)
+
+
+def _entries_of_noise() -> list[CatalogueEntry]:
+    """Return the entries of what a diagnosis names and no effect describes: faults of noise, a turning start."""
+    factor = ("factor [1]: by which the noise exceeds the declared",)
+    named = {
+        "initial-rate": ("x, y, z [rad/s]: normal, in every recording anew",),
+        "rate-noise": factor,
+        "accel-noise": factor,
+        "attitude-noise": factor,
+        ENCODER_NOISE: factor,
+        "coloured-noise:SENSOR": ("sigma [unit of the sensor], time [s]: of the correlation",),
+        "outliers:SENSOR": ("fraction [1]: of the samples",),
+        "quantisation:SENSOR": ("step [unit of the sensor]",),
+    }
+    return [
+        CatalogueEntry(
+            name=name,
+            summary=SUMMARIES.get(name.partition(":")[0], SUMMARIES["noise"]),
+            separated_by="" if name == "initial-rate" else f"{FAULT_OF_NOISE}.",
+            parameters=parameters,
+            needs=('initial_rate = "zero" in [model]',) if name == "initial-rate" else _sensor_needed(name),
+        )
+        for name, parameters in named.items()
+    ]
+
+
+def _sensor_needed(name: str) -> tuple[str, ...]:
+    sensor = name.partition("-")[0]
+    if name == ENCODER_NOISE:
+        return ("sigma in [sensors.encoder]",)
+    return ("the section of the sensor, such as [sensors.rate]",) if ":" in name else (f"[sensors.{sensor}]",)
