@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from bayesid.diagnosis import diagnose
+from bayesid.diagnosis import Status, diagnose
 from studies.throws.data import SMOOTH, Timing, read_throws, read_truth
 from studies.throws.diagnosis import SPREAD, device_candidates
 from studies.throws.model import extended, manoeuvres, rigid
@@ -61,3 +61,20 @@ def test_the_regression_needs_the_mass_alone(tmp_path):
     found = regress(read_throws(tmp_path, "body", Timing()), MASS)
     np.testing.assert_allclose(np.linalg.eigvalsh(found.inertia), np.linalg.eigvalsh(INERTIA), rtol=0.03)
     np.testing.assert_allclose(found.com, COM, atol=0.001)
+
+
+@pytest.mark.slow
+def test_perfect_throws_are_adequate(tmp_path):
+    found = diagnosed(tmp_path, 0)
+    assert found.verdict.status is Status.ADEQUATE
+    assert 0.9 < found.gain.before.chi2_per_sample < 1.15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cause", "hidden"), [("rotational-drag", {"drag": (4e-6, 4e-6, 4e-6)}), ("wheel-tilt", {"tilt": (0.03, -0.02)})]
+)
+def test_a_known_drag_and_a_known_error_of_the_wheel_are_named(tmp_path, cause, hidden):
+    found = diagnosed(tmp_path, 0, **hidden)
+    assert found.verdict.status is Status.EXPLAINED
+    assert found.verdict.causes == (cause,)
