@@ -26,6 +26,7 @@ __all__ = [
     "EXCLUDED",
     "INTERVAL",
     "SMOOTH",
+    "WHEEL_COUNT",
     "WHEEL_INERTIA",
     "WHEEL_STEPS",
     "Timing",

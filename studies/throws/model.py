@@ -19,7 +19,7 @@ from bayesid import (
     Sensor,
     White,
 )
-from studies.throws.data import WHEEL_INERTIA
+from studies.throws.data import WHEEL_COUNT, WHEEL_INERTIA
 from studies.throws.effects import AirDrag, GyroCross, SmoothForce, SmoothTorque, ThrowBias, WheelDelay, WheelTilt
 from studies.throws.noise import quiet_noise
 
@@ -42,6 +42,9 @@ DRAG = 20.0 * WHEEL_INERTIA
 BIAS = 0.1
 """Prior standard deviation of the accelerometer's constant error in a throw [m/s2]."""
 
+RESOLUTION = WHEEL_COUNT / np.sqrt(12.0)
+"""Least noise of the wheel's recorded speed, that of its counts [rad/s]: the gyro sees it through the inertia."""
+
 RATE = 150.0
 """Prior standard deviation of the initial rate [rad/s], wide enough for any throw."""
 
@@ -60,7 +63,8 @@ def rigid(centre: InertialParameters, spread: float, recordings: Sequence[Record
     upper = inertia[np.triu_indices(3)]
     robot = Robot.from_string(URDF.format(*upper, com=" ".join(map(str, centre.com)), mass=centre.mass))
     rate = quiet_noise(recordings, "rate")
-    rate[2] = np.hypot(rate[2], quiet_noise(recordings, "wheel_momentum")[2] / inertia[2, 2])
+    momentum = max(quiet_noise(recordings, "wheel_momentum")[2], WHEEL_INERTIA * RESOLUTION)
+    rate[2] = np.hypot(rate[2], momentum / inertia[2, 2])
     sensors = (Sensor(Kind.RATE, _white(rate)), Sensor(Kind.ACCEL, _white(quiet_noise(recordings, "accel"))))
     return Model(robot, sensors, (BodyPrior("base_link", centre, spread),), effects=(ThrowBias(BIAS),), rate_sigma=RATE)
 
