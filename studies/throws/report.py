@@ -91,7 +91,7 @@ def _negatives(document: Document, result: Result) -> None:
         "data of each body by marginal likelihood.",
         "Every throw of a body shares the error of its stated geometry and of the wheel's inertia. Intervals that "
         "count "
-        f"both hold {held_in_all(result, with_truth=True)[0]} of {held_in_all(result, with_truth=True)[1]}: too wide.",
+        f"both hold {held_in_all(result, with_truth=True)[0]} of {held_in_all(result, with_truth=True)[1]}.",
         "The gyro's scale cannot be told from the wheel's inertia; a shift of the wheel's place is not a candidate.",
     ]
     noisy = {body: factor for body, factor in result.extended.noise.items() if factor.max() > 1.5}
@@ -269,7 +269,7 @@ def _conditions(document: Document, result: Result) -> None:
     )
     document.foot(
         "Data: Blaha, Kuijper, Pop and Smeur, arXiv:2503.13137; none of them is reproduced here. "
-        f"bayesid {version('bayesid')}, seed 1, `python -m studies.throws --full`."
+        f"bayesid {version('bayesid')}, seed 1, `python -m studies.throws{' --full' if result.studies else ''}`."
     )
 
 
