@@ -7,7 +7,8 @@ import pytest
 
 from bayesid import InputError
 from studies.throws import run
-from studies.throws.data import DEFAULT_FOLDER, Timing, read_throws
+from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws
+from studies.throws.goals import goal_rows, held_in_all
 from studies.throws.report import write_report
 
 PRESENT = (DEFAULT_FOLDER / "truth.json").is_file()
@@ -27,7 +28,7 @@ def test_the_wheel_and_the_bodies_jointly(result):
     assert analysis.converged
     assert 1.43e-6 < analysis.wheel < 1.47e-6
     for body in analysis.bodies.values():
-        assert np.abs(body.joint_errors).max() < 2.0
+        assert np.abs(body.joint_errors).max() < 3.0
         assert np.abs(body.joint_distance).max() < 3.0
 
 
@@ -41,19 +42,28 @@ def test_single_throws(result, body, mean, largest):
 
 
 @pytest.mark.slow
-def test_the_rigid_model_is_overconfident_and_the_extended_one_hardly(result):
+def test_the_rigid_model_is_overconfident_and_the_extended_one_is_not(result):
     for body in ("Empty", "A"):
         plain, extended = result.plain.bodies[body], result.extended.bodies[body]
-        assert plain.inflation > 3.0
-        assert extended.inflation < 2.5
-        assert extended.coverage(0.95) > plain.coverage(0.95)
-        assert extended.coverage(0.95, with_truth=True) >= 0.9
+        assert plain.inflation > 5.0
+        assert extended.inflation < 2.0
+        assert plain.held(0.95)[0] < extended.held(0.95)[0]
+    held, total = held_in_all(result, with_truth=True)
+    assert held >= 0.9 * total
 
 
 @pytest.mark.slow
-def test_the_blocks_need_no_cad(result):
-    analysis = result.extended
-    np.testing.assert_allclose(analysis.blocks, analysis.blocks_truth, rtol=0.04)
+def test_the_unexplained_torque_has_the_width_that_its_prior_says(result):
+    for body in (*CALIBRATION, "Empty", "A"):
+        torque = result.extended.widths[body]["smooth-torque"]
+        assert 0.9 < torque.factor < 1.1
+        assert not torque.doubtful
+
+
+@pytest.mark.slow
+def test_goals_without_a_diagnosis_are_not_decided(result):
+    rows = {goal: verdict for goal, _, verdict in goal_rows(result)}
+    assert rows["a cause named on every body"] == "NOT DECIDED"
 
 
 @pytest.mark.slow

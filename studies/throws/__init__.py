@@ -1,4 +1,4 @@
-"""Study of real measurements: thrown rigid bodies with a reaction wheel, identified and compared with their geometry.
+"""Study of real measurements: thrown bodies with a reaction wheel, identified, diagnosed and held to their geometry.
 
 Data: Blaha, Kuijper, Pop, Smeur, "Rapid and Inexpensive Inertia Tensor Estimation from a Single Object Throw",
 arXiv:2503.13137; not part of the project. ``python -m studies.throws --full`` writes ``reports/throws.pdf``.
@@ -6,49 +6,67 @@ arXiv:2503.13137; not part of the project. ``python -m studies.throws --full`` w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from time import perf_counter
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from bayesid._io.progress import Progress, silent
+from bayesid.diagnosis import Diagnosis
 from studies.common.command import Command
-from studies.throws.analysis import Analysis, BodyResult, analyse, configure, prepare
-from studies.throws.data import DEFAULT_FOLDER, Timing, read_truth
-from studies.throws.model import TORQUE, Settings, is_fitted, is_rigid
-from studies.throws.report import draw_figures, write_report
-from studies.throws.sampling import Sampled, sample_jointly
+from studies.throws.analysis import Analysis, analyse, prepare
+from studies.throws.body_result import BodyResult
+from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws, read_truth
+from studies.throws.diagnosis import Lacking, geometry_errors, lacking, without_wheel
+from studies.throws.model import is_fitted, is_rigid
+from studies.throws.report import write_report
 
 __all__ = ["Analysis", "BodyResult", "Result", "main", "run"]
 
 QUICK = 4
-"""Throws of each body in a quick run."""
+"""Throws of each body that a quick run identifies."""
+
+TRAINING = 1
+"""Throws of each body that are diagnosed."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """Numbers and figures of the study.
+    """Numbers of the study.
 
     Attributes
     ----------
     plain, extended : Analysis
-        Rigid body with wheel and nothing else; the same with what it lacks.
-    variants : mapping of str to Analysis
-        The extended model with other reasonable choices; only in a full run.
-    sampled : Sampled or None
-        Posterior samples of one joint fit beside its Laplace approximation; only in a full run.
+        Rigid body with wheel and nothing else; the same with what the device and the air add.
+    studies : tuple of Lacking
+        What each body's diagnosis said; empty where it was left out.
+    errors : mapping of str to mapping of str to (3,) array
+        Of the diagnosed models against the geometry [%].
+    wheel : Diagnosis or None
+        With the recorded wheel dropped.
+    seconds : float
+        Time of the whole run.
     """
 
     plain: Analysis
     extended: Analysis
-    variants: Mapping[str, Analysis]
-    sampled: Sampled | None
-    figures: Mapping[str, Figure]
-    full: bool
+    studies: tuple[Lacking, ...]
+    errors: Mapping[str, Mapping[str, np.ndarray]]
+    wheel: Diagnosis | None
+    seconds: float
 
 
-def run(folder: Path | None = None, *, full: bool = False, seed: int = 1, throws: int | None = None) -> Result:
+def run(
+    folder: Path | None = None,
+    *,
+    full: bool = False,
+    reverse: bool = False,
+    seed: int = 1,
+    throws: int | None = None,
+    progress: Progress = silent,
+) -> Result:
     """Run the study.
 
     Parameters
@@ -56,7 +74,9 @@ def run(folder: Path | None = None, *, full: bool = False, seed: int = 1, throws
     folder : path, optional
         Of the measurements; beside the checkout where left out.
     full : bool
-        All throws, other settings, and posterior samples.
+        All throws, and the diagnosis of every body.
+    reverse : bool
+        Whether to drop the recorded wheel from a throw of the box and to have it sought, which takes minutes more.
     throws : int, optional
         Throws of each body; all in a full run and `QUICK` in a quick one where left out.
 
@@ -65,54 +85,43 @@ def run(folder: Path | None = None, *, full: bool = False, seed: int = 1, throws
     InputError
         If the measurements are not there.
     """
+    began = perf_counter()
     folder = DEFAULT_FOLDER if folder is None else Path(folder)
     truth, count = read_truth(folder), throws if full or throws else QUICK
     rng = np.random.default_rng(seed)
-
-    throws_read = prepare(folder, Timing(), count)
-    configured = configure(throws_read, Settings())
-    plain = analyse("plain", configured, is_rigid, truth, rng)
-    extended = analyse("extended", configured, is_fitted, truth, rng)
-    variants = {}
-    for label, (settings, timing, free) in _variants().items() if full else ():
-        own = throws_read if timing == Timing() else prepare(folder, timing, count, throws_read[0].posterior)
-        variants[label] = analyse(label, configure(own, settings), free, truth, rng)
-    sampled = sample_jointly(folder, "A", Settings(knots=8), Timing(), seed) if full else None
-    return Result(plain, extended, variants, sampled, draw_figures(plain, extended), full)
-
-
-def _variants() -> dict[str, tuple[Settings, Timing, Callable[[str], bool]]]:
-    settings, timing = Settings(), Timing()
-
-    def torque(values: dict[str, float]) -> tuple[Settings, Timing, Callable[[str], bool]]:
-        return replace(settings, torque=values), timing, is_fitted
-
-    return {
-        "torque prior halved": torque({body: 0.5 * sd for body, sd in TORQUE.items()}),
-        "torque prior doubled": torque({body: 2.0 * sd for body, sd in TORQUE.items()}),
-        "torque prior 100 for all bodies": torque(dict.fromkeys(TORQUE, 100.0)),
-        "gyro noise halved": (replace(settings, rate_sigma=0.0035), timing, is_fitted),
-        "gyro noise doubled": (replace(settings, rate_sigma=0.014), timing, is_fitted),
-        "no drag": (settings, timing, lambda name: is_fitted(name) and "air-drag" not in name),
-        "no cross-axis terms": (settings, timing, lambda name: is_fitted(name) and "gyro-cross" not in name),
-        "no wheel tilt": (settings, timing, lambda name: is_fitted(name) and "wheel-tilt" not in name),
-        "samples at fast wheel kept": (settings, replace(timing, fast=1e9), is_fitted),
-        "more samples at fast wheel left out": (settings, replace(timing, fast=6000.0), is_fitted),
-        "start 44 ms later": (settings, replace(timing, start=timing.start + 0.044), is_fitted),
-        "wheel delay as recorded": (settings, replace(timing, delay=0.0, delay_periods=0.0), is_fitted),
-    }
+    prepared = prepare(folder, truth, count)
+    plain = analyse("rigid", prepared, is_rigid, truth, rng, smooth=False)
+    extended = analyse("extended", prepared, is_fitted, truth, rng)
+    studies: tuple[Lacking, ...] = ()
+    errors: Mapping[str, Mapping[str, np.ndarray]] = {}
+    wheel = None
+    if full:
+        recordings = {body: read_throws(folder, body, Timing()) for body in truth.bodies}
+        masses = {body: truth.thrown_mass(body) for body in truth.bodies}
+        studies = tuple(
+            lacking(body, recordings[body], masses[body], TRAINING, seed, progress) for body in truth.bodies
+        )
+        errors = geometry_errors(studies, truth)
+    if reverse:
+        body = CALIBRATION[1]
+        thrown = read_throws(folder, body, Timing())
+        wheel = without_wheel(thrown, truth.thrown_mass(body), TRAINING, seed, progress)
+    return Result(plain, extended, studies, errors, wheel, perf_counter() - began)
 
 
 COMMAND = Command(
     "throws",
-    "Identify thrown rigid bodies from real measurements.",
-    full="all throws, other settings and posterior samples",
-    extra={"--data": {"type": Path, "help": "folder of the measurements"}},
+    "Identify and diagnose thrown rigid bodies from real measurements.",
+    full="all throws, and the diagnosis of every body",
+    extra={
+        "--data": {"type": Path, "help": "folder of the measurements"},
+        "--reverse": {"action": "store_true", "help": "drop the recorded wheel from a throw and seek it"},
+    },
 )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     options = COMMAND.parse(arguments)
-    result = run(options.data, full=options.full)
+    result = run(options.data, full=options.full, reverse=options.reverse)
     write_report(result, options.output)

@@ -72,5 +72,5 @@ def object_moments(device: Tensor, test: Tensor, wheel: Floats | float, device_m
 
 def truth_sd(truth: Truth, body: str) -> Floats:
     """Return the standard deviation of a body's stated moments, shape (3,) [kg m2], under the assumptions above."""
-    plate = truth.moments["Empty"]
+    plate = truth.moments.get("Empty", truth.moments[body])
     return np.hypot(PLATE_SD * plate, BLOCK_SD * (truth.moments[body] - plate))

@@ -31,8 +31,6 @@ PRECISION = 1e-7
 class Throw:
     """One throw of a body: its posterior, and a point to start from or that was found.
 
-    All throws share one compiled model; what differs between bodies besides the data is put on top of it.
-
     Attributes
     ----------
     z : (size,) array
@@ -83,6 +81,12 @@ class Joint:
     information : (throws, n, n) array
     pull : (throws, n) array
         Each throw's own part of the normal equations at the mode, its own unknowns eliminated.
+    own_variance : tuple of arrays
+        Of each throw's free own unknowns, in the order of its posterior.
+    fitted : (throws, 6) array
+        Number of samples of each axis that the throw's own unknowns absorb.
+    own : tuple of integer arrays
+        Which unknowns of each throw these are.
     converged : bool
     """
 
@@ -92,6 +96,9 @@ class Joint:
     throws: tuple[Throw, ...]
     information: Floats
     pull: Floats
+    own_variance: tuple[Floats, ...]
+    fitted: Floats
+    own: tuple[NDArray[np.intp], ...]
     converged: bool
 
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
@@ -159,7 +166,14 @@ def maximise_jointly(throws: Sequence[Throw], free: Callable[[str], bool] = is_f
     pull = np.zeros((len(throws), len(value)))
     for row, block, places in zip(pull, blocks, layout.places, strict=True):
         row[places] = block.pull
-    return Joint(layout.names, value, np.linalg.inv(hessian), found, information, pull, converged)
+    covariance = np.linalg.inv(hessian)
+    variance = tuple(
+        block.own_variance
+        + ((block.own_response @ covariance[np.ix_(places, places)]) * block.own_response).sum(axis=1)
+        for block, places in zip(blocks, layout.places, strict=True)
+    )
+    own, fitted = tuple(layout.own), np.stack([block.fitted for block in blocks])
+    return Joint(layout.names, value, covariance, found, information, pull, variance, fitted, own, converged)
 
 
 @dataclass(frozen=True)
@@ -170,6 +184,8 @@ class _Block:
     pull: Floats
     own_step: Floats
     own_response: Floats
+    own_variance: Floats
+    fitted: Floats
 
 
 def _eliminate(throw: Throw, z: Floats, layout: _Layout, index: int) -> _Block:
@@ -180,7 +196,10 @@ def _eliminate(throw: Throw, z: Floats, layout: _Layout, index: int) -> _Block:
     half = np.linalg.solve(factor, np.column_stack([b.T @ a, b.T @ residual + precision * z[own]]))
     mixed, pulled = half[:, :-1], half[:, -1]
     back = np.linalg.solve(factor.T, half)
-    return _Block(a.T @ a - mixed.T @ mixed, a.T @ residual - mixed.T @ pulled, -back[:, -1], -back[:, :-1])
+    variance = (np.linalg.inv(factor) ** 2).sum(axis=0)
+    pull = a.T @ residual - mixed.T @ pulled
+    fitted = (np.linalg.solve(factor, b.T) ** 2).sum(axis=0).reshape(-1, 6).sum(axis=0)
+    return _Block(a.T @ a - mixed.T @ mixed, pull, -back[:, -1], -back[:, :-1], variance, fitted)
 
 
 def _assemble(blocks: Sequence[_Block], layout: _Layout, value: Floats) -> tuple[Floats, Floats]:

@@ -3,130 +3,88 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bayesid import BodyPrior, InertialParameters, Kind, Model, Robot, Sensor, White
-from studies.throws.data import WHEEL_INERTIA
-from studies.throws.effects import AirDrag, GyroCross, SmoothTorque, ThrowBias, WheelTilt
+from bayesid import (
+    BodyPrior,
+    InertialParameters,
+    Kind,
+    Manoeuvre,
+    MeasuredMotion,
+    Model,
+    Recording,
+    Robot,
+    Sensor,
+    White,
+)
+from studies.throws.data import WHEEL_COUNT, WHEEL_INERTIA
+from studies.throws.effects import AirDrag, GyroCross, SmoothForce, SmoothTorque, ThrowBias, WheelDelay, WheelTilt
+from studies.throws.noise import quiet_noise
 
-__all__ = [
-    "STEP",
-    "Settings",
-    "build_model",
-    "common_model",
-    "is_calibration",
-    "is_fitted",
-    "is_own",
-    "is_rigid",
-    "noise_factors",
-    "rough",
-    "widths",
-]
+__all__ = ["KNOTS", "TORQUE", "extended", "is_calibration", "is_fitted", "is_own", "is_rigid", "manoeuvres", "rigid"]
 
-URDF = """<robot name="thrown"><link name="base_link"><inertial><origin xyz="0 0 0"/><mass value="{mass}"/>
-<inertia ixx="{xx}" iyy="{yy}" izz="{zz}" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+Floats = NDArray[np.floating]
 
-COMMON = "Empty"
-"""The body whose rough numbers centre the prior that all bodies share in joint fits."""
+URDF = """<robot name="thrown"><link name="base_link"><inertial><origin xyz="{com}"/><mass value="{mass}"/>
+<inertia ixx="{0}" ixy="{1}" ixz="{2}" iyy="{3}" iyz="{4}" izz="{5}"/></inertial></link></robot>"""
 
-ROUGH = {
-    "cal_device": (0.1007, (3e-5, 7e-5, 8e-5), (0.0, 0.01, 0.01)),
-    "cal_proof": (0.4467, (2e-4, 2e-4, 3e-4), (0.0, 0.01, 0.03)),
-    "Empty": (0.2792, (2e-4, 4e-4, 5e-4), (0.0, 0.01, 0.03)),
-    "A": (0.5596, (3e-4, 15e-4, 16e-4), (0.0, 0.01, 0.04)),
-}
-"""Mass of each body with the device, as weighed, and the centre of a prior of 100 % width, to one digit: inertia and
-centre of mass from the sensor, in its axes."""
+KNOTS = 16
+"""Of the unexplained torque, over the flight: 32 ms apart."""
 
-TORQUE = {"cal_device": 50.0, "cal_proof": 70.0, "Empty": 200.0, "A": 100.0}
-"""Prior standard deviation of the unexplained torque [wheel inertias / s2]; large plates feel the air more."""
+TORQUE = 100.0 * WHEEL_INERTIA
+"""Width of the unexplained torque that estimates of a body's own start from [N m]."""
 
-STEP = 0.004
-"""Of the integration [s]; its error is a tenth of the declared noise at worst, in the throws of the device alone."""
+DRAG = 20.0 * WHEEL_INERTIA
+"""Prior standard deviation of the drag coefficients [N m s]."""
 
-WHEEL_NOISE = 1.5
-"""Noise of the wheel's speed [rad/s], seen by the gyro through the body's inertia about the wheel's axis."""
+BIAS = 0.1
+"""Prior standard deviation of the accelerometer's constant error in a throw [m/s2]."""
+
+RESOLUTION = WHEEL_COUNT / np.sqrt(12.0)
+"""Least noise of the wheel's recorded speed, that of its counts [rad/s]: the gyro sees it through the inertia."""
+
+RATE = 150.0
+"""Prior standard deviation of the initial rate [rad/s], wide enough for any throw."""
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Choices of the extended model, gathered so that their influence can be tried.
+def rigid(centre: InertialParameters, spread: float, recordings: Sequence[Recording]) -> Model:
+    """Return a rigid body with a recorded wheel; every throw has an initial rate and an accelerometer bias of its own.
 
     Parameters
     ----------
-    knots : int
-        Of the unexplained torque, over the flight.
-    torque : mapping of str to float
-        Its prior standard deviation per body [wheel inertias / s2].
-    drag : float
-        Prior standard deviation of the drag coefficients [wheel inertias / s].
-    rate_sigma, accel_sigma : float
-        Noise of the filtered samples [rad/s, m/s2]; errors of the sensors that are not white are counted in.
-    bias_sigma : float
-        Of the accelerometer in each throw [m/s2].
+    centre, spread
+        Of the body's prior.
+    recordings : sequence of Recording
+        Whose quiet stretches give the noise.
     """
-
-    knots: int = 16
-    torque: dict[str, float] = field(default_factory=lambda: dict(TORQUE))
-    drag: float = 20.0
-    rate_sigma: float = 0.007
-    accel_sigma: float = 0.2
-    bias_sigma: float = 0.1
-
-
-def rough(body: str) -> InertialParameters:
-    """Return what is known of a body with the device before any throw."""
-    mass, moments, com = ROUGH[body]
-    return InertialParameters(mass, np.array(com), np.diag(moments))
+    inertia = centre.inertia
+    upper = inertia[np.triu_indices(3)]
+    robot = Robot.from_string(URDF.format(*upper, com=" ".join(map(str, centre.com)), mass=centre.mass))
+    rate = quiet_noise(recordings, "rate")
+    momentum = max(quiet_noise(recordings, "wheel_momentum")[2], WHEEL_INERTIA * RESOLUTION)
+    rate[2] = np.hypot(rate[2], momentum / inertia[2, 2])
+    sensors = (Sensor(Kind.RATE, _white(rate)), Sensor(Kind.ACCEL, _white(quiet_noise(recordings, "accel"))))
+    return Model(robot, sensors, (BodyPrior("base_link", centre, spread),), effects=(ThrowBias(BIAS),), rate_sigma=RATE)
 
 
-def build_model(body: str, settings: Settings, duration: float) -> Model:
-    """Return the extended model of one body on the device."""
-    mass, moments, _ = ROUGH[body]
-    robot = Robot.from_string(URDF.format(mass=mass, xx=moments[0], yy=moments[1], zz=moments[2]))
-    prior = BodyPrior("base_link", rough(body), 1.0)
-    effects = (
-        GyroCross(),
-        WheelTilt(),
-        AirDrag(settings.drag * WHEEL_INERTIA),
-        SmoothTorque(duration, settings.knots, settings.torque[body] * WHEEL_INERTIA),
-        ThrowBias(settings.bias_sigma),
-    )
-    noise = rate_noise(body, settings).tolist()
-    rate = Sensor(Kind.RATE, White((noise[0], noise[1], noise[2])))
-    accel = Sensor(Kind.ACCEL, White(settings.accel_sigma))
-    # wide enough for any throw, and the same for all, so that they share what is compiled
-    return Model(robot, (rate, accel), (prior,), effects=effects, rate_sigma=150.0)
+def extended(centre: InertialParameters, recordings: Sequence[Recording], duration: float) -> Model:
+    """Return the same with the device's errors, drag and unexplained torque, and a body that is hardly known."""
+    model = rigid(centre, 1.0, recordings)
+    smooth = SmoothTorque(duration, KNOTS, TORQUE), SmoothForce(duration, KNOTS, BIAS)
+    for effect in (GyroCross(), WheelTilt(), WheelDelay(), AirDrag(DRAG), *smooth):
+        model = model.extend(effect)
+    return model
 
 
-def common_model(settings: Settings, duration: float) -> Model:
-    """Return the extended model with one prior and one noise for all bodies, so that it compiles once.
-
-    `widths` and `noise_factors` say what a body has instead.
-    """
-    model = build_model(COMMON, settings, duration)
-    return replace(model, sensors=(replace(model.sensors[0], noise=White(settings.rate_sigma)), *model.sensors[1:]))
+def manoeuvres(model: Model, recordings: Sequence[Recording]) -> list[Manoeuvre]:
+    """Return the recordings as manoeuvres of a body without joints."""
+    return [Manoeuvre(recording, MeasuredMotion.from_recording(recording, model.robot)) for recording in recordings]
 
 
-def widths(names: Sequence[str], body: str, settings: Settings) -> np.ndarray:
-    """Width of a body's priors relative to those of `common_model`, one per unknown."""
-    torque = settings.torque[body] / TORQUE[COMMON]
-    return np.array([torque if name.startswith("smooth-torque") else 1.0 for name in names])
-
-
-def noise_factors(body: str, settings: Settings) -> np.ndarray:
-    """Noise of a body's recordings relative to `common_model`, shape (6,)."""
-    factors = np.ones(6)
-    factors[:3] = rate_noise(body, settings) / Settings().rate_sigma
-    return factors
-
-
-def rate_noise(body: str, settings: Settings) -> np.ndarray:
-    """Noise of the gyro's axes, shape (3,) [rad/s]: about the wheel's axis its speed's noise is seen as well."""
-    wheel = WHEEL_NOISE * WHEEL_INERTIA / ROUGH[body][1][2]
-    return np.hypot(settings.rate_sigma, np.array([0.0, 0.0, wheel]))
+def _white(sigma: Floats) -> White:
+    return White((float(sigma[0]), float(sigma[1]), float(sigma[2])))
 
 
 def is_own(name: str) -> bool:
@@ -135,11 +93,8 @@ def is_own(name: str) -> bool:
 
 
 def is_rigid(name: str) -> bool:
-    """Whether an unknown is one of the plain model: rigid body, initial rate and accelerometer bias, mass known."""
-    return (name.partition(":")[2].startswith("base_link") and not name.endswith(".alpha")) or name.startswith(_PLAIN)
-
-
-_PLAIN = ("initial-rate", "throw-bias")
+    """Whether an unknown is one of the rigid model: body, initial rate and accelerometer bias, mass known."""
+    return is_fitted(name) and ("base_link" in name or name.startswith(("initial-rate", "throw-bias")))
 
 
 def is_fitted(name: str) -> bool:
@@ -149,4 +104,4 @@ def is_fitted(name: str) -> bool:
 
 def is_calibration(name: str) -> bool:
     """Whether an unknown is one of the device's, the same on all bodies."""
-    return name.startswith(("gyro-cross", "wheel-tilt"))
+    return name.startswith(("gyro-cross", "wheel-tilt", "wheel-delay"))

@@ -1,0 +1,81 @@
+"""Simulated throws through the reader of the measured ones: noise as declared, and causes that are known."""
+
+import json
+
+import numpy as np
+import pytest
+
+from bayesid.diagnosis import Status, diagnose
+from studies.throws.data import SMOOTH, Timing, read_throws, read_truth
+from studies.throws.diagnosis import SPREAD, device_candidates
+from studies.throws.model import extended, manoeuvres, rigid
+from studies.throws.noise import quiet_noise
+from studies.throws.regression import regress
+from tests.simulated_throws import ACCEL_NOISE, COM, INERTIA, MASS, RATE_NOISE, write_throws
+
+RATES = np.array([[11.0, -9.0, 4.0], [-7.0, 12.0, 8.0], [15.0, 5.0, -9.0], [6.0, -14.0, 7.0]])
+
+
+def diagnosed(folder, seed, count=2, **hidden):
+    rng = np.random.default_rng(seed)
+    rates = np.concatenate([RATES[:count], rng.normal(scale=10.0, size=(10, 3))])  # further ones tell the noise
+    write_throws(folder, "body", rates, rng, **hidden)
+    recordings = read_throws(folder, "body", Timing())
+    model = rigid(regress(recordings, MASS), SPREAD, recordings)
+    return diagnose(
+        model, manoeuvres(model, recordings[:count]), 1, effects=device_candidates(model, records_wheels=True)
+    )
+
+
+def test_samples_are_independent_and_their_noise_is_measured(tmp_path):
+    write_throws(tmp_path, "body", np.zeros((8, 3)), np.random.default_rng(3))
+    recordings = read_throws(tmp_path, "body", Timing(fast=1e9))
+    # the body is at rest about x until the wheel runs up, so that all that is read there is noise
+    noise = np.array([recording.vector("rate")[1][:20, 0] for recording in recordings])
+    noise = noise - noise.mean(axis=1, keepdims=True)
+    correlation = (noise[:, 1:] * noise[:, :-1]).mean() / (noise**2).mean()
+    assert abs(correlation) < 0.25  # 0.78 before samples were independent
+    for sensor, raw in (("rate", RATE_NOISE), ("accel", ACCEL_NOISE)):
+        expected = raw * np.sqrt(27.0 / (16.0 * 2.0 * np.sqrt(np.pi)) / (4030.0 * SMOOTH))
+        np.testing.assert_allclose(quiet_noise(recordings, sensor), expected, rtol=0.15)
+
+
+def test_a_new_body_needs_its_mass_and_its_files(tmp_path):
+    moments = np.diag([2e-4, 4e-4, 5e-4]).tolist()
+    content = {
+        "device": {"mass": 0.1},
+        "proof_body": {"mass": 0.3, "I_com": moments},
+        "bodies": {"new": {"mass": 0.2, "I_com_grid": moments}},
+    }
+    (tmp_path / "truth.json").write_text(json.dumps(content), encoding="utf-8")
+    write_throws(tmp_path, "new", RATES[:1], np.random.default_rng(5))
+    truth = read_truth(tmp_path)
+    assert truth.objects == ("new",)
+    recordings = read_throws(tmp_path, "new", Timing())
+    model = extended(regress(recordings, truth.thrown_mass("new")), recordings, Timing().duration)
+    assert model.priors[0].centre.mass == pytest.approx(0.3)
+
+
+def test_the_regression_needs_the_mass_alone(tmp_path):
+    write_throws(tmp_path, "body", RATES[:2], np.random.default_rng(4))
+    found = regress(read_throws(tmp_path, "body", Timing()), MASS)
+    np.testing.assert_allclose(np.linalg.eigvalsh(found.inertia), np.linalg.eigvalsh(INERTIA), rtol=0.03)
+    np.testing.assert_allclose(found.com, COM, atol=0.001)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
+def test_perfect_throws_are_adequate(tmp_path, seed):
+    found = diagnosed(tmp_path, seed)
+    assert found.verdict.status is Status.ADEQUATE
+    assert 0.85 < found.gain.before.chi2_per_sample < 1.15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cause", "hidden"), [("rotational-drag", {"drag": (4e-6, 4e-6, 4e-6)}), ("wheel-tilt", {"tilt": (0.03, -0.02)})]
+)
+def test_a_known_drag_and_a_known_error_of_the_wheel_are_named(tmp_path, cause, hidden):
+    found = diagnosed(tmp_path, 0, **hidden)
+    assert found.verdict.status is Status.EXPLAINED
+    assert found.verdict.causes == (cause,)
