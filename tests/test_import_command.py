@@ -96,6 +96,38 @@ def test_the_file_within_the_folder_of_a_bag_will_do(writer, tmp_path):
     assert Recording.read(tmp_path / "out" / "flight.csv").joints
 
 
+@pytest.mark.parametrize("options", [("--start", 5.1, "--end", 14.9), ("--start", 5.1, "--duration", 9.8)])
+def test_a_window_takes_its_own_part_of_the_bag(flown, writer, tmp_path, options):
+    bag = writer.write(tmp_path, "ros1")
+    status, output = run(bag, *TOPICS, *options, "--output", tmp_path / "out")
+    assert status == 0, output
+    read = Recording.read(tmp_path / "out" / "flight.csv")
+    times, values = flown.series("rate.x")
+    joint = flown.series("position.joint2")[0]
+    origin = joint[joint >= 5.1][0]  # time 0 is the first message of the joints
+    inside = (times >= origin) & (times <= joint[joint <= 14.9][-1])
+    np.testing.assert_allclose(read.series("rate.x")[0], times[inside] - origin, atol=1e-8)
+    np.testing.assert_allclose(read.series("rate.x")[1], values[inside], rtol=1e-10, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--start", 100.0), "it has no message from 100 to"),
+        (("--start", 5.0, "--end", 4.0), "the window from 5 to 4 s is empty"),
+        (("--duration", 0.0), "the window from 0 to 0 s is empty"),
+        (("--start", -1.0), "the window starts at -1 s, before the bag"),
+        (("--end", 4.0, "--duration", 2.0), "both --end and --duration are given"),
+        (("--start", 20.5, "--end", 22.5), "it has no message"),
+    ],
+)
+def test_a_window_without_messages_is_refused(writer, tmp_path, options, message):
+    status, output = run(writer.write(tmp_path, "ros1"), *TOPICS, *options, "--output", tmp_path / "out")
+    assert status == 2
+    assert message in output
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_drafted_study_of_an_imported_bag_passes_check(writer, robot, tmp_path, slow):
     bag = writer.write(tmp_path, "ros1")
     status, output = run(bag, *TOPICS, "--attitude", "/star", "--output", tmp_path / "out")

@@ -32,13 +32,20 @@ def run(
     ] = False,
     effort: Annotated[bool, typer.Option("--effort", help="Take efforts as joint torques.")] = False,
     accel: Annotated[bool, typer.Option(help="Take the accelerations of the IMU.")] = True,
+    start: Annotated[float, typer.Option(metavar="S", help="First instant, in seconds from the first stamp.")] = 0.0,
+    end: Annotated[float | None, typer.Option(metavar="S", help="Last instant, in the same seconds.")] = None,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="Length from the start, instead of --end.")
+    ] = None,
 ) -> Iterator[str]:
     """Make a recording from a bag of ROS 1 or ROS 2: NAME.csv, and NAME.import.json on where it comes from."""
     from bayesid._io.files import complete_folder, write_json
     from bayesid.recording.bag_import import BagTopics, import_bag
+    from bayesid.recording.bag_window import TimeWindow
     from bayesid.recording.ros_bag import format_stamp
 
-    wanted = BagTopics(joints, imu, attitude, tuple(without or ()), velocity, effort, accel)
+    window = TimeWindow.of_options(start, end, duration)
+    wanted = BagTopics(joints, imu, attitude, tuple(without or ()), velocity, effort, accel, window)
     imported = import_bag(bag, wanted)
     recording = imported.recording
     file = output / f"{recording.name}.csv"

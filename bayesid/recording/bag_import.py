@@ -8,7 +8,7 @@ left out, since nothing is known of the motion there.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,7 @@ from bayesid.recording.bag_channels import (
     of_joints,
 )
 from bayesid.recording.bag_clocks import refuse_mixed_clocks
+from bayesid.recording.bag_window import TimeWindow
 from bayesid.recording.recording import Recording
 from bayesid.recording.ros_bag import StampedTopic, read_topics
 
@@ -47,6 +48,8 @@ class BagTopics:
         Whether to take the joints' velocities beside their positions, and their efforts.
     accel : bool
         Whether to take the accelerations of the IMU.
+    window : TimeWindow
+        Which part of the bag to take.
     """
 
     joints: str
@@ -56,6 +59,7 @@ class BagTopics:
     velocity: bool = False
     effort: bool = False
     accel: bool = True
+    window: TimeWindow = field(default_factory=TimeWindow)
 
     def __post_init__(self) -> None:
         named = [topic for topic in (self.joints, self.imu, self.attitude) if topic is not None]
@@ -106,12 +110,13 @@ def import_bag(bag: Path, wanted: BagTopics) -> ImportedBag:
     Raises
     ------
     InputError
-        If the bag or a topic cannot be read, the topics are stamped by different clocks, a value is not finite, a joint
-        is in some messages only, or the IMU feels gravity.
+        If the bag or a topic cannot be read, the topics are stamped by different clocks, a topic has no message in the
+        window, a value is not finite, a joint is in some messages only, or the IMU feels gravity.
     """
     kinds = {wanted.joints: JOINTS, wanted.imu: IMU, wanted.attitude: ATTITUDES}
-    read = read_topics(bag, {name: allowed for name, allowed in kinds.items() if name is not None})
-    refuse_mixed_clocks(list(read.values()))
+    whole = read_topics(bag, {name: allowed for name, allowed in kinds.items() if name is not None})
+    refuse_mixed_clocks(list(whole.values()))
+    read = wanted.window.of(whole)
     joints, names = of_joints(read[wanted.joints], wanted.without)
     found = [(joints, joint_channels(joints, names, velocity=wanted.velocity, effort=wanted.effort))]
     if wanted.imu is not None:
@@ -120,7 +125,7 @@ def import_bag(bag: Path, wanted: BagTopics) -> ImportedBag:
     if wanted.attitude is not None:
         attitude = _during(joints, read[wanted.attitude])
         found.append((attitude, attitude_channels(attitude)))
-    topics = tuple(_described(topic, channels, len(read[topic.name].messages)) for topic, channels in found)
+    topics = tuple(_described(topic, channels, len(whole[topic.name].messages)) for topic, channels in found)
     return ImportedBag(_recording(bag, found), int(joints.stamps[0]), topics)
 
 

@@ -19,6 +19,7 @@ from scipy.interpolate import BPoly
 from scipy.optimize import minimize, minimize_scalar
 
 from bayesid._math.arrays import Floats, Integers
+from bayesid.recording.band_covariance import covariances_by_distance
 
 __all__ = ["JointSamples", "SmoothedJoint", "smooth"]
 
@@ -136,23 +137,28 @@ class SmoothedJoint:
         return {}
 
     def _lag_covariance(self, time: Floats, lags: int) -> Floats:
-        left, weights = self._interpolation(time)
         # the curve at a time depends on the states of the nodes left and right of it
-        states = left[:, None] * self.order + np.arange(2 * self.order)
-        size, count = self.states.size, len(time)
+        left, weights = self._interpolation(time)
+        count = len(time)
         result = np.zeros((lags + 1, count, 3, 3))
-        chunk = max(1, 4_000_000 // size)
-        for start in range(0, count, chunk):
-            rows = np.arange(start, min(start + chunk, count))
-            right = np.zeros((size, len(rows), 3))
-            for offset in range(2 * self.order):
-                right[states[rows, offset], np.arange(len(rows))] = weights[rows, :, offset]
-            solved = sla.cho_solve_banded((self.factor, True), right.reshape(size, -1), check_finite=False)
-            solved = solved.reshape(size, len(rows), 3)
-            for lag in range(min(lags, int(rows[-1])) + 1):
-                used = rows[rows >= lag]
-                earlier = solved[states[used - lag], (used - start)[:, None]]
-                result[lag, used] = np.einsum("tsk,tls->tkl", earlier, weights[used - lag])
+        apart = [left[lag:] - left[: count - lag] for lag in range(min(lags, count - 1) + 1)]
+        farthest = max(int(places.max()) for places in apart)
+        blocks = covariances_by_distance(self.factor, self.order)
+        here = next(blocks)
+        before, after = next(blocks).transpose(0, 2, 1), None
+        for distance in range(farthest + 1):
+            after = before.transpose(0, 2, 1) if distance == 0 else next(blocks, np.zeros_like(here[:0]))
+            for lag, places in enumerate(apart):
+                rows = lag + np.flatnonzero(places == distance)
+                if len(rows):
+                    node = left[rows - lag]
+                    upper = np.concatenate([here[node], after[node]], axis=2)
+                    # of neighbours, the node right of the earlier time is that left of the later one
+                    lower = np.concatenate([before[node + (distance > 0)], here[node + 1]], axis=2)
+                    covariance = np.concatenate([upper, lower], axis=1)
+                    earlier = weights[rows - lag] @ covariance
+                    result[lag, rows] = weights[rows] @ earlier.transpose(0, 2, 1)
+            before, here = here, after
         return result
 
     def _interpolation(self, time: Floats) -> tuple[Integers, Floats]:
