@@ -9,6 +9,7 @@ from pathlib import Path
 from pypdf import PdfReader
 
 FOOTER = re.compile(r"\s*\d+\s*/\s*\d+\s*$")
+CAPTION_AT_THE_FOOT = re.compile(r"\nFigure \d+\.(?:(?!\nFigure \d+\.).)*$", re.DOTALL)
 BREAKABLE = re.compile("[\\s\u00ad\u200b-]+")
 
 
@@ -17,6 +18,8 @@ class PdfText:
     """Text of a PDF by page, without page numbers; sentences are looked up whatever the breaks of lines and pages.
 
     Typst breaks lines at spaces and hyphens and may hyphenate, so spaces and hyphens do not count in a comparison.
+    A figure at the foot of a page may stand between two halves of a sentence, so a sentence may also run on without
+    the caption that ends a page.
     """
 
     pages: tuple[str, ...]
@@ -26,7 +29,8 @@ class PdfText:
         return cls(tuple(FOOTER.sub("", page.extract_text()) for page in PdfReader(file).pages))
 
     def __contains__(self, text: str) -> bool:
-        return _bare(text) in _bare("".join(self.pages))
+        pages = ("".join(self.pages), "".join(CAPTION_AT_THE_FOOT.sub("", page) for page in self.pages))
+        return any(_bare(text) in _bare(version) for version in pages)
 
     def row(self, *cells: str) -> bool:
         """Whether these cells of a table stand beside each other."""

@@ -29,8 +29,12 @@ def wheel(time):
     return -(idle + 1270.0 * rise - 1230.0 * fall), -(slope + 300.0)
 
 
-def write_throws(folder: Path, body: str, rates, rng, *, drag=(0.0, 0.0, 0.0), tilt=(0.0, 0.0)) -> None:
-    """Write one file for each initial rate [rad/s], with drag coefficients [N m s] and a tilted wheel [rad]."""
+def write_throws(folder: Path, body: str, rates, rng, *, drag=(0.0, 0.0, 0.0), tilt=(0.0, 0.0), shake=0.0) -> None:
+    """Write one file for each initial rate [rad/s], with drag coefficients [N m s] and a tilted wheel [rad].
+
+    A force on the x axis of the accelerometer shakes at 6/7 of the wheel's speed with an amplitude, at 1000 rad/s, of
+    ``shake`` [m/s2].
+    """
     (folder / "throws").mkdir(parents=True, exist_ok=True)
     axis, brake = np.array([*tilt, 1.0]), np.array(drag)
 
@@ -46,6 +50,9 @@ def write_throws(folder: Path, body: str, rates, rng, *, drag=(0.0, 0.0, 0.0), t
         rate = solve_ivp(change, (clock[0], clock[-1]), rate, t_eval=clock, **options).y.T
         slope = np.array([change(t, w) for t, w in zip(clock, rate, strict=True)])
         force = -np.cross(slope, COM) - np.cross(rate, np.cross(rate, COM))
+        speed = np.abs(wheel(clock)[0])
+        turn = 6.0 / 7.0 * np.cumsum(speed) * (clock[1] - clock[0])
+        force[:, 0] += shake * (speed / 1000.0) ** 2 * np.cos(turn)
         columns = [1e6 * clock]
         for values, noise, scale in ((rate, RATE_NOISE, RATE_SCALE), (force, ACCEL_NOISE, ACCEL_SCALE)):
             seen = (values + noise * rng.normal(size=values.shape)) * SIGNS / scale

@@ -1,8 +1,8 @@
 """Causes hidden in MuJoCo's data must be found, outside effects called unknown, and nothing hidden raise no alarm.
 
-A part of the cases of `studies.truth.hidden_causes` runs by default, all of them with ``pytest --catalogue`` (half an
-hour). The same seed gives studies of one robot the same circumstances, so that they share compiled functions; the
-campaign in studies/blind_injections varies them.
+A part of the cases of `studies.truth.hidden_causes` runs by default, another with ``pytest --slow``, all of them with
+``pytest --catalogue`` (half an hour). The same seed gives studies of one robot the same circumstances, so that they
+share compiled functions; the campaign in studies/blind_injections varies them.
 """
 
 from __future__ import annotations
@@ -22,6 +22,24 @@ FOUND = [
 ]
 """Cases that always run."""
 
+FOUND_SLOWLY = [
+    "aerodynamic-drag",
+    "fuel-slosh",
+    "link-inertia:link2",
+    "link-inertia:link3",
+    "joint-flexibility:joint2",
+    "rate-scale",
+    "accel-position",
+    "joint-latency",
+    "encoder-offset:joint3",
+    "coloured-noise:rate",
+    "rate-clock",
+    "pulse-train",
+    "growing-torque",
+    "backlash",
+]
+"""Cases that run with the slow tests."""
+
 
 def right(result: Diagnosis, case: hidden_causes.Case) -> bool:
     """Whether a named set is the hidden one, by any of its names."""
@@ -38,8 +56,10 @@ def right(result: Diagnosis, case: hidden_causes.Case) -> bool:
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     every = metafunc.config.getoption("--catalogue")
-    cases = [case for case in hidden_causes.CASES if every or case.name in FOUND]
-    metafunc.parametrize("case", cases, ids=[case.name for case in cases])
+    known = {case.name: case for case in hidden_causes.CASES}
+    later = [pytest.param(known[name], marks=pytest.mark.slow, id=name) for name in FOUND_SLOWLY]
+    always = [pytest.param(known[name], id=name) for name in (known if every else FOUND)]
+    metafunc.parametrize("case", always if every else always + later)
 
 
 def test_what_is_hidden_is_said(case, tmp_path):

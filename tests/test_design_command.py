@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +20,7 @@ from bayesid.app.study_to_design import load_problem
 from bayesid.app.study_to_encoders import assume_missing, encoder_noise
 from bayesid.design import Store, expected_probability, noncentrality_for
 from bayesid.design.extended_posture import extended_posture
-from bayesid.design.trajectory_search import _Run
+from bayesid.design.polish import _Descent
 from bayesid.recording.recording import Recording
 from bayesid.report.numbers import format_fixed, format_number
 from bayesid.robot.end_effector import Tip
@@ -83,19 +84,20 @@ def shared_problem():
 
 @pytest.fixture(scope="module")
 def made(shared_problem, tmp_path_factory: pytest.TempPathFactory):
-    """A design that was interrupted in its third search and taken up again; the text of its report."""
+    """A design that was interrupted in its second search and taken up again; the text of its report."""
     folder, patch = tmp_path_factory.mktemp("design"), pytest.MonkeyPatch()
-    file, kept = write(folder), []
-    minimise = _Run.minimise
+    file, kept, one_at_a_time = write(folder), [], Lock()
+    minimise = _Descent.minimise
 
     def stop(self) -> None:
-        if len(kept) == 2:
-            raise KeyboardInterrupt
-        minimise(self)
-        kept.append(self.best)
+        with one_at_a_time:
+            if len(kept) == 1:
+                raise KeyboardInterrupt
+            minimise(self)
+            kept.append(self.best)
 
     with patch.context() as interrupted:
-        interrupted.setattr(_Run, "minimise", stop)
+        interrupted.setattr(_Descent, "minimise", stop)
         status, text = run("design", file, "--output", folder / "out", *EFFORT)
     assert status == 130
     assert "continues" in text
@@ -164,7 +166,7 @@ def test_the_report_holds_the_result_and_the_assumptions(made):
         "were designed to identify base_link",
         f"The smallest posterior is that of {content['best']}",
         "−y1² + y2² + 3 y3²",
-        "white noise of the sensors alone",
+        "white noise of the sensors and the noise of the encoders",
         "each the larger of the one relative to the base",
         "initial rate, which the manoeuvre does not cause, is left out",
         "99 % below",
@@ -255,9 +257,9 @@ def test_the_papers_family_extends_the_wrist():
 
 def test_state_of_another_question_is_not_used(tmp_path: Path):
     store = Store(tmp_path / "search.json", "one")
-    store.of("a").keep(0, np.array([1.0]), 2.0, 7)
-    assert Store.open(tmp_path / "search.json", "one").of("a").known(0)[1:] == (2.0, 7)
-    assert Store.open(tmp_path / "search.json", "two").of("a").known(0) is None
+    store.of("a").keep("0.0", np.array([1.0]), 2.0, 7)
+    assert Store.open(tmp_path / "search.json", "one").of("a").known("0.0")[1:] == (2.0, 7)
+    assert Store.open(tmp_path / "search.json", "two").of("a").known("0.0") is None
     (tmp_path / "search.json").write_text("{")
     with pytest.raises(InputError, match="Delete the file"):
         Store.open(tmp_path / "search.json", "one")

@@ -13,6 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from studies.truth import hidden_causes
 from studies.truth import mujoco as mj
+from studies.truth.hidden_causes import causes as hide
+from studies.truth.hidden_causes.case import merge
 from studies.truth.urdf import SERVICER3, SERVICER4, link_body
 
 REST = (np.zeros(3), np.zeros(3), np.zeros(3))
@@ -204,3 +206,18 @@ def test_table_covers_the_catalogue() -> None:
     assert statuses.count("unknown") >= 4
     assert statuses.count("adequate") >= 6
     assert sum(len(case.causes) == 2 for case in hidden_causes.CASES) >= 3
+
+
+def test_two_understated_noises_are_both_declared() -> None:
+    """What one cause declares does not take away what the other does."""
+    case = next(case for case in hidden_causes.CASES if case.name == "rate-noise, accel-noise")
+    first, second = (build(np.random.default_rng(0), 1.0) for build in case.builds)
+    both = merge(first, second)["declared"]
+    assert both == {**first["declared"], **second["declared"]}
+    assert len(both) == 2
+
+
+def test_two_causes_cannot_spoil_the_same_samples() -> None:
+    spoilt = hide.outliers("rate", np.random.default_rng(0), 1.0)
+    with pytest.raises(ValueError, match="common cause"):
+        merge(spoilt, spoilt)

@@ -198,6 +198,12 @@ def test_a_users_file_executes(tmp_path: Path):
         ("x = 1", (), ["it defines no spacecraft"]),
         ("def execute(plan):\n    return 3\n", (), ["execute returned a int", "Recording.read"]),
         (SPACECRAFT, ("--wanted", 2.0), ["2 is not between 0 and 1"]),
+        (SPACECRAFT, ("--wanted-sd", "base_link=0.5"), ["names no body to identify", "base_link.mass=0.5"]),
+        (SPACECRAFT, ("--wanted-sd", "base_link.mass=light"), ["has no number after '='"]),
+        (SPACECRAFT, ("--wanted-sd", "base_link.weight=0.5"), ["'weight' is no quantity of a body", "mass"]),
+        (SPACECRAFT, ("--wanted-tip", -1), ["-1 mm"]),
+        (SPACECRAFT, ("--wanted-cause", "payload:link2=0.2"), ["0.2 is no probability that decides"]),
+        (SPACECRAFT, ("--no-diagnose", "--wanted-cause", "payload:link2"), ["the steps are not reviewed"]),
         (SPACECRAFT, ("--at-most", 0), ["0 manoeuvres"]),
     ],
 )

@@ -18,7 +18,9 @@ def test_the_origin_names_every_file_with_its_hash(tmp_path):
         recordings=[SimpleNamespace(file=file) for file in recordings],
     )
     hashes = [f"{file.name} {hashlib.sha256(file.name.encode()).hexdigest()[:12]}" for file in files]
-    tail = f"bayesid {version('bayesid')}, seed 7, command: bayesid diagnose."
-    assert report_origin(made, "diagnose", 7) == f"SHA-256: {', '.join(hashes)}. {tail}"
+    said = f"bayesid {version('bayesid')}, seed 7, command: bayesid diagnose"
+    options = ["--output", "my results"]
+    found = report_origin(made, "diagnose", 7, options)
+    assert found == f"SHA-256: {', '.join(hashes)}. {said} study.toml --seed 7 --output 'my results'"
     made.file = None
-    assert report_origin(made, "diagnose", 7) == f"SHA-256: {', '.join(hashes[1:])}. {tail}"
+    assert report_origin(made, "diagnose", 7) == f"SHA-256: {', '.join(hashes[1:])}. {said} --seed 7"

@@ -10,6 +10,7 @@ from studies.blind_injections.goals import _least, _most, _rate, _scatter, inter
 from studies.blind_injections.report import confusion, rates, reliability, scores, statements
 from studies.blind_injections.trials import Plan, read
 from studies.common.monte_carlo import read_store
+from studies.truth import hidden_causes
 
 PLANS = [Plan("rate-bias", 5, 0.3), Plan("null, three joints", 5)]
 
@@ -118,7 +119,7 @@ def test_the_plans_hide_everything_and_nothing():
     for full in (False, True):
         plans = plan(full)
         assert len({item.seed for item in plans}) == len(plans)
-        assert len({item.case for item in plans}) == 68
+        assert len({item.case for item in plans}) == len(hidden_causes.CASES)
     assert sum(item.case.startswith("null") for item in plans) == 1000
 
 

@@ -8,6 +8,7 @@ import pytest
 from bayesid.diagnosis import Status, diagnose
 from studies.throws.data import SMOOTH, Timing, read_throws, read_truth
 from studies.throws.diagnosis import SPREAD, device_candidates
+from studies.throws.left_over import ORDERS, orders_of
 from studies.throws.model import extended, manoeuvres, rigid
 from studies.throws.noise import quiet_noise
 from studies.throws.regression import regress
@@ -61,6 +62,15 @@ def test_the_regression_needs_the_mass_alone(tmp_path):
     found = regress(read_throws(tmp_path, "body", Timing()), MASS)
     np.testing.assert_allclose(np.linalg.eigvalsh(found.inertia), np.linalg.eigvalsh(INERTIA), rtol=0.03)
     np.testing.assert_allclose(found.com, COM, atol=0.001)
+
+
+@pytest.mark.parametrize(("shake", "there"), [(0.0, False), (0.5, True)])
+def test_a_wheel_that_shakes_is_seen_at_the_order_of_its_turns(tmp_path, shake, there):
+    write_throws(tmp_path, "body", RATES[:1], np.random.default_rng(6), shake=shake)
+    orders = orders_of(read_throws(tmp_path, "body", Timing())[0], tmp_path)[:, 3]
+    peak = ORDERS[np.argmax(orders)]
+    assert (orders.max() > 10.0 * np.median(orders)) == there
+    assert not there or abs(peak - 6.0 / 7.0) < 0.03
 
 
 @pytest.mark.slow

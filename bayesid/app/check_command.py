@@ -25,7 +25,7 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
     from bayesid.inference.recording_check import check_recording, refuse_wrong_units
     from bayesid.report import check_report
 
-    posterior = load_posterior(study)
+    posterior = load_posterior(study, window=0)  # nothing is fitted: the samples' correlations do not matter
     refuse_wrong_units(posterior)
     count = len(posterior.manoeuvres)
     yield f"{study.title}: {count} recordings, {posterior.samples} samples, {posterior.size} unknowns."

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Annotated
 
 import typer
@@ -19,8 +22,8 @@ def run(
     output: Output,
     progress: Progress,
     seed: Seed = 0,
-    starts: Annotated[int, typer.Option(min=1, help="Number of random starts for every criterion.")] = 2,
-    iterations: Annotated[int, typer.Option(min=1, help="Iterations of the optimiser per start.")] = 60,
+    starts: Annotated[int, typer.Option(min=1, help="Number of random starts for every criterion.")] = 12,
+    iterations: Annotated[int, typer.Option(min=1, help="Iterations of the optimiser from the last ones.")] = 250,
     separate: Annotated[
         tuple[str, str] | None,
         typer.Option(metavar="A B", help="Two effects of the catalogue that the manoeuvre is to tell apart."),
@@ -51,11 +54,12 @@ def run(
     if assumed:
         yield f"The study gives no sensors.encoder.sigma of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
     progress(0.0, "compiling")
-    store = Store.open(
-        output / "search.json", content_key(*defining_files(study), seed, starts, iterations, *(separate or ()))
-    )
+    effort = Search(starts, iterations)
+    key = content_key(*defining_files(study), seed, effort, *(separate or ()))
+    store = Store.open(output / "search.json", key)
     try:
-        designs = design(problem, seed, noise, Search(starts, iterations), store=store, progress=progress)
+        with ThreadPoolExecutor(os.cpu_count()) as executor:
+            designs = design(problem, seed, noise, replace(effort, executor=executor), store=store, progress=progress)
         best = best_design(designs)
     except InputError as error:
         raise error.within(file=file) from None

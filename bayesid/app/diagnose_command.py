@@ -70,26 +70,22 @@ def diagnose_study(
     from bayesid._io.files import complete_folder, write_json
     from bayesid._io.phase_clock import PhaseClock
     from bayesid.app.report_origin import report_origin
+    from bayesid.app.study_to_causes import cause_prior, stated_bounds
     from bayesid.app.study_to_model import load_manoeuvres, load_model
-    from bayesid.diagnosis import CausePrior, diagnose, identify_extended
+    from bayesid.diagnosis import diagnose, identify_extended
     from bayesid.inference.posterior_file import write_netcdf
     from bayesid.report import diagnosis_report
     from bayesid.report.sentences.diagnosis_sentences import diagnosis_sentences
-    from bayesid.simulation.effects import PhysicalBound
 
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
     knows = all(section.argument_of_latitude is not None for section in study.recordings)
-    said = study.diagnosis
     result = diagnose(
         model,
         manoeuvres,
         seed,
-        bounds={
-            label: [PhysicalBound(unit, size, "Stated in the study.") for unit, size in sizes.items()]
-            for label, sizes in said.bounds.items()
-        },
-        prior=CausePrior(said.one_more_cause, said.outside_catalogue),
+        bounds=stated_bounds(study),
+        prior=cause_prior(study),
         knows_latitude=knows,
         progress=progress if effective_samples is None else part_of(progress, 0.0, VERDICT),
     )
@@ -105,7 +101,8 @@ def diagnose_study(
         result.unexplained.write(folder / "unexplained.csv")
         if identification is not None:
             write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
-        origin = report_origin(study, "diagnose", seed)
+        asked = ["--no-sample"] if effective_samples is None else ["--samples", f"{effective_samples:g}"]
+        origin = report_origin(study, "diagnose", seed, ["--output", output.name, *asked])
         diagnosis_report(result, identification, study.title, folder / "report.pdf", origin=origin)
         clock.ends("report")
         content = result.to_dict(identification)

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress
 from bayesid.app.options import Output, Samples, Seed, StudyFile
-
-if TYPE_CHECKING:
-    from bayesid.design.loop_history import History
 
 __all__ = ["run"]
 
@@ -27,14 +24,22 @@ def run(
     spacecraft: Annotated[
         Path | None, typer.Option(help="Python file that executes plans; without it, put the recordings into DIR.")
     ] = None,
-    wanted: Annotated[float, typer.Option(help="Relative sd of mass and principal moments at which to stop.")] = 0.01,
+    wanted: Annotated[
+        float | None, typer.Option(help="Relative sd of mass and principal moments; 0.01 if nothing else is wanted.")
+    ] = None,
+    wanted_sd: Annotated[
+        list[str] | None, typer.Option(metavar="BODY.QUANTITY=SD", help="Sd of a quantity in SI units; repeatable.")
+    ] = None,
+    wanted_tip: Annotated[
+        float | None, typer.Option(metavar="MM", help="Semi-axis of the end-effector's 95 % region.")
+    ] = None,
+    wanted_cause: Annotated[
+        str | None, typer.Option(metavar="NAME[=0.95]", help="Cause whose presence is to be decided.")
+    ] = None,
     at_most: Annotated[int, typer.Option(help="Largest number of manoeuvres.")] = 5,
+    diagnose: Annotated[bool, typer.Option(help="Diagnose after every step, and stop if the model is wrong.")] = True,
 ) -> Iterator[str]:
-    """Plan a manoeuvre, have it executed, identify, and plan again from the posterior: loop.json."""
-    if not 0.0 < wanted < 1.0:
-        raise InputError(
-            f"{wanted:g} is not between 0 and 1", place="--wanted", remedy="Give a relative precision: 0.01 is 1 %"
-        )
+    """Plan a manoeuvre, have it executed, identify, diagnose, plan again: loop.json and report.pdf."""
     if at_most < 1:
         raise InputError(f"{at_most} manoeuvres", place="--at-most", remedy="Allow at least one")
 
@@ -42,46 +47,33 @@ def run(
 
     study = Study.load(file)
 
+    from bayesid.app.report_origin import report_origin
+    from bayesid.app.study_to_causes import loop_review
     from bayesid.app.study_to_design import load_loop_problem
     from bayesid.app.study_to_encoders import encoder_noise
     from bayesid.app.user_spacecraft import Nobody, load_spacecraft
+    from bayesid.app.wanted import goals_of
     from bayesid.design import Loop, Sampled
+    from bayesid.report import loop_report
+    from bayesid.report.sentences.loop_sentences import loop_sentences
 
     problem = load_loop_problem(study)
+    model, tip_frame = problem.plan.model, None if study.design is None else study.design.tip_frame
     loop = Loop(
         problem,
-        encoder_noise(study, problem.plan.model.robot),
+        encoder_noise(study, model.robot),
         seed=seed,
-        wanted=wanted,
+        goals=goals_of(model, wanted, wanted_sd or (), wanted_tip, wanted_cause, tip_frame),
         at_most=at_most,
         identifier=Sampled(samples),
+        reviewer=loop_review(study) if diagnose else None,
     )
     history = loop.run(Nobody() if spacecraft is None else load_spacecraft(spacecraft), output, progress)
-    yield from _sentences(history, wanted)
-
-
-def _sentences(history: History, wanted: float) -> Iterator[str]:
-    for step in history.steps:
-        number, attempts = step["step"], step["plan"]["attempts"]
-        if len(attempts) > 1:
-            yield f"Step {number}: limits tightened {len(attempts) - 1} times until they held with 99 %."
-        identification = step.get("identification")
-        if identification is not None:
-            for name, body in identification["bodies"].items():
-                yield f"Step {number}: {name}: mass {body['mass']['mean']:.6g} +- {body['mass']['sd']:.2g} kg"
-            precision = identification["precision"]
-            yield f"Step {number}: the worst of mass and principal moments is known to {precision:.2%}."
-            yield from identification["disagreements"]
-    number = len(history.steps)
-    if history.status == "waiting":
-        yield f"Fly {history.path(number, 'plan')}: positions, velocities and accelerations of the joints."
-        recording = history.path(number, "recording")
-        yield f"Write the readings of the sensors and encoders to {recording}, then run this command again."
-    elif history.status == "no-go":
-        broken = [name for name, item in attempts[-1]["limits"].items() if not item["quantile_99"] <= item["limit"]]
-        yield f"No go: {', '.join(broken)} would not hold with 99 %, however small the manoeuvre was made."
-    elif history.status == "reached":
-        yield f"The wanted {wanted:.2%} are reached after {number} manoeuvres."
-    else:
-        yield f"The wanted {wanted:.2%} are not reached after {number} manoeuvres; --at-most allows more."
+    yield from loop_sentences(history)
+    if any("identification" in step for step in history.steps):
+        options = ["--output", output.name, "--at-most", str(at_most)]
+        options += [] if spacecraft is None else ["--spacecraft", spacecraft.name]
+        origin = report_origin(study, "loop", seed, options)
+        loop_report(history, study.title, output / "report.pdf", origin=origin)
+        yield f"Wrote {output / 'report.pdf'}."
     yield f"Wrote {history.folder / 'loop.json'}."

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from importlib.metadata import version
 
 from bayesid._io.store import file_key
@@ -13,10 +15,22 @@ DIGITS = 12
 """Digits of a hash that are printed."""
 
 
-def report_origin(study: Study, command: str, seed: int) -> str:
-    """Return the files of a study with the beginnings of their SHA-256, the version, the seed and the command."""
+def report_origin(study: Study, command: str, seed: int, options: Sequence[str] = ()) -> str:
+    """Return the files of a study with the beginnings of their SHA-256, the version, the seed and the whole command.
+
+    Parameters
+    ----------
+    study : Study
+    command : str
+        Name of the command.
+    seed : int
+    options : sequence of str
+        Further words of the command.
+    """
     files = [study.robot.urdf, *(recording.file for recording in study.recordings)]
     if study.file is not None:
         files.insert(0, study.file)
     hashes = ", ".join(f"{file.name} {file_key(file)[:DIGITS]}" for file in files)
-    return f"SHA-256: {hashes}. bayesid {version('bayesid')}, seed {seed}, command: bayesid {command}."
+    place = [] if study.file is None else [study.file.name]
+    words = shlex.join(["bayesid", command, *place, "--seed", str(seed), *options])
+    return f"SHA-256: {hashes}. bayesid {version('bayesid')}, seed {seed}, command: {words}"

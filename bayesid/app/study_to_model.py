@@ -31,8 +31,14 @@ CHANGE_SEED = 0
 """Seed of the draws of an uncertain mass-property change, so that a study always has the same prior."""
 
 
-def load_posterior(study: Study) -> Posterior:
+def load_posterior(study: Study, window: int | None = None) -> Posterior:
     """Read all files that a study names, and return its posterior.
+
+    Parameters
+    ----------
+    study : Study
+    window : int, optional
+        As for `Posterior.of`.
 
     Raises
     ------
@@ -40,7 +46,7 @@ def load_posterior(study: Study) -> Posterior:
         If a file is absent or a rule is broken; the message names file, place, value and remedy.
     """
     model = load_model(study)
-    return Posterior.of(model, load_manoeuvres(study, model.robot))
+    return Posterior.of(model, load_manoeuvres(study, model.robot), window=window)
 
 
 def load_robot(study: Study) -> Robot:

@@ -22,6 +22,7 @@ from bayesid.design.designed import Design, best_design, design, evaluate
 from bayesid.design.excitation_loop import Loop, NotFlown
 from bayesid.design.expected_probability import expected_probability, noncentrality_for
 from bayesid.design.knowledge_update import Laplace, Sampled, worst_relative_sd
+from bayesid.design.loop_goals import CauseProbability, Goal, QuantitySd, RelativePrecision, TipRegion
 from bayesid.design.motion_limits import Limit, Limits
 from bayesid.design.plan import Plan
 from bayesid.design.predicted_posterior import Predicted, planned_manoeuvre, planned_posterior, predict
@@ -34,6 +35,7 @@ from bayesid.robot.end_effector import Tip
 __all__ = [
     "AOptimal",
     "BSplines",
+    "CauseProbability",
     "ConditionNumber",
     "Criterion",
     "DOptimal",
@@ -41,6 +43,7 @@ __all__ = [
     "EOptimal",
     "Found",
     "Fourier",
+    "Goal",
     "InformationGain",
     "Laplace",
     "Limit",
@@ -55,6 +58,8 @@ __all__ = [
     "PlannedMotion",
     "Predicted",
     "Problem",
+    "QuantitySd",
+    "RelativePrecision",
     "Sampled",
     "Search",
     "Separation",
@@ -62,6 +67,7 @@ __all__ = [
     "Spacecraft",
     "Store",
     "Tip",
+    "TipRegion",
     "TrajectoryFamily",
     "best_design",
     "design",

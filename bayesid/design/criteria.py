@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from bayesid._io.errors import InputError
-from bayesid.design.plan import Plan, PlannedOutcome
+from bayesid.design.plan import Outcome, Plan
 
 __all__ = [
     "AOptimal",
@@ -38,21 +38,24 @@ class Criterion(Protocol):
     ----------
     name : str
         Name of the criterion in design.json.
+    informed : bool
+        Whether the cost depends on the information of the sensors, which takes longest to compute.
     """
 
     name: ClassVar[str]
+    informed: ClassVar[bool]
 
     @property
     def draws(self) -> int:
         """Number of draws of the prior over which the cost is averaged; 0 for the prior's centre alone."""
         ...
 
-    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return the scalar to be minimised, differentiable by JAX."""
         ...
 
 
-def covariance(plan: Plan, outcome: PlannedOutcome) -> Array:
+def covariance(plan: Plan, outcome: Outcome) -> Array:
     """Return the Laplace posterior covariance of the log-Cholesky coordinates of the bodies to identify.
 
     All other unknowns are marginalised. The coordinates are relative: the relative standard deviation of a mass is
@@ -61,7 +64,7 @@ def covariance(plan: Plan, outcome: PlannedOutcome) -> Array:
     return _of_bodies(plan, outcome.information + _prior(plan, outcome))
 
 
-def _prior(plan: Plan, outcome: PlannedOutcome) -> Array:
+def _prior(plan: Plan, outcome: Outcome) -> Array:
     return jnp.eye(plan.unknowns.size) if outcome.prior is None else outcome.prior
 
 
@@ -80,9 +83,10 @@ class Paper26:
     """
 
     name: ClassVar[str] = "paper-26"
+    informed: ClassVar[bool] = False
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus (26)."""
         squares = _largest_squares(outcome)
         value = jnp.sum(squares)
@@ -99,9 +103,10 @@ class Paper26Intended:
     """
 
     name: ClassVar[str] = "paper-26-intended"
+    informed: ClassVar[bool] = False
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus (26) with the sizes of the differences."""
         squares = _largest_squares(outcome)
         value = jnp.sum(squares)
@@ -119,9 +124,10 @@ class ConditionNumber:
     """
 
     name: ClassVar[str] = "condition-number"
+    informed: ClassVar[bool] = False
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return the logarithm of the largest singular value over the smallest."""
         squares = jnp.linalg.eigvalsh(outcome.regressor.T @ outcome.regressor)
         return 0.5 * (jnp.log(squares[-1]) - jnp.log(jnp.maximum(squares[0], 1e-15 * squares[-1])))
@@ -132,9 +138,10 @@ class DOptimal:
     """Volume of the posterior, as half the logarithm of the determinant of its covariance."""
 
     name: ClassVar[str] = "d-optimal"
+    informed: ClassVar[bool] = True
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return half the log-determinant."""
         return 0.5 * jnp.linalg.slogdet(covariance(plan, outcome))[1]
 
@@ -144,9 +151,10 @@ class AOptimal:
     """Logarithm of the root mean square of the standard deviations of the log-Cholesky coordinates."""
 
     name: ClassVar[str] = "a-optimal"
+    informed: ClassVar[bool] = True
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return the logarithm of the root mean square."""
         return 0.5 * jnp.log(jnp.mean(jnp.diag(covariance(plan, outcome))))
 
@@ -156,9 +164,10 @@ class EOptimal:
     """Logarithm of the standard deviation of the log-Cholesky coordinates along the worst direction."""
 
     name: ClassVar[str] = "e-optimal"
+    informed: ClassVar[bool] = True
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return the logarithm of the largest standard deviation over all directions."""
         return 0.5 * jnp.log(jnp.linalg.eigvalsh(covariance(plan, outcome))[-1])
 
@@ -171,9 +180,10 @@ class InformationGain:
     """
 
     name: ClassVar[str] = "information-gain"
+    informed: ClassVar[bool] = True
     draws: int = 4
 
-    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus the gain at one draw."""
         prior = jnp.linalg.slogdet(_of_bodies(plan, _prior(plan, outcome)))[1]
         return 0.5 * (jnp.linalg.slogdet(covariance(plan, outcome))[1] - prior)
@@ -183,9 +193,10 @@ class InformationGain:
 class Separation:
     """Smallest signal-to-noise ratio of any of several rival effects, with all other unknowns marginalised.
 
-    The other unknowns include the remaining rivals. For two effects of one parameter the squared ratio is
-    lambda (1 - rho^2) of the weaker one. The model of the plan must contain the rivals; their amplitudes are those of
-    their priors.
+    The other unknowns include the remaining rivals. Half the squared ratio is the expected log Bayes factor of the
+    rival against all others if it acts in the direction of its amplitudes that shows least, with the size of its prior.
+    For two effects of one parameter the squared ratio is lambda (1 - rho^2) of the weaker one. The model of the plan
+    must contain the rivals.
 
     Parameters
     ----------
@@ -195,6 +206,7 @@ class Separation:
 
     rivals: tuple[str, ...]
     name: ClassVar[str] = "separation"
+    informed: ClassVar[bool] = True
     draws: int = 0
 
     def __post_init__(self) -> None:
@@ -203,8 +215,8 @@ class Separation:
                 f"{len(self.rivals)} effects to tell apart", place="design.rivals", remedy="Name at least two"
             )
 
-    def noncentrality(self, plan: Plan, outcome: PlannedOutcome) -> Array:
-        """Return the expected lambda (1 - rho^2) of each rival, shape (rivals,)."""
+    def noncentrality(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return lambda (1 - rho^2) of each rival in its worst direction, at the size of its prior, shape (rivals,)."""
         groups = [jnp.asarray(self._coordinates(plan, label), dtype=int) for label in self.rivals]
         # no prior on the rivals' amplitudes, because a rival may have any size
         free = jnp.ones(plan.unknowns.size).at[jnp.concatenate(groups)].set(0.0)
@@ -214,10 +226,10 @@ class Separation:
             rest = jnp.setdiff1d(jnp.arange(plan.unknowns.size), group, size=plan.unknowns.size - len(group))
             direct = outcome.information[jnp.ix_(group, group)]
             cross = outcome.information[jnp.ix_(group, rest)]
-            values.append(jnp.trace(direct - cross @ _inverse(total[jnp.ix_(rest, rest)]) @ cross.T))
+            values.append(jnp.linalg.eigvalsh(direct - cross @ _inverse(total[jnp.ix_(rest, rest)]) @ cross.T)[0])
         return jnp.stack(values)
 
-    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus the logarithm of the smallest square root of a noncentrality."""
         return -0.5 * jnp.log(jnp.maximum(jnp.min(self.noncentrality(plan, outcome)), 1e-12))
 
@@ -232,7 +244,7 @@ class Separation:
         return coordinates
 
 
-def _largest_squares(outcome: PlannedOutcome) -> Array:
+def _largest_squares(outcome: Outcome) -> Array:
     return jnp.max(jnp.abs(outcome.trajectory.excursion), axis=0) ** 2
 
 

@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from threading import get_ident
+from types import MappingProxyType
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from numpy.typing import NDArray
 
 from bayesid._io.errors import InputError
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid.design.criteria import Criterion
+from bayesid.design.encoder_shadow import Encoder, encoder_shadow, position_noise
+from bayesid.design.flight import Flight
 from bayesid.design.motion_limits import ACTIVE, Limit, Limits, smooth_largest
-from bayesid.design.plan import Plan, Trajectory
+from bayesid.design.plan import FlightOutcome, Plan
+from bayesid.design.trajectory import Trajectory
 
 __all__ = ["FINER", "Known", "Problem", "Reached"]
 
-QUICKLY = {"xla_llvm_disable_expensive_passes": True}
-"""Options of XLA with which compilation is a third faster and the compiled code is as fast."""
+QUICKLY = {"xla_llvm_disable_expensive_passes": True, "xla_cpu_use_fusion_emitters": False}
+"""Options of XLA with which compilation takes half the time and the compiled code is as fast."""
 
 FINER = 8
 """Ratio of the optimiser's time step to the one at which the limits of a result are checked."""
 
-_SHARED = ("_cost", "_fractions", "_fine_trajectory")
+_SHARED = ("_informed_cost", "_motion_cost", "_fractions", "_fine_trajectory")
 """Names of the compiled functions that depend neither on bounds nor on prior knowledge, both of which are arguments."""
 
 
@@ -108,6 +116,39 @@ class Problem:
         """Bound of every limit, shape (m,)."""
         return np.array([limit.bound for limit in self.applied])
 
+    @cached_property
+    def shadow(self) -> Floats:
+        """Directions of the readings that errors of the encoders could explain (`encoder_shadow`), at rest."""
+        return self.shadow_along(self.plan.family.centre)
+
+    def shadow_along(self, parameters: Floats) -> Floats:
+        """Return the directions of the readings that errors of the encoders could explain along a motion."""
+        samples = self.plan.samples
+        if not any(self.plan.encoder_sigma):
+            return encoder_shadow(self.plan, parameters, np.zeros((len(samples), 3)))
+        fine = self.trajectory(parameters)
+        rate = np.stack([np.interp(samples, fine.time, fine.rate[:, axis]) for axis in range(3)], axis=1)
+        return encoder_shadow(self.plan, parameters, rate)
+
+    @cached_property
+    def limit_of_fraction(self) -> Integers:
+        """Index of the limit to which each of `fractions` belongs."""
+        shape = jax.eval_shape(
+            lambda p: self.plan.trajectory(p, jnp.asarray(self.centre))[1:], jnp.zeros(self.plan.family.size)
+        )
+        empty = Trajectory(self.plan.instants, *(jnp.zeros(part.shape) for part in shape))
+        counts = [len(smooth_largest(limit, empty, limit.bound)) for limit in self.applied]
+        return np.repeat(np.arange(len(counts)), counts)
+
+    @cached_property
+    def shrinkable(self) -> NDArray[np.bool_]:
+        """Whether a smaller motion reduces each of `fractions`."""
+        return np.array([limit.shrinks for limit in self.applied])[self.limit_of_fraction]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what the problem is made of, without anything compiled."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
     def with_limits(self, limits: Limits) -> Problem:
         """Return the problem with other bounds of the same limits, without a new compilation."""
         new = replace(self, limits=limits)
@@ -118,6 +159,14 @@ class Problem:
     def knowing(self, known: Known) -> Problem:
         """Return the problem with the knowledge from earlier manoeuvres, without a new compilation."""
         return self._sharing(replace(self, known=known))
+
+    def with_encoder(self, encoder: Encoder) -> Problem:
+        """Return the problem with the noise of the encoders, without a new compilation."""
+        joints = tuple(joint.name for joint in self.plan.model.robot.joints)
+        sigma = tuple(float(value) for value in position_noise(encoder, joints))
+        if sigma == self.plan.encoder_sigma:
+            return self
+        return self._sharing(replace(self, plan=replace(self.plan, encoder_sigma=sigma)))
 
     def _sharing(self, other: Problem) -> Problem:
         other.__dict__.update({key: getattr(self, key) for key in _SHARED})
@@ -133,6 +182,18 @@ class Problem:
         """Precision of the prior in the unknowns' coordinates, shape (n, n)."""
         return np.eye(self.plan.unknowns.size) if self.known is None else self.known.precision
 
+    def compile(self) -> None:
+        """Compile all functions of the problem at once, each in a thread of its own; at most once."""
+        if "_latest" in self.__dict__:
+            return
+        parameters = self.plan.family.centre
+        first = {criterion.informed: criterion for criterion in self.criteria}
+        with ThreadPoolExecutor() as pool:
+            pending: list[Future[Any]] = [pool.submit(self.cost, one, parameters) for one in first.values()]
+            pending += [pool.submit(self.fractions, parameters), pool.submit(self.trajectory, parameters)]
+            for future in pending:
+                future.result()
+
     def draws(self, count: int, rng: np.random.Generator) -> Floats:
         """Return draws of the bodies from their prior, other unknowns at its centre, shape (count, n)."""
         bodies = 10 * len(self.plan.model.priors)
@@ -143,13 +204,18 @@ class Problem:
 
     def cost(self, criterion: Criterion, parameters: Floats, points: Sequence[Floats] = ()) -> tuple[float, Floats]:
         """Return a criterion and its gradient, averaged over points of the unknowns, by default the prior's centre."""
-        index = self.criteria.index(criterion)
-        pairs = [self._cost(parameters, z, index, self.precision) for z in (points or [self.centre])]
+        alike = [own for own in self.criteria if own.informed is criterion.informed]
+        compiled = self._informed_cost if criterion.informed else self._motion_cost
+        index = alike.index(criterion)
+        pairs = [compiled(parameters, z, index, self.precision, self.shadow) for z in (points or [self.centre])]
         return float(np.mean([pair[0] for pair in pairs])), np.mean([np.asarray(pair[1]) for pair in pairs], axis=0)
 
-    def costs(self, parameters: Floats) -> dict[str, float]:
-        """Return every criterion at the prior's centre."""
-        return {criterion.name: self.cost(criterion, parameters)[0] for criterion in self.criteria}
+    def costs(self, parameters: Floats, points: Mapping[str, list[Floats]] = MappingProxyType({})) -> dict[str, float]:
+        """Return the values of all criteria by name, each averaged over its points or at the prior's centre."""
+        return {
+            criterion.name: self.cost(criterion, parameters, points.get(criterion.name, ()))[0]
+            for criterion in self.criteria
+        }
 
     def fractions(self, parameters: Floats) -> tuple[Floats, Floats]:
         """Return the used fractions of all limits, shape (m,), and their Jacobian, shape (m, n).
@@ -157,15 +223,16 @@ class Problem:
         The fractions are smooth functions of the parameters and never smaller than the true ones.
         """
         key = np.asarray(parameters, dtype=float).tobytes()
-        if key not in self._latest:  # the optimiser requests value and slope at one point in two calls
+        thread = get_ident()  # the optimiser of a thread requests value and slope at one point in two calls
+        latest = self._latest.get(thread)
+        if latest is None or latest[0] != key:
             value, slope = self._fractions(parameters, self.centre, self.bounds)
-            self._latest.clear()
-            self._latest[key] = (np.asarray(value), np.asarray(slope))
-        return self._latest[key]
+            latest = self._latest[thread] = (key, (np.asarray(value), np.asarray(slope)))
+        return latest[1]
 
     @cached_property
-    def _latest(self) -> dict[bytes, tuple[Floats, Floats]]:
-        """Latest result of `fractions`, by the parameters."""
+    def _latest(self) -> dict[int, tuple[bytes, tuple[Floats, Floats]]]:
+        """Latest parameters and result of `fractions`, by thread."""
         return {}
 
     def reached(self, parameters: Floats) -> list[Reached]:
@@ -194,27 +261,54 @@ class Problem:
     # ---- compiled ----
 
     @cached_property
-    def _cost(self):  # type: ignore[no-untyped-def]
-        def cost(parameters: Array, z: Array, index: Array, prior: Array) -> Array:
-            outcome = self.plan.outcome(parameters, z, prior)
-            branches = [lambda o, c=criterion: c.cost(self.plan, o) for criterion in self.criteria]
-            return jax.lax.switch(index, branches, outcome)
+    def _informed_cost(self):  # type: ignore[no-untyped-def]
+        """Criteria that depend on the information, compiled."""
+
+        def cost(parameters: Array, z: Array, index: Array, prior: Array, shadow: Array) -> Array:
+            flight = Flight(self.plan, parameters, z)
+            information = flight.information(shadow)
+            flight.prepare()
+            return self._chosen(True, flight, index, information, prior)
 
         return jax.jit(jax.value_and_grad(cost), compiler_options=QUICKLY)
 
     @cached_property
+    def _motion_cost(self):  # type: ignore[no-untyped-def]
+        """All other criteria, compiled."""
+
+        def cost(parameters: Array, z: Array, index: Array, prior: Array, shadow: Array) -> Array:
+            flight = Flight(self.plan, parameters, z)
+            flight.prepare()
+            return self._chosen(False, flight, index, jnp.zeros_like(prior), prior)
+
+        return jax.jit(jax.value_and_grad(cost), compiler_options=QUICKLY)
+
+    def _chosen(self, informed: bool, flight: Flight, index: Array, information: Array, prior: Array) -> Array:
+        """Return the cost by one of the criteria that depend on the information, or of the others."""
+
+        def branch(criterion: Criterion) -> Callable[[Array], Array]:
+            return lambda own: criterion.cost(self.plan, FlightOutcome(self.plan, flight, own, prior))
+
+        own = [branch(criterion) for criterion in self.criteria if criterion.informed is informed]
+        return jax.lax.switch(index, own, information)
+
+    @cached_property
     def _fractions(self):  # type: ignore[no-untyped-def]
         def fractions(parameters: Array, z: Array, bounds: Array) -> tuple[Array, Array]:
-            trajectory = self.plan.trajectory(parameters, z)
-            pairs = zip(self.applied, bounds, strict=True)
-            values = jnp.stack([smooth_largest(limit, trajectory, bound) for limit, bound in pairs])
-            return values, values
+            flight = Flight(self.plan, parameters, z)
+            (time, *motion), (_, *slopes) = flight.trajectory_and_slopes()
 
-        def both(parameters: Array, z: Array, bounds: Array) -> tuple[Array, Array]:
-            slope, value = jax.jacfwd(fractions, has_aux=True)(parameters, z, bounds)
-            return value, slope
+            def values(*motion: Array) -> Array:
+                trajectory = Trajectory(time, *motion)
+                pairs = zip(self.applied, bounds, strict=True)
+                return jnp.concatenate([smooth_largest(limit, trajectory, bound) for limit, bound in pairs])
 
-        return jax.jit(both, compiler_options=QUICKLY)
+            def along(*direction: Array) -> Array:
+                return jax.jvp(values, tuple(motion), direction)[1]
+
+            return values(*motion), jax.vmap(along, -1, -1)(*slopes)
+
+        return jax.jit(fractions, compiler_options=QUICKLY)
 
     @cached_property
     def _fine_trajectory(self):  # type: ignore[no-untyped-def]

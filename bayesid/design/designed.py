@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, part_of, silent
 from bayesid._math.arrays import Floats
-from bayesid.design.criteria import Criterion
+from bayesid.design.concurrently import Shares, each
 from bayesid.design.design_problem import Problem, Reached
 from bayesid.design.plan import Trajectory
 from bayesid.design.predicted_posterior import Encoder, Predicted, planned_manoeuvre, planned_posterior, predict
@@ -25,6 +26,12 @@ __all__ = ["Design", "Risk", "best_design", "design", "evaluate", "sample_times"
 
 CERTAIN = 0.99
 """Probability with which a limit must hold for a manoeuvre to be flown."""
+
+PASSES = 4
+"""Largest number of passes over all criteria until the manoeuvres agree; the last one only exchanges them."""
+
+SEARCHING, EVALUATING = 0.7, 0.9
+"""Shares of a design's progress at which the searches from random starts and all searches end."""
 
 DRAWS = 200
 """Number of draws of the prior for the risk of breaking a limit, enough for a 99 % quantile."""
@@ -178,13 +185,14 @@ def design(
     encoder: Encoder,
     search: Search = Search(),  # noqa: B008  (immutable)
     *,
+    first: Sequence[Floats] = (),
     store: Store | None = None,
     progress: Progress = silent,
 ) -> list[Design]:
     """Design a manoeuvre by every criterion of a problem.
 
-    Each criterion is minimised from separate random starts, and then from the best result over all criteria, so that a
-    search that happened to fail does no harm.
+    Each criterion is minimised from many starts, and again from any other manoeuvre that is better by it, until the
+    manoeuvre designed by each criterion is the best by it.
 
     Parameters
     ----------
@@ -193,9 +201,11 @@ def design(
     seed : int
         Seed of all random numbers.
     encoder : Encoder
-        Noise of the encoders, for the predicted posterior.
+        Noise of the encoders.
     search : Search
         Effort of the search by each criterion.
+    first : sequence of (n,) arrays
+        Parameters to start from besides the random starts, such as the best of a family that this one contains.
     store : Store, optional
         Store of the results, for a run that may be interrupted.
     progress : Progress
@@ -207,42 +217,41 @@ def design(
         If no manoeuvre keeps the limits.
     """
     store = Store.forgetful() if store is None else store
-    seeds = np.random.SeedSequence(seed).spawn(2 * len(problem.criteria) + 1)
+    problem = problem.with_encoder(encoder)
     count = len(problem.criteria)
-    first: list[Found] = []
-    for index, criterion in enumerate(problem.criteria):
-        starts = store.of(f"{problem.plan.family.name}.{criterion.name}")
-        first.append(
-            optimise(
-                problem,
-                criterion,
-                np.random.default_rng(seeds[index]),
-                search,
-                known=starts.known,
-                keep=starts.keep,
-                progress=part_of(progress, index / (2 * count), (index + 1) / (2 * count)),
-            )
+    seeds = np.random.SeedSequence(seed).spawn(2 * count + 1)
+    points = {
+        criterion.name: problem.points(criterion, np.random.default_rng(own))
+        for criterion, own in zip(problem.criteria, seeds[count:], strict=False)
+    }
+    shares = Shares(part_of(progress, 0.0, SEARCHING), count)
+
+    def search_by(index: int) -> Found:
+        criterion = problem.criteria[index]
+        kept = store.of(f"{problem.plan.family.name}.{criterion.name}")
+        return optimise(
+            problem,
+            criterion,
+            np.random.default_rng(seeds[index]),
+            search,
+            first=first,
+            points=points[criterion.name],
+            known=kept.known,
+            keep=kept.keep,
+            progress=shares.of(index),
         )
-    polished = []
-    for index, criterion in enumerate(problem.criteria):
-        polished.append(
-            _crossed(
-                problem,
-                criterion,
-                index,
-                first,
-                np.random.default_rng(seeds[count + index]),
-                search,
-                store,
-                part_of(progress, (count + index) / (2 * count), (count + index + 1) / (2 * count)),
-            )
-        )
-    rng = np.random.default_rng(seeds[-1])
-    designs: list[Design] = []
-    for criterion, item in zip(problem.criteria, polished, strict=True):
-        like = designs[0].posterior if designs else None
-        designs.append(evaluate(problem, criterion.name, item, encoder, rng, like))
-    return designs
+
+    problem.compile()
+    found = each(search_by, count, search.executor)
+    found = _consistent(problem, points, found, search, store, part_of(progress, SEARCHING, EVALUATING))
+    streams = seeds[-1].spawn(count)
+
+    def evaluate_by(index: int) -> Design:
+        name, rng = problem.criteria[index].name, np.random.default_rng(streams[index])
+        return evaluate(problem, name, found[index], encoder, rng, points=points)
+
+    progress(EVALUATING, "predicting what each manoeuvre leads to")
+    return each(evaluate_by, count, search.executor)
 
 
 def evaluate(
@@ -252,6 +261,8 @@ def evaluate(
     encoder: Encoder,
     rng: np.random.Generator,
     like: Posterior | None = None,
+    *,
+    points: Mapping[str, list[Floats]] = MappingProxyType({}),
 ) -> Design:
     """Return the design of a motion with its predicted posterior, given all sensor and encoder noise, and its limits.
 
@@ -269,6 +280,8 @@ def evaluate(
         Source of the draws for the risks.
     like : Posterior, optional
         Posterior of another design of the problem; it has no effect any more.
+    points : mapping of str to list of (n,) arrays
+        Points of the unknowns over which each criterion is averaged, by its name; by default the prior's centre.
     """
     plan = problem.plan
     parameters = found.parameters
@@ -289,7 +302,7 @@ def evaluate(
         problem=problem,
         parameters=parameters,
         found=found,
-        costs=problem.costs(parameters),
+        costs=problem.costs(parameters, points),
         posterior=posterior,
         predicted=predict(posterior),
         reached=problem.reached(parameters),
@@ -310,32 +323,41 @@ def risks(problem: Problem, parameters: Floats, rng: np.random.Generator, draws:
     ]
 
 
-def _crossed(
+def _consistent(
     problem: Problem,
-    criterion: Criterion,
-    index: int,
-    first: Sequence[Found],
-    rng: np.random.Generator,
+    points: Mapping[str, list[Floats]],
+    found: Sequence[Found],
     search: Search,
     store: Store,
     progress: Progress,
-) -> Found:
-    """Search once more from the best result over all criteria, and return the outcome with the costs of all starts."""
-    points = problem.points(criterion, rng)
-    present = problem.cost(criterion, first[index].parameters, points)[0]
-    candidates = [(problem.cost(criterion, other.parameters, points)[0], other.parameters) for other in first]
-    best_cost, best = min(candidates, key=lambda pair: pair[0])
-    kept = store.of(f"{problem.plan.family.name}.{criterion.name}.crossed")
-    again = optimise(
-        problem,
-        criterion,
-        rng,
-        Search(1, search.iterations, search.tolerance),
-        first=best if best_cost < present else first[index].parameters,
-        known=kept.known,
-        keep=kept.keep,
-        progress=progress,
-    )
-    costs = (again.cost, *first[index].costs)
-    evaluations = again.evaluations + first[index].evaluations
-    return Found(again.parameters, again.cost, costs, evaluations)
+) -> list[Found]:
+    """Return for each criterion a manoeuvre that no other is better than, by descents from those that are better."""
+    result, alone = list(found), replace(search, starts=0)
+    for number in range(PASSES):
+        changed = False
+        for index, criterion in enumerate(problem.criteria):
+            own = points[criterion.name]
+            costs = [problem.cost(criterion, item.parameters, own)[0] for item in result]
+            best = int(np.argmin(costs))
+            if costs[best] >= costs[index]:
+                continue
+            changed = True
+            kept = store.of(f"{problem.plan.family.name}.{criterion.name}.again-{number}")
+            again = Found(result[best].parameters, costs[best], (), 0)
+            if number < PASSES - 1:
+                again = optimise(
+                    problem,
+                    criterion,
+                    np.random.default_rng(0),  # no number is drawn
+                    alone,
+                    first=[result[best].parameters],
+                    points=own,
+                    known=kept.known,
+                    keep=kept.keep,
+                )
+            evaluations = again.evaluations + result[index].evaluations
+            result[index] = Found(again.parameters, again.cost, (again.cost, *result[index].costs), evaluations)
+            progress((number + index / len(result)) / PASSES, f"{criterion.name}: best {again.cost:.4g}")
+        if not changed:
+            break
+    return result

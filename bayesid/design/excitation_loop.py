@@ -1,13 +1,15 @@
-"""Loop of section 3.3 of the paper: plan a manoeuvre, execute it, identify the bodies, and repeat to some precision.
+"""Loop of section 3.3 of the paper: plan a manoeuvre, execute it, identify the bodies, and repeat until all is known.
 
 Every manoeuvre is designed from the posterior of those before it, and flown only if its limits hold with 99 %
-probability under that posterior. All random numbers follow from one seed and the step's number, and all data between
-two stages pass through files of the folder. An interrupted loop therefore continues to exactly the same result.
+probability under that posterior. Where the recordings are reviewed, the loop stops as soon as they show that the model
+is wrong: more of them would only make a wrong answer sharp. All random numbers follow from one seed and the step's
+number, and all data between two stages pass through files of the folder. An interrupted loop therefore continues to
+exactly the same result.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -27,15 +29,15 @@ from bayesid.design.knowledge_update import (
     describe_bodies,
     known_of,
     updated_model,
-    worst_relative_sd,
 )
+from bayesid.design.loop_goals import Goal, RelativePrecision, StepKnowledge, goal_dict
 from bayesid.design.loop_history import History
 from bayesid.design.plan import Plan
 from bayesid.design.predicted_posterior import Encoder
 from bayesid.design.search_store import Store
 from bayesid.design.simulated_spacecraft import Spacecraft, plan_recording
+from bayesid.design.step_review import Reviewer
 from bayesid.design.trajectory_search import Search
-from bayesid.inference.body_quantities import BodyDraws
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
 from bayesid.inference.recording_check import refuse_wrong_units
@@ -71,36 +73,46 @@ class Loop:
         Noise of the joints' encoders.
     seed : int
         Seed of all random numbers.
-    wanted : float
-        Precision at which the loop stops.
+    goals : sequence of Goal
+        What must be reached for the loop to stop, all of them; by default a relative precision of 1 %.
     at_most : int
         Largest number of manoeuvres.
-    precision : callable
-        Function of the draws of the identified bodies, by name, whose value must reach ``wanted`` or less.
     search : Search
         Effort of each design.
     identifier : Identifier
         Method of the identification.
+    reviewer : Reviewer, optional
+        Method by which the recordings so far are reviewed after each step. If they show that the model is wrong, the
+        loop stops, unless a goal asks what it is that is wrong.
     """
 
     problem: Problem
     encoder: Encoder
     seed: int = 0
-    wanted: float = 0.01
+    goals: Sequence[Goal] = (RelativePrecision(),)
     at_most: int = 5
-    precision: Callable[[Mapping[str, BodyDraws]], float] = worst_relative_sd
-    search: Search = Search(starts=2, iterations=60)  # noqa: RUF009  (immutable)
+    search: Search = Search(starts=8, iterations=60)  # noqa: RUF009  (immutable)
     identifier: Identifier = Sampled()  # noqa: RUF009  (immutable)
+    reviewer: Reviewer | None = None
+
+    def __post_init__(self) -> None:
+        if self.reviewer is None and any(goal.diagnosed for goal in self.goals):
+            raise InputError(
+                "a probability of a cause is wanted, but the steps are not reviewed",
+                place="goals",
+                remedy="Give a reviewer, such as DiagnosisReview",
+            )
 
     def run(self, spacecraft: Spacecraft, folder: Path, progress: Progress = silent) -> History:
-        """Run the loop until the wanted precision, the limit of steps, a no-go, or `NotFlown`.
+        """Run the loop until its goals are reached, the limit of steps, a wrong model, a no-go, or `NotFlown`.
 
         Parameters
         ----------
         spacecraft : Spacecraft
             Spacecraft that executes the plans.
         folder : Path
-            Folder of ``step-N-plan.csv``, ``step-N-recording.csv``, ``step-N-posterior.nc`` and ``loop.json``.
+            Folder of ``step-N-plan.csv``, ``step-N-recording.csv``, ``step-N-posterior.nc``, ``step-N-diagnosis.json``
+            where the steps are reviewed, and ``loop.json``.
         progress : Progress
             Receiver of the fraction done.
 
@@ -109,7 +121,7 @@ class Loop:
         InputError
             If a plan is impossible or a recording does not fit.
         """
-        history = History.open(folder, self._key())
+        history = History.open(folder, self._key(), reviewed=self.reviewer is not None)
         problem, model = self.problem, self.problem.plan.model
         for number in range(1, self.at_most + 1):
             progress((number - 1) / self.at_most, f"step {number}: planning")
@@ -124,14 +136,18 @@ class Loop:
                 return history
             progress((number - 0.4) / self.at_most, f"step {number}: identifying")
             self._identify(history, number, model)
-            last = number == len(history.steps)
-            if last and history.steps[-1]["identification"]["precision"] <= self.wanted:
+            progress((number - 0.2) / self.at_most, f"step {number}: reviewing")
+            trusted = self._review(history, number)
+            draws = InertialDraws.read(history.path(number, "identification"))
+            model = updated_model(self.problem.plan.model, draws)
+            reached = self._assess(history, number, model, draws)
+            if number == len(history.steps) and not trusted:
+                history.close("wrong-model")
+                return history
+            if number == len(history.steps) and reached:
                 history.close("reached")
                 return history
-            if number < self.at_most:
-                draws = InertialDraws.read(history.path(number, "identification"))
-                problem = self.problem.knowing(known_of(self.problem.plan.unknowns, draws))
-                model = updated_model(self.problem.plan.model, draws)
+            problem = self.problem.knowing(known_of(self.problem.plan.unknowns, draws))
         history.close("at-most")
         return history
 
@@ -196,8 +212,38 @@ class Loop:
         seed = int(np.random.SeedSequence([self.seed, number, 1]).generate_state(1)[0])
         fit = self.identifier.identify(posterior, seed, file)
         bodies = bodies_of_draws(model, InertialDraws.read(file))
-        entry = {**fit, "precision": float(self.precision(bodies)), "bodies": describe_bodies(bodies)}
-        history.record(number, "identification", entry)
+        history.record(number, "identification", {**fit, "bodies": describe_bodies(bodies)})
+
+    def _review(self, history: History, number: int) -> bool:
+        """Review the recordings so far unless it is done already, and return whether the loop may go on."""
+        if self.reviewer is None:
+            return True
+        entry = history.entry(number, "diagnosis")
+        if entry is None:
+            manoeuvres = [self._flown(history, step) for step in range(1, number + 1)]
+            seed = int(np.random.SeedSequence([self.seed, number, 2]).generate_state(1)[0])
+            file = history.path(number, "diagnosis")
+            entry = self.reviewer.review(self.problem.plan.model, manoeuvres, seed, file).to_dict()
+            history.record(number, "diagnosis", entry)
+        return entry["trusted"] or any(goal.diagnosed for goal in self.goals)
+
+    def _assess(self, history: History, number: int, model: Model, draws: InertialDraws) -> bool:
+        """Note the values of all goals after a step, and return whether they are reached."""
+        review = history.entry(number, "diagnosis")
+        knowledge = StepKnowledge(
+            model,
+            bodies_of_draws(self.problem.plan.model, draws),
+            self._flown(history, number),
+            {} if review is None else review["probabilities"],
+            int(np.random.SeedSequence([self.seed, number, 3]).generate_state(1)[0]),
+        )
+        found = [(goal, goal.value(knowledge)) for goal in self.goals]
+        history.note(number, "goals", [goal_dict(goal, value) for goal, value in found])
+        return all(goal.reached(value) for goal, value in found)
+
+    def _flown(self, history: History, number: int) -> Manoeuvre:
+        """Return the manoeuvre of a step as it was recorded."""
+        return flown(self.problem.plan, Recording.read(history.path(number, "recording")), self.encoder)
 
     def _key(self) -> str:
         """Return the key of everything that the results depend on; when the loop stops is not part of it."""
@@ -217,7 +263,7 @@ class Loop:
             start_of(plan),
             (plan.attitude.tolist(), plan.attitude_sigma, plan.argument_of_latitude, plan.step, plan.thinning),
             [(limit.name, limit.bound) for limit in limits],
-            (self.problem.criteria[0], self.seed, self.search, self.identifier, dict(self.encoder)),
+            (self.problem.criteria[0], self.seed, self.search, self.identifier, dict(self.encoder), self.reviewer),
         )
 
 

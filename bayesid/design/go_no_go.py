@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem, Reached
@@ -19,7 +20,13 @@ from bayesid.design.trajectory_search import Found, Search, optimise
 __all__ = ["Attempt", "plan_to_go"]
 
 ATTEMPTS = 5
-"""Largest number of designs before the step is a no-go."""
+"""Largest number of designs before the last one is only made smaller."""
+
+SHRUNK = 30
+"""Largest number of times that the last design is made smaller before the step is a no-go."""
+
+LEAST = 0.1
+"""Smallest factor by which it is made smaller at a time."""
 
 MARGIN = 0.97
 """Factor on a tightened limit, since the quantile is not exactly proportional to the limit."""
@@ -52,7 +59,13 @@ class Attempt:
     @property
     def go(self) -> bool:
         """True if the plan may be flown."""
-        return all(risk.go for risk in self.risks) and all(item.kept for item in self.reached)
+        return not self.broken
+
+    @property
+    def broken(self) -> list[str]:
+        """Names of the limits that do not hold."""
+        risky = [risk.name for risk in self.risks if not risk.go]
+        return list(dict.fromkeys([*risky, *(item.name for item in self.reached if not item.kept)]))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of loop.json: for each uncertain limit its value, the tightened value and the quantile."""
@@ -67,7 +80,7 @@ class Attempt:
                 }
                 for risk in self.risks
             },
-            "broken": [item.name for item in self.reached if not item.kept],
+            "broken": self.broken,
         }
 
 
@@ -81,7 +94,9 @@ def plan_to_go(
 ) -> list[Attempt]:
     """Design a manoeuvre, and repeat the design under tighter limits until all limits hold with 99 % probability.
 
-    A limit that does not hold is tightened by the ratio of the limit to the 99 % quantile of the largest value.
+    A limit that does not hold is tightened by the ratio of the limit to the 99 % quantile of the largest value. If
+    that does not lead to a manoeuvre that may be flown, the last one is made smaller, towards rest, until all limits
+    hold. The step is a no-go only if a limit is broken however little moves.
 
     Parameters
     ----------
@@ -108,22 +123,45 @@ def plan_to_go(
     for number, stream in enumerate(seed.spawn(ATTEMPTS)):
         starts, draws = stream.spawn(2)
         known = store.of(f"attempt-{number + 1}")
-        optimum = optimise(
-            tight,
-            criterion,
-            np.random.default_rng(starts),
-            search if number == 0 else replace(search, starts=1),
-            first=first,
-            known=known.known,
-            keep=known.keep,
-            progress=progress,
-        )
+        try:
+            optimum = optimise(
+                tight,
+                criterion,
+                np.random.default_rng(starts),
+                search if number == 0 else replace(search, starts=0),
+                first=() if first is None else [first],
+                known=known.known,
+                keep=known.keep,
+                progress=progress,
+            )
+        except InputError:
+            if not attempts:
+                raise
+            break  # limits as tight as that leave nothing to search
         risky = risks(problem, optimum.parameters, np.random.default_rng(draws))
         attempts.append(Attempt(tight.limits, optimum, risky, problem.reached(optimum.parameters)))
         if attempts[-1].go:
             break
         tight, first = tight.with_limits(_tightened(tight.limits, risky)), optimum.parameters
+    if not attempts[-1].go:
+        attempts.append(_made_smaller(problem, criterion, attempts[-1], draws))
     return attempts
+
+
+def _made_smaller(problem: Problem, criterion: Criterion, last: Attempt, draws: np.random.SeedSequence) -> Attempt:
+    """Return an attempt made smaller, towards rest, until all limits hold with 99 % probability."""
+    centre = problem.plan.family.centre
+    for _ in range(SHRUNK):
+        factors = [risk.limit / risk.quantile for risk in last.risks if not risk.go]
+        factors += [item.limit / item.largest for item in last.reached if not item.kept]
+        size = float(np.clip(MARGIN * np.nan_to_num(min(factors)), LEAST, MARGIN))
+        parameters = centre + size * (last.found.parameters - centre)
+        found = replace(last.found, parameters=parameters, cost=problem.cost(criterion, parameters)[0])
+        risky = risks(problem, parameters, np.random.default_rng(draws))
+        last = Attempt(last.limits, found, risky, problem.reached(parameters))
+        if last.go:
+            break
+    return last
 
 
 def _tightened(limits: Limits, risky: Sequence[Risk]) -> Limits:

@@ -17,7 +17,7 @@ from bayesid._io.store import JsonStore, file_key
 __all__ = ["History"]
 
 STAGES = ("plan", "recording", "identification")
-"""Stages of a step, in their order."""
+"""Stages of a step, in their order; a loop that is reviewed has the diagnosis as well."""
 
 
 @dataclass
@@ -31,19 +31,29 @@ class History:
     key : str
         SHA-256 of robot, sensors, prior, manoeuvre, limits, search and seed.
     status : str
-        Status ``running``, ``waiting`` (for a recording), ``reached``, ``at-most`` or ``no-go``.
+        Status ``running``, ``waiting`` (for a recording), ``reached``, ``at-most``, ``no-go`` or ``wrong-model``.
+    stages : tuple of str
+        Names of the stages of each step.
     steps : list of dict
-        Entries of the stages ``plan``, ``recording`` and ``identification``, one dictionary per step.
+        Entries of the stages, one dictionary per step, and what was noted of it.
     """
 
     folder: Path
     key: str
     status: str = "running"
+    stages: tuple[str, ...] = STAGES
     steps: list[dict[str, Any]] = field(default_factory=list)
 
     @classmethod
-    def open(cls, folder: Path, key: str) -> History:
+    def open(cls, folder: Path, key: str, *, reviewed: bool = False) -> History:
         """Read the history that an earlier run left in a folder, as far as its files exist.
+
+        Parameters
+        ----------
+        folder : Path
+        key : str
+        reviewed : bool
+            Whether every step is diagnosed.
 
         Raises
         ------
@@ -51,7 +61,7 @@ class History:
             If the history belongs to another loop, or a recording or plan was changed after it was used.
         """
         create_folder(folder)
-        history = cls(folder, key)
+        history = cls(folder, key, stages=(*STAGES, "diagnosis") if reviewed else STAGES)
         history._take(history._store.read("steps") or [])
         return history
 
@@ -68,6 +78,11 @@ class History:
         if number > len(self.steps):
             self.steps.append({"step": number})
         self.steps[number - 1][stage] = {**entry, **self._mark(number, stage)}
+        self.write()
+
+    def note(self, number: int, name: str, content: Any) -> None:
+        """Note something that follows from the stages of a step, and is computed anew whenever the loop is run."""
+        self.steps[number - 1][name] = content
         self.write()
 
     def close(self, status: str) -> None:
@@ -92,11 +107,11 @@ class History:
         """Keep the entries of stages that are done."""
         for number, step in enumerate(steps, start=1):
             kept: dict[str, Any] = {"step": number}
-            for stage in STAGES:
+            for stage in self.stages:
                 if stage not in step or not self.path(number, stage).is_file():
                     break
                 if self._mark(number, stage)["sha256"] != step[stage]["sha256"]:
-                    if stage == "identification":
+                    if stage in ("identification", "diagnosis"):
                         break
                     raise InputError(
                         f"the {stage} of step {number} was changed after it was used",
@@ -106,9 +121,14 @@ class History:
                 kept[stage] = step[stage]
             if len(kept) > 1:
                 self.steps.append(kept)
-            if len(kept) <= len(STAGES):
+            if len(kept) <= len(self.stages):
                 return
 
 
-_ENDING = {"plan": "plan.csv", "recording": "recording.csv", "identification": "posterior.nc"}
+_ENDING = {
+    "plan": "plan.csv",
+    "recording": "recording.csv",
+    "identification": "posterior.nc",
+    "diagnosis": "diagnosis.json",
+}
 """Endings of the file names, by stage."""

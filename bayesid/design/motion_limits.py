@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bayesid.design.plan import Trajectory
+from bayesid.design.trajectory import Trajectory
 from bayesid.robot.robot import Robot
 
 __all__ = ["ACTIVE", "Limit", "Limits", "smooth_largest"]
@@ -22,6 +22,9 @@ NOTHING = 1e-20
 
 SHARPNESS = 300.0
 """Sharpness of the smooth maximum, at which 500 equal values are overestimated by 2 % of the limit."""
+
+PARTS = 8
+"""Number of parts of a manoeuvre whose largest values are limited separately."""
 
 ACTIVE = 0.97
 """Fraction of a limit above which it is called active, as the smooth maximum keeps motions slightly below it."""
@@ -109,10 +112,17 @@ class Limits:
 
 
 def smooth_largest(limit: Limit, trajectory: Trajectory, bound: Array | float) -> Array:
-    """Return a smooth upper bound of the largest value divided by the bound; at most one keeps the limit."""
-    values = (limit.quantity(trajectory) / bound).ravel()
-    top = jnp.max(values)
-    return top + jnp.log(jnp.sum(jnp.exp(SHARPNESS * (values - top)))) / SHARPNESS
+    """Return smooth upper bounds of the largest values divided by the bound; at most one keeps the limit.
+
+    There is one bound for each of several parts of the manoeuvre, so that an optimiser sees all peaks at once.
+    """
+    values = limit.quantity(trajectory) / bound
+    count = min(PARTS, len(values))
+    longest = -(-len(values) // count)
+    # the last value is repeated, so that all parts are of one length
+    padded = values[np.minimum(np.arange(count * longest), len(values) - 1)].reshape(count, -1)
+    top = jnp.max(padded, axis=1, keepdims=True)
+    return top[:, 0] + jnp.log(jnp.sum(jnp.exp(SHARPNESS * (padded - top)), axis=1)) / SHARPNESS
 
 
 def _joint_limits(robot: Robot) -> Sequence[Limit]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid.design.encoder_shadow import Encoder
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.posterior import Posterior
@@ -17,9 +18,6 @@ from bayesid.recording.recording import Recording
 from bayesid.simulation.model import Manoeuvre, Model
 
 __all__ = ["Encoder", "Predicted", "describe", "planned_manoeuvre", "planned_posterior", "predict", "simulated"]
-
-Encoder = Mapping[int, float | Mapping[str, float | None] | None]
-"""Standard deviation of joint position (0), velocity (1) and acceleration (2), for all joints or by joint."""
 
 
 @dataclass(frozen=True)

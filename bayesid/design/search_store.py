@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 
@@ -15,7 +16,7 @@ __all__ = ["Store"]
 
 @dataclass
 class Store:
-    """Results of several searches, each from several starts.
+    """Results of several searches, each of several descents.
 
     Parameters
     ----------
@@ -24,12 +25,15 @@ class Store:
     key : str
         Key of the design problem; results under another key are discarded.
     results : dict
-        Parameters, cost and number of evaluations by search and start.
+        Parameters, cost and number of evaluations by search and descent.
+    lock : threading.Lock
+        Lock of the results, which several searches may add at once.
     """
 
     file: Path | None
     key: str
     results: dict[str, dict[str, tuple[list[float], float, int]]] = field(default_factory=dict)
+    lock: Lock = field(default_factory=Lock, repr=False)
 
     @classmethod
     def forgetful(cls) -> Store:
@@ -64,21 +68,22 @@ class Store:
 
 @dataclass(frozen=True)
 class Starts:
-    """Results of one search, by the number of the start."""
+    """Results of one search, by the name of the descent."""
 
     store: Store
     search: str
 
-    def known(self, start: int) -> tuple[Floats, float, int] | None:
-        """Return parameters, cost and number of evaluations of a start, None where there are none."""
-        entry = self.store.results.get(self.search, {}).get(str(start))
+    def known(self, descent: str) -> tuple[Floats, float, int] | None:
+        """Return parameters, cost and number of evaluations of a descent, None where there are none."""
+        entry = self.store.results.get(self.search, {}).get(descent)
         return None if entry is None else (np.array(entry[0]), float(entry[1]), int(entry[2]))
 
-    def keep(self, start: int, parameters: Floats, cost: float, evaluations: int) -> None:
-        """Add the result of a start, and write the file."""
-        results = self.store.results.setdefault(self.search, {})
-        results[str(start)] = ([float(value) for value in parameters], float(cost), evaluations)
-        self.store.write()
+    def keep(self, descent: str, parameters: Floats, cost: float, evaluations: int) -> None:
+        """Add the result of a descent, and write the file."""
+        with self.store.lock:
+            results = self.store.results.setdefault(self.search, {})
+            results[descent] = ([float(value) for value in parameters], float(cost), evaluations)
+            self.store.write()
 
 
 def _kept(file: Path, key: str) -> JsonStore:

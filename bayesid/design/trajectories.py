@@ -20,10 +20,14 @@ from scipy.linalg import null_space
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.recording.joint_motion import Excitation
+from bayesid.recording.joint_motion import Excitation, Motion
 from bayesid.robot.joint_state import JointState
 
 __all__ = ["BSplines", "Fourier", "Linear", "PaperExcitation", "ParameterisedMotion", "TrajectoryFamily"]
+
+
+FITTED = 400
+"""Number of instants at which a motion is fitted to another one."""
 
 
 class TrajectoryFamily:
@@ -66,6 +70,10 @@ class TrajectoryFamily:
         parts = [jax.vmap(part)(instants) for part in (lambda t: self.position(parameters, t), speed, change)]
         return JointState(*cast("list[Floats]", parts))
 
+    def slopes(self, parameters: Array, time: Floats) -> Array:
+        """Return the derivatives of position, velocity and acceleration, shape (3, T, joints, n)."""
+        return jnp.stack(jax.jacfwd(lambda own: tuple(self.state(own, time)))(jnp.asarray(parameters)))
+
     @property
     def size(self) -> int:
         """Number of parameters."""
@@ -104,6 +112,23 @@ class Linear(TrajectoryFamily):
     def matrices(self, time: Floats) -> tuple[Floats, Floats]:
         """Return rest (3, T, joints) and basis (3, T, joints, n), each for position, velocity and acceleration."""
         raise NotImplementedError
+
+    def nearest(self, motion: Motion) -> Floats:
+        """Return the parameters of the motion closest to another one's excursion from its start, by least squares.
+
+        A motion of a family that this one contains is met exactly.
+        """
+        time = np.linspace(0.0, self.duration, FITTED)
+        basis = self.matrices(time)[1][0].reshape(-1, self.size)
+        position = np.asarray(motion.evaluate(time).position)
+        offset = np.asarray(self.motion(self.centre).evaluate(time).position)[0]
+        rest = self.matrices(time)[0][0]
+        wanted = position - position[0] + offset - rest
+        return np.asarray(np.linalg.lstsq(basis, wanted.ravel(), rcond=None)[0])
+
+    def slopes(self, parameters: Array, time: Floats) -> Array:
+        """Return the derivatives of position, velocity and acceleration, shape (3, T, joints, n)."""
+        return jnp.asarray(self.matrices(np.asarray(time, dtype=float))[1])
 
     def state(self, parameters: Array, time: Floats) -> JointState:
         """Return positions, velocities and accelerations, each (T, joints)."""

@@ -1,31 +1,42 @@
-"""Search for the best manoeuvre: SLSQP with exact gradients from several starts, within the limits."""
+"""Search for the best manoeuvre: short descents from random starts and from what the best of them have in common."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, as_completed
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import minimize
 
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem
+from bayesid.design.offspring import offspring
+from bayesid.design.polish import Polished, Shared, Task, fitted_to_fine_limits, polish
+from bayesid.design.search_starts import SLACK, random_start
 
 __all__ = ["Found", "Search", "optimise"]
 
+SHORT = 40
+"""Iterations of SLSQP of all descents but the last, after which their order hardly changes."""
 
-FILLED = 0.8
-"""Fraction of the tightest limit that random starts use, so that they begin inside the limits."""
+OFFSPRING = 8
+"""Motions that are made of the best ones in each generation."""
 
-SHRUNK = 12
-"""Largest number of times that a random start is shrunk."""
+FEW = 4
+"""Random starts below which nothing is made of their results."""
 
-SLACK = 1e-6
-"""Fraction of a limit by which the optimiser may exceed it, since the smooth maximum lies above the true one."""
+FOLLOWED = 3
+"""Number of motions that are followed to the end, unless there are fewer."""
+
+ALIKE = 0.1
+"""Difference of the cost below which two motions count as one: 1 % of ten parameters, where the cost is in nats."""
+
+Kept = tuple[Floats, float, int]
+"""Parameters, cost and number of evaluations of one descent."""
 
 
 @dataclass(frozen=True)
@@ -37,14 +48,21 @@ class Search:
     starts : int
         Number of random starts.
     iterations : int
-        Largest number of iterations of SLSQP from each start.
+        Largest number of iterations of SLSQP from the last ones.
+    generations : int
+        How often motions are made of the best ones, if there are at least four starts.
     tolerance : float
-        Tolerance of the cost, relative to that of the start, at which SLSQP stops.
+        Tolerance of the cost at which SLSQP stops, relative to that of the start where that is below one.
+    executor : concurrent.futures.Executor, optional
+        Executor of the descents, in threads, processes or on other machines; by default they run one after the other.
+        It has no influence on the result.
     """
 
-    starts: int = 4
-    iterations: int = 200
-    tolerance: float = 1e-5
+    starts: int = 12
+    iterations: int = 250
+    generations: int = 2
+    tolerance: float = 1e-3
+    executor: Executor | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -58,7 +76,7 @@ class Found:
     cost : float
         Cost of the best motion.
     costs : tuple of float
-        Costs of the feasible starts, the best first.
+        Costs of the descents of the last round, the best first.
     evaluations : int
         Number of evaluations of the cost over all starts.
     """
@@ -75,9 +93,10 @@ def optimise(
     rng: np.random.Generator,
     search: Search = Search(),
     *,
-    first: Floats | None = None,
-    known: Callable[[int], tuple[Floats, float, int] | None] = lambda start: None,
-    keep: Callable[[int, Floats, float, int], None] = lambda start, parameters, cost, evaluations: None,
+    first: Sequence[Floats] = (),
+    points: list[Floats] | None = None,
+    known: Callable[[str], Kept | None] = lambda descent: None,
+    keep: Callable[[str, Floats, float, int], None] = lambda descent, parameters, cost, evaluations: None,
     progress: Progress = silent,
 ) -> Found:
     """Minimise a criterion within the limits.
@@ -92,13 +111,15 @@ def optimise(
         Source of the random starts.
     search : Search
         Effort of the search.
-    first : (n,) array, optional
-        Parameters to start from in place of the first random start.
+    first : sequence of (n,) arrays
+        Parameters to start from besides the random starts.
+    points : list of (n,) arrays, optional
+        Points of the unknowns over which the criterion is averaged, by default as many draws as it wants.
     known : callable
-        Function of the number of a start that returns parameters, cost and evaluations of an earlier run from it, or
+        Function of the name of a descent that returns parameters, cost and evaluations of it in an earlier run, or
         None.
     keep : callable
-        Function that receives number, parameters, cost and evaluations of every start when it is done.
+        Function that receives name, parameters, cost and evaluations of every descent when it is done.
     progress : Progress
         Receiver of the fraction done.
 
@@ -107,147 +128,114 @@ def optimise(
     InputError
         If no start leads to a manoeuvre within the limits; the message names the broken limits.
     """
-    points = problem.points(criterion, rng)
-    results: list[tuple[float, Floats]] = []
-    evaluations, broken = 0, ""
-    for start in range(search.starts):
-        begin = _random_start(problem, rng)
-        if start == 0 and first is not None:
-            begin = np.array(first, dtype=float)
-        earlier = known(start)
-        if earlier is not None:
-            results.append((earlier[1], earlier[0]))
-            evaluations += earlier[2]
-            continue
-        begin = _repaired(problem, begin)
-        fractions = problem.fractions(begin)[0]
-        if fractions.max() > 1.0 + SLACK:
-            broken = _describe(problem, fractions)
-            continue
-        run = _Run(problem, criterion, points, start, search, progress, begin)
-        run.minimise()
-        evaluations += run.evaluations
-        results.append((run.best_cost, run.best))
-        keep(start, run.best, run.best_cost, run.evaluations)
-    if not results:
+    problem.compile()
+    points = problem.points(criterion, rng) if points is None else points
+    starts = [*first, *(random_start(problem, rng) for _ in range(search.starts))]
+    generations = search.generations if search.starts >= FEW else 0
+    short, followed = min(SHORT, search.iterations), min(FOLLOWED, len(starts))
+    first_round = [] if len(starts) <= followed else starts
+    total = (len(first_round) + generations * OFFSPRING) * (short + 1) + followed * (search.iterations + 1)
+    work = _Work(problem, criterion, search, known, keep, progress, total)
+    # one point of the unknowns ranks them well enough
+    pool = _ranked(work.run(0, first_round, short, points[:1]), problem) if first_round else []
+    for number in range(1, generations + 1):
+        made = offspring(problem, [item.parameters for item in pool], OFFSPRING, rng)
+        pool = _ranked([*pool, *work.run(number, made, short, points[:1])], problem)
+    last = [item.parameters for item in pool[:followed]] or starts
+    alive = _ranked(work.run(generations + 1, last, search.iterations, points), problem)
+    best = alive[0]
+    parameters = fitted_to_fine_limits(problem, best.parameters)
+    cost = best.cost if parameters is best.parameters else problem.cost(criterion, parameters, points)[0]
+    return Found(parameters, cost, tuple(item.cost for item in alive), work.evaluations)
+
+
+def _ranked(done: Sequence[Polished], problem: Problem) -> list[Polished]:
+    """Return what keeps the limits, the best first, without what is alike.
+
+    Raises
+    ------
+    InputError
+        If nothing keeps the limits; the message names the broken ones.
+    """
+    ranked: list[Polished] = []
+    for item in sorted((item for item in done if np.isfinite(item.cost)), key=lambda item: item.cost):
+        if not ranked or item.cost - ranked[-1].cost > ALIKE * min(abs(item.cost), 1.0):
+            ranked.append(item)
+    if not ranked:
         raise InputError(
-            f"no manoeuvre of the family {problem.plan.family.name!r} was found within the limits: {broken}",
+            f"no manoeuvre of the family {problem.plan.family.name!r} was found within the limits: "
+            f"{_describe(problem, done[0].parameters)}",
             place="design.limits",
             remedy="Loosen these limits, allow more time, or move other joints",
         )
-    results.sort(key=lambda pair: pair[0])
-    return Found(results[0][1], results[0][0], tuple(cost for cost, _ in results), evaluations)
+    return ranked
 
 
-class _Run:
-    """One run of SLSQP, with the best point so far that keeps the limits."""
+@dataclass
+class _Work:
+    """Descents of one search, with their number and the time that they take."""
 
-    def __init__(
-        self,
-        problem: Problem,
-        criterion: Criterion,
-        points: list[Floats],
-        number: int,
-        search: Search,
-        progress: Progress,
-        begin: Floats,
-    ) -> None:
-        self.problem, self.criterion, self.points = problem, criterion, points
-        self.number, self.search, self.progress = number, search, progress
-        self.best, self.evaluations, self.iteration = begin, 0, 0
-        self.best_cost = problem.cost(criterion, begin, points)[0]
-        self.unit = max(abs(self.best_cost), 1e-12)  # SLSQP's tolerance is absolute
+    problem: Problem
+    criterion: Criterion
+    search: Search
+    known: Callable[[str], Kept | None]
+    keep: Callable[[str, Floats, float, int], None]
+    progress: Progress
+    total: int
+    done: int = 0
+    evaluations: int = 0
+    best: float = np.inf
+    began: float = field(default_factory=time.monotonic)
 
-    def minimise(self) -> None:
-        family = self.problem.plan.family
-        constraints: Any = {"type": "ineq", "fun": self.margin, "jac": self.margin_slope}
-        report: Any = self.report
-        options: Any = {"maxiter": self.search.iterations, "ftol": self.search.tolerance}
-        for tighter in (1.0, 0.99, 0.97, 0.9):  # in case the fine grid shows larger values
-            self.bound = tighter
-            end = minimize(
-                self.cost,
-                (self.best - family.centre) / family.scale,
-                jac=True,
-                method="SLSQP",
-                constraints=constraints,
-                callback=report,
-                options=options,
-            )
-            # SLSQP's iterates lie slightly outside the limits until it has converged
-            self.consider(_repaired(self.problem, family.centre + family.scale * end.x, tighter))
-            if all(reached.kept for reached in self.problem.reached(self.best)):
-                return
-            self.best = _repaired(self.problem, self.best, 0.98 * tighter)
-            self.best_cost = self.problem.cost(self.criterion, self.best, self.points)[0]
+    def run(self, number: int, starts: Sequence[Floats], iterations: int, points: list[Floats]) -> list[Polished]:
+        """Run the descents of one round that no earlier run has finished."""
+        results: dict[int, Polished] = {}
+        shared, tasks = Shared(self.problem), {}
+        for index, start in enumerate(starts):
+            earlier = self.known(f"{number}.{index}")
+            if earlier is not None:
+                self._finish(results, index, Polished(*earlier), iterations)
+            else:
+                tasks[index] = Task(shared, self.criterion, points, start, iterations, self.search.tolerance)
+        for index, result in self._each(tasks):
+            if np.isfinite(result.cost):
+                self.keep(f"{number}.{index}", result.parameters, result.cost, result.evaluations)
+            self._finish(results, index, result, iterations)
+        return [results[index] for index in range(len(starts))]
 
-    def consider(self, parameters: Floats) -> None:
-        """Keep the parameters if they are better than the best so far and break no limit."""
-        value = self.problem.cost(self.criterion, parameters, self.points)[0]
-        if value < self.best_cost and self.problem.fractions(parameters)[0].max() <= self.bound + SLACK:
-            self.best, self.best_cost = parameters, value
+    def _each(self, tasks: dict[int, Task]):  # type: ignore[no-untyped-def]
+        """Return the results of tasks as they become known, each with its number."""
+        if self.search.executor is None:
+            yield from ((index, polish(task)) for index, task in tasks.items())
+            return
+        futures = {self.search.executor.submit(polish, task): index for index, task in tasks.items()}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        finally:
+            for future in futures:
+                future.cancel()
 
-    def cost(self, x: Floats) -> tuple[float, Floats]:
-        family = self.problem.plan.family
-        parameters = family.centre + family.scale * x
-        value, slope = self.problem.cost(self.criterion, parameters, self.points)
-        self.evaluations += 1
-        if not np.isfinite(value):
-            return 1e6, np.zeros_like(x)
-        if value < self.best_cost and self.problem.fractions(parameters)[0].max() <= self.bound + SLACK:
-            self.best, self.best_cost = parameters, value
-        return value / self.unit, slope * family.scale / self.unit
-
-    def margin(self, x: Floats) -> Floats:
-        family = self.problem.plan.family
-        return self.bound - self.problem.fractions(family.centre + family.scale * x)[0]
-
-    def margin_slope(self, x: Floats) -> Floats:
-        family = self.problem.plan.family
-        return -self.problem.fractions(family.centre + family.scale * x)[1] * family.scale
-
-    def report(self, x: Floats) -> None:
-        self.iteration += 1
-        done = (self.number + min(1.0, self.iteration / self.search.iterations)) / self.search.starts
-        self.progress(done, f"{self.criterion.name}: start {self.number + 1}, best {self.best_cost:.4g}")
+    def _finish(self, results: dict[int, Polished], index: int, result: Polished, iterations: int) -> None:
+        results[index] = result
+        self.done += iterations + 1
+        self.evaluations += result.evaluations
+        self.best = min(self.best, result.cost)
+        spent = max(time.monotonic() - self.began, 1e-9)
+        left = spent * (self.total - self.done) / self.done
+        self.progress(
+            self.done / self.total,
+            f"{self.criterion.name}: best {self.best:.4g}, {self.evaluations / spent:.0f} evaluations/s, "
+            f"{left:.0f} s left",
+        )
 
 
-def _random_start(problem: Problem, rng: np.random.Generator) -> Floats:
-    """Draw parameters and shrink them towards the centre until they use at most `FILLED` of the tightest limit.
-
-    Only limits that a smaller motion helps to keep are considered.
-    """
-    family = problem.plan.family
-    direction = family.scale * rng.normal(size=family.size)
-    helped = [limit.shrinks for limit in problem.applied]
-    for size in 0.6 ** np.arange(SHRUNK):
-        if problem.fractions(family.centre + size * direction)[0][helped].max() <= FILLED:
-            break
-    return family.centre + size * direction
-
-
-def _repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) -> Floats:
-    """Return parameters that keep the limits, by descent from given ones; the same parameters where none is broken."""
-    family = problem.plan.family
-
-    def excess(x: Floats) -> tuple[float, Floats]:
-        value, slope = problem.fractions(family.centre + family.scale * x)
-        over = np.maximum(value - bound, 0.0)
-        return float(0.5 * over @ over), (over @ slope) * family.scale
-
-    x = (parameters - family.centre) / family.scale
-    if excess(x)[0] == 0.0:
-        return parameters
-    # a slightly lower bound, so that the result lies inside the limits
-    bound -= 2e-3
-    return family.centre + family.scale * minimize(excess, x, jac=True, method="L-BFGS-B").x
-
-
-def _describe(problem: Problem, fractions: Floats) -> str:
-    parts = [
-        f"{limit.name} {fraction * limit.bound:.4g}{'' if limit.unit == '1' else f' {limit.unit}'} where "
-        f"{limit.bound:.4g} is allowed"
-        for limit, fraction in zip(problem.applied, fractions, strict=True)
-        if fraction > 1.0 + SLACK
-    ]
-    return "; ".join(parts)
+def _describe(problem: Problem, parameters: Floats) -> str:
+    largest: dict[str, tuple[float, str]] = {}
+    for index, fraction in zip(problem.limit_of_fraction, problem.fractions(parameters)[0], strict=True):
+        limit = problem.applied[index]
+        if fraction > max(1.0 + SLACK, largest.get(limit.name, (0.0, ""))[0]):
+            unit = "" if limit.unit == "1" else f" {limit.unit}"
+            text = f"{limit.name} {fraction * limit.bound:.4g}{unit} where {limit.bound:.4g} is allowed"
+            largest[limit.name] = (float(fraction), text)
+    return "; ".join(text for _, text in largest.values())

@@ -7,6 +7,7 @@ from bayesid.diagnosis.diagnosis_run import Diagnosis, diagnose, identify_extend
 from bayesid.diagnosis.disturbing_wrench import Frame, Unexplained
 from bayesid.diagnosis.gain import Gain
 from bayesid.diagnosis.hypothesis import Hypothesis
+from bayesid.diagnosis.loop_review import DiagnosisReview
 from bayesid.diagnosis.probable_verdict import ProbableVerdict
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
 from bayesid.diagnosis.status import Status
@@ -16,6 +17,7 @@ __all__ = [
     "CausePrior",
     "CauseSet",
     "Diagnosis",
+    "DiagnosisReview",
     "Frame",
     "Gain",
     "Hypothesis",

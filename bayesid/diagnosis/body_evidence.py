@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sla
-from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats
+from bayesid._math.log_sum import log_sum
 
 __all__ = ["MissingBody", "MissingBodyPrior", "body_log_evidence", "outer_moments", "rigid_moments"]
 
@@ -101,22 +101,24 @@ class MissingBody:
             )
             for radius in self.radii
         ]
-        return float(logsumexp(values)) - float(np.log(len(values)))
+        return log_sum(values) - float(np.log(len(values)))
 
 
 def rigid_moments(theta: Floats) -> Floats:
-    """Return mass, first moment and inertia about the origin of a rigid body, shape (10,)."""
-    mass, place = np.exp(theta[0]), theta[1:4]
-    about = place @ place * np.eye(3) - np.outer(place, place)
-    second = np.array([about[i, j] for i, j in PAIRS]) + (theta[4:] if len(theta) > 4 else 0.0)
-    return np.asarray(mass * np.concatenate([[1.0], place, second]))
+    """Return mass, first moment and inertia about the origin of rigid bodies, shape (..., 10) for (..., n)."""
+    mass, place = np.exp(theta[..., :1]), theta[..., 1:4]
+    square = (place**2).sum(axis=-1)
+    second = np.stack([(square if i == j else 0.0) - place[..., i] * place[..., j] for i, j in PAIRS], axis=-1)
+    if theta.shape[-1] > 4:
+        second = second + theta[..., 4:]
+    return np.concatenate([mass, mass * place, mass * second], axis=-1)
 
 
 def outer_moments(theta: Floats) -> Floats:
-    """Return mass, first and second moment of mass of a point mass, shape (10,)."""
-    mass, place = np.exp(theta[0]), theta[1:4]
-    second = np.array([place[i] * place[j] for i, j in PAIRS])
-    return np.asarray(mass * np.concatenate([[1.0], place, second]))
+    """Return mass, first and second moment of mass of point masses, shape (..., 10) for (..., n)."""
+    mass, place = np.exp(theta[..., :1]), theta[..., 1:4]
+    second = np.stack([place[..., i] * place[..., j] for i, j in PAIRS], axis=-1)
+    return np.concatenate([mass, mass * place, mass * second], axis=-1)
 
 
 def body_log_evidence(
@@ -132,7 +134,7 @@ def body_log_evidence(
         The likelihood of moments ``a`` relative to none is ``exp(-score'a - a'matrix a / 2)``.
     prior : MissingBodyPrior
     moments : callable
-        The ten moments of the logarithm of the mass, the place and so on.
+        The ten moments of the logarithm of the mass, the place and so on, the last axis for the last axis.
     linear : (10,) array
         Moments from which a search starts, such as those that a linear fit gives.
     """
@@ -190,6 +192,4 @@ def _from(
 def _slope(x: Floats, mean: Floats, sd: Floats, moments: Callable[[Floats], Floats]) -> Floats:
     """Return the derivatives of the moments in prior deviations, shape (10, n), by central differences."""
     steps = STEP * np.eye(len(x))
-    return np.stack(
-        [(moments(mean + sd * (x + h)) - moments(mean + sd * (x - h))) / (2.0 * STEP) for h in steps], axis=1
-    )
+    return (moments(mean + sd * (x + steps)) - moments(mean + sd * (x - steps))).T / (2.0 * STEP)

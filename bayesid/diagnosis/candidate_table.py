@@ -149,7 +149,7 @@ def _noise(name: str, weighed: WeighedCauses) -> Candidate:
     """Return a fault of the noise, with its size where it was weighed."""
     local, adjusted = weighed.alarm.log_p_values()[name]
     state = next((state for state in weighed.states if name in state.names), None)
-    fault = None if state is None else state.fault
+    fault = None if state is None else next(fault for fault in state.faults if fault.label == name)
     mean, sd = (np.zeros(0), np.zeros(0)) if fault is None else (fault.mean, fault.sd)
     return Candidate(
         name,

@@ -8,39 +8,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesid._io.progress import Progress, silent
-from bayesid.diagnosis.amplitude_fit import fit_in_amplitudes
-from bayesid.diagnosis.burst_signatures import burst_signatures
 from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.equivalent_causes import classes_of_equivalents
 from bayesid.diagnosis.family_alarm import FamilyAlarm
-from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
+from bayesid.diagnosis.fault_weighing import WeighedState, weighed_states
+from bayesid.diagnosis.followed_motion import linearise_along_data
 from bayesid.diagnosis.linearisation import Linearisation, linearise
-from bayesid.diagnosis.noise_states import NoiseState, fault_names, noise_state
-from bayesid.diagnosis.noise_tests import noise_tests
+from bayesid.diagnosis.noise_states import NoiseState, fault_names
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.set_enumeration import enumerate_sets
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
-from bayesid.diagnosis.signature_bank import SignatureBank
-from bayesid.diagnosis.tone_tuning import with_tuned_tones
-from bayesid.diagnosis.vibration_fits import plausible_vibrations, with_fitted_vibrations
+from bayesid.diagnosis.settled_sets import settled
+from bayesid.diagnosis.vibration_fits import with_fitted_vibrations
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 __all__ = ["WeighedCauses", "weigh_causes"]
 
-AGREES = 0.5
-"""Difference between the cost of a fit and its linear prediction below which the linear evidence stands [nats]."""
-
-ROUNDS = 3
-"""Most linearisations about the best set."""
-
 MATTERS = 3e-3
 """Probability from which a set is evaluated anew under other ranges of the scales."""
-
-SUSPECT = 1e-3
-"""Local p-value of a test of the noise below which the fault is weighed as a cause."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +52,14 @@ class WeighedCauses:
 
     def state(self, causes: Sequence[str]) -> NoiseState:
         """Return the state of the noise in a set of causes."""
-        return next((state for state in self.states[1:] if state.names[0] in causes), self.states[0])
+        faulty = {name for state in self.states for name in state.names} & set(causes)
+        return next((state for state in self.states if set(state.names) == faulty), self.states[0])
 
     def widened(self, bound: float, floor: float) -> SetProbabilities:
         """Return the probabilities with the bounds and the floors of all scales multiplied by factors.
 
-        Only sets that matter are evaluated anew; the others keep their evidence.
+        Only sets that matter are evaluated anew, in the most probable forms of their causes; the others keep their
+        evidence.
         """
         matter = {name for item in self.probabilities.sets if item.probability >= MATTERS for name in item.names}
         wider = {
@@ -89,7 +78,9 @@ class WeighedCauses:
             state = self.state(item.causes)
             names = [name for name in item.names if name in state.point.evidence.causes]
             if item.probability >= MATTERS and names:
-                change = wider[state.names].log_evidence(names) - state.point.evidence.log_evidence(names)
+                forms = [state.point.evidence.forms(names)]
+                change = wider[state.names].log_evidence(names, forms)
+                change -= state.point.evidence.log_evidence(names, forms)
                 item = replace(item, log_evidence=item.log_evidence + change)
             sets.append(item)
         found = self.probabilities
@@ -110,6 +101,8 @@ def weigh_causes(
     prior: CausePrior,
     rng: np.random.Generator,
     progress: Progress = silent,
+    *,
+    held: bool = False,
 ) -> WeighedCauses:
     """Weigh every set of causes.
 
@@ -126,92 +119,24 @@ def weigh_causes(
     rng : Generator
         For the alarm.
     progress : Progress, optional
+    held : bool
+        Whether the bodies are held in the fit, which diverged: the model is then linearised along the data.
     """
     progress(0.2, "computing what each candidate would change")
-    base = linearise(engine, fit, effects, bounds)
+    base = linearise_along_data(engine, effects, bounds) if held else linearise(engine, fit, effects, bounds)
     progress(0.4, "testing the present model")
-    alarm = FamilyAlarm.of(base, rng)
+    alarm = FamilyAlarm.of(base, fit, rng)
     faults = fault_names(engine)
     if alarm.silent:
         single = enumerate_sets(base.evidence, prior, largest=1)
-        return WeighedCauses(base, alarm, (NoiseState(None, base),), _with_faults(single, faults))
+        return WeighedCauses(base, alarm, (NoiseState((), base),), _with_faults(single, faults))
     progress(0.5, "weighing the sets of causes")
-    point, found, best = _settled(_with_bursts(base), effects, bounds, prior)
+    point, found, best = settled(base, effects, bounds, prior)
     found, best = with_fitted_vibrations(point, found, effects, best)
-    states = [NoiseState(None, point)]
-    sets = [list(found.sets)]
-    for label, residual in _suspects(alarm, best, base.fit).items():
-        progress(0.6, f"weighing {label}")
-        highest = point.log_nothing + max(item.log_evidence for item in found.sets)
-        state = noise_state(label, residual, base, effects, bounds, highest)
-        if state is not None:
-            settled, own, _ = _settled(_with_bursts(state.point), effects, bounds, prior)
-            states.append(replace(state, point=settled))
-            sets.append(list(own.sets))
-    return WeighedCauses(base, alarm, tuple(states), _joined(states, sets, found, faults))
-
-
-def _settled(
-    base: Linearisation,
-    effects: Sequence[Effect],
-    bounds: Mapping[str, Sequence[PhysicalBound]],
-    prior: CausePrior,
-) -> tuple[Linearisation, SetProbabilities, Fit]:
-    """Enumerate, linearise about the best set where the linear model fails there, and again until it holds."""
-    point, found, best = base, enumerate_sets(base.evidence, prior), base.fit
-    if beside := plausible_vibrations(found, effects):
-        point = with_tuned_tones(point, effects, bounds, beside)
-        found = enumerate_sets(point.evidence, prior)
-    for _ in range(ROUNDS):
-        chosen, released = _best_known(found, effects)
-        if not chosen and not released:
-            return point, found, best
-        fit, expected = fit_in_amplitudes(point, chosen, released)
-        if fit.cost > best.cost:
-            return point, found, best
-        best = fit
-        if abs(fit.cost - expected) < AGREES:
-            return point, found, best
-        point = _with_bursts(linearise(point.engine, best, effects, bounds))
-        found = enumerate_sets(point.evidence, prior)
-        if beside := plausible_vibrations(found, effects):
-            point = with_tuned_tones(point, effects, bounds, beside)
-            found = enumerate_sets(point.evidence, prior)
-    return point, found, best
-
-
-def _with_bursts(point: Linearisation) -> Linearisation:
-    """Return the linearisation with bursts of the sensors among its candidates."""
-    return point.with_bank(SignatureBank.joined([point.bank, burst_signatures(point.engine, point.fit)]))
-
-
-def _best_known(found: SetProbabilities, effects: Sequence[Effect]) -> tuple[list[Effect], bool]:
-    """Return the effects of the most probable set that names all of its causes, and whether it frees initial rates.
-
-    There are none where one of them has several forms.
-    """
-    best = next((item for item in found.sets if item.causes and item.generic is None), None)
-    causes = () if best is None else best.causes
-    chosen = [effect for effect in effects if effect.label in causes]
-    if any(effect.modes_count or isinstance(effect, MassShift) for effect in chosen):
-        return [], False
-    return chosen, INITIAL_RATE in causes
-
-
-def _suspects(alarm: FamilyAlarm, best: Fit, base: Fit) -> dict[str, Fit]:
-    """Return the faults of the noise to weigh, each with the fit from whose residual its size follows.
-
-    What the best set leaves counts first; a fault that only the present model's residual shows may yet explain all of
-    it by itself.
-    """
-    found = {}
-    for name, log_p in noise_tests(best.posterior, best).items():
-        if log_p < np.log(SUSPECT):
-            found[name] = best
-    for name, log_p in alarm.noise.items():
-        if log_p < np.log(SUSPECT) and name not in found and not name.startswith("variance"):
-            found[name] = base
-    return found
+    first = WeighedState(base, NoiseState((), point), found, best)
+    weighed = weighed_states(first, alarm, effects, bounds, prior, progress)
+    every, sets = [item.state for item in weighed], [item.found.sets for item in weighed]
+    return WeighedCauses(base, alarm, tuple(every), _joined(every, sets, found, faults))
 
 
 def _with_faults(found: SetProbabilities, faults: Sequence[str]) -> SetProbabilities:

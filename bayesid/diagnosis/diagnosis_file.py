@@ -45,6 +45,7 @@ def diagnosis_dict(result: Diagnosis, identification: Identification | None) -> 
             "signal_to_noise": result.unexplained.signal_to_noise,
             "fixed_in": None if result.unexplained.fixed_in is None else result.unexplained.fixed_in.value,
         },
+        "bodies_held": result.held,
         "gain": _gain(result),
         "p_value": result.alarm.p_value,
         "most_significant": result.alarm.loudest,

@@ -20,11 +20,13 @@ from bayesid.diagnosis.cause_weighing import WeighedCauses, weigh_causes
 from bayesid.diagnosis.diagnosis_file import diagnosis_dict
 from bayesid.diagnosis.disturbing_wrench import Unexplained, unexplained_wrench
 from bayesid.diagnosis.family_alarm import FamilyAlarm
+from bayesid.diagnosis.followed_motion import step_along_data, without_torque
 from bayesid.diagnosis.gain import Gain, measure_gain
 from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.hypothesis_fit import fit_hypothesis
 from bayesid.diagnosis.left_over import with_left_over
 from bayesid.diagnosis.perturbed_fit import Engine
+from bayesid.diagnosis.present_fit import fit_present_model
 from bayesid.diagnosis.probable_verdict import UNKNOWN, ProbableVerdict
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import SetProbabilities
@@ -102,6 +104,11 @@ class Diagnosis:
     def alarm(self) -> FamilyAlarm:
         """Whether data hold more than the declared noise."""
         return self.weighed.alarm
+
+    @property
+    def held(self) -> bool:
+        """Whether every fit of the present model diverged, so that its bodies stay at their prior's centre."""
+        return self.weighed.base.held
 
     @property
     def evidence(self) -> SetEvidence:
@@ -187,16 +194,21 @@ def _diagnose(
     engine.compile()
     clock.ends("compile")
     progress(0.1, "fitting the present model")
-    first = engine.fit()
-    engine = engine.with_posterior(relinearised(posterior, first.z))
-    before = Hypothesis(engine, engine.fit(z=first.z))
+    first = fit_present_model(engine)
+    if first.held and (step := step_along_data(posterior)) < posterior.step:
+        posterior = Posterior.of(posterior.model, manoeuvres, step=step)
+        engine = Engine(posterior, engine.frozen)
+        first = fit_present_model(engine)
+    engine = engine.with_posterior(relinearised(posterior, first.fit.z))
+    present = fit_present_model(engine, first.fit.z)
+    before = Hypothesis(engine, present.fit)
     clock.ends("fit")
     wheels = any(f"wheel_momentum.{axis}" in item.recording.channels for item in manoeuvres for axis in "xyz")
     longest = max(float(item.recording.time[-1]) for item in manoeuvres)
     possible = candidates(model, knows_latitude=knows_latitude, records_wheels=wheels, longest=longest)
     catalogue = possible if effects is None else list(effects)
     limits = bounds_by_label(catalogue, model, stated)
-    weighed = weigh_causes(engine, before.fit, catalogue, limits, prior, rng, progress)
+    weighed = weigh_causes(engine, before.fit, catalogue, limits, prior, rng, progress, held=present.held)
     progress(0.65, "fitting the most probable causes")
     weighed, fitted = with_left_over(weighed, catalogue)
     classes = weighed.classes()
@@ -212,7 +224,8 @@ def _diagnose(
     gain = measure_gain(before, after)
     progress(0.85, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
-    disturbance = unexplained_wrench(before, weighed.base.bank, open_question)
+    lacking = Hypothesis(engine, without_torque(weighed.base.fit)) if present.held else before
+    disturbance = unexplained_wrench(lacking, weighed.base.bank, open_question)
     unexplained = unexplained_wrench(after, weighed.state(named).point.bank, False) if named else disturbance
     table = candidate_table(weighed, catalogue, rng)
     clock.ends("consequences")

@@ -10,6 +10,7 @@ from bayesid.diagnosis.encoder_fault import encoder_test
 from bayesid.diagnosis.evidence_alarm import FAMILY_LEVEL, EvidenceAlarm
 from bayesid.diagnosis.linearisation import Linearisation
 from bayesid.diagnosis.noise_tests import noise_tests, variance_tests
+from bayesid.diagnosis.perturbed_fit import Fit
 
 __all__ = ["FamilyAlarm"]
 
@@ -33,10 +34,10 @@ class FamilyAlarm:
     level: float = FAMILY_LEVEL
 
     @staticmethod
-    def of(point: Linearisation, rng: np.random.Generator, draws: int = 2000) -> FamilyAlarm:
-        """Test the present model at its fit."""
+    def of(point: Linearisation, fit: Fit, rng: np.random.Generator, draws: int = 2000) -> FamilyAlarm:
+        """Test the present model: candidates by its linearisation, the noise by its fit."""
         posterior = point.engine.posterior
-        tests = noise_tests(posterior, point.fit) | variance_tests(posterior, point.fit) | encoder_test(posterior)
+        tests = noise_tests(posterior, fit) | variance_tests(posterior, fit) | encoder_test(posterior)
         return FamilyAlarm(EvidenceAlarm.of(point.evidence, rng, draws), tests)
 
     @property

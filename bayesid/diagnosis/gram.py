@@ -130,7 +130,10 @@ class Gram:
         for name, own in chosen.items():
             groups[name] = np.arange(first, first + len(own))
             first += len(own)
-        return Gram(self.matrix[np.ix_(kept, kept)], self.score[kept], groups)
+        matrix, score = self.matrix[np.ix_(kept, kept)], self.score[kept]
+        for own in (matrix, score):
+            own.setflags(write=False)  # finite like those that they are of
+        return Gram(matrix, score, groups)
 
     def cosines(self, first: str, second: str) -> Floats:
         """Return the canonical correlations of two groups after projection, shape (k,), the largest first.

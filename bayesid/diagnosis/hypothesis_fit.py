@@ -56,11 +56,12 @@ def fit_hypothesis(state: NoiseState, causes: Sequence[str], effects: Sequence[E
     if INITIAL_RATE in names:
         z[point.engine.frozen] = engine.posterior.starting_point()[point.engine.frozen]
     starts = [_starts(effect, point, names) for effect in wanted]
+    along = point.fit.operating if point.held else None
     best: Fit | None = None
     problem: InputError | None = None
     for start in list(product(*starts))[:MOST_STARTS]:
         try:
-            fit = engine.fit(chosen, start, z=z)
+            fit = engine.fit(chosen, start, z=z, operating=along)
         except InputError as error:  # no motion from this start
             problem = error
             continue
@@ -68,7 +69,7 @@ def fit_hypothesis(state: NoiseState, causes: Sequence[str], effects: Sequence[E
             best = fit
     if best is None:
         raise problem if problem is not None else InputError("a hypothesis cannot be fitted", remedy="Name another")
-    return Hypothesis(engine, best, () if state.fault is None else (state.fault,))
+    return Hypothesis(engine, best, state.faults)
 
 
 def _starts(effect: Effect, point: Linearisation, names: Sequence[str]) -> Sequence[Floats]:

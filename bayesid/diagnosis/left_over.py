@@ -13,6 +13,7 @@ from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.hypothesis_fit import fit_hypothesis
 from bayesid.diagnosis.noise_tests import noise_tests
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
+from bayesid.diagnosis.structure_tests import structure_tests
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["LEFT_OVER", "log_odds_of_anything", "log_p_left", "with_left_over"]
@@ -73,7 +74,7 @@ def with_left_over(
 
 def log_p_left(hypothesis: Hypothesis) -> float:
     """Return the logarithm of the p-value of the loudest test of the residual, for the number of tests."""
-    tests = noise_tests(hypothesis.fit.posterior, hypothesis.fit)
+    tests = noise_tests(hypothesis.fit.posterior, hypothesis.fit) | structure_tests(hypothesis.fit)
     return min(0.0, min(tests.values()) + float(np.log(len(tests))))
 
 

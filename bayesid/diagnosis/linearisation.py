@@ -14,6 +14,7 @@ from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE, initial_rate_signatures
 from bayesid.diagnosis.mass_shift_signatures import mass_shift_signatures
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.present_fit import with_bodies_held
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.signature_bank import SignatureBank
 from bayesid.diagnosis.vibration_signatures import vibration_signatures
@@ -37,6 +38,8 @@ class Linearisation:
         Of sets of causes relative to nothing, by the linear model.
     log_nothing : float
         Logarithm of the evidence of the present model without any cause, by the linear model.
+    held : bool
+        Whether the bodies are held where the fit has them, since the present model's own fit diverged.
     """
 
     engine: Engine
@@ -44,14 +47,21 @@ class Linearisation:
     bank: SignatureBank
     evidence: SetEvidence
     log_nothing: float
+    held: bool = False
 
     def with_bank(self, bank: SignatureBank) -> Linearisation:
         """Return the linearisation with another bank about the same fit."""
-        return _assembled(self.engine, self.fit, bank)
+        return _assembled(self.engine, self.fit, bank, self.held)
 
 
 def linearise(
-    engine: Engine, fit: Fit, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
+    engine: Engine,
+    fit: Fit,
+    effects: Sequence[Effect],
+    bounds: Mapping[str, Sequence[PhysicalBound]],
+    *,
+    held: bool = False,
+    beside: SignatureBank | None = None,
 ) -> Linearisation:
     """Linearise the model and all candidates about a fit.
 
@@ -67,6 +77,11 @@ def linearise(
         Candidates of the catalogue.
     bounds : mapping of str to sequence of PhysicalBound
         Of each candidate, by its label.
+    held : bool
+        Whether the bodies stay where the fit has them. A body of another size would make up for the lack of a large
+        cause in the linear model, and only there.
+    beside : SignatureBank, optional
+        Further signatures, such as those of what the fit holds beside the candidates.
     """
     bank = SignatureBank.joined(
         [
@@ -75,12 +90,13 @@ def linearise(
             vibration_signatures(engine, fit, effects, bounds),
             mass_shift_signatures(engine, fit, effects, bounds),
             generic_signatures(engine, fit),
+            beside or SignatureBank(),
         ]
     )
-    return _assembled(engine, fit, bank)
+    return _assembled(engine, with_bodies_held(fit) if held else fit, bank, held)
 
 
-def _assembled(engine: Engine, fit: Fit, bank: SignatureBank) -> Linearisation:
+def _assembled(engine: Engine, fit: Fit, bank: SignatureBank, held: bool) -> Linearisation:
     gram = bank.gram(fit)
     amplitudes = _amplitudes(fit, gram)
     own = fit.own
@@ -92,7 +108,7 @@ def _assembled(engine: Engine, fit: Fit, bank: SignatureBank) -> Linearisation:
     taken = gram.matrix @ amplitudes
     log_nothing = constant - cost + float(gram.score @ amplitudes - 0.5 * amplitudes @ taken)
     gram = replace(gram, score=gram.score - taken)
-    return Linearisation(engine, fit, bank, SetEvidence(gram, bank.causes), log_nothing)
+    return Linearisation(engine, fit, bank, SetEvidence(gram, bank.causes), log_nothing, held)
 
 
 def _amplitudes(fit: Fit, gram: Gram) -> Floats:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesid.diagnosis.encoder_fault import ENCODER_NOISE
+from bayesid.diagnosis.followed_motion import linearise_along_data
 from bayesid.diagnosis.linearisation import Linearisation, linearise
 from bayesid.diagnosis.noise_faults import NoiseFault, noise_fault, refined
 from bayesid.diagnosis.noise_tests import ON_LATTICE
@@ -28,28 +29,28 @@ HOPELESS, BEHIND = 60.0, 20.0
 
 @dataclass(frozen=True)
 class NoiseState:
-    """The model under one fault of its noise, or under none.
+    """The model under some faults of its noise, or under none.
 
     Attributes
     ----------
-    fault : NoiseFault or None
+    faults : tuple of NoiseFault
     point : Linearisation
     log_charge : float
-        Logarithm of what the freedom of the fault costs.
+        Logarithm of what the freedom of the faults costs.
     """
 
-    fault: NoiseFault | None
+    faults: tuple[NoiseFault, ...]
     point: Linearisation
     log_charge: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Name of the fault, if any."""
-        return () if self.fault is None else (self.fault.label,)
+        """Names of the faults, in order."""
+        return tuple(sorted(fault.label for fault in self.faults))
 
     @property
     def log_nothing(self) -> float:
-        """Logarithm of the evidence of the present model with this fault and no other cause."""
+        """Logarithm of the evidence of the present model with these faults and no other cause."""
         return self.point.log_nothing + self.log_charge
 
 
@@ -68,15 +69,15 @@ def fault_names(engine: Engine) -> tuple[str, ...]:
 def noise_state(
     label: str,
     residual: Fit,
-    base: Linearisation,
+    before: NoiseState,
     effects: Sequence[Effect],
     bounds: Mapping[str, Sequence[PhysicalBound]],
     best: float,
 ) -> NoiseState | None:
-    """Return the state with one fault, whose size is estimated from a residual.
+    """Return the state with one fault more, whose size is estimated from a residual.
 
-    It is None if the residual shows no such fault, or if the fault was to explain by itself what the present model
-    leaves and is far behind the best explanation.
+    It is None if the residual shows no such fault, or if the fault was to explain by itself what the model leaves and
+    is far behind the best explanation.
 
     Parameters
     ----------
@@ -84,29 +85,32 @@ def noise_state(
         Name of the fault.
     residual : Fit
         From whose residual the fault is estimated.
-    base : Linearisation
-        Of the present model, from which its fit under the fault starts.
+    before : NoiseState
+        Linearised about the fit without causes of the catalogue, from which that under the fault starts.
     effects : sequence of Effect
         Candidates of the catalogue.
     bounds : mapping of str to sequence of PhysicalBound
     best : float
         Log evidence of the best explanation so far.
     """
+    base = before.point
     alone = residual is base.fit
-    fault = noise_fault(label, residual, best - base.log_nothing - HOPELESS if alone else -np.inf)
+    fault = noise_fault(label, residual, best - before.log_nothing - HOPELESS if alone else -np.inf)
     if fault is None:
         return None
     engine = base.engine.with_posterior(fault.posterior)
     fit = engine.fit(z=base.fit.z)
-    if alone and fit.log_evidence + _log_charge(fault) < best - HOPELESS:
+    if alone and fit.log_evidence + before.log_charge + _log_charge(fault) < best - HOPELESS:
         return None
     if label.startswith("coloured-noise"):
         fault = refined(fault, engine, residual)
         engine = engine.with_posterior(fault.posterior)
         fit = engine.fit(z=base.fit.z)
-    if alone and fit.log_evidence + _log_charge(fault) < best - BEHIND:
+    charge = before.log_charge + _log_charge(fault)
+    if alone and fit.log_evidence + charge < best - BEHIND:
         return None
-    return NoiseState(fault, linearise(engine, fit, effects, bounds), _log_charge(fault))
+    point = linearise_along_data(engine, effects, bounds) if base.held else linearise(engine, fit, effects, bounds)
+    return NoiseState((*before.faults, fault), point, charge)
 
 
 def _log_charge(fault: NoiseFault) -> float:
@@ -115,7 +119,7 @@ def _log_charge(fault: NoiseFault) -> float:
     name, _, place = fault.label.partition(":")
     if name == "quantisation":  # that values fall on a lattice by chance
         return -float(np.log(2.0 * ON_LATTICE)) * fault.posterior.samples / 3.0
-    relative = np.maximum(fault.sd / fault.mean, 1e-6)
+    relative = np.maximum(fault.sd / np.maximum(fault.mean, np.finfo(float).tiny), 1e-6)
     charge = float(np.minimum(np.log(np.sqrt(2.0 * np.pi) * relative / width), 0.0).sum()) + fault.log_gain
     if name == "outliers":
         charge += _contamination(fault, Kind.of(place))

@@ -17,9 +17,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats, Integers
+from bayesid._math.log_sum import log_sum
 from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.scale_nodes import LogNodes, log_nodes, thinning
 from bayesid.diagnosis.scale_prior import AmplitudeGroup, ScaleRange, range_of
@@ -155,7 +155,7 @@ def average_over_scales(groups: Sequence[GroupSpectrum], gram: Gram) -> ScaleAve
         if thinned == 1.0 or narrower == parts:
             break
         parts = narrower
-    log_evidence = float(logsumexp(log_terms))
+    log_evidence = log_sum(log_terms)
     return ScaleAverage(log_evidence, nodes, log_terms - log_evidence)
 
 

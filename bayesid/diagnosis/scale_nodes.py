@@ -53,7 +53,9 @@ def log_nodes(whole: ScaleRange, part: tuple[float, float], amplitudes: int, thi
     count = max(int(np.ceil(decades * max(PER_DECADE, PER_ROOT * np.sqrt(amplitudes)) * thinned)) + 1, 3)
     weights = np.full(count, np.log(part[1] / part[0]) / (count - 1) / np.log(whole.high / whole.low))
     weights[[0, -1]] *= 0.5
-    return LogNodes(np.geomspace(part[0], part[1], count), np.log(weights))
+    scales = np.exp(np.linspace(np.log(part[0]), np.log(part[1]), count))
+    scales[[0, -1]] = part  # exactly
+    return LogNodes(scales, np.log(weights))
 
 
 def thinning(counts: Sequence[int], limit: int) -> float:

@@ -9,6 +9,7 @@ so that their Occam factors are comparable.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -116,7 +117,7 @@ class CandidateCause:
         if self.fixed and (self.others or len(self.groups) != 1):
             raise ValueError(f"{self.name!r}: a cause of fixed size has one form with one group")
 
-    @property
+    @cached_property
     def variants(self) -> tuple[Variant, ...]:
         """All forms, with their prior probabilities."""
         forms = (self.groups, *self.others)

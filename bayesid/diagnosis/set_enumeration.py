@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import logsumexp
 
+from bayesid._math.log_sum import log_sum
 from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.evidence_beside import evidence_beside
 from bayesid.diagnosis.set_evidence import SetEvidence
@@ -107,7 +107,7 @@ def _screened(
         forms = evidence.forms(parent.names)
         for name, values in evidence_beside(evidence, parent.names, forms, others).items():
             key = (tuple(sorted((*parent.causes, name))), parent.generic)
-            gain = float(logsumexp(list(values.values()))) + max(evidence.bodily.get(name, 0.0), 0.0)
+            gain = log_sum(list(values.values())) + max(evidence.bodily.get(name, 0.0), 0.0)
             order = [form for form, _ in sorted(values.items(), key=lambda item: -item[1])][:MOST_FORMS]
             near = [form for form in order if values[form] > values[order[0]] - FORMS_NEAR]
             choices = [{**forms, name: form} for form in near]

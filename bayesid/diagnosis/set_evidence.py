@@ -12,6 +12,7 @@ import scipy.linalg as sla
 from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats, Integers
+from bayesid._math.log_sum import log_sum
 from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.scale_integral import MOST_NODES, GroupSpectrum, ScaleAverage, average_over_scales
 from bayesid.diagnosis.scale_nodes import LogNodes, thinning
@@ -84,6 +85,7 @@ class SetEvidence:
             name: tuple(tuple(GroupSpectrum.of(g, gram) for g in variant.groups) for variant in cause.variants)
             for name, cause in self.causes.items()
         }
+        self._known: dict[tuple[tuple[str, ...], tuple[int, ...]], float] = {}
         self._log_weights = {
             name: np.array([variant.log_weight for variant in cause.variants]) for name, cause in self.causes.items()
         }
@@ -115,7 +117,7 @@ class SetEvidence:
         choices = self._choices(ordered)
         if len(choices) == 1:
             return dict(zip(ordered, choices[0], strict=True))
-        best = max(choices, key=lambda own: self._of(ordered, own).log_evidence + self._log_weight(ordered, own))
+        best = max(choices, key=lambda own: self._log_evidence(ordered, own))
         return dict(zip(ordered, best, strict=True))
 
     def places(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[tuple[str, int]]:
@@ -160,9 +162,16 @@ class SetEvidence:
             if choices is None
             else [tuple(choice[name] for name in ordered) for choice in choices]
         )
-        values = [self._of(ordered, own).log_evidence + self._log_weight(ordered, own) for own in forms]
+        values = [self._log_evidence(ordered, own) for own in forms]
         best = dict(zip(ordered, forms[int(np.argmax(values))], strict=True))
-        return float(logsumexp(values)) + self._bodily(ordered, best)
+        return log_sum(values) + self._bodily(ordered, best)
+
+    def _log_evidence(self, ordered: Sequence[str], forms: tuple[int, ...]) -> float:
+        """Return the logarithm of the evidence of causes in given forms, times the prior probability of these."""
+        key = (tuple(ordered), forms)
+        if key not in self._known:
+            self._known[key] = self._of(ordered, forms).log_evidence + self._log_weight(ordered, forms)
+        return self._known[key]
 
     def _bodily(self, ordered: Sequence[str], forms: Mapping[str, int]) -> float:
         """Return what it adds to the log evidence of a set that some of its amplitudes are moments of a body.
@@ -214,7 +223,10 @@ class SetEvidence:
         lower = np.linalg.cholesky(information)
         shared = sla.solve_triangular(lower, deviations[:, None] * self.gram.matrix[np.ix_(held, kept)], lower=True)
         pull = sla.solve_triangular(lower, deviations * score[held], lower=True)
-        return Gram(part.matrix - shared.T @ shared, score[kept] - shared.T @ pull, part.groups)
+        matrix, left = part.matrix - shared.T @ shared, score[kept] - shared.T @ pull
+        for own in (matrix, left):
+            own.setflags(write=False)  # finite, since the set's information is positive definite
+        return Gram(matrix, left, part.groups)
 
     def _log_weight(self, ordered: Sequence[str], forms: Sequence[int]) -> float:
         """Return the logarithm of the prior probability of a combination of forms."""

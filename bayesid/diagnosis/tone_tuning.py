@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bayesid.diagnosis.catalogue_signatures import group_names
 from bayesid.diagnosis.linearisation import Linearisation
 from bayesid.diagnosis.scale_prior import CandidateCause
 from bayesid.diagnosis.signature_bank import SignatureBank
@@ -61,6 +62,7 @@ def _tuned(
     per_tone = len(cause.variants) // grid
     cell = evidence.forms([*others, effect.label])[effect.label] // per_tone
     names = {group.name for name in others for form in evidence.causes[name].variants for group in form.groups}
+    names |= {name for held in point.fit.effects for name in group_names(held).values()}  # whose amplitudes it needs
     rest = SignatureBank(
         tuple(item for item in point.bank.signatures if item.name in names), tuple(evidence.causes[n] for n in others)
     )

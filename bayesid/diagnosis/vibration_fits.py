@@ -62,7 +62,7 @@ def with_fitted_vibrations(
         if linear is None:
             linear = point.evidence.log_evidence(names)
         try:
-            fits[label] = fit_hypothesis(NoiseState(None, point), names, effects).fit
+            fits[label] = fit_hypothesis(NoiseState((), point), names, effects).fit
         except InputError:  # no motion with this vibration
             continue
         gains[label] = max(fits[label].log_evidence - point.log_nothing - linear, 0.0)

@@ -54,7 +54,13 @@ class Posterior:
 
     @classmethod
     def of(
-        cls, model: Model, manoeuvres: Sequence[Manoeuvre], *, step: float | None = None, flat_prior: bool = False
+        cls,
+        model: Model,
+        manoeuvres: Sequence[Manoeuvre],
+        *,
+        step: float | None = None,
+        flat_prior: bool = False,
+        window: int | None = None,
     ) -> Posterior:
         """Return the posterior of a model given manoeuvres.
 
@@ -66,6 +72,9 @@ class Posterior:
             Longest integration step [s], by default chosen from the sensors' noise (`choose_step`).
         flat_prior : bool
             Whether the prior is left out.
+        window : int, optional
+            Number of earlier blocks on which the whitening conditions each sample, by default the smallest that is
+            accurate. With 0 the correlation of the encoders' noise is left out, which suits a first look at the data.
 
         Raises
         ------
@@ -80,7 +89,8 @@ class Posterior:
         start = starting_point(unknowns, recorded)
         chosen = choose_step(model, manoeuvres, recorded, structure, numbers, start) if step is None else step
         grids = grids_of(model, manoeuvres, recorded, chosen)
-        whitenings = whiten(model, recorded, grids, manoeuvres, unknowns, structure, numbers, start)
+        windows = None if window is None else [window] * len(recorded)
+        whitenings = whiten(model, recorded, grids, manoeuvres, unknowns, structure, numbers, start, windows)
         arrays = stacked(model, manoeuvres, recorded, grids, whitenings)
         left_out = tuple(np.zeros_like(item.outputs) for item in whitenings)
         data = Data(model, tuple(manoeuvres), recorded, tuple(whitenings), left_out, chosen, arrays)

@@ -6,6 +6,7 @@ from bayesid.report.diagnosis_report import diagnosis_report
 from bayesid.report.document import Document
 from bayesid.report.identifiability_report import identifiability_report
 from bayesid.report.identification_report import identification_report
+from bayesid.report.loop_report import loop_report
 from bayesid.report.numbers import format_quantity
 from bayesid.report.prediction_report import prediction_report
 from bayesid.report.simulation_report import simulation_report
@@ -18,6 +19,7 @@ __all__ = [
     "format_quantity",
     "identifiability_report",
     "identification_report",
+    "loop_report",
     "prediction_report",
     "simulation_report",
 ]

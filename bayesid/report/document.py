@@ -159,7 +159,7 @@ class Document:
             numbered = f"#{{ show figure: set block(breakable: true)\n {numbered[1:]} }}\n"
         self._parts.append(numbered if caption is not None else f"#{table}\n")
 
-    def figure(self, fig: Figure, caption: str, width: str = "100%") -> None:
+    def figure(self, fig: Figure, caption: str, width: str = "100%", *, floating: bool = False) -> None:
         """Add a numbered figure.
 
         Parameters
@@ -168,12 +168,17 @@ class Document:
         caption : str
         width : str
             Width in percent of the text's width, such as ``80%``.
+        floating : bool
+            Whether it goes to the foot of this page or of the next one, so that what follows fills the page.
         """
         if not re.fullmatch(r"\d+(\.\d+)?%", width):
             raise InputError(f"width {width!r} is not a percentage", remedy='Give the width of a figure as "80%"')
         self._figures.append(_svg(fig))
         name = literal(f"figure-{len(self._figures)}.svg")
-        self._parts.append(f"#figure(image({name}, width: {width}), kind: image, caption: {literal(caption)})\n")
+        place = "bottom" if floating else "none"
+        self._parts.append(
+            f"#figure(image({name}, width: {width}), kind: image, placement: {place}, caption: {literal(caption)})\n"
+        )
 
     def write(self, path: str | Path) -> None:
         """Set the document and write it as PDF, all or nothing."""

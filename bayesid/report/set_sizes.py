@@ -52,9 +52,7 @@ def set_sizes(result: Diagnosis, item: CauseSet) -> list[GroupSize]:
     state = result.weighed.state(item.causes)
     evidence = state.point.evidence
     ordered = sorted(name for name in item.names if name in evidence.causes)
-    found = (
-        [] if state.fault is None else [_of_fault(state.fault.label, state.fault.mean[0], state.fault.quantities[0])]
-    )
+    found = [_of_fault(fault.label, fault.mean[0], fault.quantities[0]) for fault in state.faults]
     rest = [GroupSize(name) for name in item.names if name not in evidence.causes and name not in state.names]
     if not ordered:
         return found + rest

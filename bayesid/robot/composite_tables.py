@@ -13,12 +13,12 @@ from typing import cast
 
 import numpy as np
 
-from bayesid._math.arrays import Floats, namespace
+from bayesid._math.arrays import Floats, Traceable, namespace
 from bayesid.robot.inertial_parameters import BASIS
 from bayesid.robot.kinematics import Kinematics, joint_motion
 from bayesid.robot.robot import Robot
 
-__all__ = ["ENTRIES", "WIDTH", "composite_rows", "link_table"]
+__all__ = ["ENTRIES", "WIDTH", "composite_rows", "link_table", "rows_of_moments"]
 
 
 ENTRIES = {
@@ -53,6 +53,12 @@ def _moments(pose: Floats, rate: Floats, acceleration: Floats, bodies: Floats) -
     left = pose[:, None] @ bodies
     xp = namespace(left)
     composite, flow, surge = (left @ xp.swapaxes(other, 1, 2)[:, None] for other in (pose, rate, acceleration))
+    return rows_of_moments(composite, flow, surge)
+
+
+def rows_of_moments(composite: Traceable, flow: Traceable, surge: Traceable) -> Floats:
+    """Return the rows (..., 28) of the sums ``P``, ``S`` and ``Q``, each of shape (..., 4, 4)."""
+    xp = namespace(composite)
     spin, spin_rate = (
         xp.stack([matrix[..., a, b] - matrix[..., b, a] for a, b in ((1, 2), (2, 0), (0, 1))], axis=-1)
         for matrix in (flow, surge)

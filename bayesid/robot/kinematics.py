@@ -11,7 +11,7 @@ from bayesid._math.arrays import Floats, namespace
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
 
-__all__ = ["Kinematics", "configuration", "joint_motion", "joint_twist", "kinematics"]
+__all__ = ["Kinematics", "configuration", "hat", "joint_motion", "joint_twist", "kinematics"]
 
 
 class Kinematics(NamedTuple):
@@ -33,7 +33,7 @@ def kinematics(robot: Robot, state: JointState) -> Kinematics:
     count = len(state.position)
     fixed, still = xp.broadcast_to(xp.eye(4), (count, 4, 4)), xp.zeros((count, 4, 4))
     for index, joint in enumerate(robot.joints):
-        axis = xp.asarray(_hat(joint_twist(robot, index)))
+        axis = xp.asarray(hat(joint_twist(robot, index)))
         q, speed, change = (part[:, index, None, None] for part in state)
         square = axis @ axis
         if joint.kind == "prismatic":
@@ -87,7 +87,7 @@ def joint_twist(robot: Robot, joint: int) -> Floats:
     return np.asarray(data.S).ravel()
 
 
-def _hat(twist: Floats) -> Floats:
+def hat(twist: Floats) -> Floats:
     """Return the 4x4 matrices of spatial velocities (..., 6), linear part first."""
     matrix = np.zeros((*twist.shape[:-1], 4, 4))
     x, y, z = np.moveaxis(twist[..., 3:], -1, 0)

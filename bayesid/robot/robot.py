@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -93,6 +94,14 @@ class Robot:
     joints: tuple[Joint, ...]
     loads: tuple[str, ...]
     model: pin.Model
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the content for another process, to which a read-only mapping cannot be sent."""
+        return {**self.__dict__, "links": dict(self.links)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take the content over."""
+        self.__dict__.update(state, links=MappingProxyType(state["links"]))
 
     @classmethod
     def from_urdf(cls, file: str | Path) -> Robot:

@@ -32,6 +32,7 @@ __all__ = [
     "LinearMotion",
     "Samples",
     "Start",
+    "System",
     "TimeTables",
     "UnitSpeed",
     "composite",
@@ -307,9 +308,9 @@ class _StateTrajectory(NamedTuple):
 
 def _integrate(
     grid: Grid, inertial: Array, start: Start, effects: Sequence[Effect], values: Sequence[Array]
-) -> tuple[_System, Array, _StateTrajectory]:
+) -> tuple[System, Array, _StateTrajectory]:
     """Return the system, the factors of its tables, and its trajectory by the classical Runge-Kutta method."""
-    system = _System(tuple(effects), tuple(values))
+    system = System(tuple(effects), tuple(values))
     more = [effect.body_loads(v, inertial) for effect, v in zip(effects, values, strict=True)]
     loads = jnp.concatenate([inertial, *more])
     bodies = jax.vmap(composite)(grid.node.known + grid.node.unknown @ loads)
@@ -339,7 +340,7 @@ def _spin_error(tables: UnitSpeed, loads: Array, start: Start) -> Array:
     return start.speed_error @ spins
 
 
-def _sample(grid: Grid, points: Array, system: _System, loads: Array, trajectory: _StateTrajectory) -> Samples:
+def _sample(grid: Grid, points: Array, system: System, loads: Array, trajectory: _StateTrajectory) -> Samples:
     """Return the motion at the samples along a trajectory of states."""
     seen = jax.vmap(composite)(grid.sample.known + grid.sample.unknown @ loads)
     sample = jax.vmap(system.sample, (0, 0, 0, None, 0, None))
@@ -368,13 +369,14 @@ class _Inner(NamedTuple):
     speed: Array
 
 
-class _System(NamedTuple):
+class System(NamedTuple):
     """Equations of motion of the composite body with a set of effects."""
 
     effects: tuple[Effect, ...]
     values: tuple[Array, ...]
 
     def initial(self, given: tuple[Composite, Environment], start: Start, spin_error: Array) -> Array:
+        """Return the state at time 0."""
         body, environment = given
         inner = jnp.zeros(sum(effect.states + 2 * effect.modes_count for effect in self.effects))
         instant = Instant(environment, body, rotation(start.attitude), *jnp.zeros((3, 3)))
@@ -382,6 +384,7 @@ class _System(NamedTuple):
         return jnp.concatenate([start.attitude, momentum, inner])
 
     def derivative(self, state: Array, given: tuple[Composite, Environment], hold: Array) -> Array:
+        """Return the derivative of the state by time."""
         if any(effect.modes_count for effect in self.effects):
             instant, mode_changes = self.motion(state, given, hold)
         else:  # the acceleration is not needed
@@ -407,6 +410,7 @@ class _System(NamedTuple):
         tables: TimeTables,
         loads: Array,
     ) -> Samples:
+        """Return the motion at a sample, as `Samples` has it."""
         instant, _ = self.motion(state, given, hold)
         added = jnp.zeros_like(points)
         for effect, values, *_ in self.inner(state[INNER]):
@@ -467,6 +471,7 @@ class _System(NamedTuple):
         ), changes
 
     def instant(self, state: Array, given: tuple[Composite, Environment]) -> tuple[Instant, Array]:
+        """Return the instant without accelerations, and the derivative of the relative momentum."""
         body, environment = given
         still = Instant(environment, body, rotation(state[ATTITUDE]), *jnp.zeros((3, 3)))
         momentum, momentum_rate = self.momentum(still, state[INNER])
@@ -484,6 +489,7 @@ class _System(NamedTuple):
         return momentum, rate
 
     def wrench(self, instant: Instant, inner: Array, hold: Array) -> Wrench:
+        """Return the force and its torque about the base origin."""
         given = hold + instant.environment.wrench
         total = Wrench(given[:3], given[3:])
         for effect, values, states, *_ in self.inner(inner):
@@ -501,6 +507,7 @@ class _System(NamedTuple):
         )
 
     def inner(self, inner: Array) -> list[_Inner]:
+        """Return every effect with its parameters and its part of the inner states."""
         parts, start = [], 0
         for effect, values in zip(self.effects, self.values, strict=True):
             ends = np.cumsum([start, effect.states, effect.modes_count, effect.modes_count])

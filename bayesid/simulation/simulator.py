@@ -143,24 +143,28 @@ class Simulator:
         effects = tuple(0 if key.effect.per_recording else None for key in self.keys)
         return Values(None, 0, 0, 0, effects)  # type: ignore[arg-type]
 
-    def _effects(self, constants: ModelConstants) -> tuple[Effect, ...]:
+    def effects(self, constants: ModelConstants) -> tuple[Effect, ...]:
+        """Return the effects with their constants."""
         return tuple(key.effect.bound(numbers) for key, numbers in zip(self.keys, constants.effects, strict=True))
 
     def _arguments(self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array) -> tuple[Any, ...]:
         start = Start(tilted(attitude, values.tilt), values.rate, values.speed)
-        return grid, values.inertial, start, self._effects(constants), values.effects, constants.point
+        return grid, values.inertial, start, self.effects(constants), values.effects, constants.point
 
     def linearise(self, constants: ModelConstants, values: Values, grid: Grid, attitude: Array) -> LinearMotion:
         """Linearise the simulation in what may act from outside; raw readings are those of `faulty`'s argument."""
 
         def one(values: Values, grid: Grid, attitude: Array) -> LinearMotion:
-            def read(sample: Samples) -> Array:
-                alone = jax.tree.map(lambda x: x[None], sample)
-                return jnp.concatenate([part[0] for part in self._raw(constants, alone)])
-
-            return partial(linearise, read=read)(*self._arguments(constants, values, grid, attitude))
+            return partial(linearise, read=partial(self.reading, constants))(
+                *self._arguments(constants, values, grid, attitude)
+            )
 
         return jax.lax.map(lambda given: one(*given), (self._repeated(values, len(attitude)), grid, attitude))
+
+    def reading(self, constants: ModelConstants, sample: Samples) -> Array:
+        """Return the raw readings (q,) of sensors without a fault at one instant, one sensor after the other."""
+        alone = jax.tree.map(lambda x: x[None], sample)
+        return jnp.concatenate([part[0] for part in self._raw(constants, alone)])
 
     def faulty(self, constants: ModelConstants, values: Values, grid: Grid, raw: Array) -> Readings:
         """Return the readings of sensors without a fault, (R, T, q), with the faults that effects add; no torques."""
@@ -205,7 +209,7 @@ class Simulator:
         """Return the readings of one recording with the faults and friction that effects add."""
         channels = {kind.value: own for kind, own in zip(self.channels.kinds, raw, strict=True)}
         readings = Readings(grid.sample.environment.time, channels, torque)
-        for effect, parameters in zip(self._effects(constants), values.effects, strict=True):
+        for effect, parameters in zip(self.effects(constants), values.effects, strict=True):
             readings = effect.read(parameters, readings)
             if self.torques and effect.uses("friction"):
                 friction = effect.friction(parameters, grid.sample.beyond.velocity)

@@ -22,7 +22,7 @@ from bayesid.simulation.effects.instant import Environment
 from bayesid.simulation.joint_torques import beyond_joints, no_joints
 from bayesid.simulation.orbit import Orbit, OrbitState
 
-__all__ = ["build_grid", "lengthened", "pad_grids", "rounded"]
+__all__ = ["build_grid", "lengthened", "pad_grids", "rounded", "time_tables"]
 
 
 BRIEF = 1e-6
@@ -84,7 +84,7 @@ def build_grid(
     nodes = _nodes(float(samples[-1]), step, breaks)
     node = np.sort(np.concatenate([nodes, 0.5 * (nodes[1:] + nodes[:-1])]))
     instants = [
-        _instants(robot, unknown, effects, motion, time, orbit, argument_of_latitude, actions, sampled)
+        time_tables(robot, unknown, effects, motion, time, orbit, argument_of_latitude, actions, sampled)
         for time, sampled in ((node, False), (samples, torques))
     ]
     index = np.clip(np.searchsorted(nodes, samples, side="right") - 1, 0, len(nodes) - 2)
@@ -122,17 +122,19 @@ def _nodes(end: float, step: float, changes: Floats) -> Floats:
     return np.concatenate([*pieces, [end]])
 
 
-def _instants(
+def time_tables(
     robot: Robot,
     unknown: tuple[str, ...],
     effects: Sequence[Effect],
     motion: Motion,
     time: Floats,
-    orbit: Orbit | None,
-    argument_of_latitude: float,
-    actions: Actions,
-    torques: bool,
+    orbit: Orbit | None = None,
+    argument_of_latitude: float = 0.0,
+    actions: Actions | None = None,
+    torques: bool = False,
 ) -> TimeTables:
+    """Return the kinematic tables at the times (T,); parameters as of `build_grid`."""
+    actions = Actions.none() if actions is None else actions
     joints = motion.evaluate(time)
     moved = kinematics(robot, joints)
     known = composite_rows(robot, moved, leave_out=unknown)

@@ -176,8 +176,13 @@ def _measured(document: Document, case: Case) -> None:
     document.table(
         ["base", "true", "before ± sd", "error [sd]", "after ± sd", "error [sd]"],
         rows,
-        "The base body, before and after the extension. The present model attributes the drift to the base, which "
-        "biases its estimates.",
+        "The base body, before and after the extension. "
+        + (
+            "Every fit of the present model attributes the drift to the base and drives it to where its prior all but "
+            "excludes it, so the base stays at the prior before the extension."
+            if case.diagnosis.held
+            else "The present model attributes the drift to the base, which biases its estimates."
+        ),
         columns("lrrrrr"),
     )
     document.paragraph(_gain_sentence(case))

@@ -22,7 +22,7 @@ from studies.ets7_limits.setting import DURATION, POINTS, limits_problem
 
 __all__ = ["Result", "main", "run"]
 
-SEARCH = Search(starts=2, iterations=60)
+SEARCH = Search()
 """Effort of the search."""
 
 REPETITIONS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5)

@@ -83,7 +83,7 @@ def run(
     progress : callable, optional
         Receives a line on what is being done.
     """
-    search = search or Search(starts=1, iterations=90 if full else 10)
+    search = search or (Search() if full else Search(starts=4, iterations=10))
     repeats = (400 if full else 4) if repeats is None else repeats
     random = (500 if full else 20) if random is None else random
     contests, realised = {}, {}

@@ -28,7 +28,7 @@ def run(*, full: bool = False, seed: int = 0) -> Result:
     """
     if not full:
         return Result(iterate(seed=seed), {})
-    search = Search(starts=2, iterations=60)
+    search = Search(starts=8, iterations=60)
     return Result(iterate(seed=seed, search=search), fly_all(seed=seed, search=search))
 
 

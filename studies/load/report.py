@@ -74,12 +74,12 @@ def _answers(document: Document, result: Result) -> None:
     ]
     flown = {name: flight for name, flight in result.flights.items() if flight.bodies}
     if flown:
-        best, flight = min(flown.items(), key=lambda item: item[1].identifications[-1]["precision"])
+        best, flight = min(flown.items(), key=lambda item: item[1].precisions[-1])
         distance = max(np.abs(item.shift(-1)).max() for item in flown.values())
         rows.append(
             [
                 "What remains with the noise of sensors and encoders?",
-                f"Mass and principal moments are known to {flight.identifications[-1]['precision']:.2%} at worst "
+                f"Mass and principal moments are known to {flight.precisions[-1]:.2%} at worst "
                 f"after {len(flight.bodies)} manoeuvres ({TITLES[best]}). The truth lies within {distance:.1f} "
                 "standard deviations of every posterior mean.",
             ]
@@ -177,7 +177,8 @@ def _sampled(document: Document, flights: Mapping[str, Flight]) -> None:
         bodies = [flights[name].bodies[step] for name, step in steps]
         cells = [format_quantity(float(body.mean[k]), float(body.sd[k])) for body in bodies]
         rows.append([title, format_number(paper.TRUTH[k], 4), *cells])
-    rows.append(["worst of mass and moments", "", *(f"{entry['precision']:.2%}" for entry in entries)])
+    precisions = [flights[name].precisions[step] for name, step in steps]
+    rows.append(["worst of mass and moments", "", *(f"{value:.2%}" for value in precisions)])
     rows.append(["chi-square / samples", "", *(f"{entry['chi2']:.0f} / {entry['samples']}" for entry in entries)])
     document.table(
         ["", "truth", *(f"{TITLES[name]}, step {step + 1}" for name, step in steps)],

@@ -9,7 +9,17 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from bayesid._math.arrays import Floats
-from bayesid.design import BSplines, Criterion, DOptimal, Limits, Loop, Paper26Intended, Sampled, Search
+from bayesid.design import (
+    BSplines,
+    Criterion,
+    DOptimal,
+    Limits,
+    Loop,
+    Paper26Intended,
+    RelativePrecision,
+    Sampled,
+    Search,
+)
 from bayesid.design.knowledge_update import bodies_of_draws
 from bayesid.inference.body_quantities import BodyDraws
 from bayesid.inference.posterior_as_prior import InertialDraws
@@ -44,6 +54,8 @@ class Flight:
         Entry of every step's plan in the loop's history.
     identifications : list of dict
         Entry of every identification in the loop's history.
+    precisions : list of float
+        Worst relative standard deviation of mass and principal moments after every identification.
     bodies : list of BodyDraws
         Posterior of the load after every identification.
     """
@@ -51,6 +63,7 @@ class Flight:
     status: str
     plans: list[dict[str, Any]]
     identifications: list[dict[str, Any]]
+    precisions: list[float]
     bodies: list[BodyDraws]
 
     def shift(self, step: int) -> Floats:
@@ -79,7 +92,7 @@ def fly_all(
             problem(known, family, criterion, limits=limits),
             {0: ENCODER},
             seed=seed,
-            wanted=1e-6,
+            goals=(RelativePrecision(1e-6),),
             at_most=at_most,
             search=search,
             identifier=Sampled(effective_samples),
@@ -97,5 +110,6 @@ def _fly(loop: Loop, spacecraft: MuJoCoSpacecraft) -> Flight:
             status=history.status,
             plans=[step["plan"] for step in history.steps],
             identifications=[step["identification"] for step in flown],
+            precisions=[step["goals"][0]["value"] for step in flown],
             bodies=[bodies_of_draws(loop.problem.plan.model, InertialDraws.read(file))[LOAD] for file in files],
         )

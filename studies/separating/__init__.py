@@ -23,7 +23,7 @@ from studies.separating.report import write_report
 
 __all__ = ["Result", "main", "run"]
 
-SEARCH = Search(starts=2, iterations=50)
+SEARCH = Search()
 """Effort of each design, minutes on two cores."""
 
 

@@ -133,7 +133,8 @@ class Pair:
     labels : (str, str)
         Labels of the effects.
     alone : (float, float)
-        Noncentrality of each at its prior's amplitude, with base, initial rate and gradient marginalised.
+        Noncentrality of each at its prior's amplitude, in the direction that shows least, with base, initial rate and
+        gradient marginalised.
     apart : (float, float)
         Noncentrality of each with the rival, of any size, marginalised too.
     """
@@ -166,7 +167,8 @@ def pairs(duration: float, thinning: int = 2) -> list[Pair]:
         single, cut = having(label)
         group = list(single.effect(label))
         rest = [index for index in range(len(cut.information)) if index not in group]
-        alone[label] = float(np.trace(unexplained_information(np.asarray(cut.information), group, rest)))
+        left = unexplained_information(np.asarray(cut.information), group, rest)
+        alone[label] = float(np.linalg.eigvalsh(left)[0])
     rows = []
     for first, second in combinations(labels, 2):
         apart = np.asarray(Separation((first, second)).noncentrality(*having(first, second)))

@@ -20,6 +20,7 @@ from studies.throws.analysis import Analysis, analyse, prepare
 from studies.throws.body_result import BodyResult
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws, read_truth
 from studies.throws.diagnosis import Lacking, geometry_errors, lacking, without_wheel
+from studies.throws.left_over import pole_pairs
 from studies.throws.model import is_fitted, is_rigid
 from studies.throws.report import write_report
 
@@ -44,18 +45,25 @@ class Result:
         What each body's diagnosis said; empty where it was left out.
     errors : mapping of str to mapping of str to (3,) array
         Of the diagnosed models against the geometry [%].
-    wheel : Diagnosis or None
-        With the recorded wheel dropped.
-    seconds : float
-        Time of the whole run.
+    wheels : mapping of str to Diagnosis
+        With the recorded wheel dropped, by body; empty where that was left out.
+    masses : mapping of str to float
+        Of the bodies with the device on them [kg].
+    pairs : int
+        Pole pairs of the wheel's motor, from the calibration throws' loudest line.
+    seconds, reverse_seconds : float
+        Time of the run without the reverse, and of the reverse.
     """
 
     plain: Analysis
     extended: Analysis
     studies: tuple[Lacking, ...]
     errors: Mapping[str, Mapping[str, np.ndarray]]
-    wheel: Diagnosis | None
+    wheels: Mapping[str, Diagnosis]
+    masses: Mapping[str, float]
+    pairs: int
     seconds: float
+    reverse_seconds: float
 
 
 def run(
@@ -76,7 +84,7 @@ def run(
     full : bool
         All throws, and the diagnosis of every body.
     reverse : bool
-        Whether to drop the recorded wheel from a throw of the box and to have it sought, which takes minutes more.
+        Whether to drop the recorded wheel from a throw of every body and to have it sought, which takes minutes more.
     throws : int, optional
         Throws of each body; all in a full run and `QUICK` in a quick one where left out.
 
@@ -89,24 +97,27 @@ def run(
     folder = DEFAULT_FOLDER if folder is None else Path(folder)
     truth, count = read_truth(folder), throws if full or throws else QUICK
     rng = np.random.default_rng(seed)
+    masses = {body: truth.thrown_mass(body) for body in truth.bodies}
     prepared = prepare(folder, truth, count)
-    plain = analyse("rigid", prepared, is_rigid, truth, rng, smooth=False)
-    extended = analyse("extended", prepared, is_fitted, truth, rng)
+    plain = analyse("rigid", prepared, is_rigid, truth, rng, folder, smooth=False)
+    extended = analyse("extended", prepared, is_fitted, truth, rng, folder)
+    pairs = pole_pairs([extended.left[body] for body in CALIBRATION])
     studies: tuple[Lacking, ...] = ()
     errors: Mapping[str, Mapping[str, np.ndarray]] = {}
-    wheel = None
+    wheels: dict[str, Diagnosis] = {}
     if full:
         recordings = {body: read_throws(folder, body, Timing()) for body in truth.bodies}
-        masses = {body: truth.thrown_mass(body) for body in truth.bodies}
         studies = tuple(
-            lacking(body, recordings[body], masses[body], TRAINING, seed, progress) for body in truth.bodies
+            lacking(body, recordings[body], masses[body], TRAINING, seed, progress, pairs=pairs)
+            for body in truth.bodies
         )
         errors = geometry_errors(studies, truth)
+    seconds = perf_counter() - began
     if reverse:
-        body = CALIBRATION[1]
-        thrown = read_throws(folder, body, Timing())
-        wheel = without_wheel(thrown, truth.thrown_mass(body), TRAINING, seed, progress)
-    return Result(plain, extended, studies, errors, wheel, perf_counter() - began)
+        for body in truth.bodies:
+            thrown = read_throws(folder, body, Timing())
+            wheels[body] = without_wheel(thrown, masses[body], TRAINING, seed, progress)
+    return Result(plain, extended, studies, errors, wheels, masses, pairs, seconds, perf_counter() - began - seconds)
 
 
 COMMAND = Command(
@@ -115,7 +126,7 @@ COMMAND = Command(
     full="all throws, and the diagnosis of every body",
     extra={
         "--data": {"type": Path, "help": "folder of the measurements"},
-        "--reverse": {"action": "store_true", "help": "drop the recorded wheel from a throw and seek it"},
+        "--reverse": {"action": "store_true", "help": "drop the recorded wheel from a throw of every body and seek it"},
     },
 )
 

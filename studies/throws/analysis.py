@@ -15,6 +15,7 @@ from studies.throws.body_result import BodyResult
 from studies.throws.data import Timing, Truth, read_throws
 from studies.throws.effects import STEP
 from studies.throws.joint import Joint, Throw, maximise_jointly
+from studies.throws.left_over import LeftOver, left_over
 from studies.throws.model import extended, is_calibration, is_own, manoeuvres
 from studies.throws.regression import regress
 from studies.throws.smooth_widths import SMOOTH, SmoothWidth, fit_widths, width_of
@@ -41,6 +42,8 @@ class Analysis:
         Noise of gyro and accelerometer relative to that of quiet stretches.
     calibration : mapping of str to (mean, sd)
         Unknowns of the device, in standard deviations of their priors times those: physical units.
+    left : mapping of str to LeftOver
+        What the model leaves, by body; empty for a rigid model.
     """
 
     label: str
@@ -51,6 +54,7 @@ class Analysis:
     widths: Mapping[str, Mapping[str, SmoothWidth]]
     noise: Mapping[str, Floats]
     calibration: Mapping[str, tuple[float, float]]
+    left: Mapping[str, LeftOver]
     converged: bool
 
 
@@ -72,6 +76,7 @@ def analyse(
     free: Callable[[str], bool],
     truth: Truth,
     rng: np.random.Generator,
+    folder: Path,
     *,
     smooth: bool = True,
 ) -> Analysis:
@@ -81,6 +86,8 @@ def analyse(
     ----------
     free : callable
         Which unknowns are fitted.
+    folder : path
+        Of the measurements.
     smooth : bool
         Whether these hold the unexplained torque and force, whose widths are then estimated.
     """
@@ -120,6 +127,7 @@ def analyse(
         widths={b: {e: width_of(joint, b, e) for e in SMOOTH} for b in truth.bodies} if smooth else {},
         noise={throw.body: throw.noise for throw in joint.throws},
         calibration=_calibration(joint, throws[0].posterior),
+        left={b: left_over([t for t in joint.throws if t.body == b], folder) for b in truth.bodies} if smooth else {},
         converged=joint.converged,
     )
 

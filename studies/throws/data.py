@@ -25,12 +25,14 @@ __all__ = [
     "DEFAULT_FOLDER",
     "EXCLUDED",
     "INTERVAL",
+    "POLE_PAIRS",
     "SMOOTH",
     "WHEEL_COUNT",
     "WHEEL_INERTIA",
     "WHEEL_STEPS",
     "Timing",
     "Truth",
+    "read_raw",
     "read_throws",
     "read_truth",
 ]
@@ -50,6 +52,8 @@ SIGNS = np.array([-1.0, -1.0, 1.0])
 RATE_SCALE = np.pi / 180.0 / 16.384
 ACCEL_SCALE = 9.81 / 2048.0
 POLE_PAIRS = 6
+"""Of the wheel's motor, as the source of the data states; its inertia takes up an error of this number."""
+
 WHEEL_COUNT = 100.0 / POLE_PAIRS * 2.0 * np.pi / 60.0
 """Wheel speed of one count of its reading [rad/s]."""
 
@@ -159,24 +163,31 @@ def read_throws(folder: Path, body: str, timing: Timing, count: int | None = Non
 _REMEDY = "Give the folder of the thrown-body measurements (SOURCE.txt, truth.json, throws/*.csv)"
 
 
-def _recording(file: Path, timing: Timing) -> Recording:
+def read_raw(file: Path) -> tuple[Floats, Floats, Floats]:
+    """Return clock (n,) [s], rate and specific force (n, 6) [rad/s, m/s2], and reading of the wheel (n,) [counts]."""
     raw = np.genfromtxt(file, delimiter=",", names=True)
-    clock = raw["t_us"] * 1e-6
+    readings = [
+        sign * scale * raw[f"{kind}{axis}"]
+        for kind, scale in (("g", RATE_SCALE), ("a", ACCEL_SCALE))
+        for axis, sign in zip("xyz", SIGNS, strict=True)
+    ]
+    return raw["t_us"] * 1e-6, np.column_stack(readings), raw["erpm"]
+
+
+def _recording(file: Path, timing: Timing) -> Recording:
+    clock, readings, erpm = read_raw(file)
     step = INTERVAL / WHEEL_STEPS
     grid = timing.start + step * np.arange(WHEEL_STEPS * round(timing.duration / INTERVAL) + 1)
     kernel = _weights(grid, clock)
-    speed = _wheel_speed(clock, raw["erpm"], grid, timing)
+    speed = _wheel_speed(clock, erpm, grid, timing)
     acceleration = np.abs(np.gradient(speed, grid))
     fast = maximum_filter1d(acceleration, 2 * round(timing.margin / step) + 1) > timing.fast
     skip = np.arange(len(grid)) % WHEEL_STEPS != 0
     channels: dict[str, Floats] = {"wheel_momentum.x": np.zeros(len(grid)), "wheel_momentum.y": np.zeros(len(grid))}
     channels["wheel_momentum.z"] = WHEEL_INERTIA * speed
-    for axis, sign in zip("xyz", SIGNS, strict=True):
-        rate, accel = (
-            kernel @ (sign * scale * raw[f"{kind}{axis}"]) for kind, scale in (("g", RATE_SCALE), ("a", ACCEL_SCALE))
-        )
-        channels[f"rate.{axis}"] = np.where(skip | fast, np.nan, rate)
-        channels[f"accel.{axis}"] = np.where(skip | fast, np.nan, accel)
+    for index, values in enumerate((kernel @ readings).T):
+        family = "rate" if index < 3 else "accel"
+        channels[f"{family}.{'xyz'[index % 3]}"] = np.where(skip | fast, np.nan, values)
     return Recording(file.stem, None, grid - timing.start, channels)
 
 

@@ -16,7 +16,7 @@ from bayesid.inference.mode import fit
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.simulation.effects import Effect
 from studies.throws.bodies import Tensor, object_moments, tensors, wheel_inertia
-from studies.throws.data import Timing, Truth
+from studies.throws.data import POLE_PAIRS, Timing, Truth
 from studies.throws.effects import GSensitivity, GyroCross, SmoothTorque, WheelDelay, WheelImbalance, WheelTilt
 from studies.throws.model import KNOTS, TORQUE, manoeuvres, rigid
 from studies.throws.regression import regress
@@ -48,14 +48,14 @@ CATALOGUE = (
 """Effects of the catalogue that a stiff body with gyro, accelerometer and one wheel can show in half a second."""
 
 
-def device_candidates(model: Model, *, records_wheels: bool) -> list[Effect]:
+def device_candidates(model: Model, *, records_wheels: bool, pairs: int = POLE_PAIRS) -> list[Effect]:
     """Return what such a device may lack: effects of the catalogue, and those that its user wrote.
 
-    Effects of the recorded wheel are candidates where it is recorded.
+    Effects of the recorded wheel are candidates where it is recorded; ``pairs`` is the number of its pole pairs.
     """
     known = candidates(model, records_wheels=records_wheels, longest=Timing().duration)
     own = [GyroCross(), GSensitivity(), SmoothTorque(Timing().duration, KNOTS, TORQUE)]
-    wheel = [WheelTilt(), WheelDelay(), WheelImbalance()] if records_wheels else []
+    wheel = [WheelTilt(), WheelDelay(), WheelImbalance(POLE_PAIRS / pairs)] if records_wheels else []
     return [effect for effect in known if effect.label in CATALOGUE] + [e.attach(model.robot) for e in (*own, *wheel)]
 
 
@@ -108,15 +108,17 @@ def lacking(
     training: int,
     seed: int,
     progress: Progress = silent,
+    *,
+    pairs: int = POLE_PAIRS,
 ) -> Lacking:
     """Diagnose the first throws of a body, and predict further ones with the rigid and with the extended model.
 
-    All throws tell the noise.
+    All throws tell the noise. The wheel's motor has a number of pairs of poles (`left_over.pole_pairs`).
     """
     used, left = recordings[:training], recordings[training : training + TESTING]
     model = rigid(regress(used, mass), SPREAD, recordings)
     throws = manoeuvres(model, used)
-    effects = device_candidates(model, records_wheels=True)
+    effects = device_candidates(model, records_wheels=True, pairs=pairs)
     found = diagnose(model, throws, seed, effects=effects, progress=progress)
     taken = _taken(found)
     plain, longer = Posterior.of(model, throws), extended_posterior(taken)

@@ -106,15 +106,25 @@ class WheelDelay(Effect):
 class WheelImbalance(Effect):
     """Imbalance of the wheel, static and dynamic, which shakes the body once in a turn; its phase differs by throw.
 
-    The angle of the wheel is the integral of its recorded speed. The samples are filtered, and so is what turns faster.
+    The angle of the wheel is the integral of its recorded speed, or of a share of it where the motor has more poles
+    than the record takes it to have. The samples are filtered, and so is what turns faster.
+
+    Parameters
+    ----------
+    share : float
+        Speed of the wheel relative to the recorded one.
+    static, dynamic : float
+        Standard deviations of the imbalance [kg m, kg m2].
     """
 
     name = "wheel-imbalance"
     summary = "The wheel is out of balance and shakes the body once in a turn."
     per_recording = True
     states = 1
+    constant_names = ("share",)
 
-    def __init__(self, static: float = 1e-7, dynamic: float = 3e-9) -> None:
+    def __init__(self, share: float = 1.0, static: float = 1e-7, dynamic: float = 3e-9) -> None:
+        self.share = share
         parts = ("static", "kg m", static), ("dynamic", "kg m2", dynamic)
         self.parameters = tuple(Parameter(f"{name}.{way}", unit, sd) for name, unit, sd in parts for way in ("c", "s"))
 
@@ -133,7 +143,7 @@ class WheelImbalance(Effect):
         return momentum, speed * jnp.cross(jnp.array([0.0, 0.0, 1.0]), momentum)
 
     def _speed(self, instant: Instant) -> Array:
-        return jnp.asarray(instant.environment.wheel_momentum[2] / WHEEL_INERTIA)
+        return jnp.asarray(self.share * instant.environment.wheel_momentum[2] / WHEEL_INERTIA)
 
     def _turned(self, pair: Array, instant: Instant, inner: Array) -> Array:
         """Return a vector across the axis that turns with the wheel, as the filter of the samples leaves it."""

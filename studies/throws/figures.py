@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid.report.figures.figure_style import styled, wide_figure
 from studies.throws.analysis import Analysis
+from studies.throws.left_over import CHANNELS, ORDERS, LeftOver
 
-__all__ = ["throws_figure"]
+__all__ = ["left_over_figure", "throws_figure"]
 
 
 @styled
@@ -34,5 +37,32 @@ def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
         row[0].set_ylabel("error [%]")
     for axes in panels[-1]:
         axes.set_xlabel("number of the throw")
-    panels[0][1].legend(title="principal moment")
+    handles, labels = panels[0][1].get_legend_handles_labels()
+    figure.legend(handles, [f"{label} moment" for label in labels], loc="outside upper center", ncols=3)
+    return figure
+
+
+@styled
+def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
+    """Draw the spectrum of what is left on the accelerometer, and the raw accelerometer against the wheel's orders."""
+    figure = wide_figure(1.6 * len(left))
+    panels = figure.subplots(len(left), 2, squeeze=False)
+    for row, (body, own) in zip(panels, left.items(), strict=True):
+        spectrum = np.array([own.spectrum[:, c] for c in range(3, 6)])
+        for edge in (own.wheel[0], own.wheel[2]):
+            row[0].axvspan(edge - 2.0, edge + 2.0, color="#eeeeee")
+        for c in range(3, 6):
+            row[0].plot(own.frequencies[1:], 1e3 * spectrum[c - 3, 1:], linewidth=1, label=CHANNELS[c][-1])
+            row[1].semilogy(
+                ORDERS, np.sqrt((own.orders[:, :, c] ** 2).mean(axis=0)), linewidth=1, label=CHANNELS[c][-1]
+            )
+        row[1].axvline(own.turn[0], color="#888888", linewidth=0.8)
+        row[0].set_title(f"{body}: residual of samples")
+        row[1].set_title(f"{body}: raw readings, wheel at speed")
+        row[0].set_ylabel("[mm/s²]")
+        row[1].set_ylabel("[m/s²]")
+    panels[-1][0].set_xlabel("frequency [Hz]")
+    panels[-1][1].set_xlabel("frequency / that of the recorded wheel")
+    handles, labels = panels[0][1].get_legend_handles_labels()
+    figure.legend(handles, [f"accelerometer {label}" for label in labels], loc="outside upper center", ncols=3)
     return figure

@@ -6,13 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bayesid.diagnosis import Diagnosis
+from bayesid.diagnosis.probable_verdict import NAMED
 from studies.blind_injections.goals import interval
 from studies.throws.smooth_widths import LARGEST
 
 if TYPE_CHECKING:
     from studies.throws import Result
 
-__all__ = ["goal_rows", "held_in_all"]
+__all__ = ["NONE", "goal_rows", "held_in_all", "wheel_probability"]
 
 QUICK_FIT = {"Empty": 1.9, "A": 1.0}
 """Mean errors of a quick least-squares fit by those who prepared the data [%]."""
@@ -23,7 +25,7 @@ LOW, HIGH = 0.90, 0.98
 SECONDS = 600.0
 """Longest time of a full run [s]."""
 
-NONE = "NOT DECIDED"
+NONE = "NOT TESTED"
 
 
 def held_in_all(result: Result, *, with_truth: bool = False) -> tuple[int, int]:
@@ -33,7 +35,7 @@ def held_in_all(result: Result, *, with_truth: bool = False) -> tuple[int, int]:
 
 
 def goal_rows(result: Result) -> list[list[str]]:
-    """Return each goal, what was reached, and PASS, FAIL or NOT DECIDED."""
+    """Return each goal, what was reached, and PASS, FAIL or NOT TESTED."""
     rows = []
     for body in result.extended.bodies.values():
         if body.name in QUICK_FIT:
@@ -69,18 +71,15 @@ def goal_rows(result: Result) -> list[list[str]]:
             _decided(result.studies, len(better) == len(result.studies)),
         ]
     )
-    wheel = result.wheel
+    rows += _reverse(result)
+    minutes = f"{result.seconds / 60.0:.1f} minutes"
     rows.append(
         [
-            "recorded wheel dropped: a wheel is named",
-            "not run"
-            if wheel is None
-            else (", ".join(wheel.verdict.causes) or f"nothing ({wheel.verdict.status.value})"),
-            NONE if wheel is None else _verdict(any(c.startswith("wheel-history") for c in wheel.verdict.causes)),
+            "whole run without the reverse within 10 minutes",
+            minutes,
+            _decided(result.studies, result.seconds <= SECONDS),
         ]
     )
-    minutes = f"{result.seconds / 60.0:.1f} minutes"
-    rows.append(["whole run within 10 minutes", minutes, _decided(result.studies, result.seconds <= SECONDS)])
     return rows
 
 
@@ -91,7 +90,29 @@ def _coverage(result: Result) -> list[str]:
     outside = high < LOW or low > HIGH
     text = f"95 % intervals of single throws hold the truth in {100 * LOW:.0f} to {100 * HIGH:.0f} % of cases"
     reached = f"{100.0 * count / total:.0f} %: {count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
-    return [text, reached, "PASS" if inside else "FAIL" if outside else NONE]
+    return [text, reached, "PASS" if inside else "FAIL" if outside else "NOT DECIDED"]
+
+
+def _reverse(result: Result) -> list[list[str]]:
+    """Rows on the recorded wheel dropped: whether its probability says that it is there, and whether it is named."""
+    titles = (
+        f"recorded wheel dropped: a wheel about z has a probability of {NAMED:g} or more on every body",
+        "recorded wheel dropped: the verdict names a wheel on every body",
+    )
+    if not result.wheels:
+        return [[title, "not run", NONE] for title in titles]
+    found = list(result.wheels.values())
+    held = [wheel_probability(item) for item in found]
+    named = [any(cause.startswith("wheel-history") for cause in item.verdict.causes) for item in found]
+    return [
+        [titles[0], f"at least {min(held):.3f}", _verdict(min(held) >= NAMED)],
+        [titles[1], f"{sum(named)} of {len(named)}", _verdict(all(named))],
+    ]
+
+
+def wheel_probability(found: Diagnosis) -> float:
+    """Return the probability that a wheel of unknown course about the recorded wheel's axis is at work."""
+    return found.probabilities.of_any(["wheel-history:z"])
 
 
 def _verdict(passed: bool | np.bool_) -> str:

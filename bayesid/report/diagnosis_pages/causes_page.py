@@ -42,6 +42,7 @@ def add_causes(document: Document, result: Diagnosis) -> None:
         figures.candidate_strengths(drawn, result.verdict.causes, result.alarm.level),
         f"Signal-to-noise ratio of the {len(drawn)} strongest of {len(result.candidates)} candidates, each alone "
         "beside the present model. Several can stand out for one cause, since they explain parts of the same residual.",
+        floating=True,
     )
 
 

@@ -40,6 +40,7 @@ def add_consequences(document: Document, result: Diagnosis, changes: Sequence[Pa
             figures.parameter_forest(changes, named),
             "Inertial parameters about the values given, as multiples of the prior's width; bars hold 95 %. Widths "
             "without the causes assume that the present model is right.",
+            floating=True,
         )
     document.table(
         ["sensor", "unit", *(["before", "after"] if named else ["error"]), "noise alone"],
@@ -89,11 +90,13 @@ def _add_wrench(document: Document, result: Diagnosis, wrench: Unexplained, whol
                     if cause is not None
                     else ""
                 ),
+                floating=True,
             )
     if whole:
         document.figure(
             figures.wrench_spectrum(wrench),
             "Amplitude of the reconstructed torque by frequency, base axes, up to the frequency that is resolved.",
+            floating=True,
         )
     if rows := correlation_rows(torque_correlations(wrench, result.before)):
         document.table(

@@ -35,11 +35,13 @@ def add_evidence(document: Document, result: Diagnosis) -> None:
         f"Residuals in {_names(result)[strongest]}"
         + (", the recording that changes most" if len(_names(result)) > 1 else "")
         + ", sensor axes. The grey band is ± 2 σ; the line is a running mean over a fortieth of the recording.",
+        floating=True,
     )
     document.figure(
         figures.residual_spectra(sides),
         "Spectra of the residuals, all recordings pooled, frequencies gathered in bins of equal width: white noise has "
         "level one. The lowest bins hold what a disturbance or a wrong body leaves.",
+        floating=True,
     )
     _add_gain(document, result)
 

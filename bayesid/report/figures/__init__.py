@@ -6,6 +6,7 @@ from bayesid.report.figures.design_figures import base_motion, covariance_ellips
 from bayesid.report.figures.diagnosis_figures import candidate_strengths, wrench_histories, wrench_spectrum
 from bayesid.report.figures.forest_figure import parameter_forest
 from bayesid.report.figures.identifiability_figures import direction_widths, displacements
+from bayesid.report.figures.loop_figures import loop_progress
 from bayesid.report.figures.prediction_figures import final_positions, trajectory_bands
 from bayesid.report.figures.residual_figures import residual_histories, residual_spectra, residual_statistics
 from bayesid.report.figures.robot_figures import manoeuvre, robot_pose
@@ -24,6 +25,7 @@ __all__ = [
     "displacements",
     "final_positions",
     "joints_within_limits",
+    "loop_progress",
     "manoeuvre",
     "measured_against_simulated",
     "parameter_forest",

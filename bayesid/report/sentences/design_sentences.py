@@ -39,8 +39,8 @@ MEANING: Mapping[str, str] = {
     "e-optimal": "The smallest standard deviation along the direction that is known worst.",
     "information-gain": "The largest expected gain of information on the bodies, averaged over draws of their prior "
     "instead of taken at its centre.",
-    "separation": "The largest signal-to-noise ratio by which the rival effects can be told apart, with everything "
-    "else unknown.",
+    "separation": "The largest expected log Bayes factor between the rival effects, each in the direction of its "
+    "amplitudes that shows least, with everything else unknown.",
 }
 """Meaning of each criterion, by its name."""
 
@@ -117,8 +117,9 @@ def assumption_sentences(best: Design) -> list[str]:
         for sensor in plan.model.sensors
     ]
     return [
-        "The search compares manoeuvres by the white noise of the sensors alone; the predicted standard deviations and "
-        "covariances below include the noise of the encoders and filters, and every other unknown is marginalised.",
+        "The search compares manoeuvres by the white noise of the sensors and the noise of the encoders at the "
+        "start; the predicted standard deviations and covariances below take the encoders along the manoeuvre and "
+        "include the filters, and every other unknown is marginalised.",
         "Predictions hold to first order about the prior's centre (Laplace), and include the prior.",
         f"Sampling every {plan.interval:g} s; the search integrates with steps of {format_number(plan.step)} s and "
         f"simulates every {f'{ordinal(plan.thinning)} ' if plan.thinning > 1 else ''}sample. Limits are evaluated "

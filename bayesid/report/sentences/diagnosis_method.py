@@ -55,6 +55,11 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
         f"ambiguous if two to {MOST_ALTERNATIVES} alternatives hold {format_number(100.0 * COVERED)} %, and unresolved "
         "if more are needed. It is unknown if candidates that name nothing hold the majority."
     )
+    if result.held:
+        yield (
+            "Every fit of the present model drove its bodies to where their prior all but excludes them. They are held "
+            "at the prior's centre, and what each candidate changes is computed along the motion that the data show."
+        )
     yield f"Seed of all random numbers: {result.seed}."
 
 

@@ -94,19 +94,6 @@ class _OnLink(Placed):
         """Reported changes of mass, centre of mass and inertia."""
         return CHANGES
 
-    @property
-    def amplitude_quantities(self) -> Sequence[Quantity]:
-        """Changes of the ten linear parameters, which are the coefficients that `loads` returns."""
-        return LINEAR_CHANGES
-
-    def in_amplitudes(self) -> Effect:
-        """Return the effect with the changes of the ten linear parameters as parameters."""
-        return LinkMoments(self)
-
-    def amplitudes(self, values: Array) -> Array:
-        """Return the changes of the ten linear parameters."""
-        return self.loads(values)
-
     def report(self, values: Array) -> Array:
         """Return the differences of the link from the nominal link."""
         factor, nominal = self._attached
@@ -184,17 +171,39 @@ class Payload(_OnLink):
         "in another posture, so that mass, centre of mass and inertia act apart."
     )
 
+    @property
+    def amplitude_quantities(self) -> Sequence[Quantity]:
+        """Changes of the ten linear parameters, which are the coefficients that `loads` returns."""
+        return LINEAR_CHANGES
+
+    def in_amplitudes(self) -> Effect:
+        """Return the effect with the changes of the ten linear parameters as parameters."""
+        return LinkMoments(self)
+
+    def amplitudes(self, values: Array) -> Array:
+        """Return the changes of the ten linear parameters."""
+        return self.loads(values)
+
     def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
         """Return the moments of a body as heavy and as large as the robot without it, fixed at the end of the link."""
-        size = RobotSize.of(model.robot)
-        reach = link_radius(model.robot, self.place) + size.radius
-        body = f"A captured body is at most as heavy as the robot, {three_digits(size.mass)} kg"
-        return _moment_bounds(size.mass, reach, body, f"within {three_digits(reach)} m of the link's origin")
+        mass = RobotSize.of(model.robot).mass
+        reach = link_radius(model.robot, self.place) + RobotSize.of(model.robot).radius
+        body = f"A captured body is at most as heavy as the robot, {three_digits(mass)} kg"
+        where = f"within {three_digits(reach)} m of the link's origin"
+        return (
+            PhysicalBound("kg", mass, f"{body}."),
+            PhysicalBound("kg m", mass * reach, f"{body}, {where}."),
+            PhysicalBound("kg m2", mass * reach**2, f"{body}, {where}."),
+        )
 
 
 @register
 class LinkInertia(_OnLink):
-    """Error of one link's inertial parameters, with a prior of 10 % in log-Cholesky coordinates and 20 % in mass."""
+    """Error of one link's inertial parameters, with a prior of 10 % in log-Cholesky coordinates and 20 % in mass.
+
+    Its amplitudes are those coordinates: an error of a drawing is one of its own mass, extent and centre, and a link
+    with a little more mass everywhere differs in one of them, but in all ten moments about its origin.
+    """
 
     name = "link-inertia"
     summary = "The link's mass, centre of mass or inertia differ from the model's (CAD) values."
@@ -205,18 +214,9 @@ class LinkInertia(_OnLink):
     spread = 0.1
 
     def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
-        """Return the moments of half of the link's mass, misplaced by the link's own extent."""
+        """Return the log-Cholesky coordinates at which half of the link's mass is missing or misplaced."""
         mass = LINK_ERROR * model.robot.link(self.place).inertial.mass
-        radius = link_radius(model.robot, self.place)
         share = f"{100.0 * LINK_ERROR:g} % of the link's mass, {three_digits(mass)} kg"
-        error = f"A drawing misses or misplaces at most {share}"
-        return _moment_bounds(mass, radius, error, f"within the link's extent of {three_digits(radius)} m")
-
-
-def _moment_bounds(mass: float, reach: float, what: str, where: str) -> tuple[PhysicalBound, ...]:
-    """Return the bounds of mass, first moment and inertia about the link's origin of a mass within a reach of it."""
-    return (
-        PhysicalBound("kg", mass, f"{what}."),
-        PhysicalBound("kg m", mass * reach, f"{what}, {where}."),
-        PhysicalBound("kg m2", mass * reach**2, f"{what}, {where}."),
-    )
+        return (
+            PhysicalBound("1", 0.5 * float(np.log1p(LINK_ERROR)), f"A drawing misses or misplaces at most {share}."),
+        )

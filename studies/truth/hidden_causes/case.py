@@ -138,6 +138,10 @@ def merge(first: Options, second: Options) -> Options:
         merged["hidden"] = Hidden(**{k: other[k] if other[k] != nothing[k] else mine[k] for k in mine})
     if "distort" in first and "distort" in second:
         merged["distort"] = in_turn(first["distort"], second["distort"])
+    if "spoil" in first and "spoil" in second:
+        raise ValueError("two causes spoil samples of one study: give them a common cause")
+    if "declared" in first and "declared" in second:
+        merged["declared"] = {**first["declared"], **second["declared"]}
     if "step" in first and "step" in second:
         merged["step"] = min(first["step"], second["step"])
     return merged

@@ -1,0 +1,237 @@
+"""What a loop is to reach: how well something must be known before it stops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid.design.base_prediction import predict
+from bayesid.design.knowledge_update import worst_relative_sd
+from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws
+from bayesid.simulation.model import Manoeuvre, Model
+
+__all__ = ["CauseProbability", "Goal", "QuantitySd", "RelativePrecision", "StepKnowledge", "TipRegion", "goal_dict"]
+
+DRAWS = 300
+"""Number of draws of what is known from which the region of the end-effector is computed."""
+
+
+@dataclass(frozen=True)
+class StepKnowledge:
+    """What a loop knows after a step.
+
+    Attributes
+    ----------
+    model : Model
+        Model whose prior is the posterior after the step.
+    bodies : mapping of str to BodyDraws
+        Draws of the quantities of the bodies to identify.
+    flown : Manoeuvre
+        Manoeuvre of the step.
+    causes : mapping of str to float
+        Probability that a cause of the catalogue, or ``"unknown"``, is at work in what was recorded so far; empty
+        where the recordings are not diagnosed.
+    seed : int
+        Seed of the random numbers that a goal needs.
+    """
+
+    model: Model
+    bodies: Mapping[str, BodyDraws]
+    flown: Manoeuvre
+    causes: Mapping[str, float]
+    seed: int
+
+
+class Goal(Protocol):
+    """Something that a loop is to reach."""
+
+    @property
+    def text(self) -> str:
+        """What is measured, as it is printed."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Unit of the value."""
+        ...
+
+    @property
+    def wanted(self) -> float:
+        """Value to be reached."""
+        ...
+
+    @property
+    def diagnosed(self) -> bool:
+        """Whether the recordings must be diagnosed to know the value."""
+        ...
+
+    def value(self, knowledge: StepKnowledge) -> float:
+        """Return the value after a step."""
+        ...
+
+    def reached(self, value: float) -> bool:
+        """Return whether a value suffices."""
+        ...
+
+
+class _Smaller:
+    """Goal that is reached where its value is small enough."""
+
+    diagnosed = False
+    wanted: float
+
+    def reached(self, value: float) -> bool:
+        """Return whether a value is at most the wanted one."""
+        return bool(value <= self.wanted)
+
+
+@dataclass(frozen=True)
+class RelativePrecision(_Smaller):
+    """Relative standard deviation of the draws of the bodies, by default the worst of mass and principal moments.
+
+    Parameters
+    ----------
+    wanted : float
+    measure : callable
+        Function of the draws of the bodies to identify, by name.
+    """
+
+    wanted: float = 0.01
+    measure: Callable[[Mapping[str, BodyDraws]], float] = worst_relative_sd
+    text = "worst relative sd of mass and principal moments"
+    unit = "1"
+
+    def value(self, knowledge: StepKnowledge) -> float:
+        """Return the measure of the bodies."""
+        return float(self.measure(knowledge.bodies))
+
+
+@dataclass(frozen=True)
+class QuantitySd(_Smaller):
+    """Standard deviation of one quantity of a body.
+
+    Parameters
+    ----------
+    body : str
+        Name of the link or load.
+    quantity : str
+        One of `BODY_QUANTITIES`.
+    wanted : float
+        In the quantity's unit.
+    """
+
+    body: str
+    quantity: str
+    wanted: float
+
+    def __post_init__(self) -> None:
+        if self.quantity not in BODY_QUANTITIES:
+            raise InputError(
+                f"{self.quantity!r} is no quantity of a body",
+                place="wanted sd",
+                remedy=f"Name one of {', '.join(BODY_QUANTITIES)}",
+            )
+        if not 0.0 < self.wanted < np.inf:
+            raise InputError(f"{self.wanted:g} is no sd", place="wanted sd", remedy="Give a positive number")
+
+    @property
+    def text(self) -> str:
+        """What is measured."""
+        return f"sd of {self.body}.{self.quantity}"
+
+    @property
+    def unit(self) -> str:
+        """Unit of the quantity."""
+        return BODY_QUANTITIES[self.quantity]
+
+    def value(self, knowledge: StepKnowledge) -> float:
+        """Return the standard deviation of the draws."""
+        if self.body not in knowledge.bodies:
+            raise InputError(
+                f"{self.body!r} is no body to identify",
+                place="wanted sd",
+                remedy=f"Name one of {', '.join(knowledge.bodies)}",
+            )
+        return float(knowledge.bodies[self.body].sd[list(BODY_QUANTITIES).index(self.quantity)])
+
+
+@dataclass(frozen=True)
+class TipRegion(_Smaller):
+    """Longest semi-axis of the region that holds the end-effector with 95 % where the last manoeuvre, repeated, ends.
+
+    Parameters
+    ----------
+    wanted : float
+        [m]
+    frame : str, optional
+        Frame of the end-effector in the URDF, by default the last link.
+    """
+
+    wanted: float
+    frame: str | None = None
+    text = "95 % region of the end-effector where the last manoeuvre ends, longest semi-axis"
+    unit = "m"
+
+    def value(self, knowledge: StepKnowledge) -> float:
+        """Return the semi-axis from draws of what is known."""
+        rng = np.random.default_rng(knowledge.seed)
+        found = predict(knowledge.model, knowledge.flown, rng, draws=DRAWS, tip_frame=self.frame)
+        return float(np.max(found.tip.pose().millimetres.semi_axes)) * 1e-3
+
+
+@dataclass(frozen=True)
+class CauseProbability:
+    """Probability that a cause is at work, which is to be decided: near one, or as near zero.
+
+    Parameters
+    ----------
+    cause : str
+        Label of an effect of the catalogue, or ``"unknown"``.
+    wanted : float
+        Probability from which it is taken to be there, or not there.
+    """
+
+    cause: str
+    wanted: float = 0.95
+    unit = "1"
+    diagnosed = True
+
+    def __post_init__(self) -> None:
+        if not 0.5 < self.wanted < 1.0:
+            raise InputError(
+                f"{self.wanted:g} is no probability that decides", place="wanted cause", remedy="Give 0.9 to 0.99"
+            )
+
+    @property
+    def text(self) -> str:
+        """What is measured."""
+        return f"probability of {self.cause}"
+
+    def value(self, knowledge: StepKnowledge) -> float:
+        """Return the probability."""
+        if self.cause not in knowledge.causes:
+            raise InputError(
+                f"{self.cause!r} is no candidate of the diagnosis",
+                place="wanted cause",
+                remedy=f"Name one of {', '.join(sorted(knowledge.causes))}",
+            )
+        return knowledge.causes[self.cause]
+
+    def reached(self, value: float) -> bool:
+        """Return whether the cause is decided, either way."""
+        return max(value, 1.0 - value) >= self.wanted
+
+
+def goal_dict(goal: Goal, value: float) -> dict[str, Any]:
+    """Return the entry of a goal in loop.json."""
+    return {
+        "goal": goal.text,
+        "value": value,
+        "wanted": goal.wanted,
+        "unit": goal.unit,
+        "reached": goal.reached(value),
+    }

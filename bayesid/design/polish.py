@@ -1,0 +1,164 @@
+"""Descent from one start by SLSQP with exact gradients, as a task that any executor can run."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from dataclasses import dataclass
+from hashlib import blake2b
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from bayesid._math.arrays import Floats
+from bayesid.design.criteria import Criterion
+from bayesid.design.design_problem import Problem
+from bayesid.design.search_starts import repaired, within_limits
+
+__all__ = ["Polished", "Shared", "Task", "fitted_to_fine_limits", "polish"]
+
+TRIES = 4
+"""Largest number of repairs of a motion that breaks a limit between the instants of the search."""
+
+
+@dataclass(frozen=True)
+class Polished:
+    """Best motion of a descent that keeps the limits.
+
+    Attributes
+    ----------
+    parameters : (n,) array
+        Parameters of the motion.
+    cost : float
+        Its cost; infinite where none keeps the limits.
+    evaluations : int
+        Number of evaluations of the cost.
+    """
+
+    parameters: Floats
+    cost: float
+    evaluations: int
+
+
+class Shared:
+    """Problem that tasks carry to other processes, each of which compiles it once.
+
+    Parameters
+    ----------
+    problem : Problem
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+    def __reduce__(self) -> tuple[Callable[[bytes], Shared], tuple[bytes]]:
+        return _revived, (pickle.dumps(self.problem),)
+
+
+_known: dict[bytes, Shared] = {}
+
+
+def _revived(content: bytes) -> Shared:
+    key = blake2b(content).digest()
+    if key not in _known:
+        _known[key] = Shared(pickle.loads(content))
+    return _known[key]
+
+
+@dataclass(frozen=True)
+class Task:
+    """Descent to be run.
+
+    Parameters
+    ----------
+    shared : Shared
+        Problem.
+    criterion : Criterion
+        Criterion to minimise.
+    points : list of (n,) arrays
+        Points of the unknowns over which it is averaged, empty for the prior's centre.
+    start : (n,) array
+        Parameters to start from.
+    iterations : int
+        Largest number of iterations.
+    tolerance : float
+        Tolerance of the cost at which SLSQP stops, relative to that of the start where that is below one.
+    """
+
+    shared: Shared
+    criterion: Criterion
+    points: list[Floats]
+    start: Floats
+    iterations: int
+    tolerance: float
+
+
+def polish(task: Task) -> Polished:
+    """Run a descent, from a start that is repaired first if it breaks a limit."""
+    run = _Descent(task)
+    if np.isfinite(run.best_cost) and task.iterations:
+        run.minimise()
+    return Polished(run.best, run.best_cost, run.evaluations)
+
+
+class _Descent:
+    """SLSQP with the best point so far that keeps the limits, since its iterates lie slightly outside."""
+
+    def __init__(self, task: Task) -> None:
+        self.task, self.problem = task, task.shared.problem
+        self.evaluations = 0
+        self.best = repaired(self.problem, np.array(task.start, dtype=float))
+        self.best_cost = np.inf
+        if within_limits(self.problem, self.best):
+            self.best_cost = self._value(self.best)[0]
+        # most costs are in nats; SLSQP's first steps follow the size of the gradient, and its tolerance is absolute
+        self.unit = float(np.clip(abs(self.best_cost), 1e-12, 1.0))
+
+    def minimise(self) -> None:
+        """Descend from the best point."""
+        family = self.problem.plan.family
+        constraints: Any = {"type": "ineq", "fun": self._margin, "jac": self._margin_slope}
+        options: Any = {"maxiter": self.task.iterations, "ftol": self.task.tolerance}
+        begin = (self.best - family.centre) / family.scale
+        end = minimize(self._cost, begin, jac=True, method="SLSQP", constraints=constraints, options=options)
+        final = repaired(self.problem, self._parameters(end.x), 1.0)
+        self._consider(final, self._value(final)[0])
+
+    def _parameters(self, x: Floats) -> Floats:
+        family = self.problem.plan.family
+        return family.centre + family.scale * x
+
+    def _value(self, parameters: Floats) -> tuple[float, Floats]:
+        self.evaluations += 1
+        return self.problem.cost(self.task.criterion, parameters, self.task.points)
+
+    def _consider(self, parameters: Floats, value: float) -> None:
+        if value < self.best_cost and within_limits(self.problem, parameters):
+            self.best, self.best_cost = parameters, value
+
+    def _cost(self, x: Floats) -> tuple[float, Floats]:
+        parameters = self._parameters(x)
+        value, slope = self._value(parameters)
+        if not np.isfinite(value):
+            return 1e6, np.zeros_like(x)
+        self._consider(parameters, value)
+        return value / self.unit, slope * self.problem.plan.family.scale / self.unit
+
+    def _margin(self, x: Floats) -> Floats:
+        return 1.0 - self.problem.fractions(self._parameters(x))[0]
+
+    def _margin_slope(self, x: Floats) -> Floats:
+        return -self.problem.fractions(self._parameters(x))[1] * self.problem.plan.family.scale
+
+
+def fitted_to_fine_limits(problem: Problem, parameters: Floats) -> Floats:
+    """Return the parameters, repaired where they break a limit between the instants of the search."""
+    bound = 1.0
+    for _ in range(TRIES):
+        worst = max(reached.largest / reached.limit for reached in problem.reached(parameters))
+        if worst <= 1.0:
+            break
+        bound = 0.999 * bound / worst
+        parameters = repaired(problem, parameters, bound)
+    return parameters

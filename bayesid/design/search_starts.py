@@ -1,0 +1,84 @@
+"""Starts of a search: random motions within the limits, motions like the paper's, and repairs of those outside."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from bayesid._math.arrays import Floats
+from bayesid.design.design_problem import Problem
+from bayesid.design.trajectories import Linear, PaperExcitation
+
+__all__ = ["SLACK", "random_start", "repaired", "within_limits"]
+
+FILLED = (0.3, 0.95)
+"""Fractions of the tightest limit between which random starts fill it, so that they begin inside the limits."""
+
+SHRUNK = 12
+"""Largest number of times that a random start is shrunk."""
+
+LIKE_THE_PAPER = 0.25
+"""Fraction of the random starts that swing three joints as the paper's (27) does."""
+
+SLACK = 1e-6
+"""Fraction of a limit by which the optimiser may exceed it, since the smooth maximum lies above the true one."""
+
+
+def random_start(problem: Problem, rng: np.random.Generator) -> Floats:
+    """Draw parameters and shrink them towards the centre until they fill a random fraction of the tightest limit.
+
+    Only limits that a smaller motion helps to keep are considered.
+    """
+    family = problem.plan.family
+    direction = family.scale * rng.normal(size=family.size)
+    if isinstance(family, Linear) and not isinstance(family, PaperExcitation) and rng.random() < LIKE_THE_PAPER:
+        direction = _like_the_paper(family, rng) - family.centre
+    filled, size = rng.uniform(*FILLED), 1.0
+    helped = problem.shrinkable
+    for _ in range(SHRUNK):
+        largest = problem.fractions(family.centre + size * direction)[0][helped].max()
+        if largest <= filled:
+            break
+        size *= np.clip(0.97 * filled / largest, 0.1, 0.9)
+    return family.centre + size * direction
+
+
+def _like_the_paper(family: Linear, rng: np.random.Generator) -> Floats:
+    """Return the parameters closest to an oscillation (27) of three random joints about the start."""
+    posture = family.motion(family.centre).evaluate(np.zeros(1)).position[0]
+    basis = family.matrices(np.linspace(0.0, family.duration, 64))[1][0]
+    moving = np.flatnonzero(np.abs(basis).max(axis=(0, 2)) > 0.0)
+    joints = rng.choice(moving, min(3, len(moving)), replace=False)
+    paper = PaperExcitation(posture, family.duration, [int(joint) for joint in joints], int(rng.integers(1, 4)))
+    return family.nearest(paper.motion(paper.centre + paper.scale * rng.normal(size=paper.size)))
+
+
+def within_limits(problem: Problem, parameters: Floats, bound: float = 1.0) -> bool:
+    """Return whether parameters keep all limits times a factor, on the grid of the search."""
+    return bool(problem.fractions(parameters)[0].max() <= bound + SLACK)
+
+
+def repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) -> Floats:
+    """Return parameters that keep the limits, by descent from given ones; the same parameters where none is broken."""
+    family = problem.plan.family
+
+    def excess(x: Floats) -> tuple[float, Floats]:
+        value, slope = problem.fractions(family.centre + family.scale * x)
+        over = np.maximum(value - bound, 0.0)
+        return float(0.5 * over @ over), (over @ slope) * family.scale
+
+    x = (parameters - family.centre) / family.scale
+    if excess(x)[0] == 0.0:
+        return parameters
+    # a slightly lower bound, so that the result lies inside the limits
+    bound -= 2e-3
+    options: Any = {"ftol": 1e-12, "gtol": 1e-7, "maxiter": 60}
+    found = family.centre + family.scale * minimize(excess, x, jac=True, method="L-BFGS-B", options=options).x
+    for _ in range(SHRUNK):
+        largest = problem.fractions(found)[0][problem.shrinkable].max()
+        if largest <= bound + 2e-3:
+            break
+        found = family.centre + np.clip(0.97 * bound / largest, 0.1, 0.9) * (found - family.centre)
+    return found

@@ -1,0 +1,100 @@
+"""A model whose fit diverges, since a large wheel is missing: its body is held, and the wheel is named (MuJoCo)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bayesid import (
+    BodyPrior,
+    InertialParameters,
+    Kind,
+    Manoeuvre,
+    MeasuredMotion,
+    Model,
+    Recording,
+    Robot,
+    Sensor,
+    White,
+)
+from bayesid.diagnosis import Status, diagnose
+from bayesid.diagnosis.followed_motion import follow, step_along_data, without_torque
+from bayesid.diagnosis.perturbed_fit import Engine
+from bayesid.diagnosis.present_fit import fit_present_model, strayed
+from bayesid.inference.posterior import Posterior
+from bayesid.simulation.effects import create
+from studies.truth import mujoco as mj
+
+MASS, INERTIA = 12.0, np.array([0.3, 0.42, 0.36])
+URDF = """<robot name="box"><link name="base_link"><inertial><mass value="12.0"/>
+<inertia ixx="0.3" ixy="0" ixz="0" iyy="0.42" iyz="0" izz="0.36"/></inertial></link></robot>"""
+NOISE = 1e-3
+"""Of the gyro [rad/s]."""
+
+END = 23.0
+"""Length of the recording [s]: a second from each knot of an unrecorded wheel to the next."""
+
+
+def model_and_flight(folder, momentum):
+    """A box that tumbles for 23 s while a wheel about z runs through the given momenta [N m s], second by second."""
+    file = folder / "box.urdf"
+    file.write_text(URDF, encoding="utf-8")
+    times = np.linspace(0.0, END, 231)
+    empty = np.zeros(0)
+    wheel = mj.SpunWheel(np.array([0.0, 0.0, 1.0]), np.arange(END + 1.0), np.asarray(momentum))
+    truth = mj.TruthModel(file, fields=[wheel]).run(
+        lambda time: (empty, empty, empty), times, rate0=(0.3, -0.2, 0.25), step=0.02
+    )
+    noise = NOISE * np.random.default_rng(2).normal(size=truth.rate.shape)
+    channels = {f"rate.{axis}": column for axis, column in zip("xyz", (truth.rate + noise).T, strict=True)}
+    robot = Robot.from_string(URDF)
+    centre = InertialParameters(MASS, np.zeros(3), np.diag(INERTIA * [1.02, 0.99, 0.98]))
+    model = Model(robot, (Sensor(Kind.RATE, White((NOISE,) * 3)),), (BodyPrior("base_link", centre, 0.1),))
+    recording = Recording("flight", None, times, channels)
+    return model, [Manoeuvre(recording, MeasuredMotion.from_recording(recording, robot))]
+
+
+@pytest.fixture(scope="module")
+def spun(tmp_path_factory):
+    knots = np.arange(END + 1.0)
+    return model_and_flight(tmp_path_factory.mktemp("spun"), 0.03 * knots)
+
+
+@pytest.fixture(scope="module")
+def engine(spun):
+    return Engine(Posterior.of(*spun, step=0.1))
+
+
+def test_a_fit_that_strays_gives_way_to_one_with_its_body_held(engine):
+    assert strayed(engine.fit())
+    found = fit_present_model(engine)
+    assert found.held
+    assert not found.fit.z[engine.posterior.unknowns.layout.all_bodies].any()
+    assert found.fit.own.shape[1] == engine.posterior.size  # of which the derivatives are known all the same
+
+
+def test_a_free_torque_brings_the_held_model_to_the_data(engine):
+    assert step_along_data(engine.posterior) == pytest.approx(0.1)
+    along = follow(engine)
+    assert not strayed(along)
+    assert along.chi2 < 1e-4 * without_torque(along).chi2
+
+
+def test_a_fit_that_follows_the_data_keeps_its_body(tmp_path):
+    engine = Engine(Posterior.of(*model_and_flight(tmp_path, np.zeros(24)), step=0.1))
+    found = fit_present_model(engine)
+    assert not found.held
+    assert found.fit.chi2 < 1.2 * engine.posterior.samples
+
+
+@pytest.mark.slow
+def test_a_large_unrecorded_wheel_is_named(spun):
+    model, manoeuvres = spun
+    names = ("wheel-history:x", "wheel-history:y", "wheel-history:z", "rotational-drag", "rate-scale")
+    effects = [create(name, end=END) if "wheel" in name else create(name) for name in names]
+    found = diagnose(model, manoeuvres, 1, effects=[effect.attach(model.robot) for effect in effects])
+    assert found.held
+    assert found.to_dict()["bodies_held"]
+    assert found.verdict.status is Status.EXPLAINED
+    assert found.verdict.causes == ("wheel-history:z",)
+    assert found.gain.after.chi2_per_sample < 1.2
