@@ -34,7 +34,6 @@ FOUND_SLOWLY = [
     "encoder-offset:joint3",
     "coloured-noise:rate",
     "rate-clock",
-    "pulse-train",
     "growing-torque",
     "backlash",
 ]
