@@ -69,6 +69,17 @@ def test_tail_beyond_the_draws_is_that_of_many_more_draws():
     assert not alarm.largest.extrapolated(float(np.quantile(largest, 0.9)))
 
 
+def test_scores_are_drawn_where_rounding_leaves_the_matrix_indefinite():
+    columns = np.random.default_rng(7).normal(size=(50, 4))
+    matrix = np.zeros((5, 5))
+    matrix[:4, :4] = columns.T @ columns
+    matrix[4], matrix[:, 4], matrix[4, 4] = matrix[0], matrix[:, 0], matrix[0, 0]
+    matrix[4, 0] = matrix[0, 4] = matrix[0, 0] * (1.0 + 1e-7)  # two equal columns that correlate by more than one
+    assert np.linalg.eigvalsh(matrix)[0] < 0.0
+    scores = Gram(matrix, np.zeros(5), {"a": np.arange(5)}).null_scores(np.random.default_rng(8), 200_000)
+    np.testing.assert_allclose(scores.T @ scores / len(scores), matrix, atol=0.02 * matrix.max())
+
+
 def test_no_p_value_is_larger_than_the_evidence_allows():
     tail = NullTail(np.sort(np.random.default_rng(4).exponential(size=1000)), 10)
     steps = [tail.log_p(x) for x in np.linspace(-1.0, 60.0, 600)]

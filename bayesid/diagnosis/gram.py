@@ -169,8 +169,17 @@ class Gram:
 
     @cached_property
     def _root(self) -> Floats:
-        """Matrix, (m, m), whose product with its transpose is ``A``, up to a part in 1e10 of its diagonal."""
+        """Matrix, (m, m), whose product with its transpose is ``A``, up to a part in 1e10 of its diagonal.
+
+        Columns that are small differences of large ones leave ``A`` slightly indefinite by rounding; the product is
+        then the nearest matrix that is not.
+        """
         length = np.sqrt(np.diag(self.matrix))
         inverse = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
         scaled = inverse[:, None] * self.matrix * inverse
-        return length[:, None] * np.linalg.cholesky(scaled + JITTER * np.eye(len(length)))
+        try:
+            root = np.linalg.cholesky(scaled + JITTER * np.eye(len(length)))
+        except np.linalg.LinAlgError:
+            values, vectors = np.linalg.eigh(scaled)
+            root = vectors * np.sqrt(np.maximum(values, 0.0))
+        return length[:, None] * root
