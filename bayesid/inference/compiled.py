@@ -2,16 +2,18 @@
 
 The operations depend on a `Structure` alone, which is the key of the compiled code; all numbers of the prior, the
 sensors, the effects and the recordings are arguments. Another width of the prior, other noise or another recording of
-about the same length therefore needs no new compilation.
+about the same length therefore needs no new compilation. Whitening is compiled by itself, since noise that is
+correlated over more samples needs another window.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Traceable
@@ -152,16 +154,14 @@ def simulated(structure: Structure, numbers: Numbers, z: Array, grid: Grid, atti
     return Simulated(*structure.simulator.readings(numbers.model, values, grid, attitude))
 
 
-@kept_jit(static=1)
 def residuals(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
     """Return the whitened residual of all recordings, shape (R, O, C)."""
-    return _whitened(structure, simulated(structure, numbers, z, arrays.grid, arrays.attitude).readings, arrays)
+    return _whitened(arrays.weights, arrays.start, _deviations(structure, numbers, z, _bare(arrays))[None])[0]
 
 
-@kept_jit(static=1)
 def jacobian(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
-    """Return the derivative of the whitened residual by forward-mode differentiation, shape (R, O, C, size)."""
-    return jax.jacfwd(lambda z: residuals(structure, numbers, z, arrays))(z)
+    """Return the derivative of the whitened residual by forward-mode differentiation, shape (size, R, O, C)."""
+    return _whitened(arrays.weights, arrays.start, _slopes(structure, numbers, z, _bare(arrays)))
 
 
 @kept_jit(static=1)
@@ -170,24 +170,31 @@ def chi2(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Ar
     return jax.vmap(lambda z: jnp.sum(residuals(structure, numbers, z, arrays) ** 2, axis=(1, 2)))(z)
 
 
-@kept_jit(static=1)
 def traced(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Traced:
     """Simulate all recordings and return the motion of the robot with the readings and the residual."""
-    values = structure.layout.values(numbers.prior, z)
-    node, sample, read = structure.simulator.trace(numbers.model, values, arrays.grid, arrays.attitude)
-    return Traced(node, sample, read, _whitened(structure, read, arrays))
+    node, sample, read, deviation = _traced(structure, numbers, z, _bare(arrays))
+    return Traced(node, sample, read, _whitened(arrays.weights, arrays.start, deviation[None])[0])
+
+
+def linearised(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> LinearMotion:
+    """Linearise the simulation of all recordings in what may act from outside the model, leading axis R."""
+    return _linearised(structure, numbers, z, _bare(arrays))
 
 
 @kept_jit(static=1)
-def linearised(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> LinearMotion:
-    """Linearise the simulation of all recordings in what may act from outside the model, leading axis R."""
+def _linearised(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> LinearMotion:
     values = structure.layout.values(numbers.prior, z)
     return structure.simulator.linearise(numbers.model, values, arrays.grid, arrays.attitude)
 
 
-@kept_jit(static=1)
 def read_out(
-    structure: Structure, numbers: Numbers, z: Array, arrays: Arrays, raw: Array, along: Array, offset: Array
+    structure: Structure,
+    numbers: Numbers,
+    z: Array,
+    arrays: Arrays,
+    raw: Traceable,
+    along: Traceable,
+    offset: Traceable,
 ) -> Array:
     """Return the derivatives of the whitened residual along n changes of the readings, shape (n, R, O, C).
 
@@ -201,17 +208,56 @@ def read_out(
     offset : (n, R, T, C) array
         Changes of the faulty readings.
     """
+    changes = _read_out(structure, numbers, z, _bare(arrays), raw, along, offset)
+    return _whitened(arrays.weights, arrays.start, changes)
+
+
+@kept_jit(static=1)
+def _read_out(
+    structure: Structure, numbers: Numbers, z: Array, arrays: Arrays, raw: Array, along: Array, offset: Array
+) -> Array:
     values = structure.layout.values(numbers.prior, z)
 
-    def whitened(raw: Array, offset: Array) -> Array:
+    def deviation(raw: Array, offset: Array) -> Array:
         read = structure.simulator.faulty(numbers.model, values, arrays.grid, raw)
-        return _whitened(structure, read, arrays._replace(offset=arrays.offset + offset))
+        return structure.simulator.residual(read, arrays.measured) - (arrays.offset + offset)
 
     at = (raw, jnp.zeros_like(arrays.offset))
-    return jax.vmap(lambda *one: jax.jvp(whitened, at, one)[1])(along, offset)
+    return jax.vmap(lambda *one: jax.jvp(deviation, at, one)[1])(along, offset)
 
 
-def _whitened(structure: Structure, read: Readings, arrays: Arrays) -> Array:
-    residual = structure.simulator.residual(read, arrays.measured) - arrays.offset
-    padded = jnp.pad(residual, ((0, 0), (0, arrays.weights.shape[3]), (0, 0)))
-    return jax.vmap(whitening.apply)(arrays.weights, arrays.start, padded)
+@kept_jit(static=1)
+def _deviations(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
+    """Return measured minus predicted readings, shape (R, T, C)."""
+    read = simulated(structure, numbers, z, arrays.grid, arrays.attitude).readings
+    return structure.simulator.residual(read, arrays.measured) - arrays.offset
+
+
+@kept_jit(static=1)
+def _slopes(structure: Structure, numbers: Numbers, z: Array, arrays: Arrays) -> Array:
+    """Return the derivatives of the deviations, shape (size, R, T, C)."""
+    return jnp.moveaxis(jax.jacfwd(lambda z: _deviations(structure, numbers, z, arrays))(z), -1, 0)
+
+
+@kept_jit(static=1)
+def _traced(
+    structure: Structure, numbers: Numbers, z: Array, arrays: Arrays
+) -> tuple[Instant, Instant, Readings, Array]:
+    values = structure.layout.values(numbers.prior, z)
+    node, sample, read = structure.simulator.trace(numbers.model, values, arrays.grid, arrays.attitude)
+    return node, sample, read, structure.simulator.residual(read, arrays.measured) - arrays.offset
+
+
+@kept_jit()
+def _whitened(weights: Array, start: Array, deviations: Array) -> Array:
+    """Whiten n deviations of all recordings, shape (n, R, T, C) -> (n, R, O, C)."""
+    padded = jnp.pad(deviations, ((0, 0), (0, 0), (0, weights.shape[3]), (0, 0)))
+    return jax.vmap(jax.vmap(whitening.apply), in_axes=(None, None, 0))(weights, start, padded)
+
+
+def _bare(arrays: Arrays) -> Arrays:
+    """Return the arrays without whitening, on whose window the simulation does not depend."""
+    return arrays._replace(weights=_NONE, start=_NONE)
+
+
+_NONE: Any = np.zeros(0)

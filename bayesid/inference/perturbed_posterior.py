@@ -25,4 +25,5 @@ def residual_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
 
 def jacobian_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
     """Return the derivatives of the whitened residual in ``z``, (R, O, C, size), for arrays that may be `perturbed`."""
-    return np.asarray(compiled.jacobian(posterior.structure, posterior.numbers, jnp.asarray(z), arrays))
+    slopes = compiled.jacobian(posterior.structure, posterior.numbers, jnp.asarray(z), arrays)
+    return np.moveaxis(np.asarray(slopes), 0, -1)

@@ -162,7 +162,7 @@ class Posterior:
     def jacobian(self, z: Floats) -> Floats:
         """Return the Jacobian of `least_squares`."""
         slopes = compiled.jacobian(self.structure, self.numbers, jnp.asarray(z), self.data.arrays)
-        j = np.asarray(slopes).reshape(-1, self.size)
+        j = np.asarray(slopes).reshape(self.size, -1).T
         return j if self.flat_prior else np.concatenate([j, np.eye(self.size)])
 
     def log_likelihoods(self, z: Floats) -> Floats:
