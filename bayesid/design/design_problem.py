@@ -99,12 +99,15 @@ class Problem:
         Criteria that may be evaluated; they share one compiled simulation.
     known : Known, optional
         Knowledge in place of the prior of the plan's model.
+    shares : tuple of float, optional
+        Fraction of each of the limits' bounds that the optimiser may use at its instants, by default all.
     """
 
     plan: Plan
     limits: Limits
     criteria: tuple[Criterion, ...]
     known: Known | None = None
+    shares: tuple[float, ...] | None = None
 
     @cached_property
     def applied(self) -> tuple[Limit, ...]:
@@ -113,8 +116,9 @@ class Problem:
 
     @cached_property
     def bounds(self) -> Floats:
-        """Bound of every limit, shape (m,)."""
-        return np.array([limit.bound for limit in self.applied])
+        """Bound of every limit at the optimiser's instants, shape (m,)."""
+        bounds = np.array([limit.bound for limit in self.applied])
+        return bounds if self.shares is None else bounds * self.shares
 
     @cached_property
     def shadow(self) -> Floats:
@@ -155,6 +159,10 @@ class Problem:
         if [limit.name for limit in new.applied] != [limit.name for limit in self.applied]:
             raise InputError("other limits apply than before", place="limits", remedy="Change bounds only")
         return self._sharing(new)
+
+    def using(self, shares: Floats) -> Problem:
+        """Return the problem with a fraction of each bound, shape (m,), without a new compilation."""
+        return self._sharing(replace(self, shares=tuple(float(share) for share in shares)))
 
     def knowing(self, known: Known) -> Problem:
         """Return the problem with the knowledge from earlier manoeuvres, without a new compilation."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 from typing import Any
 
@@ -18,8 +18,11 @@ from bayesid.design.search_starts import repaired, within_limits
 
 __all__ = ["Polished", "Shared", "Task", "fitted_to_fine_limits", "polish"]
 
-TRIES = 4
-"""Largest number of repairs of a motion that breaks a limit between the instants of the search."""
+TRIES = 8
+"""Largest number of times that a descent goes on because its end breaks a limit between the instants of the search."""
+
+SPARE = 0.999
+"""Fraction of a bound at which such a limit is to end."""
 
 
 @dataclass(frozen=True)
@@ -152,13 +155,20 @@ class _Descent:
         return -self.problem.fractions(self._parameters(x))[1] * self.problem.plan.family.scale
 
 
-def fitted_to_fine_limits(problem: Problem, parameters: Floats) -> Floats:
-    """Return the parameters, repaired where they break a limit between the instants of the search."""
-    bound = 1.0
+def fitted_to_fine_limits(task: Task) -> Polished:
+    """Go on with a descent until its end keeps the limits between the instants of the search, too.
+
+    A limit that is broken there gets as much less of its bound at the instants as it is broken by, and the descent goes
+    on with that. The cost is infinite where no end keeps the limits.
+    """
+    problem, parameters, evaluations = task.shared.problem, task.start, 0
+    shares = np.ones(len(problem.applied))
     for _ in range(TRIES):
-        worst = max(reached.largest / reached.limit for reached in problem.reached(parameters))
-        if worst <= 1.0:
-            break
-        bound = 0.999 * bound / worst
-        parameters = repaired(problem, parameters, bound)
-    return parameters
+        used = np.array([reached.largest / reached.limit for reached in problem.reached(parameters)])
+        if used.max() <= 1.0:
+            cost = problem.cost(task.criterion, parameters, task.points)[0]
+            return Polished(parameters, cost, evaluations + 1)
+        shares = np.where(used > 1.0, SPARE * shares / np.maximum(used, 1.0), shares)
+        done = polish(replace(task, shared=Shared(problem.using(shares)), start=parameters))
+        parameters, evaluations = done.parameters, evaluations + done.evaluations
+    return Polished(parameters, np.inf, evaluations)

@@ -1,4 +1,4 @@
-"""Search for the best manoeuvre: short descents from random starts and from what the best of them have in common."""
+"""Search for the best manoeuvre: descents from random starts, of which the best are followed to the end."""
 
 from __future__ import annotations
 
@@ -14,23 +14,16 @@ from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem
-from bayesid.design.offspring import offspring
 from bayesid.design.polish import Polished, Shared, Task, fitted_to_fine_limits, polish
 from bayesid.design.search_starts import SLACK, random_start
 
 __all__ = ["Found", "Search", "optimise"]
 
-SHORT = 40
-"""Iterations of SLSQP of all descents but the last, after which their order hardly changes."""
-
-OFFSPRING = 8
-"""Motions that are made of the best ones in each generation."""
-
-FEW = 4
-"""Random starts below which nothing is made of their results."""
-
 FOLLOWED = 3
 """Number of motions that are followed to the end, unless there are fewer."""
+
+FINISH = 1e-3
+"""Factor on the tolerance with which they are: where limits change, SLSQP's first end is 1 to 2 nats too early."""
 
 ALIKE = 0.1
 """Difference of the cost below which two motions count as one: 1 % of ten parameters, where the cost is in nats."""
@@ -48,19 +41,16 @@ class Search:
     starts : int
         Number of random starts.
     iterations : int
-        Largest number of iterations of SLSQP from the last ones.
-    generations : int
-        How often motions are made of the best ones, if there are at least four starts.
+        Largest number of iterations of SLSQP from each.
     tolerance : float
-        Tolerance of the cost at which SLSQP stops, relative to that of the start where that is below one.
+        Tolerance of the cost at which SLSQP stops at first, relative to that of the start where that is below one.
     executor : concurrent.futures.Executor, optional
         Executor of the descents, in threads, processes or on other machines; by default they run one after the other.
         It has no influence on the result.
     """
 
     starts: int = 12
-    iterations: int = 250
-    generations: int = 2
+    iterations: int = 400
     tolerance: float = 1e-3
     executor: Executor | None = field(default=None, compare=False, repr=False)
 
@@ -76,7 +66,7 @@ class Found:
     cost : float
         Cost of the best motion.
     costs : tuple of float
-        Costs of the descents of the last round, the best first.
+        Costs of the descents that were followed to the end, the best first.
     evaluations : int
         Number of evaluations of the cost over all starts.
     """
@@ -131,22 +121,16 @@ def optimise(
     problem.compile()
     points = problem.points(criterion, rng) if points is None else points
     starts = [*first, *(random_start(problem, rng) for _ in range(search.starts))]
-    generations = search.generations if search.starts >= FEW else 0
-    short, followed = min(SHORT, search.iterations), min(FOLLOWED, len(starts))
+    followed = min(FOLLOWED, len(starts))
     first_round = [] if len(starts) <= followed else starts
-    total = (len(first_round) + generations * OFFSPRING) * (short + 1) + followed * (search.iterations + 1)
+    total = (len(first_round) + followed) * (search.iterations + 1)
     work = _Work(problem, criterion, search, known, keep, progress, total)
     # one point of the unknowns ranks them well enough
-    pool = _ranked(work.run(0, first_round, short, points[:1]), problem) if first_round else []
-    for number in range(1, generations + 1):
-        made = offspring(problem, [item.parameters for item in pool], OFFSPRING, rng)
-        pool = _ranked([*pool, *work.run(number, made, short, points[:1])], problem)
+    pool = _ranked(work.run(0, first_round, search.tolerance, points[:1]), problem) if first_round else []
     last = [item.parameters for item in pool[:followed]] or starts
-    alive = _ranked(work.run(generations + 1, last, search.iterations, points), problem)
-    best = alive[0]
-    parameters = fitted_to_fine_limits(problem, best.parameters)
-    cost = best.cost if parameters is best.parameters else problem.cost(criterion, parameters, points)[0]
-    return Found(parameters, cost, tuple(item.cost for item in alive), work.evaluations)
+    ends = work.run(1, last, FINISH * search.tolerance, points)
+    alive = _ranked(work.fitted(ends, FINISH * search.tolerance, points), problem)
+    return Found(alive[0].parameters, alive[0].cost, tuple(item.cost for item in alive), work.evaluations)
 
 
 def _ranked(done: Sequence[Polished], problem: Problem) -> list[Polished]:
@@ -187,21 +171,33 @@ class _Work:
     best: float = np.inf
     began: float = field(default_factory=time.monotonic)
 
-    def run(self, number: int, starts: Sequence[Floats], iterations: int, points: list[Floats]) -> list[Polished]:
+    def run(self, number: int, starts: Sequence[Floats], tolerance: float, points: list[Floats]) -> list[Polished]:
         """Run the descents of one round that no earlier run has finished."""
         results: dict[int, Polished] = {}
         shared, tasks = Shared(self.problem), {}
         for index, start in enumerate(starts):
             earlier = self.known(f"{number}.{index}")
             if earlier is not None:
-                self._finish(results, index, Polished(*earlier), iterations)
+                self._finish(results, index, Polished(*earlier))
             else:
-                tasks[index] = Task(shared, self.criterion, points, start, iterations, self.search.tolerance)
+                tasks[index] = Task(shared, self.criterion, points, start, self.search.iterations, tolerance)
         for index, result in self._each(tasks):
             if np.isfinite(result.cost):
                 self.keep(f"{number}.{index}", result.parameters, result.cost, result.evaluations)
-            self._finish(results, index, result, iterations)
+            self._finish(results, index, result)
         return [results[index] for index in range(len(starts))]
+
+    def fitted(self, ends: Sequence[Polished], tolerance: float, points: list[Floats]) -> list[Polished]:
+        """Go on with descents until they keep the limits between the instants of the search, too."""
+        kept = [
+            fitted_to_fine_limits(
+                Task(Shared(self.problem), self.criterion, points, end.parameters, self.search.iterations, tolerance)
+            )
+            for end in ends
+            if np.isfinite(end.cost)
+        ]
+        self.evaluations += sum(item.evaluations for item in kept)
+        return kept or list(ends)
 
     def _each(self, tasks: dict[int, Task]):  # type: ignore[no-untyped-def]
         """Return the results of tasks as they become known, each with its number."""
@@ -216,9 +212,9 @@ class _Work:
             for future in futures:
                 future.cancel()
 
-    def _finish(self, results: dict[int, Polished], index: int, result: Polished, iterations: int) -> None:
+    def _finish(self, results: dict[int, Polished], index: int, result: Polished) -> None:
         results[index] = result
-        self.done += iterations + 1
+        self.done += self.search.iterations + 1
         self.evaluations += result.evaluations
         self.best = min(self.best, result.cost)
         spent = max(time.monotonic() - self.began, 1e-9)
