@@ -23,7 +23,7 @@ def run(
     progress: Progress,
     seed: Seed = 0,
     starts: Annotated[int, typer.Option(min=1, help="Number of random starts for every criterion.")] = 12,
-    iterations: Annotated[int, typer.Option(min=1, help="Iterations of the optimiser from the last ones.")] = 250,
+    iterations: Annotated[int, typer.Option(min=1, help="Most iterations of the optimiser from each.")] = 400,
     separate: Annotated[
         tuple[str, str] | None,
         typer.Option(metavar="A B", help="Two effects of the catalogue that the manoeuvre is to tell apart."),
