@@ -11,7 +11,7 @@ from scipy.stats import chi2 as chi2_distribution
 from scipy.stats import kstest, norm
 
 from bayesid._io.errors import InputError
-from bayesid.inference.ensemble import BLOCK, LaplaceMove, sample
+from bayesid.inference.ensemble import BLOCK, LaplaceMove, autocorrelation_time, sample
 from bayesid.inference.identification import identify
 from bayesid.inference.importance import importance_sample
 from bayesid.inference.mode import Optimum, fit, maximise
@@ -142,6 +142,30 @@ def test_samples_of_a_known_posterior():
     assert (np.abs(chains.flat.mean(axis=0) - stub.optimum.z) < 4.5 * error).all()
     np.testing.assert_allclose(np.cov(chains.flat.T), stub.optimum.covariance, atol=0.1 * sd.max() ** 2)
     np.testing.assert_allclose(chains.log_density.ravel()[:50], stub.log_density(chains.flat[:50]), rtol=1e-12)
+
+
+def test_the_autocorrelation_time_of_short_chains():
+    """Autoregressive walkers of lag-one correlation 2/3 have one of 5 steps; 20 times that is long enough, within 7 %.
+
+    An estimate that takes each walker's mean for the true one would give about half.
+    """
+    rng, correlation = np.random.default_rng(5), 2.0 / 3.0
+    chain = np.empty((100, 200, 2))
+    chain[0] = rng.normal(size=(200, 2))
+    for step in range(1, len(chain)):
+        chain[step] = correlation * chain[step - 1] + np.sqrt(1.0 - correlation**2) * rng.normal(size=(200, 2))
+    assert autocorrelation_time(chain) == pytest.approx((1.0 + correlation) / (1.0 - correlation), rel=0.07)
+
+
+@pytest.mark.parametrize("trusted", [False, True])
+def test_means_scatter_as_the_effective_samples_say(trusted):
+    """Over 15 seeds and four coordinates, within four standard errors; the worst coordinate sets the size."""
+    stub = LinearGaussian(4)
+    runs = [drawn(stub, seed, effective_samples=1000.0, max_steps=400, trusted=trusted) for seed in range(15)]
+    assert all(run.converged for run in runs)
+    sd = np.sqrt(np.diag(stub.optimum.covariance))
+    off = [(run.flat.mean(axis=0) - stub.optimum.z) / sd * np.sqrt(run.effective_samples) for run in runs]
+    assert 0.64 < np.sqrt(np.mean(np.square(off))) < 1.36
 
 
 def test_the_same_seed_gives_the_same_chains_and_another_does_not(tmp_path):

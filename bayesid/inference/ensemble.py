@@ -13,7 +13,7 @@ from pathlib import Path
 import emcee
 import h5py
 import numpy as np
-from emcee.autocorr import integrated_time
+from emcee.autocorr import auto_window
 from emcee.moves import DEMove, DESnookerMove
 from emcee.moves.red_blue import RedBlueMove
 
@@ -32,11 +32,22 @@ __all__ = ["Chains", "LaplaceMove", "sample"]
 ENSEMBLES = 4
 """Number of independent ensembles, so that their disagreement shows a lack of convergence."""
 
-BLOCK = 40
+BLOCK = 20
 """Number of steps between two tests of convergence."""
 
-LENGTHS = 50.0
-"""Smallest number of steps of a converged sampler, in autocorrelation times, as emcee advises."""
+BURN_IN = 5.0
+"""Number of steps left out at first, and over which the autocorrelation is summed up, in autocorrelation times."""
+
+LENGTHS = 20.0
+"""Smallest number of steps of a converged sampler, in autocorrelation times.
+
+emcee advises 50, since its estimate takes the mean of every walker for that of the posterior, and is too small by ten
+autocorrelation times over the number of steps. Here all walkers share one mean, so that a chain need only be long
+beside `BURN_IN`.
+"""
+
+INDEPENDENT = {True: 0.9, False: 0.5}
+"""Share of moves that propose from the Laplace approximation, where it is and is not trusted."""
 
 R_HAT = 1.01
 """Largest potential scale reduction of a converged sampler."""
@@ -77,7 +88,7 @@ class Chains:
     r_hat : float
         Potential scale reduction between the ensembles, the largest over the coordinates.
     autocorrelation : float
-        Autocorrelation time, the longest over ensembles and coordinates [steps].
+        Autocorrelation time, the longest over the coordinates [steps].
     acceptance : float
         Mean share of accepted proposals.
     evaluations : int
@@ -120,6 +131,7 @@ def sample(
     *,
     effective_samples: float = 4000.0,
     max_steps: int = 5000,
+    trusted: bool = False,
     file: Path | None = None,
     progress: Progress = silent,
 ) -> Chains:
@@ -137,6 +149,8 @@ def sample(
         Goal for the effective samples of all ensembles together.
     max_steps : int
         Largest number of steps of each ensemble; a sampler that stops there may not have converged.
+    trusted : bool
+        Whether importance sampling trusts the Laplace approximation, so that most moves may propose from it.
     file : path, optional
         HDF5 file that keeps every step; if it holds a part of the same run, sampling goes on from there.
     progress : Progress, optional
@@ -144,7 +158,8 @@ def sample(
     """
     posterior = parameterisation.posterior
     proposal = parameterisation.proposal(optimum)
-    moves = [(LaplaceMove(proposal), 0.6), (DEMove(), 0.3), (DESnookerMove(), 0.1)]
+    share = INDEPENDENT[trusted]
+    moves = [(LaplaceMove(proposal), share), (DEMove(), 0.75 * (1.0 - share)), (DESnookerMove(), 0.25 * (1.0 - share))]
     walkers = _walkers(posterior.size)
     sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
     # the mode stands for data and model in the key; it is rounded, so that rounding errors do not change the key
@@ -227,15 +242,29 @@ class _KeyedBackend(emcee.backends.HDFBackend):
             opened[self.name].attrs["key"] = self.key
 
 
+def autocorrelation_time(chain: Floats) -> float:
+    """Return the longest autocorrelation time of the coordinates of walkers (steps, walkers, n) [steps].
+
+    The autocovariance is that about the mean of all walkers, and is summed up in Sokal's window.
+    """
+    steps = len(chain)
+    spectrum = np.fft.rfft(chain - chain.mean(axis=(0, 1)), n=2 * steps, axis=0)
+    power = np.mean(np.abs(spectrum) ** 2, axis=1)
+    covariance = np.fft.irfft(power, axis=0)[:steps] / np.arange(steps, 0, -1)[:, None]
+    if not np.all(covariance[0] > 0.0):
+        return float(steps)
+    times = 2.0 * np.cumsum(covariance / covariance[0], axis=0) - 1.0
+    return max(1.0, *(float(time[auto_window(time, BURN_IN)]) for time in times.T))
+
+
 def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
     import arviz as az  # imported here, since it takes a second that commands without samples save
 
     steps = min(int(sampler.iteration) for sampler in samplers)
     chains = [sampler.get_chain()[:steps] for sampler in samplers]
     densities = [sampler.get_log_prob()[:steps] for sampler in samplers]
-    tau = max(float(np.max(integrated_time(chain, tol=0, quiet=True))) for chain in chains)
-    tau = max(tau, 1.0) if np.isfinite(tau) else float(steps)
-    burn = min(int(np.ceil(5.0 * tau)), steps // 2)
+    tau = autocorrelation_time(np.concatenate(chains, axis=1))
+    burn = min(int(np.ceil(BURN_IN * tau)), steps // 2)
     y = np.stack([chain[burn:].reshape(-1, chain.shape[-1]) for chain in chains])
     walkers = chains[0].shape[1]
     effective = y.shape[0] * y.shape[1] / tau

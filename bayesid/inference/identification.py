@@ -216,6 +216,7 @@ def identify(
         walkers,
         effective_samples=effective_samples,
         max_steps=max_steps,
+        trusted=evidence.trusted,
         file=file,
         progress=progress,
     )
