@@ -9,6 +9,7 @@ from studies.blind_injections import Trial, plan, run, write_report
 from studies.blind_injections.goals import _least, _most, _rate, _scatter, interval
 from studies.blind_injections.report import confusion, rates, reliability, scores, statements
 from studies.blind_injections.trials import Plan, read
+from studies.common.goals import Verdict
 from studies.common.monte_carlo import read_store
 from studies.truth import hidden_causes
 
@@ -126,18 +127,18 @@ def test_the_plans_hide_everything_and_nothing():
 def test_a_goal_is_decided_by_its_interval():
     """By hand: 0 of 1,000, and 30 of 1,000, where one per cent is due; 95 % of many, of few, and of none."""
     assert interval(0, 10) == pytest.approx((0.0, 1.0 - 0.025**0.1))
-    assert _rate("", 0.01, 12, 1000)[2] == "PASS"
-    assert _rate("", 0.01, 30, 1000)[2] == "FAIL"
-    assert _rate("", 0.01, 1, 100)[2] == "NOT DECIDED"
-    assert _least("", 0.93, 198, 200)[2] == "PASS"
-    assert _least("", 0.93, 5, 5)[2] == "NOT DECIDED"
-    assert _least("", 0.93, 150, 200)[2] == "FAIL"
-    assert _least("", 0.93, 0, 0)[2] == "NOT TESTED"
-    assert _most("", 0.03, 0, 200)[2] == "PASS"
-    assert _most("", 0.03, 30, 200)[2] == "FAIL"
+    assert _rate("", 0.01, 12, 1000).verdict is Verdict.PASS
+    assert _rate("", 0.01, 30, 1000).verdict is Verdict.FAIL
+    assert _rate("", 0.01, 1, 100).verdict is Verdict.OPEN
+    assert _least("", 0.93, 198, 200).verdict is Verdict.PASS
+    assert _least("", 0.93, 5, 5).verdict is Verdict.OPEN
+    assert _least("", 0.93, 150, 200).verdict is Verdict.FAIL
+    assert _least("", 0.93, 0, 0).verdict is Verdict.NOT_TESTED
+    assert _most("", 0.03, 0, 200).verdict is Verdict.PASS
+    assert _most("", 0.03, 30, 200).verdict is Verdict.FAIL
     rng = np.random.default_rng(1)
-    assert _scatter("", rng.normal(size=4000))[2] == "PASS"
-    assert _scatter("", 1.5 * rng.normal(size=4000))[2] == "FAIL"
+    assert _scatter("", rng.normal(size=4000)).verdict is Verdict.PASS
+    assert _scatter("", 1.5 * rng.normal(size=4000)).verdict is Verdict.FAIL
 
 
 @pytest.mark.usefixtures("slow")

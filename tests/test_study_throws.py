@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from bayesid import InputError
+from studies.common.goals import Verdict
 from studies.throws import run
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws
-from studies.throws.goals import goal_rows, held_in_all
+from studies.throws.goals import goals_of, held_in_all
 from studies.throws.report import write_report
 
 PRESENT = (DEFAULT_FOLDER / "truth.json").is_file()
@@ -62,8 +63,8 @@ def test_the_unexplained_torque_has_the_width_that_its_prior_says(result):
 
 @pytest.mark.slow
 def test_goals_without_a_diagnosis_are_not_tested(result):
-    rows = {goal: verdict for goal, _, verdict in goal_rows(result)}
-    assert rows["a cause named on every body"] == "NOT TESTED"
+    verdicts = {goal.text: goal.verdict for goal in goals_of(result)}
+    assert verdicts["a cause named on every body"] is Verdict.NOT_TESTED
 
 
 @pytest.mark.slow

@@ -5,11 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from importlib.metadata import version
+from pathlib import Path
 
 from bayesid._io.store import file_key
 from bayesid.app.schema import Study
 
-__all__ = ["report_origin"]
+__all__ = ["origin_text", "report_origin"]
 
 DIGITS = 12
 """Digits of a hash that are printed."""
@@ -30,7 +31,12 @@ def report_origin(study: Study, command: str, seed: int, options: Sequence[str] 
     files = [study.robot.urdf, *(recording.file for recording in study.recordings)]
     if study.file is not None:
         files.insert(0, study.file)
-    hashes = ", ".join(f"{file.name} {file_key(file)[:DIGITS]}" for file in files)
     place = [] if study.file is None else [study.file.name]
-    words = shlex.join(["bayesid", command, *place, "--seed", str(seed), *options])
-    return f"SHA-256: {hashes}. bayesid {version('bayesid')}, seed {seed}, command: {words}"
+    return origin_text(files, ["bayesid", command, *place, "--seed", str(seed), *options], seed)
+
+
+def origin_text(files: Sequence[Path], words: Sequence[str], seed: int | None) -> str:
+    """Return the hashes of files, the version, the seed, if there is one, and the words of a command."""
+    hashes = ", ".join(f"{file.name} {file_key(file)[:DIGITS]}" for file in files)
+    sown = "" if seed is None else f", seed {seed}"
+    return f"SHA-256: {hashes}. bayesid {version('bayesid')}{sown}, command: {shlex.join(words)}"

@@ -8,8 +8,9 @@ import numpy as np
 from scipy import stats
 
 from studies.blind_injections.trials import Trial
+from studies.common.goals import Goal, Verdict
 
-__all__ = ["CLEAR", "LEFT", "goal_rows", "interval", "share_text"]
+__all__ = ["CLEAR", "LEFT", "goals_of", "interval", "share_text"]
 
 CLEAR = 7.0
 """Signal-to-noise ratio from which the hidden causes should be named."""
@@ -19,9 +20,6 @@ LEFT = 10.0
 
 SURE = 0.9
 """Stated probability from which a named cause should be right as often as 93 % say."""
-
-NONE, OPEN = "NOT TESTED", "NOT DECIDED"
-"""Verdicts on a goal without any trial, and with too few."""
 
 LEAST_NULLS = 1000
 """Trials without anything hidden below which a rate of 1 % is not decided."""
@@ -42,7 +40,7 @@ def share_text(count: int, total: int) -> str:
     return f"{count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
 
 
-def goal_rows(trials: Sequence[Trial]) -> list[list[str]]:
+def goals_of(trials: Sequence[Trial]) -> list[Goal]:
     """Return each goal, what was reached, and PASS, FAIL, or that too few trials were made."""
     nulls = [trial for trial in trials if trial.kind == "adequate"]
     clear = [t for t in trials if t.kind == "effect" and t.signal_to_noise is not None and t.signal_to_noise >= CLEAR]
@@ -55,11 +53,13 @@ def goal_rows(trials: Sequence[Trial]) -> list[list[str]]:
     return [
         _rate("false alarms where nothing is hidden", 0.01, sum(t.alarmed for t in nulls), len(nulls)),
         _least("named causes right where 0.9 and more is stated", 0.93, sum(t.holds for t in sure), len(sure)),
-        [
+        Goal(
             f"named alone at {CLEAR:g} sigma and more, relative to the simulated limit: 0.97",
             f"{sum(t.named_rightly for t in limited) / limit:.2f} ({len(limited)} trials)" if limited else "-",
-            _verdict(*interval(sum(t.named_rightly for t in limited), len(limited)), 0.97) if limited else NONE,
-        ],
+            _verdict(*interval(sum(t.named_rightly for t in limited), len(limited)), 0.97)
+            if limited
+            else Verdict.NOT_TESTED,
+        ),
         _least(f"hidden causes in the reported set at {CLEAR:g} sigma", 0.97, sum(t.in_set for t in clear), len(clear)),
         _least(
             f"outside effects with {LEFT:g} sigma left called unknown",
@@ -73,40 +73,42 @@ def goal_rows(trials: Sequence[Trial]) -> list[list[str]]:
     ]
 
 
-def _verdict(low: float, high: float, goal: float) -> str:
+def _verdict(low: float, high: float, goal: float) -> Verdict:
     """Return the verdict on a share that is to be at least a goal."""
-    return "PASS" if low >= goal else "FAIL" if high < goal else OPEN
+    return Verdict.PASS if low >= goal else Verdict.FAIL if high < goal else Verdict.OPEN
 
 
-def _least(text: str, goal: float, count: int, total: int) -> list[str]:
+def _least(text: str, goal: float, count: int, total: int) -> Goal:
     goal_text = f"{text}: at least {100.0 * goal:g} %"
-    return [goal_text, share_text(count, total), _verdict(*interval(count, total), goal) if total else NONE]
+    return Goal(
+        goal_text, share_text(count, total), _verdict(*interval(count, total), goal) if total else Verdict.NOT_TESTED
+    )
 
 
-def _most(text: str, goal: float, count: int, total: int) -> list[str]:
+def _most(text: str, goal: float, count: int, total: int) -> Goal:
     goal_text = f"{text}: at most {100.0 * goal:g} %"
     if not total:
-        return [goal_text, share_text(count, total), NONE]
+        return Goal(goal_text, share_text(count, total), Verdict.NOT_TESTED)
     low, high = interval(count, total)
-    return [goal_text, share_text(count, total), _verdict(1.0 - high, 1.0 - low, 1.0 - goal)]
+    return Goal(goal_text, share_text(count, total), _verdict(1.0 - high, 1.0 - low, 1.0 - goal))
 
 
-def _rate(text: str, goal: float, count: int, total: int) -> list[str]:
+def _rate(text: str, goal: float, count: int, total: int) -> Goal:
     goal_text = f"{text}: consistent with {100.0 * goal:g} % in {LEAST_NULLS} trials"
     if not total:
-        return [goal_text, share_text(count, total), NONE]
+        return Goal(goal_text, share_text(count, total), Verdict.NOT_TESTED)
     low, high = interval(count, total)
-    verdict = "FAIL" if not low <= goal <= high else "PASS" if total >= LEAST_NULLS else OPEN
-    return [goal_text, share_text(count, total), verdict]
+    verdict = Verdict.FAIL if not low <= goal <= high else Verdict.PASS if total >= LEAST_NULLS else Verdict.OPEN
+    return Goal(goal_text, share_text(count, total), verdict)
 
 
-def _scatter(text: str, errors: np.ndarray) -> list[str]:
+def _scatter(text: str, errors: np.ndarray) -> Goal:
     """Return the goal on errors in stated standard deviations: their root mean square, within two standard errors."""
     goal_text = f"errors of {text} in stated sd: rms 0.9 to 1.1"
     if len(errors) < 2:
-        return [goal_text, "-", NONE]
+        return Goal(goal_text, "-", Verdict.NOT_TESTED)
     rms = float(np.sqrt((errors**2).mean()))
     error = float((errors**2).std() / (2.0 * rms * np.sqrt(len(errors))))
     low, high = rms - 2.0 * error, rms + 2.0 * error
-    verdict = "PASS" if low >= 0.9 and high <= 1.1 else "FAIL" if high < 0.9 or low > 1.1 else OPEN
-    return [goal_text, f"{rms:.2f} ± {error:.2f} ({len(errors)} numbers)", verdict]
+    verdict = Verdict.PASS if low >= 0.9 and high <= 1.1 else Verdict.FAIL if high < 0.9 or low > 1.1 else Verdict.OPEN
+    return Goal(goal_text, f"{rms:.2f} ± {error:.2f} ({len(errors)} numbers)", verdict)

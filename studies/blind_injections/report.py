@@ -15,9 +15,10 @@ from scipy import stats
 
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
-from studies.blind_injections.goals import goal_rows, share_text
+from studies.blind_injections.goals import goals_of, share_text
 from studies.blind_injections.trials import Trial, plan, read, run
 from studies.common.command import Command
+from studies.common.goals import add_goals
 
 __all__ = ["confusion", "main", "rates", "reliability", "scores", "statements", "write_report"]
 
@@ -181,12 +182,11 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
             f"Incomplete: {planned} trials are planned, and these were made first, in random order. Read the rates "
             "with their intervals."
         )
-    document.table(
-        ["goal", "reached, 95 % interval", ""],
-        goal_rows(trials),
-        "Goals. PASS where the interval lies within the goal, FAIL where it lies outside; NOT DECIDED where it holds "
-        "both, because too few trials were made.",
-        ["left", "left", "left"],
+    add_goals(
+        document,
+        goals_of(trials),
+        "Goals, with 95 % intervals. PASS where the interval lies within the goal, FAIL where it lies outside; NOT "
+        "DECIDED where it holds both, because too few trials were made.",
     )
     document.items(_findings(trials, outside))
     seconds = np.array([trial.seconds["total"] for trial in trials])

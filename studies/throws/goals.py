@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from bayesid.diagnosis import Diagnosis
 from bayesid.diagnosis.probable_verdict import NAMED
 from studies.blind_injections.goals import interval
+from studies.common.goals import Goal, Verdict
 from studies.throws.smooth_widths import LARGEST
 
 if TYPE_CHECKING:
     from studies.throws import Result
 
-__all__ = ["NONE", "goal_rows", "held_in_all", "wheel_probability"]
+__all__ = ["goals_of", "held_in_all", "wheel_probability"]
 
 QUICK_FIT = {"Empty": 1.9, "A": 1.0}
 """Mean errors of a quick least-squares fit by those who prepared the data [%]."""
@@ -25,8 +24,6 @@ LOW, HIGH = 0.90, 0.98
 SECONDS = 600.0
 """Longest time of a full run [s]."""
 
-NONE = "NOT TESTED"
-
 
 def held_in_all(result: Result, *, with_truth: bool = False) -> tuple[int, int]:
     """Return how many 95 % intervals of single throws hold the truth over all bodies, and of how many."""
@@ -34,90 +31,80 @@ def held_in_all(result: Result, *, with_truth: bool = False) -> tuple[int, int]:
     return sum(held for held, _ in counts), sum(total for _, total in counts)
 
 
-def goal_rows(result: Result) -> list[list[str]]:
-    """Return each goal, what was reached, and PASS, FAIL or NOT TESTED."""
-    rows = []
-    for body in result.extended.bodies.values():
-        if body.name in QUICK_FIT:
-            goal = QUICK_FIT[body.name]
-            text = f"{body.name}: mean error of single throws at most {goal:g} %, that of a quick least-squares fit"
-            rows.append([text, f"{body.mean_error:.2f} %", _verdict(body.mean_error <= goal)])
-    rows.append(_coverage(result))
-    ratios = [ratio for body in result.extended.bodies.values() for ratio in body.joint_formal / body.joint_jackknife]
-    rows.append(
-        [
+def goals_of(result: Result) -> list[Goal]:
+    """Return each goal, what was reached, and whether that passes; what only a full run tests is not tested before."""
+    bodies, studies = result.extended.bodies.values(), result.studies
+    ratios = [ratio for body in bodies for ratio in body.joint_formal / body.joint_jackknife]
+    torques = [widths["smooth-torque"].ratio for widths in result.extended.widths.values()]
+    named = [study.body for study in studies if study.diagnosis.verdict.causes]
+    better = [study.body for study in studies if study.held_out.gain.sum() > 0.0]
+    return [
+        *(_quick_fit(body.name, body.mean_error) for body in bodies if body.name in QUICK_FIT),
+        _coverage(result),
+        Goal(
             "joint answer: formal over jackknife sd between 0.67 and 1.5 for every moment",
             f"{min(ratios):.2f} to {max(ratios):.2f}",
-            _verdict(min(ratios) >= 0.67 and max(ratios) <= 1.5),
-        ]
-    )
-    torques = [widths["smooth-torque"].ratio for widths in result.extended.widths.values()]
-    rows.append(
-        [
+            Verdict.of(min(ratios) >= 0.67 and max(ratios) <= 1.5),
+        ),
+        Goal(
             f"unexplained torque at most {LARGEST:g} prior sd on every body",
             f"{max(torques):.2f}",
-            _verdict(max(torques) <= LARGEST),
-        ]
-    )
-    named = [study.body for study in result.studies if study.diagnosis.verdict.causes]
-    known = f"{len(named)} of {len(result.studies)}" if result.studies else "not run"
-    rows.append(["a cause named on every body", known, _decided(result.studies, len(named) == len(result.studies))])
-    better = [study.body for study in result.studies if study.held_out.gain.sum() > 0.0]
-    gain = f"{len(better)} of {len(result.studies)} bodies" if result.studies else "not run"
-    rows.append(
-        [
+            Verdict.of(max(torques) <= LARGEST),
+        ),
+        Goal("a cause named on every body", *_full(result, f"{len(named)} of {len(studies)}", len(named))),
+        Goal(
             "extension predicts throws left out better",
-            gain,
-            _decided(result.studies, len(better) == len(result.studies)),
-        ]
-    )
-    rows += _reverse(result)
-    minutes = f"{result.seconds / 60.0:.1f} minutes"
-    rows.append(
-        [
+            *_full(result, f"{len(better)} of {len(studies)} bodies", len(better)),
+        ),
+        *_reverse(result),
+        Goal(
             "whole run without the reverse within 10 minutes",
-            minutes,
-            _decided(result.studies, result.seconds <= SECONDS),
-        ]
-    )
-    return rows
+            f"{result.seconds / 60.0:.1f} minutes",
+            Verdict.of(result.seconds <= SECONDS if studies else None),
+        ),
+    ]
 
 
-def _coverage(result: Result) -> list[str]:
+def _quick_fit(body: str, error: float) -> Goal:
+    goal = QUICK_FIT[body]
+    text = f"{body}: mean error of single throws at most {goal:g} %, that of a quick least-squares fit"
+    return Goal(text, f"{error:.2f} %", Verdict.of(error <= goal))
+
+
+def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
+    """Return what was reached on all diagnosed bodies, which only a full run has."""
+    if not result.studies:
+        return "not run", Verdict.NOT_TESTED
+    return reached, Verdict.of(count == len(result.studies))
+
+
+def _coverage(result: Result) -> Goal:
     count, total = held_in_all(result)
     low, high = interval(count, total)
     inside = low >= LOW and high <= HIGH
     outside = high < LOW or low > HIGH
     text = f"95 % intervals of single throws hold the truth in {100 * LOW:.0f} to {100 * HIGH:.0f} % of cases"
     reached = f"{100.0 * count / total:.0f} %: {count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
-    return [text, reached, "PASS" if inside else "FAIL" if outside else "NOT DECIDED"]
+    return Goal(text, reached, Verdict.of(inside) if inside or outside else Verdict.OPEN)
 
 
-def _reverse(result: Result) -> list[list[str]]:
-    """Rows on the recorded wheel dropped: whether its probability says that it is there, and whether it is named."""
+def _reverse(result: Result) -> list[Goal]:
+    """Goals on the recorded wheel dropped: whether its probability says that it is there, and whether it is named."""
     titles = (
         f"recorded wheel dropped: a wheel about z has a probability of {NAMED:g} or more on every body",
         "recorded wheel dropped: the verdict names a wheel on every body",
     )
     if not result.wheels:
-        return [[title, "not run", NONE] for title in titles]
+        return [Goal(title, "not run", Verdict.NOT_TESTED) for title in titles]
     found = list(result.wheels.values())
     held = [wheel_probability(item) for item in found]
     named = [any(cause.startswith("wheel-history") for cause in item.verdict.causes) for item in found]
     return [
-        [titles[0], f"at least {min(held):.3f}", _verdict(min(held) >= NAMED)],
-        [titles[1], f"{sum(named)} of {len(named)}", _verdict(all(named))],
+        Goal(titles[0], f"at least {min(held):.3f}", Verdict.of(min(held) >= NAMED)),
+        Goal(titles[1], f"{sum(named)} of {len(named)}", Verdict.of(all(named))),
     ]
 
 
 def wheel_probability(found: Diagnosis) -> float:
     """Return the probability that a wheel of unknown course about the recorded wheel's axis is at work."""
     return found.probabilities.of_any(["wheel-history:z"])
-
-
-def _verdict(passed: bool | np.bool_) -> str:
-    return "PASS" if passed else "FAIL"
-
-
-def _decided(studies: tuple[object, ...], passed: bool) -> str:
-    return _verdict(passed) if studies else NONE

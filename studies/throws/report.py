@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid.report import Document
+from studies.common.goals import add_goals
 from studies.common.report_parts import not_evaluated
 from studies.throws.bodies import BLOCK_SD, PLATE_SD
 from studies.throws.data import EXCLUDED, INTERVAL, POLE_PAIRS, WHEEL_INERTIA
 from studies.throws.diagnosis import SPREAD
-from studies.throws.goals import goal_rows, held_in_all, wheel_probability
+from studies.throws.goals import goals_of, held_in_all, wheel_probability
 from studies.throws.report_bodies import add_bodies
 from studies.throws.report_diagnosis import add_diagnosis, add_reverse, said
 from studies.throws.report_left_over import add_left_over
@@ -65,7 +66,7 @@ def _answer(document: Document, result: Result) -> None:
             *_described(result),
         ]
     )
-    document.table(("goal", "reached", "verdict"), goal_rows(result), "Goals.", ["left", "left", "left"])
+    add_goals(document, goals_of(result))
 
 
 def _described(result: Result) -> list[str]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bayesid.diagnosis import Diagnosis
 from bayesid.report import Document
-from bayesid.report.numbers import format_p_value, relation
+from bayesid.report.numbers import format_number, format_p_value, relation
 from bayesid.report.tables.probability_tables import set_rows
 from studies.throws.diagnosis import Lacking
 from studies.throws.goals import wheel_probability
@@ -64,7 +64,7 @@ def add_reverse(document: Document, wheels: Mapping[str, Diagnosis], seconds: fl
         [
             body,
             "yes" if found.held else "no",
-            f"{found.gain.before.chi2_per_sample:.2g}",
+            format_number(found.gain.before.chi2_per_sample, 2),
             f"{wheel_probability(found):.3f}",
             " + ".join(found.probabilities.sets[0].names),
             found.verdict.status.value,

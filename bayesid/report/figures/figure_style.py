@@ -15,10 +15,13 @@ from bayesid._math.arrays import Floats
 from bayesid.simulation.sensors import Kind
 
 __all__ = [
+    "AFTER",
     "BAND",
+    "BEFORE",
     "COLOURS",
     "DASHES",
     "FILL",
+    "TRUTH",
     "WIDTH",
     "axis_title",
     "curve_style",
@@ -38,6 +41,9 @@ WIDTH = 6.7
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours of curves, by Okabe and Ito, Color Universal Design (2008)."""
 
+BEFORE, AFTER, TRUTH = COLOURS[1], COLOURS[0], "#808080"
+"""Orange of what was before (a model without its causes, the paper), blue of what is after, and grey of the truth."""
+
 DASHES = ("-", "--", ":", "-.")
 """Dashes of curves, one after the other when the colours are used up."""
 
@@ -55,12 +61,12 @@ _TITLES = {Kind.RATE: "angular rate", Kind.ACCEL: "acceleration", Kind.ATTITUDE:
 
 _SETTINGS: Any = {
     "font.family": "DejaVu Sans",
-    "font.size": 7.0,
-    "axes.titlesize": 7.5,
-    "axes.labelsize": 7.0,
-    "xtick.labelsize": 6.5,
-    "ytick.labelsize": 6.5,
-    "legend.fontsize": 6.5,
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelsize": 8.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.fontsize": 7.5,
     "axes.linewidth": 0.6,
     "xtick.major.width": 0.6,
     "ytick.major.width": 0.6,

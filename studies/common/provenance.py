@@ -1,0 +1,61 @@
+"""Where a study's report comes from: date, commit, processor, hashes of its inputs, version, seed and command."""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import subprocess
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+from bayesid.app.report_origin import origin_text
+
+__all__ = ["study_origin"]
+
+ROOT = Path(__file__).resolve().parents[2]
+"""Folder of the checkout."""
+
+MODELS = ROOT / "bayesid" / "robot" / "models"
+"""Folder of the robots that are shipped."""
+
+
+def study_origin(name: str, options: argparse.Namespace, inputs: Sequence[Path] = (MODELS / "ets7.urdf",)) -> str:
+    """Return one paragraph on where a report comes from.
+
+    Parameters
+    ----------
+    name : str
+        Name of the study.
+    options : argparse.Namespace
+        Options of the command as `studies.common.command.Command.parse` gives them.
+    inputs : sequence of Path
+        Files that the study reads, by default the robot ETS-VII.
+    """
+    seed = getattr(options, "seed", None)
+    words = ["python", "-m", f"studies.{name}", *(["--full"] if getattr(options, "full", False) else [])]
+    words += [] if seed is None else ["--seed", str(seed)]
+    return f"{datetime.now(UTC):%Y-%m-%d}, commit {commit()}, {processor()}. {origin_text(inputs, words, seed)}"
+
+
+def commit() -> str:
+    """Return the commit of the code that runs, marked where package or studies differ from it."""
+    try:
+        found = _git("rev-parse", "--short=12", "HEAD")
+        return f"{found} with changes" if _git("status", "--porcelain", "--", "bayesid", "studies") else found
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+def _git(*words: str) -> str:
+    return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout.strip()
+
+
+def processor() -> str:
+    """Return the name of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(names, platform.machine())

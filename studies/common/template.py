@@ -1,0 +1,129 @@
+"""Parts that make all studies' reports alike: first page, setup, the paper's statements, and what is written beside.
+
+A report is a `bayesid.report.Document` of two to four pages: `add_first_page`, `add_setup`, at most two figures and two
+tables of evidence, calibration and failures, `add_statements`; `write_study` adds where it comes from and writes it.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from bayesid._io.files import complete_file, write_json
+from bayesid.report import Document
+from studies.common.goals import Goal, add_goals
+
+__all__ = ["Finding", "Setup", "Statement", "Summary", "add_first_page", "add_setup", "add_statements"]
+__all__ += ["write_study", "write_table"]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a reader of the first page alone should know.
+
+    Attributes
+    ----------
+    question, answer : str
+        One sentence each.
+    goals : tuple of Goal
+    valid : str
+        Conditions under which the answer holds.
+    full : bool
+        Whether the study was run in full.
+    """
+
+    question: str
+    answer: str
+    goals: tuple[Goal, ...]
+    valid: str
+    full: bool
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Conditions of a study, one sentence or two each.
+
+    Attributes
+    ----------
+    robot, manoeuvre, sensors, known, unknown, replicates : str
+        The manoeuvre states its speed beside the flight's rule; the replicates say what a full run repeats.
+    """
+
+    robot: str
+    manoeuvre: str
+    sensors: str
+    known: str
+    unknown: str
+    replicates: str
+
+
+class Finding(StrEnum):
+    """What a study finds of a statement in the paper."""
+
+    CONFIRMED = "confirmed"
+    REFUTED = "refuted"
+    NOT_TESTABLE = "not testable"
+
+
+@dataclass(frozen=True)
+class Statement:
+    """A statement of the paper, what is found of it, and why."""
+
+    text: str
+    finding: Finding
+    reason: str
+
+
+def add_first_page(document: Document, summary: Summary, figure: Figure, caption: str, width: str = "100%") -> None:
+    """Add the answer in a box, the figure that decides, and the table of goals."""
+    run = "full run" if summary.full else "quick run: read it as an example, not as the result"
+    document.decision(summary.answer, [("Question", summary.question), ("Valid when", summary.valid), ("Effort", run)])
+    document.figure(figure, caption, width)
+    add_goals(document, summary.goals)
+
+
+def add_setup(document: Document, setup: Setup, picture: Figure | None = None, caption: str = "") -> None:
+    """Add the conditions in a box, and a picture of the robot if there is one."""
+    document.section("Setup")
+    entries = [(name.capitalize(), text) for name, text in asdict(setup).items()]
+    document.decision("Conditions", entries)
+    if picture is not None:
+        document.figure(picture, caption)
+
+
+def add_statements(document: Document, statements: Sequence[Statement]) -> None:
+    """Add the table of the paper's statements."""
+    document.section("What the paper states, and what is found here")
+    rows = [[item.text, item.finding.value, item.reason] for item in statements]
+    document.table(["the paper", "finding", "why"], rows, "Statements of the paper.", ["left"] * 3)
+
+
+def write_study(document: Document, summary: Summary, output: Path, origin: str | None = None) -> None:
+    """Write the report as PDF, with where it comes from at its foot, and beside it question, answer and goals as JSON.
+
+    Parameters
+    ----------
+    document : Document
+    summary : Summary
+    output : Path
+        File of the PDF; that of the JSON has the same name but for its suffix.
+    origin : str, optional
+        Result of `studies.common.provenance.study_origin`.
+    """
+    if origin is not None:
+        document.foot(origin)
+    document.write(output)
+    write_json(output.with_suffix(".json"), {**asdict(summary), "origin": origin})
+
+
+def write_table(output: Path, name: str, header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """Write a table as CSV beside a report, ``REPORT-NAME.csv``, and return the name of the file."""
+    file = output.with_name(f"{output.stem}-{name}.csv")
+    with complete_file(file) as part, part.open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, lineterminator="\n").writerows([header, *rows])
+    return file.name

@@ -1,0 +1,119 @@
+"""The template of the studies: what it writes, and that its rules are seen to be broken where they are."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+from matplotlib.figure import Figure
+
+from bayesid.report import Document
+from bayesid.report.figures.figure_style import styled, wide_figure
+from studies.common.goals import Goal, Verdict
+from studies.common.provenance import study_origin
+from studies.common.template import (
+    Finding,
+    Setup,
+    Statement,
+    Summary,
+    add_first_page,
+    add_setup,
+    add_statements,
+    write_study,
+    write_table,
+)
+from tests.pdf_text import PdfText
+from tests.report_rules import badly_written, broken_rules
+
+GOALS = (
+    Goal("error at most 2 %", "1.2 % (0.9 to 1.5 %)", Verdict.of(1.2 < 2.0)),
+    Goal("error at most 1 %", "1.2 % (1.1 to 1.5 %)", Verdict.of(False)),
+    Goal("speed", "not run", Verdict.of(None)),
+)
+SUMMARY = Summary("How heavy is it?", "It weighs 3.1 kg.", GOALS, "the arm is known.", full=False)
+
+
+@styled
+def picture(height: float) -> Figure:
+    figure = wide_figure(height)
+    figure.subplots().plot([0.0, 1.0], [1.0, 0.0])
+    return figure
+
+
+def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
+    document = Document("Weighing", "An example")
+    add_first_page(document, SUMMARY, picture(4.0), "What decides.")
+    add_setup(document, Setup("a box", "slow", "rate", "arm", "base", "3 recordings"), picture(2.0), "The box.")
+    add_statements(document, [Statement("It is heavy.", Finding.REFUTED, "It weighs 3.1 kg.")])
+    document.figure(picture(3.0), "More.")
+    origin = study_origin("weighing", argparse.Namespace(full=True, seed=4, output=tmp_path))
+    write_study(document, SUMMARY, tmp_path / "weighing.pdf", origin)
+    text = PdfText.read(tmp_path / "weighing.pdf")
+    for words in (
+        "It weighs 3.1 kg.",
+        "How heavy is it?",
+        "the arm is known.",
+        "quick run",
+        "python -m studies.weighing --full --seed 4",
+        "ets7.urdf",
+    ):
+        assert words in text, words
+    assert text.row("error at most 1 %", "1.2 % (1.1 to 1.5 %)", "FAIL")
+    assert text.row("speed", "not run", "NOT TESTED")
+    assert text.row("It is heavy.", "refuted", "It weighs 3.1 kg.")
+    assert broken_rules(tmp_path / "weighing.pdf") == []
+    kept = json.loads((tmp_path / "weighing.json").read_text())
+    assert kept["answer"] == SUMMARY.answer
+    assert kept["origin"] == origin
+    assert [goal["verdict"] for goal in kept["goals"]] == ["PASS", "FAIL", "NOT TESTED"]
+
+
+def test_a_table_beside_a_report_can_be_read_back(tmp_path: Path):
+    name = write_table(tmp_path / "weighing.pdf", "all", ["body", "mass [kg]"], [["a, b", 0.1], ["c", 2]])
+    assert name == "weighing-all.csv"
+    with (tmp_path / name).open(newline="") as stream:
+        assert list(csv.reader(stream)) == [["body", "mass [kg]"], ["a, b", "0.1"], ["c", "2"]]
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        ("chi-square 8e+05", "computers"),
+        ("noise of 1e-5", "computers"),
+        ("an error of -0.3", "minus"),
+        ("from (-1", "minus"),
+        ("in m/s2", "raised"),
+        ("in kg m2.", "raised"),
+    ],
+)
+def test_what_is_badly_written_is_seen(text: str, rule: str):
+    (found,) = badly_written(text)
+    assert rule in found
+
+
+def test_what_is_well_written_is_left_alone():
+    words = "8 × 10⁵, −0.3, 2026-11-23, link2-3, rate-noise, --seed 1, 6-8 m/s², x2, commit 12e45678ab90, 1–2 kg m²"
+    assert list(badly_written(words)) == []
+
+
+def test_a_hyphen_an_empty_half_page_and_a_lonely_caption_are_seen_in_a_report(tmp_path: Path):
+    document = Document("Bad")
+    document.figure(picture(6.0), "Fills the page, with an error of -0.3.")
+    document.page()
+    document.paragraph("Table 1. A caption whose table is on the next page.")
+    document.write(tmp_path / "bad.pdf")
+    found = broken_rules(tmp_path / "bad.pdf")
+    assert [rule[:8] for rule in found] == ["page 1 h", "page 2 e", "page 2 o"], found
+
+
+def test_labels_can_be_read_in_print():
+    @styled
+    def sizes() -> list[float]:
+        keys = ("font.size", "axes.labelsize", "axes.titlesize", "xtick.labelsize", "ytick.labelsize")
+        return [float(mpl.rcParams[key]) for key in keys]
+
+    assert min(sizes()) >= 8.0
