@@ -15,7 +15,7 @@ from bayesid.simulation.sensors import Kind
 from studies import base_body
 from studies.base_body import noise_free, paper, setting
 from studies.base_body.report import write
-from studies.common.ets7 import ACCELEROMETER, BASE, RADIUS, ets7, excitation
+from studies.common.ets7 import ACCELEROMETER, BASE, RADIUS, ets7, excitation, tip_speed
 from studies.truth import stepwise as reference
 
 GOAL = 1e-6
@@ -106,7 +106,8 @@ def test_sigma_in_radians_per_second_exceeds_the_signal(result):
 
 
 def test_a_slower_manoeuvre_keeps_the_limits_of_the_flight(result):
-    speed, rate = setting.tip_speed(excitation(paper.EXCITATION, result.slowness))
+    motion = excitation(paper.EXCITATION, result.slowness)
+    speed, rate = tip_speed(motion, motion.duration)
     assert speed == pytest.approx(0.05, rel=0.02) or rate == pytest.approx(np.radians(5.0), rel=0.02)
     assert speed < 0.0505
     assert rate < np.radians(5.05)

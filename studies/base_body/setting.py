@@ -10,13 +10,12 @@ from bayesid.inference.simulated_recordings import blank_channels
 from bayesid.recording.joint_motion import Excitation
 from bayesid.recording.recording import Recording
 from bayesid.robot.inertial_parameters import InertialParameters
-from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from studies.base_body import paper
-from studies.common.ets7 import BASE, INTERVAL, TIP_RATE, TIP_SPEED, ets7, excitation, tip_of
+from studies.common.ets7 import BASE, INTERVAL, TIP_RATE, TIP_SPEED, excitation, tip_speed
 
-__all__ = ["POOR", "heavy_arm", "limits_broken", "planned", "slowest", "tip_speed"]
+__all__ = ["POOR", "heavy_arm", "limits_broken", "planned", "slowest"]
 
 POOR = np.array([0.68, -0.03, 1.04, -0.53, 1.17, -0.37])
 """Excitation that hardly turns the base about z, since joint 1, which turns about z, almost rests [rad].
@@ -38,18 +37,10 @@ def heavy_arm(robot: Robot, ratio: float = 1.0 / 7.0) -> Robot:
     return robot
 
 
-def tip_speed(motion: Excitation) -> tuple[float, float]:
-    """Return the largest speed [m/s] and turning rate [rad/s] of the tip relative to the base."""
-    moving = kinematics(ets7(), motion.evaluate(np.linspace(0.0, motion.duration, 400)))
-    speed = np.linalg.norm(tip_of(moving.rate), axis=1).max()
-    # the derivative of a rotation matrix has twice the squared norm of the angular velocity
-    rate = np.linalg.norm(moving.rate[:, -1, :3, :3], axis=(1, 2)).max() / np.sqrt(2.0)
-    return float(speed), float(rate)
-
-
 def slowest(q: Floats) -> float:
     """Return how many times slower the excitation ``q`` must be to stay within the flight rules of ETS-VII."""
-    speed, rate = tip_speed(excitation(q))
+    motion = excitation(q)
+    speed, rate = tip_speed(motion, motion.duration)
     return max(speed / TIP_SPEED, rate / TIP_RATE)
 
 

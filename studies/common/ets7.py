@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from bayesid.design import Limits
-from bayesid.recording.joint_motion import Excitation
+from bayesid.recording.joint_motion import Excitation, Motion
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 
 __all__ = ["ACCEL", "ACCELEROMETER", "BASE", "BIAS", "CORNER", "ENCODER", "EXCURSION", "INTERVAL", "LIMITS"]
 __all__ += ["PERIOD", "PERIODS", "RADIUS", "RAMP", "RAMPS", "RATE", "START", "TIP", "TIP_RATE", "TIP_SPEED"]
-__all__ += ["FlightManoeuvre", "ets7", "excitation", "extended_wrist", "tip_of"]
+__all__ += ["FlightManoeuvre", "ets7", "excitation", "extended_wrist", "tip_of", "tip_speed"]
 
 Floats = NDArray[np.floating]
 
@@ -162,3 +162,12 @@ def tip_of(pose: Floats) -> Floats:
     """Return the tip's position from poses of the joints (T, joints, 4, 4): 0.53 m along the axis of joint 6."""
     tip: Floats = pose[:, -1] @ np.array([0.0, 0.0, 0.53, 1.0])
     return tip[:, :3]
+
+
+def tip_speed(motion: Motion, duration: float) -> tuple[float, float]:
+    """Return the largest speed [m/s] and turning rate [rad/s] of the tip relative to the base during a motion."""
+    moving = kinematics(ets7(), motion.evaluate(np.linspace(0.0, duration, 400)))
+    speed = np.linalg.norm(tip_of(moving.rate), axis=1).max()
+    # the derivative of a rotation matrix has twice the squared norm of the angular velocity
+    rate = np.linalg.norm(moving.rate[:, -1, :3, :3], axis=(1, 2)).max() / np.sqrt(2.0)
+    return float(speed), float(rate)

@@ -7,7 +7,7 @@ tables of evidence, calibration and failures, `add_statements`; `write_study` ad
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -121,7 +121,7 @@ def write_study(document: Document, summary: Summary, output: Path, origin: str 
     write_json(output.with_suffix(".json"), {**asdict(summary), "origin": origin})
 
 
-def write_table(output: Path, name: str, header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+def write_table(output: Path, name: str, header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Write a table as CSV beside a report, ``REPORT-NAME.csv``, and return the name of the file."""
     file = output.with_name(f"{output.stem}-{name}.csv")
     with complete_file(file) as part, part.open("w", encoding="utf-8", newline="") as stream:

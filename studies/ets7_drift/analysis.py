@@ -1,4 +1,4 @@
-"""One case: the diagnosis, its causes one by one, and the attitude simulated before and after."""
+"""The diagnosis, its causes one by one, and the attitude simulated before and predicted after, with its band."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import CauseSet, Diagnosis, Hypothesis, diagnose
 from bayesid.diagnosis.cause_amplitudes import amplitudes_of
+from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.simulation.effects import create
 from studies.ets7_drift.world import ATTITUDE_SIGMA, World, model_of
@@ -21,6 +22,9 @@ __all__ = ["CAUSES", "Amplitude", "Attitude", "Case", "Step", "analyse"]
 
 CAUSES = ("initial-rate", "gravity-gradient", "wheel-momentum")
 """Causes that act in the truth and that the simulation lacks."""
+
+DRAWS = 200
+"""Number of draws for the band about the predicted attitude."""
 
 MOST = 3
 """Largest number of causes of a set that is shown."""
@@ -36,7 +40,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Amplitude:
-    """A true amplitude beside its estimate.
+    """A true amplitude, or another quantity, beside its estimate.
 
     Attributes
     ----------
@@ -74,6 +78,10 @@ class Attitude:
         Angles simulated by the present model after its base was fitted to the rates [degrees].
     extended : (T, 3) array
         Angles simulated by the extended model [degrees]; the fitted present model where nothing is named.
+    missed : (T, 3) array
+        Rotation from the measured attitude to the extended model's, about base axes [degrees].
+    sd : (T, 3) array
+        Predicted standard deviation of ``missed``: from what is not known of the model and the attitude's noise.
     errors : dict of str to float
         Root mean square angle between measured and simulated attitude [degrees], by the name of the simulation.
     """
@@ -83,19 +91,19 @@ class Attitude:
     plain: Floats
     fitted: Floats
     extended: Floats
+    missed: Floats
+    sd: Floats
     errors: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Case:
-    """One world and its diagnosis.
+    """The world and its diagnosis.
 
     Attributes
     ----------
     world : World
         What truly happens.
-    spread : float
-        Relative width of the base's prior.
     diagnosis : Diagnosis
         Diagnosis of the rates.
     steps : tuple of Step
@@ -104,11 +112,10 @@ class Case:
     amplitudes : tuple of Amplitude
         Amplitudes of the named causes that have any.
     attitudes : tuple of Attitude
-        Attitude in every recording; empty where it was not simulated.
+        Attitude in every recording.
     """
 
     world: World
-    spread: float
     diagnosis: Diagnosis
     steps: tuple[Step, ...]
     amplitudes: tuple[Amplitude, ...]
@@ -119,38 +126,31 @@ class Case:
         """True if the three true causes are named, and no other."""
         return set(self.diagnosis.verdict.causes) == set(CAUSES)
 
+    @property
+    def distances(self) -> Floats:
+        """Errors of the predicted attitude at the end of each recording, in predicted deviations, (recordings, 3)."""
+        return np.array([attitude.missed[-1] / attitude.sd[-1] for attitude in self.attitudes])
 
-def analyse(
-    world: World,
-    spread: float,
-    seed: int,
-    progress: Progress = silent,
-    *,
-    names: Sequence[str] | None = None,
-    compared: bool = True,
-) -> Case:
+
+def analyse(world: World, seed: int, progress: Progress = silent, *, names: Sequence[str] | None = None) -> Case:
     """Diagnose the rates of a world; the attitude is not used, but compared with.
 
     Parameters
     ----------
     world : World
         What truly happens.
-    spread : float
-        Relative width of the base's prior.
     seed : int
-        Seed of the diagnosis.
+        Seed of the diagnosis, and of the draws for the band.
     progress : callable, optional
         Receives a fraction and a sentence.
     names : sequence of str, optional
         Names of the candidates, by default the whole catalogue.
-    compared : bool
-        True to simulate the attitude.
     """
-    model = model_of(spread)
+    model = model_of()
     effects = None if names is None else [create(name).attach(model.robot) for name in names]
     result = diagnose(model, world.manoeuvres, seed, effects=effects, progress=progress)
-    attitudes = tuple(_attitudes(model, result)) if compared else ()
-    return Case(world, spread, result, _steps(result), tuple(_amplitudes(world, result)), attitudes)
+    attitudes = tuple(_attitudes(model, result, np.random.default_rng(seed)))
+    return Case(world, result, _steps(result), tuple(_amplitudes(world, result)), attitudes)
 
 
 def _steps(result: Diagnosis) -> tuple[Step, ...]:
@@ -177,13 +177,14 @@ def _amplitudes(world: World, result: Diagnosis) -> Iterator[Amplitude]:
                 yield Amplitude(f"{title}{key}", unit, float(truth), mean, sd)
 
 
-def _attitudes(model: Model, result: Diagnosis) -> Iterator[Attitude]:
+def _attitudes(model: Model, result: Diagnosis, rng: np.random.Generator) -> Iterator[Attitude]:
     before = result.before.fit.z[result.before.engine.free]
     simulated = {
         "plain": _simulated(model, result, np.zeros_like(before)),
         "fitted": _simulated(model, result, before),
         "extended": _simulated(result.posterior.model, result, result.start),
     }
+    draws = _draws(result, rng)
     for index, manoeuvre in enumerate(result.before.fit.posterior.manoeuvres):
         time, recorded = manoeuvre.recording.vector("attitude", ("x", "y", "z", "w"))
         measured, start = Rotation.from_quat(recorded), Rotation.from_quat(manoeuvre.attitude).inv()
@@ -191,7 +192,25 @@ def _attitudes(model: Model, result: Diagnosis) -> Iterator[Attitude]:
         squares = {name: (measured.inv() * curve).magnitude() ** 2 for name, curve in curves.items()}
         errors = {name: float(np.degrees(np.sqrt(square.mean()))) for name, square in squares.items()}
         angles = {name: _angles(start * curve) for name, curve in curves.items()}
-        yield Attitude(time, _angles(start * measured), **angles, errors=errors)
+        best = curves["extended"]
+        turned = np.array([(best.inv() * Rotation.from_quat(draw[index])).as_rotvec() for draw in draws])
+        yield Attitude(
+            time,
+            _angles(start * measured),
+            **angles,
+            missed=np.degrees((measured.inv() * best).as_rotvec()),
+            sd=np.degrees(np.sqrt((turned**2).mean(axis=0) + ATTITUDE_SIGMA**2)),
+            errors=errors,
+        )
+
+
+def _draws(result: Diagnosis, rng: np.random.Generator) -> list[list[Floats]]:
+    """Return attitudes of all recordings by draws from the posterior of the extended model, linearised at its fit."""
+    root = np.linalg.cholesky(Knowledge.at(result.posterior, result.start).coordinates)
+    return [
+        _simulated(result.posterior.model, result, result.start + root @ rng.standard_normal(len(root)))
+        for _ in range(DRAWS)
+    ]
 
 
 def _angles(turned: Rotation) -> Floats:
