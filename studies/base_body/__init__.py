@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from studies.base_body.figures import draw
-from studies.base_body.report import write
+from bayesid.app.compilation_cache import keep_compiled
+from studies.base_body.report import write_report
 from studies.base_body.result import BaseBody, compute
 from studies.common.command import Command
+from studies.common.provenance import study_origin
 
 __all__ = ["BaseBody", "main", "run"]
 
@@ -18,13 +19,11 @@ def run(*, full: bool = False, seed: int = 0) -> BaseBody:
     Parameters
     ----------
     full : bool
-        Whether to add what takes minutes: samples by emcee, measured joints, the slow manoeuvre, the heavier arm.
+        Whether to add what takes minutes: samples by emcee, measured joints, the heavier arm.
     seed : int
         Seed of all random numbers.
     """
-    result = compute(full=full, seed=seed)
-    result.figures.update(draw(result))
-    return result
+    return compute(full=full, seed=seed)
 
 
 COMMAND = Command(
@@ -38,4 +37,6 @@ COMMAND = Command(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     options = COMMAND.parse(arguments)
-    write(run(full=options.full, seed=options.seed), options.output)
+    keep_compiled()
+    result = run(full=options.full, seed=options.seed)
+    write_report(result, options.output, origin=study_origin(COMMAND.name, options))

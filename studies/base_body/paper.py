@@ -6,7 +6,7 @@ import numpy as np
 
 from studies.common.quantities import body_of as body
 
-__all__ = ["EXCITATION", "GUESS", "LIMIT", "RESULT_POOR", "RESULT_WELL", "TRUTH", "body"]
+__all__ = ["EXCITATION", "GUESS", "LIMIT", "RESULT_POOR", "RESULT_WELL", "SIGMAS", "TRUTH", "body"]
 
 TRUTH = np.array([2645.9, -0.532, -0.281, 1.499, 5665.5, 3033.0, 7067.2, 54.2, 145.1, -123.2])
 """True mass [kg], centre of mass [m] and inertia xx, yy, zz, xy, xz, yz [kg m2]."""
@@ -23,3 +23,10 @@ EXCITATION = np.array([0.63, -1.87, -2.18, -0.15, 5.3e-2, -0.56])
 
 LIMIT = np.pi / 2.0
 """Joint limit that the paper states [rad]."""
+
+SIGMAS = (0.04, 0.009)
+"""Sigma of the noise in the simulated signals of the paper's reference [16], and in the data of ETS-VII; no unit.
+
+All studies read them as degrees per second of the rates and degrees of the joints: in rad/s the first would be five
+times the largest rate of the base. An accelerometer gets noise of the same share of its peak as the rates.
+"""

@@ -7,25 +7,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesid.simulation.sensors import Kind
+from studies.base_body import paper
 from studies.base_body.information import ACCEL_BIAS, ARM, TILT, UNIT, Information
 from studies.common.quantities import MASS, MOMENTS
 
 __all__ = ["CLAIM", "Reading", "read_sigmas"]
 
-SIGMAS = (0.04, 0.009)
-"""Sigma of the noise added to the simulated signals of the paper's reference [16], and of the data of ETS-VII."""
-
 CLAIM = 0.02
 """Error of the solution that the paper reports for sigma 0.04."""
 
 UNITS = (
-    ("rad/s", Kind.RATE, 1.0),
     ("deg/s", Kind.RATE, np.pi / 180.0),
+    ("rad/s", Kind.RATE, 1.0),
     ("m/s2", Kind.ACCEL, 1.0),
     ("rad, of attitude", Kind.ATTITUDE, 1.0),
     ("deg, of attitude", Kind.ATTITUDE, np.pi / 180.0),
 )
-"""Units that a sigma may have: name, sensor, and size in the SI unit."""
+"""Units that a sigma may have: name, sensor, and size in the SI unit; the first is the one that studies take."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +57,7 @@ class Reading:
 def read_sigmas(information: Information) -> list[Reading]:
     """Evaluate every unit; all sensors used get noise of the same fraction of their signals' peaks."""
     readings = []
-    for sigma in SIGMAS:
+    for sigma in paper.SIGMAS:
         for unit, kind, scale in UNITS:
             readings.append(_reading(information, sigma, unit, sigma * scale / information.peak[kind], kind))
         readings.append(_reading(information, sigma, "of the peak", sigma, Kind.RATE))

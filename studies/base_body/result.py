@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
 from bayesid.inference import Identification
@@ -19,7 +18,6 @@ from studies.base_body.sampled import encoder_grades, sample_posterior
 from studies.base_body.setting import slowest
 from studies.common.ets7 import INTERVAL, excitation
 from studies.common.models import ARM_SPREAD
-from studies.common.quantities import MASS
 
 __all__ = ["GRADES", "BaseBody", "compute"]
 
@@ -32,15 +30,14 @@ DIFFERENCED = float(StarTracker(2.0).sigma(INTERVAL)[0])
 
 @dataclass(frozen=True)
 class BaseBody:
-    """Numbers and figures of the study.
+    """Numbers of the study.
 
     Attributes
     ----------
     noise_free : mapping of str to NoiseFree
         Identifications without noise: ``well``, ``poor``, ``well, no gradient`` and, in the full study, more.
     fast, slow : Information
-        Information from the paper's manoeuvre, and from the same within the flight rules of ETS-VII; the latter in the
-        full study only.
+        Information from the paper's manoeuvre, and from the same within the flight rules of ETS-VII.
     grades : mapping of str to (5, 10) array
         Relative standard deviations per accelerometer of `GRADES` and quantity. ``exact`` and ``5 %`` say how the arm
         is known, with the star sensor's attitude; ``exact, differenced`` has the differenced rate instead, and
@@ -51,26 +48,25 @@ class BaseBody:
         Factor by which the paper's manoeuvre must be slowed down for ETS-VII.
     sampled : mapping of str to Identification
         Sampled posteriors ``exact`` and ``5 %``, in the full study only.
-    figures : mapping of str to Figure
-        Figures of the report.
     """
 
     noise_free: Mapping[str, NoiseFree]
     fast: Information
-    slow: Information | None
+    slow: Information
     grades: Mapping[str, Floats]
     readings: list[Reading]
     slowness: float
     sampled: Mapping[str, Identification]
-    figures: dict[str, Figure] = field(default_factory=dict)
 
     @property
-    def arm_ratio(self) -> float:
-        """Ratio of the mass's standard deviation with the arm known to 5 % to that with the arm known exactly.
-
-        Both are with the coarsest accelerometer.
-        """
-        return float(self.grades["5 %"][0, MASS] / self.grades["exact"][0, MASS])
+    def precision(self) -> dict[str, Floats]:
+        """Relative standard deviations (10,) by speed and knowledge of the arm, with the coarsest accelerometer."""
+        sigma = {Kind.ATTITUDE: STAR, Kind.ACCEL: GRADES[0]}
+        return {
+            f"{speed}, arm {arm}": information.relative_sd(sigma, known)
+            for speed, information in (("permitted", self.slow), ("faster", self.fast))
+            for arm, known in (("exact", (ARM,)), ("5 %", ()))
+        }
 
 
 def compute(*, full: bool, seed: int) -> BaseBody:
@@ -89,7 +85,7 @@ def compute(*, full: bool, seed: int) -> BaseBody:
     return BaseBody(
         noise_free=run_noise_free(full=full),
         fast=fast,
-        slow=Information.of(excitation(paper.EXCITATION, slowness), step=4.0) if full else None,
+        slow=Information.of(excitation(paper.EXCITATION, slowness), step=4.0),
         grades=grades,
         readings=read_sigmas(fast),
         slowness=slowness,

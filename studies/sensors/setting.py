@@ -101,12 +101,11 @@ def model_of(noise: Noise, *, biased: bool) -> Model:
 def levels(flown: Flight) -> dict[str, Noise]:
     """Return the levels of noise by name.
 
-    The paper prints sigma 0.04 and 0.009 without a unit. They are read as degrees and degrees per second, or as a
-    fraction of the peak; the accelerometer's noise is then the same fraction of its peak as the rate's.
+    The paper's sigmas are read as `studies.base_body.paper.SIGMAS` says; beside it, the first as a share of the peak.
     """
     rate, accel = (float(np.abs(values).max()) for values in (flown.rate, flown.accel))
     noises = {}
-    for sigma in (0.04, 0.009):
+    for sigma in paper.SIGMAS:
         degrees = float(np.radians(sigma))
         noises[f"{sigma:g} deg/s"] = Noise(degrees, degrees * accel / rate, degrees)
     noises["4 % of peak"] = Noise(0.04 * rate, 0.04 * accel, 1e-5)
