@@ -13,6 +13,7 @@ from pathlib import Path
 
 from bayesid.app.compilation_cache import keep_compiled
 from studies.common.command import TRIALS, Command
+from studies.common.provenance import study_origin
 from studies.sensors.report import write_report
 from studies.sensors.result import REALISTIC, Effort, Result, compute
 
@@ -66,4 +67,4 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = COMMAND.parse(arguments)
     keep_compiled()
     result = run(full=options.full, seed=options.seed, trials=options.trials, workers=options.workers, progress=print)
-    write_report(result, options.output)
+    write_report(result, options.output, origin=study_origin(COMMAND.name, options))

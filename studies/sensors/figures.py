@@ -8,11 +8,36 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
+from bayesid.report.figures.figure_style import AFTER, BEFORE, COLOURS, TRUTH, shared_legend, styled, wide_figure
+from bayesid.report.numbers import format_text
 from studies.common.quantities import MASS, MOMENTS
-from studies.sensors.montecarlo import Spread
+from studies.sensors.montecarlo import LIKELIHOOD, PAPER, Spread
+from studies.sensors.result import Result
 
-__all__ = ["treatment_figure"]
+__all__ = ["level_figure", "treatment_figure"]
+
+
+@styled
+def level_figure(result: Result) -> Figure:
+    """Draw the error of mass and worst moment by level of noise, of the paper's procedure and of the likelihood."""
+    figure = wide_figure(2.6)
+    panels = figure.subplots(1, 2, sharey=True, sharex=True)
+    series = (
+        (PAPER, BEFORE, -0.12, {name: uses[PAPER] for name, uses in result.accelerometers.items()}),
+        ("the package's likelihood", AFTER, 0.12, {name: uses[LIKELIHOOD] for name, uses in result.joints.items()}),
+    )
+    for axes, title in zip(panels, ("mass", "moment with the largest error"), strict=True):
+        for label, colour, shift, spreads in series:
+            chosen = [(spread, MASS if title == "mass" else spread.worst()) for spread in spreads.values()]
+            size, error = (100.0 * np.array([getattr(s, key)[k] for s, k in chosen]) for key in ("rms", "rms_error"))
+            place = np.arange(len(size)) + shift
+            axes.errorbar(size, place, xerr=error, fmt="o", markersize=3.5, color=colour, label=label)
+        axes.axvline(2.0, color=TRUTH, linewidth=0.8)
+        axes.set(xscale="log", title=title, xlabel="error [%]")
+    panels[0].set_yticks(range(len(result.levels)), [format_text(name) for name in result.levels])
+    panels[0].set_ylim(len(result.levels) - 0.5, -0.5)
+    shared_legend(figure, panels[0], 2)
+    return figure
 
 
 @styled

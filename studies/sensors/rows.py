@@ -1,31 +1,22 @@
-"""Rows of the report's tables, and numbers for its sentences."""
+"""Tables of the study: cells of the report's, and rows of the files beside it with all numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
-from bayesid.report.numbers import format_fixed, format_number, format_percent, format_quantity, format_range
-from studies.base_body import paper
-from studies.common.quantities import HEADINGS, JUDGED, MASS, MOMENTS
+from bayesid.inference.body_quantities import BODY_QUANTITIES
+from bayesid.report.numbers import format_fixed, format_number, format_range
+from studies.common.quantities import JUDGED, MASS
 from studies.sensors.montecarlo import Spread
 from studies.sensors.result import Result
 
-__all__ = ["falsified_rows", "honesty_of", "level_rows", "median_of", "parameter_rows", "percent", "refit_rows"]
-__all__ += ["regression_rows", "rms_of", "scalar_rows", "shift_of", "spread_rows"]
-
-NO_CHI2 = 1e-2
-"""Chi-square per degree of freedom below which it is in SI units and without meaning."""
+__all__ = ["estimate_rows", "honesty_of", "linear_rows", "percent", "refit_rows", "rms_of", "rms_pair"]
+__all__ += ["treatment_rows"]
 
 FINEST = 7
 """Largest number of decimals of a percentage."""
-
-HALF_NORMAL = 1.17
-"""Error of the median of n absolute normal numbers over that median, times the root of n."""
-
-NOTHING = 1e-9
-"""Relative error below which only rounding remains."""
 
 
 def percent(value: float, error: float) -> str:
@@ -44,16 +35,9 @@ def rms_of(spread: Spread, index: int) -> str:
     return percent(spread.rms[index], spread.rms_error[index])
 
 
-def shift_of(spread: Spread, first: Spread, index: int) -> str:
-    """Return the mean shift against another estimator on the same noise, in percent."""
-    shift = spread.errors[:, index] - first.errors[:, index]
-    return percent(shift.mean(), shift.std(ddof=1) / np.sqrt(len(shift)))
-
-
-def median_of(spread: Spread, index: int) -> str:
-    """Return the median absolute error in percent; its Monte-Carlo error is that of normal estimates."""
-    median = np.median(np.abs(spread.errors[:, index]))
-    return percent(float(median), float(HALF_NORMAL * median / np.sqrt(len(spread.errors))))
+def rms_pair(spread: Spread) -> str:
+    """Return the root mean square errors of the mass and of the worst moment in percent."""
+    return f"{rms_of(spread, MASS)}; {rms_of(spread, spread.worst())}"
 
 
 def honesty_of(spread: Spread) -> str:
@@ -61,111 +45,58 @@ def honesty_of(spread: Spread) -> str:
     return format_range(spread.honesty[JUDGED], 2)
 
 
-def level_rows(result: Result) -> list[list[str]]:
-    """Return the noise of the sensors at every level, with its share of the signal's peak."""
-    rate, accel = (float(np.abs(values).max()) for values in (result.flight.rate, result.flight.accel))
-    return [
-        [
-            name,
-            f"{format_number(noise.rate, 2)} ({format_percent(noise.rate / rate, 2)})",
-            f"{format_number(noise.accel, 2)} ({format_percent(noise.accel / accel, 2)})",
-            format_number(noise.position, 2),
-        ]
-        for name, noise in result.levels.items()
-    ]
-
-
-def spread_rows(spreads: Mapping[str, Spread]) -> list[list[str]]:
-    """Return bias, shift against the first row and standard deviation of mass and worst moment, and honesty."""
-    rows, first = [], next(iter(spreads.values()))
-    for name, spread in spreads.items():
+def treatment_rows(result: Result, level: str) -> list[list[str]]:
+    """Return bias and standard deviation of mass and worst moment, and honesty, of every treatment of the joints."""
+    rows = []
+    for name, spread in result.joints[level].items():
         cells = []
         for k in (MASS, spread.worst()):
-            cells += [
-                percent(spread.bias[k], spread.bias_error[k]),
-                shift_of(spread, first, k) if spread is not first else "",
-                percent(spread.sd[k], spread.sd_error[k]),
-            ]
-        chi2 = float(spread.chi2.mean())
-        rows.append([name, *cells, honesty_of(spread), format_number(chi2, 3) if chi2 > NO_CHI2 else "–"])
+            cells += [percent(spread.bias[k], spread.bias_error[k]), percent(spread.sd[k], spread.sd_error[k])]
+        rows.append([name, *cells, honesty_of(spread)])
     return rows
 
 
-def parameter_rows(spreads: Mapping[str, Spread]) -> list[list[str]]:
-    """Return every quantity's truth, then bias, standard deviation and stated standard deviation, in its unit."""
-    rows = []
-    for k, heading in enumerate(HEADINGS):
-        size, cells = abs(paper.TRUTH[k]), []
-        for spread in spreads.values():
-            cells += [
-                format_quantity(size * float(spread.bias[k]), size * float(spread.bias_error[k])),
-                format_quantity(size * float(spread.sd[k]), size * float(spread.sd_error[k])),
-                format_number(size * float(np.sqrt((spread.stated[:, k] ** 2).mean())), 2),
-            ]
-        rows.append([heading, format_number(paper.TRUTH[k], 6), *cells])
-    return rows
+def estimate_rows(result: Result) -> Iterator[tuple[object, ...]]:
+    """Yield what is treated, noise, treatment, quantity; bias, sd, rms with Monte-Carlo errors; stated sd, honesty."""
+    for what, levels in (
+        ("joints", result.joints),
+        ("rates", result.rates),
+        ("accelerometer", result.accelerometers),
+    ):
+        for level, spreads in levels.items():
+            for name, spread in spreads.items():
+                stated = np.sqrt((spread.stated**2).mean(axis=0))
+                columns = (
+                    spread.bias,
+                    spread.bias_error,
+                    spread.sd,
+                    spread.sd_error,
+                    spread.rms,
+                    spread.rms_error,
+                    stated,
+                    spread.honesty,
+                )
+                for k, key in enumerate(BODY_QUANTITIES):
+                    yield what, level, name, key, *(f"{column[k]:.4g}" for column in columns)
 
 
-def falsified_rows(result: Result) -> list[list[str]]:
-    """Return the errors that a bias and the trapezoidal rule cause in every use of the accelerometer."""
-    rows = []
-    for name, falsified in result.falsified.items():
-        pairs = [(errors[MASS], np.abs(errors[MOMENTS]).max()) for errors in (falsified.bias, falsified.rule)]
-        cells = (
-            (format_number(100.0 * float(value) if abs(value) > NOTHING else 0.0, 2) for value in pair)
-            for pair in pairs
-        )
-        rows.append([name, *(" / ".join(cell) for cell in cells)])
-    return rows
-
-
-def scalar_rows(result: Result) -> list[list[str]]:
-    """Return closed form, matrices and simulation of one unknown."""
-    return [
-        [
-            item.name,
-            format_fixed(item.closed, 4),
-            format_fixed(item.matrices, 4),
-            format_quantity(item.simulated, item.error),
-            format_fixed(item.whole, 4),
-            format_number(item.bias_closed),
-            format_fixed(item.bias, 3),
-        ]
-        for item in result.scalars
-    ]
-
-
-def regression_rows(result: Result) -> list[list[str]]:
-    """Return bias and standard deviation of the linear method, and the closed form for central differences."""
-    rows = []
+def linear_rows(result: Result) -> Iterator[tuple[object, ...]]:
+    """Yield noise, treatment, quantity, then bias, its Monte-Carlo error and the closed form, of the linear method."""
     for level, regressions in result.regressions.items():
-        predicted = (format_number(100.0 * float(result.predicted[level][k]), 3) for k in JUDGED)
-        rows.append([level, "closed form, differences", *predicted, "", ""])
         for name, regression in regressions.items():
-            count = len(regression.errors)
             mean, sd = regression.errors.mean(axis=0), regression.errors.std(axis=0, ddof=1)
-            rows.append(
-                [
-                    level,
-                    name,
-                    *(percent(mean[k], sd[k] / np.sqrt(count)) for k in JUDGED),
-                    percent(sd[MASS], sd[MASS] / np.sqrt(2.0 * (count - 1))),
-                    f"{regression.unphysical} of {count}",
-                ]
-            )
-    return rows
+            closed = result.predicted[level] if name == "differences" else None
+            for k in JUDGED:
+                exact = "" if closed is None else f"{closed[k]:.4g}"
+                error = sd[k] / np.sqrt(len(regression.errors))
+                yield level, name, list(BODY_QUANTITIES)[k], f"{mean[k]:.4g}", f"{error:.2g}", exact
 
 
-def refit_rows(result: Result) -> list[list[str]]:
-    """Return nonlinear against linear errors from the same noise."""
-    rows = []
+def refit_rows(result: Result) -> Iterator[tuple[object, ...]]:
+    """Yield noise, estimator, fits, diverged fits, then median errors of mass, nonlinear and linear, and difference."""
     for level, procedures in result.refits.items():
         for name, refits in procedures.items():
-            medians = [
-                median_of(spread, k)
-                for k in (MASS, refits.linear.worst())
-                for spread in (refits.nonlinear, refits.linear)
-            ]
-            diverged = f"{int(refits.diverged.sum())} of {len(refits.diverged)}"
-            rows.append([level, name, diverged, *medians, format_number(float(refits.difference[JUDGED].max()), 2)])
-    return rows
+            medians = [np.median(np.abs(item.errors[:, MASS])) for item in (refits.nonlinear, refits.linear)]
+            difference = float(refits.difference[JUDGED].max())
+            count = len(refits.diverged)
+            yield level, name, count, int(refits.diverged.sum()), *(f"{value:.4g}" for value in (*medians, difference))
