@@ -1,12 +1,22 @@
-"""The arithmetic of the benchmark on its smallest cases; no time is compared with a limit."""
+"""The arithmetic of the benchmark on its smallest cases and made-up times; no time is compared with a limit."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 
 from bayesid.inference.predicted_readings import integration_error_at
 from studies.benchmark.cases import chain, posterior_of
-from studies.benchmark.timing import seconds_per_evaluation
+from studies.benchmark.report import figures_of_merit, goals_of, write_report
+from studies.benchmark.run import Benchmark
+from studies.benchmark.sampling import Sampling
+from studies.benchmark.timing import Rival, seconds_per_evaluation
+from studies.common.goals import Verdict
+from tests.pdf_text import PdfText
+from tests.report_rules import broken_rules
 
 
 def test_chains_of_any_length_are_the_same_arm() -> None:
@@ -19,3 +29,41 @@ def test_an_evaluation_is_timed() -> None:
     posterior = posterior_of(chain(3), interval=2.0)
     assert 0.0 < seconds_per_evaluation(posterior, repeats=1) < 1.0
     assert integration_error_at(posterior, posterior.starting_point()) < 0.01
+
+
+def measured(evaluation: float) -> Benchmark:
+    """Times as one run could give them."""
+    chains = SimpleNamespace(evaluations=24000, effective_samples=6000.0, z=np.zeros((4, 10, 13)))
+    return Benchmark(
+        evaluation=evaluation,
+        error=7.3e-6,
+        rivals=[
+            Rival("Pinocchio, step by step in Python", 1.0, 0.5, 2e-4),
+            Rival("MuJoCo rollouts in C", 0.01, 0.02, 0.006),
+        ],
+        links={6: 1e-4, 20: 1e-4, 60: 1.4e-4},
+        samples={121: 1e-4, 241: 1.5e-4, 601: 2e-4, 1201: 3e-4},
+        whitening={"white": 1e-4, "encoder 1e-6 rad": 1.1e-4, "encoder 1e-4 rad": 1.2e-4},
+        windows={"white": 0, "encoder 1e-6 rad": 4},
+        sampling=Sampling(chains, 9.0, 100000, 400.0, 50.0, 60.0),
+    )
+
+
+def test_goals_are_met_missed_or_open_over_all_runs(tmp_path: Path) -> None:
+    runs = [measured(evaluation) for evaluation in (1e-4, 2e-4, 1.5e-4, 1.2e-4, 1.8e-4)]
+    figures = figures_of_merit(runs)
+    values = {name: list(found) for name, found, _, _ in figures}
+    assert values["time of Pinocchio, step by step in Python over that of one evaluation"] == pytest.approx(
+        [10000, 5000, 6667, 8333, 5556], rel=1e-4
+    )
+    assert values["time of MuJoCo rollouts in C over that of one evaluation"] == pytest.approx(
+        [100, 50, 66.67, 83.33, 55.56], rel=1e-4
+    )
+    assert values["time for 4000 effective samples [s]"] == pytest.approx([6.0] * 5)
+    cost = "evaluations per effective sample, emcee's default move over the package's"
+    assert values[cost] == pytest.approx([62.5] * 5)  # 250 evaluations a sample over 4
+    verdicts = [goal.verdict for goal in goals_of(figures)]
+    assert verdicts == [Verdict.PASS, Verdict.OPEN, Verdict.PASS, Verdict.FAIL, *[Verdict.PASS] * 3]
+    write_report(runs, tmp_path / "benchmark.pdf", full=True)
+    assert "150 (100 to 200) µs" in PdfText.read(tmp_path / "benchmark.pdf")
+    assert broken_rules(tmp_path / "benchmark.pdf") == []

@@ -2,111 +2,233 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from matplotlib.figure import Figure
+
+from bayesid._math.arrays import Floats
+from bayesid.app.compilation_cache import keep_compiled
 from bayesid.report import Document
-from studies.benchmark.run import Benchmark, run
-from studies.benchmark.sampling import Sampling
+from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figure
+from bayesid.report.numbers import format_number, format_text
+from studies.benchmark.run import RUNS, Benchmark, run
 from studies.common.command import Command
-from studies.common.tables import add_number_table
+from studies.common.goals import Goal, Verdict
+from studies.common.provenance import processor, study_origin
+from studies.common.report_parts import columns
+from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 
-__all__ = ["main", "write_report"]
+__all__ = ["goals_of", "main", "write_report"]
 
-GOALS = {"Pinocchio, step by step in Python": 2000.0, "MuJoCo rollouts in C": 100.0}
+RIVALS = {"Pinocchio, step by step in Python": 2000.0, "MuJoCo rollouts in C": 100.0}
 """Smallest wanted ratio of the time of each other simulator to that of an evaluation."""
+
+ERROR = 0.01
+"""Largest wanted error of the integration [standard deviations of a sample]."""
+
+LINKS, WHITENING = 1.3, 1.5
+"""Largest wanted ratios of the times with 60 and 6 links, and with noisy and exact joints."""
+
+SAMPLES, SECONDS = 4000.0, 15.0
+"""Number of effective samples that are wanted, and the time for them [s]."""
+
+CHEAPER = 20.0
+"""Smallest wanted ratio of the evaluations per effective sample, emcee's default move over the package's."""
 
 ENOUGH = 50.0
 """Number of autocorrelation times from which on the estimate of the autocorrelation is reliable."""
 
-
-def write_report(result: Benchmark, file: Path) -> None:
-    """Write the report as PDF."""
-    document = Document("Benchmark", "Cost of simulations and of effective samples, as ratios of one run")
-    _simulations(document, result)
-    _dependence(document, result)
-    _samples(document, result.sampling)
-    document.write(file)
+Figures = Sequence[tuple[str, Floats, float, bool]]
+"""Figures of merit: name, value in each run, goal, and whether more is better."""
 
 
-def _simulations(document: Document, result: Benchmark) -> None:
+def figures_of_merit(runs: Sequence[Benchmark]) -> Figures:
+    """Return every figure of merit in each run with its goal."""
+
+    def over(value: Callable[[Benchmark], float]) -> Floats:
+        return np.array([value(item) for item in runs])
+
+    return [
+        *(
+            (
+                f"time of {name} over that of one evaluation",
+                np.array([item.speedups[name] for item in runs]),
+                goal,
+                True,
+            )
+            for name, goal in RIVALS.items()
+        ),
+        ("integration error [σ of a sample]", over(lambda item: item.error), ERROR, False),
+        ("time with 60 links over that with 6", over(lambda item: item.links[60] / item.links[6]), LINKS, False),
+        (
+            "time with noisy joints over that with exact ones",
+            over(lambda item: max(item.whitening.values()) / item.whitening["white"]),
+            WHITENING,
+            False,
+        ),
+        (
+            f"time for {SAMPLES:.0f} effective samples [s]",
+            over(lambda item: item.sampling.seconds * SAMPLES / item.sampling.chains.effective_samples),
+            SECONDS,
+            False,
+        ),
+        (
+            "evaluations per effective sample, emcee's default move over the package's",
+            over(lambda item: item.sampling.default_cost / item.sampling.cost),
+            CHEAPER,
+            True,
+        ),
+    ]
+
+
+def goals_of(figures: Figures) -> list[Goal]:
+    """Return the goals: met or missed in every run, else not decided."""
+    goals = []
+    for name, values, goal, more in figures:
+        met = values >= goal if more else values <= goal
+        verdict = Verdict.of(met.all()) if met.all() or not met.any() else Verdict.OPEN
+        goals.append(
+            Goal(f"{name}: at {'least' if more else 'most'} {format_number(goal, 4)}", _spread(values), verdict)
+        )
+    return goals
+
+
+def _spread(values: Floats) -> str:
+    """Return the median of all runs with the smallest and the largest value."""
+    middle, low, high = (format_number(float(f(values)), 3) for f in (np.median, np.min, np.max))
+    return f"{middle} ({low} to {high})"
+
+
+def write_report(runs: Sequence[Benchmark], output: Path, *, full: bool, origin: str | None = None) -> None:
+    """Write the report as PDF, and beside it its summary and the times of every run."""
+    document = Document("Benchmark", "Cost of simulations and of effective samples")
+    figures, first = figures_of_merit(runs), runs[0]
+    evaluations = np.array([item.evaluation for item in runs])
+    summary = Summary(
+        "What does one simulation cost beside other simulators at the same accuracy, how does that depend on the "
+        "problem, and what does an effective sample cost?",
+        f"One evaluation takes {_spread(1e6 * evaluations)} µs in batches, {_spread(figures[0][1])} times less than "
+        f"Pinocchio step by step in Python and {_spread(figures[1][1])} times less than MuJoCo's rollouts in C.",
+        tuple(goals_of(figures)),
+        f"run on {processor()}. Ratios depend on the machine and its load much less than times do.",
+        full,
+    )
+    caption = (
+        f"Every figure over its goal in {len(runs)} runs (dots: median; bars: smallest to largest). Right of the line "
+        "the goal is met; where less is better, the inverse is drawn."
+    )
+    add_first_page(document, summary, merit_figure(figures), caption)
+    add_setup(
+        document,
+        Setup(
+            robot="ETS-VII; chains of 6 to 60 links that cut one arm into equal parts.",
+            manoeuvre="A random manoeuvre of all joints of 120 s. No rule of the flight is applied: only times count.",
+            sensors="Rate and accelerometer at 2 Hz, 10⁻⁵ rad/s and 10⁻⁵ m/s²; encoders exact, or with noise.",
+            known="Arm and orbit. MuJoCo's joints are driven by the exact torques at mid-step, its best case; it "
+            "simulates without the gravity gradient.",
+            unknown=f"Base and initial rate; three recordings and {first.sampling.chains.z.shape[-1]} unknowns where "
+            "samples are drawn.",
+            replicates=f"{len(runs)} runs of all of it, one after the other; within a run the shortest of several "
+            "times counts, after one that is not counted.",
+        ),
+    )
+    _simulations(document, runs)
+    _samples(document, runs)
+    rows = [(number, name, value) for name, values, _, _ in figures for number, value in enumerate(values, start=1)]
+    write_table(output, "runs", ["run", "figure of merit", "value"], rows)
+    write_study(document, summary, output, origin)
+
+
+def _simulations(document: Document, runs: Sequence[Benchmark]) -> None:
     document.section("Simulations")
-    document.paragraph(
-        "One evaluation simulates a manoeuvre of ETS-VII of 120 s with rate and accelerometer at 2 Hz and gives its "
-        f"log likelihood. It takes {1e6 * result.evaluation:.0f} µs in batches on this machine, with an integration "
-        f"error of {result.error:.2g} σ of a sample. The other simulators simulate the same manoeuvre with steps short "
-        "enough for an error below 0.01 σ, where they reach it. MuJoCo's joints are driven by the exact torques at "
-        "mid-step, which is the best case for it; it simulates without the gravity gradient."
-    )
-    add_number_table(
-        document,
-        ["simulator", "step [s]", "error [σ]", "time [ms]", "ratio", "goal"],
+    rows = [
         [
+            f"{rival.name} (step {rival.step:g} s, error {format_number(rival.error, 2)} σ)",
+            _spread(np.array([1e6 * item.rivals[k].seconds for item in runs])),
+            _spread(np.array([item.speedups[rival.name] for item in runs])),
+        ]
+        for k, rival in enumerate(runs[0].rivals)
+    ]
+    cases: tuple[tuple[str, list[Mapping[Any, float]]], ...] = (
+        ("links", [item.links for item in runs]),
+        ("samples", [item.samples for item in runs]),
+        ("", [item.whitening for item in runs]),
+    )
+    for title, times in cases:
+        first = next(iter(times[0]))
+        rows += [
             [
-                rival.name,
-                f"{rival.step:g}",
-                f"{rival.error:.2g}",
-                f"{1e3 * rival.seconds:.3g}",
-                f"{result.speedups[rival.name]:.0f}",
-                f"{GOALS[rival.name]:.0f}",
+                format_text(f"{key} {title}".strip()),
+                _spread(np.array([1e6 * found[key] for found in times])),
+                _spread(np.array([found[key] / found[first] for found in times])),
             ]
-            for rival in result.rivals
-        ],
-        "Time per simulation over that of one evaluation.",
+            for key in times[0]
+        ]
+    document.table(
+        ["simulator or case", "time [µs]", "ratio"],
+        rows,
+        f"Median of {len(runs)} runs (smallest to largest). Ratios: of other simulators to one evaluation of the log "
+        "likelihood; of cases to the first with the same unit. Other simulators take steps short enough for an error "
+        "below 0.01 σ, where they reach it.",
+        columns("lrr"),
     )
 
 
-def _dependence(document: Document, result: Benchmark) -> None:
-    document.section("Dependence of the cost on the problem")
-    for title, header, times in (
-        ("Time of one evaluation by number of links; the goal is a ratio of at most 1.3.", "links", result.links),
-        ("Time by number of samples of a recording of 120 s.", "samples", result.samples),
-        ("Time by treatment of the joints' noise; the goal is a ratio of at most 1.5.", "noise", result.whitening),
-    ):
-        first = next(iter(times.values()))
-        rows = [[str(key), f"{1e6 * value:.0f}", f"{value / first:.2f}"] for key, value in times.items()]
-        add_number_table(document, [header, "time [µs]", "ratio to the first"], rows, title)
-    windows = ", ".join(f"{name}: {count}" for name, count in result.windows.items())
-    document.paragraph(f"Numbers of earlier sample times that the whitening conditions on: {windows}.")
-
-
-def _samples(document: Document, sampling: Sampling) -> None:
+def _samples(document: Document, runs: Sequence[Benchmark]) -> None:
     document.section("Effective samples")
-    chains = sampling.chains
-    document.paragraph(
-        f"The base of ETS-VII is identified from three recordings of 120 s, with {chains.z.shape[-1]} unknowns. The "
-        f"package's moves gave {chains.effective_samples:.0f} effective samples in {sampling.seconds:.1f} s after "
-        f"compilation (R-hat {chains.r_hat:.4f}, {chains.evaluations} evaluations); the goal is 4,000 within 15 s."
+    rows = []
+    for number, item in enumerate(runs, start=1):
+        found, chains = item.sampling, item.sampling.chains
+        rows += [
+            _cost(number, "package's", chains.evaluations, chains.effective_samples, found.seconds),
+            _cost(number, "default", found.default_evaluations, found.default_effective, found.default_seconds),
+        ]
+    lengths = min(item.sampling.default_lengths for item in runs)
+    doubt = "" if lengths >= ENOUGH else ", too few to be sure of it, so that its cost is a lower bound"
+    document.table(
+        ["run", "moves", "evaluations", "effective samples", "evaluations per sample", "time per sample [ms]"],
+        rows,
+        "Cost of an effective sample, burn-in included: by the package's moves (Laplace-t independence and "
+        f"differential evolution) and by emcee's default stretch move, whose chain covers {lengths:.0f} "
+        f"autocorrelation times or more{doubt}.",
+        columns("rlrrrr"),
     )
-    lengths = f"The default move's chain covers {sampling.default_lengths:.0f} autocorrelation times"
-    if sampling.default_lengths < ENOUGH:
-        lengths += ", too few to be sure of its length, so the ratio is a lower bound"
-    add_number_table(
-        document,
-        ["moves", "evaluations per effective sample", "time per effective sample [ms]"],
-        [
-            [
-                "Laplace-t independence and differential evolution",
-                f"{sampling.evaluations:.1f}",
-                f"{1e3 * sampling.seconds / chains.effective_samples:.2f}",
-            ],
-            [
-                "emcee's default stretch move",
-                f"{sampling.default_evaluations:.0f}",
-                f"{1e3 * sampling.default_seconds:.2f}",
-            ],
-        ],
-        "Cost of an effective sample. The ratio of evaluations is "
-        f"{sampling.default_evaluations / sampling.evaluations:.0f}; the goal is 20. {lengths}.",
-    )
+
+
+def _cost(number: int, moves: str, evaluations: int, effective: float, seconds: float) -> list[str]:
+    counts = [str(evaluations), f"{effective:.0f}", f"{evaluations / effective:.1f}"]
+    return [str(number), moves, *counts, f"{1e3 * seconds / effective:.2f}"]
+
+
+@styled
+def merit_figure(figures: Figures) -> Figure:
+    """Draw every figure over its goal, so that more is better."""
+    figure = wide_figure(0.7 + 0.28 * len(figures))
+    axes = figure.subplots()
+    for row, (_, values, goal, more) in enumerate(figures):
+        ratio = values / goal if more else goal / values
+        axes.plot([ratio.min(), ratio.max()], [row, row], color=AFTER, linewidth=2.5, alpha=0.5)
+        axes.plot(np.median(ratio), row, "o", color=AFTER, markersize=4)
+    axes.axvline(1.0, color=TRUTH, linewidth=0.8)
+    axes.set(xscale="log", xlabel="times better than the goal")
+    axes.set_yticks(range(len(figures)), [name for name, _, _, _ in figures])
+    axes.invert_yaxis()
+    return figure
 
 
 COMMAND = Command(
-    "benchmark", "Measure the cost of simulations and of effective samples.", full="longer chains, more repeats"
+    "benchmark",
+    f"Measure the cost of simulations and of effective samples in {RUNS} runs.",
+    full="longer chains, more repeats",
 )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the benchmark and write its report."""
     options = COMMAND.parse(arguments)
-    write_report(run(full=options.full), options.output)
+    keep_compiled()
+    runs = run(full=options.full, progress=print)
+    write_report(runs, options.output, full=options.full, origin=study_origin(COMMAND.name, options))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from bayesid.inference.predicted_readings import integration_error_at
@@ -10,12 +11,15 @@ from studies.benchmark.sampling import Sampling, compare_moves
 from studies.benchmark.timing import Rival, rivals, seconds_per_evaluation
 from studies.common.ets7 import ets7
 
-__all__ = ["Benchmark", "run"]
+__all__ = ["RUNS", "Benchmark", "run"]
+
+RUNS = 5
+"""Number of runs, one after the other, whose spread is reported."""
 
 
 @dataclass(frozen=True)
 class Benchmark:
-    """Measured times [s].
+    """Times measured in one run [s].
 
     Attributes
     ----------
@@ -50,16 +54,27 @@ class Benchmark:
         return {rival.name: rival.seconds / self.evaluation for rival in self.rivals}
 
 
-def run(*, full: bool = False, seed: int = 0) -> Benchmark:
-    """Measure everything.
+def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = lambda text: None) -> list[Benchmark]:
+    """Measure everything in each of `RUNS` runs.
 
     Parameters
     ----------
     full : bool
         Whether to take longer chains of the default move and more repeats.
     seed : int
-        Seed of the samplers.
+        Seed of the samplers in the first run.
+    progress : callable, optional
+        Receives a line before each run.
     """
+    results = []
+    for number in range(RUNS):
+        progress(f"run {number + 1} of {RUNS}")
+        results.append(_measured(full=full, seed=seed + number))
+    return results
+
+
+def _measured(*, full: bool, seed: int) -> Benchmark:
+    """Measure everything once."""
     robot = ets7()
     single = posterior_of(robot)
     whitening = {"white": 0.0, "encoder 1e-6 rad": 1e-6, "encoder 1e-4 rad": 1e-4}

@@ -16,7 +16,7 @@ __all__ = ["Sampling", "compare_moves"]
 
 
 class Sampling(NamedTuple):
-    """Cost of effective samples, without compilation.
+    """Cost of effective samples, burn-in included and compilation not.
 
     Attributes
     ----------
@@ -24,20 +24,32 @@ class Sampling(NamedTuple):
         Samples by the package's moves.
     seconds : float
         Time that they took [s].
-    evaluations, default_evaluations : float
-        Evaluations per effective sample by the package's moves and by emcee's default move.
+    default_evaluations : int
+        Number of evaluations by emcee's default move, burn-in included.
+    default_effective : float
+        Number of effective samples that they gave.
     default_seconds : float
-        Time per effective sample by emcee's default move [s].
+        Time that they took [s].
     default_lengths : float
         Number of autocorrelation times that the default move's chain covers.
     """
 
     chains: Chains
     seconds: float
-    evaluations: float
-    default_evaluations: float
+    default_evaluations: int
+    default_effective: float
     default_seconds: float
     default_lengths: float
+
+    @property
+    def cost(self) -> float:
+        """Evaluations per effective sample by the package's moves."""
+        return self.chains.evaluations / self.chains.effective_samples
+
+    @property
+    def default_cost(self) -> float:
+        """Evaluations per effective sample by emcee's default move."""
+        return self.default_evaluations / self.default_effective
 
 
 def compare_moves(posterior: Posterior, *, wanted: float, default_steps: int, seed: int) -> Sampling:
@@ -65,12 +77,13 @@ def compare_moves(posterior: Posterior, *, wanted: float, default_steps: int, se
     began = time.perf_counter()
     sampler.run_mcmc(start, default_steps, skip_initial_state_check=True)
     default_seconds = time.perf_counter() - began
-    tau = float(np.max(integrated_time(sampler.get_chain()[default_steps // 5 :], tol=0, quiet=True)))
+    kept = default_steps - default_steps // 5
+    tau = float(np.max(integrated_time(sampler.get_chain()[-kept:], tol=0, quiet=True)))
     return Sampling(
         chains=chains,
         seconds=seconds,
-        evaluations=chains.autocorrelation,  # each walker is evaluated once per step
-        default_evaluations=tau,
-        default_seconds=default_seconds * tau / (default_steps * chains.walkers),
-        default_lengths=0.8 * default_steps / tau,
+        default_evaluations=default_steps * chains.walkers,
+        default_effective=kept * chains.walkers / tau,
+        default_seconds=default_seconds,
+        default_lengths=kept / tau,
     )
