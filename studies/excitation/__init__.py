@@ -1,31 +1,31 @@
 """Which manoeuvre tells most about the base: the paper's criterion against the posterior it leads to.
 
-The paper's 4.1 manoeuvre, a poor neighbour of it and the best by each criterion compete on ETS-VII at equal duration
-within equal limits, once with the rule of the flight (50 mm/s and 5 deg/s at the tip) and once with no rule for the
-tip. The predicted posterior is compared with emcee on data of an independent simulator, and with the errors realised
-over repeated noise. ``python -m studies.excitation --full`` writes ``reports/excitation.pdf``.
+The paper's manoeuvre of section 4.1, a poor neighbour of it and the best by each criterion compete on ETS-VII at equal
+duration within the rule of the flight (50 mm/s and 5 deg/s at the tip). The predicted posterior is compared with the
+errors realised over repeated flights of an independent simulator. ``python -m studies.excitation --full`` writes
+``reports/excitation.pdf`` and, beside it, the manoeuvres, which `studies.ets7_limits` reads.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from bayesid.app.compilation_cache import keep_compiled
-from bayesid.design import Search
-from studies.common.command import Command
-from studies.common.ets7 import LIMITS
-from studies.excitation.cloud import Cloud, Sensitivity, random_cloud, sensitivity
+from bayesid.design import Search, Store
+from studies.common import mission
+from studies.common.command import TRIALS, Command
+from studies.common.repeated_fits import Realised, repeat
+from studies.excitation.cloud import Cloud, random_cloud
 from studies.excitation.contest import Contest, compete
-from studies.excitation.realised import Realised, realise
-from studies.excitation.world import FAST
 
 __all__ = ["Result", "main", "run"]
 
-SETS = {"within the flight's rule": LIMITS, "without a rule for the tip": FAST}
-"""Sets of limits by their names, which complete a sentence of the report."""
+FULL, QUICK = Search(), Search(starts=3, iterations=60)
+"""Effort of each search of a full and of a quick run."""
 
 
 @dataclass(frozen=True)
@@ -34,20 +34,21 @@ class Result:
 
     Attributes
     ----------
-    contests : mapping of str to Contest
-        Contests by the name of their set of limits.
-    realised : mapping of (set, design) to Realised
-        Designs that were flown.
-    clouds : mapping of str to Cloud
-        Random manoeuvres within the flight's rule by their family.
-    sensitivities : mapping of str to Sensitivity
-        Sensitivities along the paper's manoeuvre and its poor neighbour, without a rule for the tip.
+    contest : Contest
+    realised : mapping of str to Realised
+        Designs that were flown, by name.
+    cloud : Cloud
+        Random manoeuvres, splines of all joints.
+    search : Search
+        Effort of each search.
+    full : bool
     """
 
-    contests: Mapping[str, Contest]
-    realised: Mapping[tuple[str, str], Realised]
-    clouds: Mapping[str, Cloud]
-    sensitivities: Mapping[str, Sensitivity]
+    contest: Contest
+    realised: Mapping[str, Realised]
+    cloud: Cloud
+    search: Search
+    full: bool
 
 
 def run(
@@ -55,10 +56,13 @@ def run(
     full: bool = False,
     seed: int = 1,
     search: Search | None = None,
-    repeats: int | None = None,
+    repeats: int = 400,
+    flown: Sequence[str] = ("d-optimal",),
     random: int | None = None,
-    points: int = 8,
-    sets: Sequence[str] = tuple(SETS),
+    points: int = mission.POINTS,
+    store: Store | None = None,
+    trials: Path | None = None,
+    workers: int = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the study.
@@ -66,55 +70,75 @@ def run(
     Parameters
     ----------
     full : bool
-        True for all criteria in place of three, and for effort to match.
+        True for all criteria in place of four, for the default effort of each search, and to fly all of them.
     seed : int
         Seed of all random numbers.
     search : Search, optional
         Effort of each design.
-    repeats : int, optional
-        Number of noisy recordings of the d-optimal design within the first set of limits; other designs that are flown
-        have a quarter of them.
+    repeats : int
+        Number of flights of each design that is flown.
+    flown : sequence of str
+        Designs to fly in a quick run.
     random : int, optional
-        Number of random manoeuvres per family.
+        Number of random manoeuvres.
     points : int
         Number of free control points of every joint.
-    sets : sequence of str
-        Names of the sets of limits.
+    store : Store, optional
+        Results of searches of an earlier run that was interrupted.
+    trials, workers
+        Folder that keeps the flights, and number of processes that fly.
     progress : callable, optional
         Receives a line on what is being done.
     """
-    search = search or (Search() if full else Search(starts=4, iterations=10))
-    repeats = (400 if full else 4) if repeats is None else repeats
-    random = (500 if full else 20) if random is None else random
-    contests, realised = {}, {}
-    for name in sets:
-        contests[name] = compete(SETS[name], seed, search, full, points, progress)
-        for design in ("paper-26", "d-optimal") if full else ("d-optimal",):
-            count = repeats if (name, design) == (sets[0], "d-optimal") else max(4, repeats // 4)
-            item = contests[name].designs[design]
-            realised[name, design] = realise(item, seed, count, 2000.0 if full else 300.0, progress)
-    rng = np.random.default_rng(seed)
-    first, last = contests[sets[0]].designs, contests[sets[-1]].designs
-    clouds = {
-        "(27), three joints": random_cloud(first["27: paper-26"].problem, random, rng),
-        "splines, six joints": random_cloud(first["paper-26"].problem, random, rng),
-    }
-    weights = {name: sensitivity(last[name].problem, last[name].parameters) for name in ("printed", "poor")}
-    return Result(contests, realised, clouds, weights)
+    search = search or (FULL if full else QUICK)
+    random = (500 if full else 100) if random is None else random
+    contest = compete(seed, search, full, points, store or Store.forgetful(), progress)
+    own = contest.designs["d-optimal"].problem
+    cloud = random_cloud(own, random, np.random.default_rng(seed))
+    realised = {}
+    for number, name in enumerate(contest.designs):
+        if full or name in flown:
+            realised[name] = repeat(
+                contest.designs[name].parameters,
+                points,
+                repeats,
+                seed=1000 * seed + number,
+                store=None if trials is None else trials / f"{name}.jsonl",
+                workers=workers,
+                progress=lambda text, name=name: progress(f"{name}: {text}"),  # type: ignore[misc]
+            )
+    return Result(contest, realised, cloud, search, full)
 
 
 COMMAND = Command(
     "excitation",
     "Compare manoeuvres by the posterior they lead to.",
-    full="all criteria, 400 recordings per design (half an hour)",
+    full="all criteria, the default effort of each search, every design flown",
     seed=1,
+    extra={
+        "--repeats": {"type": int, "default": 400, "help": "number of flights of each design that is flown"},
+        "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
+        **TRIALS,
+    },
 )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
+    from studies.common.provenance import study_origin
     from studies.excitation.report import write_report
 
     options = COMMAND.parse(arguments)
     keep_compiled()
-    write_report(run(full=options.full, seed=options.seed, progress=print), options.output)
+    effort = FULL if options.full else QUICK
+    store = None if options.store is None else Store.open(options.store, f"excitation {options.seed} {effort}")
+    result = run(
+        full=options.full,
+        seed=options.seed,
+        repeats=options.repeats,
+        store=store,
+        trials=options.trials,
+        workers=options.workers,
+        progress=lambda text: print(text, flush=True),
+    )
+    write_report(result, options.output, study_origin("excitation", options))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from bayesid import Model
 from bayesid._math.arrays import Floats
 from bayesid.design import (
     AOptimal,
@@ -15,99 +17,122 @@ from bayesid.design import (
     Design,
     DOptimal,
     EOptimal,
-    Found,
     InformationGain,
-    Limits,
     Paper26,
     Paper26Intended,
+    PaperExcitation,
+    Predicted,
     Problem,
     Search,
+    Store,
     design,
-    evaluate,
-    optimise,
+    planned_manoeuvre,
+    planned_posterior,
+    predict,
 )
-from bayesid.design.design_problem import Known
+from bayesid.design.designed import sample_times
+from bayesid.recording.joint_motion import Motion
 from studies.base_body import paper
 from studies.base_body.setting import POOR
-from studies.common.ets7 import ENCODER
-from studies.excitation.world import paper_family, problem, splines
+from studies.common import mission
+from studies.common.ets7 import INTERVAL
+from studies.common.quantities import JUDGED
 
-__all__ = ["Contest", "compete", "shrunk"]
+__all__ = ["Contest", "compete", "paper_problem", "shrunk"]
 
-FEW: tuple[Criterion, ...] = (Paper26(), ConditionNumber(), DOptimal())
+FEW: tuple[Criterion, ...] = (Paper26(), Paper26Intended(), ConditionNumber(), DOptimal())
 """Criteria of a quick run: the paper's, the one usual for arms on the ground, and the posterior's volume."""
 
-ALL: tuple[Criterion, ...] = (*FEW[:1], Paper26Intended(), *FEW[1:], AOptimal(), EOptimal(), InformationGain(draws=2))
+ALL: tuple[Criterion, ...] = (*FEW, AOptimal(), EOptimal(), InformationGain(draws=2))
 """Criteria of a full run."""
 
 
 @dataclass(frozen=True)
 class Contest:
-    """Manoeuvres within one set of limits.
+    """Manoeuvres within the rule of the flight.
 
     Attributes
     ----------
-    limits : Limits
     designs : mapping of str to Design
-        ``printed`` and ``poor`` are the paper's manoeuvre and its poor neighbour, made smaller until they keep the
-        limits; ``27: NAME`` was designed in the paper's family, ``NAME`` with splines on all joints; ``wrong guess`` is
-        d-optimal for the paper's initial guess of the base.
+        Designed manoeuvres by criterion, splines of all joints, with the arm known to 5 %.
+    predicted : mapping of str to mapping of str to Predicted
+        Predicted posteriors of all manoeuvres by what is known of the arm; beside the designs these are ``printed``
+        and ``poor``, the paper's manoeuvre and its poor neighbour, made smaller until they keep the rule.
     shrink : mapping of str to float
-        Factors by which the first two were made smaller.
+        Factors by which these two were made smaller.
+    motions : mapping of str to Motion
+        Motions of all manoeuvres.
     """
 
-    limits: Limits
     designs: Mapping[str, Design]
+    predicted: Mapping[str, Mapping[str, Predicted]]
     shrink: Mapping[str, float]
+    motions: Mapping[str, Motion]
 
-    def relative(self, name: str) -> tuple[float, float, float]:
-        """Return log-determinant less that of (26), and worst and geometric-mean deviation over those of (26)."""
-        this, base = self.designs[name].predicted, self.designs["paper-26"].predicted
-        return this.log_det - base.log_det, this.worst / base.worst, this.geometric_mean / base.geometric_mean
+    def factor(self, name: str, over: str, row: str) -> float:
+        """Return how many times smaller one manoeuvre's geometric-mean sd is than that of another."""
+        own = self.predicted[row]
+        return own[over].geometric_mean / own[name].geometric_mean
+
+    def worst(self, name: str, row: str) -> float:
+        """Return the largest relative standard deviation of mass and moments of inertia."""
+        own = self.predicted[row][name]
+        return float((own.sd[JUDGED] / own.mean[JUDGED]).max())
+
+    @property
+    def consistent(self) -> bool:
+        """Whether no manoeuvre is better by a criterion than the one that was designed for it."""
+        return all(
+            item.costs[name] <= min(other.costs[name] for other in self.designs.values()) + 1e-9
+            for name, item in self.designs.items()
+            if name != "information-gain"  # an average over draws, which the costs of the others are not
+        )
 
 
 def compete(
-    limits: Limits, seed: int, search: Search, full: bool, points: int, progress: Callable[[str], None]
+    seed: int, search: Search, full: bool, points: int, store: Store, progress: Callable[[str], None]
 ) -> Contest:
-    """Design by every criterion within some limits; parameters as in `studies.excitation.run`."""
-    seeds = [int(value) for value in np.random.SeedSequence(seed).generate_state(3)]
-    rng = np.random.default_rng(seeds[0])
-    sines = problem(paper_family(), limits, (Paper26(), DOptimal()))
-    designs: dict[str, Design] = {}
+    """Design by every criterion; parameters as in `studies.excitation.run`."""
+    known = mission.base_unknown()
+    own = mission.problem(known, mission.splines(points), *(ALL if full else FEW))
+    found = design(own, seed, mission.ENCODERS, search, store=store, progress=_sparse(progress))
+    designs = {item.name: item for item in found}
+    motions: dict[str, Motion] = {}
     shrink: dict[str, float] = {}
+    sines = paper_problem()
     for name, q in (("printed", paper.EXCITATION), ("poor", POOR)):
         parameters, shrink[name] = shrunk(sines, q)
-        given = Found(parameters, float("nan"), (), 0)
-        like = designs["printed"].posterior if designs else None
-        designs[name] = evaluate(sines, name, given, {0: ENCODER}, rng, like)
-
-    def tell(family: str) -> Callable[[float, str], None]:
-        told = [-1]  # a line every five percent
-
-        def show(fraction: float, text: str) -> None:
-            if int(20 * fraction) > told[0]:
-                told[0] = int(20 * fraction)
-                progress(f"{family}: {100.0 * fraction:.0f} %, {text}")
-
-        return show
-
-    for item in design(sines, seeds[1], {0: ENCODER}, search, progress=tell("(27)")):
-        designs[f"27: {item.criterion}"] = item
-    free = problem(splines(points), limits, ALL if full else FEW)
-    for item in design(free, seeds[2], {0: ENCODER}, search, progress=tell("splines")):
-        designs[item.criterion] = item
-    if full:
-        designs["wrong guess"] = _from_wrong_guess(free, search, rng, designs["d-optimal"])
-    return Contest(limits, designs, shrink)
+        motions[name] = sines.plan.family.motion(parameters)
+    motions |= {name: item.motion for name, item in designs.items()}
+    predicted = {}
+    for row, spread in mission.ROWS.items():
+        progress(f"predictions with the {row}")
+        tell = partial(_predicted, mission.base_unknown(spread))
+        predicted[row] = {name: tell(motion) for name, motion in motions.items()}
+    return Contest(designs, predicted, shrink, motions)
 
 
-def _from_wrong_guess(free: Problem, search: Search, rng: np.random.Generator, like: Design) -> Design:
-    """Design by the posterior as it would be if the paper's initial guess of the base were true."""
-    unknowns = free.plan.unknowns
-    guess = unknowns.coordinates([paper.body(paper.GUESS)])
-    best = optimise(free.knowing(Known(guess, np.eye(unknowns.size))), DOptimal(), rng, search)
-    parameters, _ = shrunk(free, best.parameters)  # the true base may not keep what the guessed one does
-    return evaluate(free, "wrong guess", replace(best, parameters=parameters), {0: ENCODER}, rng, like.posterior)
+def paper_problem() -> Problem:
+    """Return the problem of the paper's motion (27) of the first three joints, whose limits alone matter here."""
+    family = PaperExcitation(mission.start(), mission.DURATION, moving=(0, 1, 2))
+    return mission.problem(mission.base_unknown(0.0), family, Paper26())
+
+
+def _predicted(model: Model, motion: Motion) -> Predicted:
+    times = sample_times(mission.DURATION, INTERVAL)
+    return predict(planned_posterior(model, [planned_manoeuvre(model, motion, times, "plan", mission.ENCODERS)]))
+
+
+def _sparse(progress: Callable[[str], None]) -> Callable[[float, str], None]:
+    """Return a progress that passes on a line every five percent."""
+    told = [-1]
+
+    def show(fraction: float, text: str) -> None:
+        if int(20 * fraction) > told[0]:
+            told[0] = int(20 * fraction)
+            progress(f"{100.0 * fraction:.0f} %, {text}")
+
+    return show
 
 
 def shrunk(problem: Problem, q: Sequence[float] | Floats) -> tuple[Floats, float]:

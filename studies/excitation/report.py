@@ -9,20 +9,22 @@ from matplotlib.figure import Figure
 
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_legend, styled, wide_figure
-from bayesid.report.numbers import format_fixed, format_number, format_signed
-from bayesid.report.tables.design_tables import sd_rows
-from bayesid.robot.log_cholesky import LOG_CHOLESKY
-from studies.common.report_parts import QUANTITY_TITLES, columns
+from bayesid.report.numbers import format_fixed, format_number, format_percent
+from studies.common import mission
+from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE
+from studies.common.goals import Goal, Verdict
+from studies.common.quantities import HEADINGS, LABELS
+from studies.common.tables import add_number_table
+from studies.common.template import Finding, Setup, Statement, Summary, add_first_page, add_setup, add_statements
+from studies.common.template import write_study, write_table
 from studies.excitation import Result
 from studies.excitation.contest import Contest
 
-__all__ = ["write_report"]
+__all__ = ["goals", "write_report"]
 
 TITLES = {
     "printed": "the paper's optimum, as printed",
     "poor": "its poor neighbour",
-    "27: paper-26": "(26), motion (27)",
-    "27: d-optimal": "d-optimal, motion (27)",
     "paper-26": "(26) as printed",
     "paper-26-intended": "(26) as intended",
     "condition-number": "condition number",
@@ -30,150 +32,246 @@ TITLES = {
     "a-optimal": "a-optimal",
     "e-optimal": "e-optimal",
     "information-gain": "information gain",
-    "wrong guess": "d-optimal for the paper's wrong guess",
 }
 """Titles of the manoeuvres."""
 
-SHOWN = ("printed", "paper-26", "condition-number", "d-optimal")
-"""Manoeuvres that are drawn, and whose standard deviations are listed."""
+DRAWN = ("printed", "paper-26", "condition-number", "d-optimal")
+"""Manoeuvres that are drawn."""
+
+HEADLINE, IDEAL = mission.ROWS
+"""What is known of the arm: in the headline, and in the idealised row."""
+
+WANTED, WITHIN = 1.3, 0.05
+"""Factor over the condition number that is wanted, and largest deviation of realised from predicted errors."""
 
 
-def write_report(result: Result, output: Path) -> None:
-    """Write the report as PDF."""
-    document = Document("Manoeuvres compared by the posterior they lead to", "Sections 3.2, 3.3 and 4.1 of the paper")
-    document.section("Question and answer")
-    document.paragraph(
-        "Which manoeuvre of ETS-VII tells most about its base? All manoeuvres last 120 s, start and end at rest with "
-        "the wrist extended, and keep the same limits. Rates have a noise of 1e-5 rad/s and accelerations of 1e-5 "
-        "m/s² at 2 Hz, encoders of 1e-6 rad. The accelerometer's bias (prior 1e-4 m/s²) and the initial rate are "
-        "unknown and marginalised; the arm is known. The predicted posterior is that of the problem linearised at the "
-        "true base, and sd stands for standard deviation throughout."
-    )
-    document.items(_answers(result))
-    for name, contest in result.contests.items():
-        _contest(document, name, contest)
-    _realised(document, result)
-    document.section("Is excitation the same as base motion?")
-    document.paragraph(
-        "Random manoeuvres were drawn within the flight's rule, each a random part of the largest that keeps it. If "
-        "base motion were what tells most, criterion (26) would rank them as the posterior does."
-    )
-    document.figure(
-        _cloud_figure(result),
-        "Information (minus half the log-determinant of the posterior covariance of the log-Cholesky coordinates) of "
-        "random manoeuvres against (26) as printed, (26) as intended, and the plain sum of the squared largest "
-        "excursions. The horizontal scale is logarithmic to either side of a linear part about zero.",
-    )
-    document.section("The weights of the errors, (25)")
-    document.figure(
-        _weight_figure(result),
-        "Sensitivities along the paper's manoeuvre and its poor neighbour without a rule for the tip: change of rate "
-        "and acceleration per unit of each log-Cholesky coordinate of the base, in standard deviations of a sample.",
-    )
-    document.write(output)
-
-
-def _answers(result: Result) -> list[str]:
-    texts = []
-    for name, contest in result.contests.items():
-        best = contest.relative("d-optimal")[2]
-        texts.append(
-            f"{name.capitalize()}, the geometric mean of the d-optimal manoeuvre's sds is {1.0 / best:.2f} times "
-            "smaller than that of (26) with the same splines (goal 2), "
-            f"{contest.relative('condition-number')[2] / best:.2f} times smaller than that of the condition number "
-            f"(goal 1.3), and {contest.relative('printed')[2] / best:.2f} times smaller than that of the paper's "
-            "printed optimum."
-        )
-    for (name, design), item in result.realised.items():
-        if design == "d-optimal":
-            texts.append(
-                f"{name.capitalize()}, the errors realised over {len(item.errors)} noisy recordings of an independent "
-                f"simulator are {item.ratio:.3f} of the predicted sd in the geometric mean (goal: within 10 %) and "
-                f"{item.rms.min():.2f} to {item.rms.max():.2f} by parameter, each with a standard error of "
-                f"{item.rms_error:.2f}."
-            )
-    cloud = result.clouds["splines, six joints"]
-    printed, motion = ("{:.2f} ± {:.2f}".format(*cloud.correlation(x)) for x in (cloud.printed, cloud.motion))
-    texts.append(
-        f"Over random manoeuvres, the rank correlation of the information with (26) as printed is {printed}, and with "
-        f"the plain sum of the squared excursions {motion}."
-    )
-    return texts
-
-
-def _contest(document: Document, name: str, contest: Contest) -> None:
-    document.section(f"Manoeuvres {name}")
+def goals(result: Result) -> tuple[Goal, ...]:
+    """Return the goals of the study with what was reached."""
+    contest = result.contest
     rows = []
-    for key, item in contest.designs.items():
-        difference, worst, mean = contest.relative(key)
-        active = ", ".join(reached.name.replace("joint_", "") for reached in item.reached if reached.active)
-        numbers = ((difference, 3), (worst, 2), (mean, 3), (item.predicted.worst, 2))
-        rows.append([TITLES[key], *(format_number(value, digits) for value, digits in numbers), active or "none"])
-    document.table(
-        ["manoeuvre", "log det − (26)", "worst / (26)", "mean sd / (26)", "worst", "active limits"],
-        rows,
-        "Predicted posterior: log-determinant of the covariance of mass, centre of mass and inertia less that of (26) "
-        "as printed with splines on all joints; sd of the log-Cholesky coordinates along the worst direction, and "
-        "geometric mean of the ten sds, over those of (26); the worst sd itself; limits filled to more than 97 %.",
-        columns("lrrrrl"),
+    for row in mission.ROWS:
+        factor = contest.factor("d-optimal", "condition-number", row)
+        text = f"Geometric-mean sd at least {WANTED} times smaller than that of the best condition number, {row}"
+        rows.append(Goal(text, f"{factor:.2f} times", Verdict.of(factor >= WANTED)))
+    over = contest.factor("d-optimal", "paper-26", HEADLINE)
+    starts = f"{over:.2f} times from {result.search.starts} starts; 100 starts were not run"
+    rows.append(Goal("Largest factor over (26) that 100 starts find, with evidence", starts, Verdict.NOT_TESTED))
+    for name, item in result.realised.items():
+        away = np.abs(item.rms - 1.0)
+        allowed = WITHIN + 2.0 * item.rms_error
+        verdict = Verdict.FAIL if away.max() > allowed else Verdict.OPEN if away.max() > WITHIN else Verdict.PASS
+        reached = (
+            f"{TITLES[name]}: {item.rms.min():.3f} to {item.rms.max():.3f} of the predicted sd over "
+            f"{len(item.errors)} flights, each ± {item.rms_error:.3f}; geometric mean {item.ratio:.3f}"
+        )
+        rows.append(Goal(f"Realised errors within {WITHIN:.0%} of predicted for every parameter", reached, verdict))
+    rows.append(
+        Goal(
+            "By every criterion, the manoeuvre designed for it is the best of all",
+            "so it is" if contest.consistent else "it is not",
+            Verdict.of(contest.consistent),
+        )
     )
-    scaled = [f"{TITLES[key]} by {format_number(value, 3)}" for key, value in contest.shrink.items() if value < 1.0]
-    if scaled:
-        document.paragraph(f"Made smaller, towards rest, to keep the limits: {'; '.join(scaled)}.")
-    shown = {TITLES[key]: contest.designs[key] for key in SHOWN if key in contest.designs}
-    document.table(
-        ["parameter", "unit", "true", *shown],
-        sd_rows(list(shown.values())),
-        "Predicted posterior standard deviations.",
-        columns("llr" + "r" * len(shown)),
+    kept = all(item.kept for own in contest.designs.values() for item in own.reached)
+    finer = "on a grid eight times finer than the search's"
+    rows.append(Goal("Every limit kept", finer if kept else f"broken {finer}", Verdict.of(kept)))
+    return tuple(rows)
+
+
+def write_report(result: Result, output: Path, origin: str | None = None) -> None:
+    """Write the report as PDF, and its tables beside it."""
+    contest, reached = result.contest, goals(result)
+    document = Document("Which manoeuvre tells most about the base", "ETS-VII; sections 3.2, 3.3 and 4.1 of the paper")
+    factors = {row: contest.factor("d-optimal", "condition-number", row) for row in mission.ROWS}
+    summary = Summary(
+        question="Which manoeuvre of ETS-VII, within the rule of its flight, tells most about its base?",
+        answer=(
+            "The manoeuvre with the smallest posterior volume (d-optimal) leaves standard deviations that are "
+            f"{factors[HEADLINE]:.2f} times smaller in the geometric mean than the best condition number's with the "
+            f"{HEADLINE}, and {factors[IDEAL]:.2f} times with the {IDEAL}."
+        ),
+        goals=reached,
+        valid=(
+            f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and keep 50 "
+            "mm/s and 5 degrees per second at the tip; the base starts at rest and nothing but the gravity gradient acts"
+        ),
+        full=result.full,
+    )
+    add_first_page(
+        document,
+        summary,
+        _factor_figure(contest),
+        "Geometric mean of the ten standard deviations of each manoeuvre over that of the d-optimal one: how many "
+        "times less it tells. Filled: arm known to 5 % of each link's mass; open: arm known exactly.",
+    )
+    add_setup(document, _setup(result))
+    _evidence(document, result)
+    _calibration(document, result)
+    add_statements(document, _statements(result))
+    tables = _write_tables(result, output)
+    document.paragraph(f"Tables beside this report: {', '.join(tables)}.")
+    write_study(document, summary, output, origin)
+
+
+def _setup(result: Result) -> Setup:
+    shrink = result.contest.shrink
+    return Setup(
+        robot=f"ETS-VII with the published base, nominal links, joints within ±{mission.REACH:g} rad.",
+        manoeuvre=(
+            f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight's rule allows. "
+            f"The paper's optimum had to be made smaller, to {shrink['printed']:.1%} of its amplitudes, and its poor "
+            f"neighbour to {shrink['poor']:.1%}."
+        ),
+        sensors=(
+            f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with {format_number(ACCEL)} "
+            f"m/s² and encoders with {format_number(ENCODER)} rad of white noise; the encoders' noise is part of every "
+            "criterion."
+        ),
+        known="The gravity gradient, the attitude at the start, and the arm to 5 % of the mass of each link.",
+        unknown=(
+            "The base (mass known to a factor of e²), the rate at the start, the accelerometer's bias within "
+            f"{format_number(BIAS)} m/s², and the links, which are marginalised."
+        ),
+        replicates=(
+            f"{result.search.starts} random starts per criterion; "
+            f"{', '.join(f'{len(item.errors)} flights of {TITLES[name]}' for name, item in result.realised.items())}, "
+            "each with an arm, a bias and noise of its own."
+        ),
+    )
+
+
+def _evidence(document: Document, result: Result) -> None:
+    document.section("Evidence")
+    contest = result.contest
+    rows = []
+    for name, title in TITLES.items():
+        if name in contest.motions:
+            numbers = [
+                cell
+                for row in mission.ROWS
+                for cell in (
+                    format_fixed(contest.factor(name, "paper-26", row), 2),
+                    format_percent(contest.worst(name, row), 2),
+                    format_number(float(contest.predicted[row][name].sd[0]), 3),
+                )
+            ]
+            rows.append([title, *numbers])
+    header = ["manoeuvre", *(f"{key}, {arm}" for arm in ("5 %", "exact") for key in ("factor", "worst", "mass sd [kg]"))]
+    add_number_table(
+        document,
+        header,
+        rows,
+        "Predicted posteriors, arm known to 5 % and exactly. Factor: geometric-mean sd of (26) as printed over that of "
+        "the manoeuvre; worst: largest relative sd of mass and moments of inertia; and the sd of the base's mass.",
     )
     document.figure(
-        _motion_figure(contest), "Joint positions, speed of the tip and rotation of the base since the start."
+        _motion_figure(contest), "Joint positions, speed of the tip (the rule dotted) and rotation of the base."
     )
 
 
-def _realised(document: Document, result: Result) -> None:
-    document.section("Predicted, sampled and realised")
-    document.paragraph(
-        "Some designs were flown by MuJoCo with fresh noise of sensors and encoders and a fresh accelerometer bias "
-        "each time, and the base was identified by the mode of the posterior. One recording of each was also sampled "
-        "with emcee."
-    )
-    for (name, key), item in result.realised.items():
-        document.table(
-            ["parameter", "predicted sd", "emcee sd / predicted", "rms error / predicted", "emcee mean − truth, sd"],
-            [
-                [
-                    title,
-                    format_number(float(item.predicted[row]), 3),
-                    format_fixed(item.sampled[row] / item.predicted[row], 3),
-                    format_fixed(item.rms[row], 3),
-                    format_signed(item.offset[row] / item.sampled[row], 2),
-                ]
-                for row, title in enumerate(QUANTITY_TITLES)
-            ],
-            f"{TITLES[key]}, {name}: errors of {len(item.errors)} recordings, so that each rms is known to "
-            f"{100.0 * item.rms_error:.1f} %. The squared distance of the truth in the predicted covariance is "
-            f"{item.distances.mean():.2f} on average (expected: 10 ± {np.sqrt(20.0 / len(item.distances)):.2f}).",
-            columns("lrrrr"),
+def _calibration(document: Document, result: Result) -> None:
+    document.section("Calibration and failures")
+    for name, item in result.realised.items():
+        title = TITLES[name]
+        beyond = [LABELS[k] for k in range(10) if abs(item.rms[k] - 1.0) > WITHIN]
+        document.paragraph(
+            f"MuJoCo flew the {title} manoeuvre {len(item.errors)} times. Not within {WITHIN:.0%} of the predicted sd: "
+            f"{', '.join(beyond) or 'none'}; one standard error of a ratio is {item.rms_error:.1%}, so that of ten "
+            "ratios some lie outside by chance alone. Each mode was found by Gauss-Newton steps with the Jacobian of "
+            f"the plan, of which the last changed no coordinate by more than {item.last_step.max():.2g} standard "
+            "deviations."
         )
+    document.figure(
+        _realised_figure(result),
+        "Root mean square error of every parameter over its predicted sd, with standard errors. The band is ± 5 %.",
+    )
+
+
+def _statements(result: Result) -> list[Statement]:
+    cloud, contest = result.cloud, result.contest
+    printed, intended, motion = (
+        "{:.2f} ± {:.2f}".format(*cloud.correlation(values)) for values in (cloud.printed, cloud.intended, cloud.motion)
+    )
+    ranks = cloud.correlation(cloud.intended)[0]
+    best = contest.factor("d-optimal", "paper-26-intended", HEADLINE)
+    worse = contest.worst("poor", IDEAL) / contest.worst("printed", IDEAL)
+    return [
+        Statement(
+            "The degree of excitation of a manoeuvre is related to the amount of base body motion (3.2).",
+            Finding.CONFIRMED if ranks > 0.5 else Finding.REFUTED,
+            f"Over {len(cloud.motion)} random manoeuvres the rank correlation of the information with the plain sum of "
+            f"the squared excursions is {motion}, with (26) as intended {intended}, as printed {printed}.",
+        ),
+        Statement(
+            "Maximising (26) gives the optimal exciting manoeuvre (3.3.1).",
+            Finding.REFUTED if best > 1.05 else Finding.CONFIRMED,
+            f"The d-optimal manoeuvre leaves sds {best:.2f} times smaller than the best by (26) as intended.",
+        ),
+        Statement(
+            "A manoeuvre that turns the base little about its third axis loses precision (4.1).",
+            Finding.CONFIRMED if worse > 1.0 else Finding.REFUTED,
+            f"The poor neighbour's worst relative sd is {worse:.1f} times that of the printed optimum, arm exact.",
+        ),
+    ]
+
+
+def _write_tables(result: Result, output: Path) -> list[str]:
+    contest = result.contest
+    sds = [
+        [name, row, *map(float, contest.predicted[row][name].sd)] for row in mission.ROWS for name in contest.motions
+    ]
+    designed = list(contest.designs.values())
+    names = designed[0].problem.plan.family.names
+    tables = [
+        write_table(output, "predicted", ["manoeuvre", "arm", *(f"sd {text}" for text in HEADINGS)], sds),
+        write_table(
+            output, "manoeuvres", ["manoeuvre", *names], [[item.name, *map(float, item.parameters)] for item in designed]
+        ),
+    ]
+    realised = [[name, len(item.errors), *map(float, item.rms)] for name, item in result.realised.items()]
+    header = ["manoeuvre", "flights", *(f"rms / predicted sd, {text}" for text in HEADINGS)]
+    return [*tables, write_table(output, "realised", header, realised)]
+
+
+@styled
+def _factor_figure(contest: Contest) -> Figure:
+    names = [name for name in TITLES if name in contest.motions][::-1]
+    figure = wide_figure(0.24 * len(names) + 0.7)
+    axes = figure.subplots()
+    place = np.arange(len(names))
+    for row, fill in zip(mission.ROWS, ("full", "none"), strict=True):
+        values = [contest.factor("d-optimal", name, row) for name in names]
+        axes.plot(values, place, "o", color=COLOURS[0], fillstyle=fill, label=row)  # type: ignore[arg-type]
+    axes.axvline(1.0, color="#888888", linewidth=0.8)
+    axes.axvline(WANTED, color="#888888", linewidth=0.8, linestyle=":")
+    axes.text(WANTED, place[-1] + 0.45, " wanted of the condition number", va="bottom", ha="left", fontsize=7)
+    axes.set(xscale="log", xlabel="geometric-mean sd over that of the d-optimal manoeuvre", ylim=(-0.6, place[-1] + 1.2))
+    axes.set_yticks(place, [TITLES[name] for name in names])
+    ticks = [value for value in (0.5, 1, 2, 5, 10, 20, 50, 100) if value < 1.2 * axes.get_xlim()[1]]
+    axes.set_xticks(ticks, [f"{value:g}" for value in ticks])
+    axes.minorticks_off()
+    axes.legend(loc="lower right")
+    return figure
 
 
 @styled
 def _motion_figure(contest: Contest) -> Figure:
-    keys = [key for key in SHOWN if key in contest.designs]
-    figure = wide_figure(5.2)
-    panels = figure.subplots(3, len(keys), sharex=True, sharey="row", squeeze=False)
-    for (top, middle, bottom), key in zip(panels.T, keys, strict=True):
-        trajectory = contest.designs[key].trajectory
+    figure = wide_figure(4.2)
+    shown = [name for name in DRAWN if name in contest.motions]
+    panels = figure.subplots(3, len(shown), sharex=True, sharey="row", squeeze=False)
+    from studies.common.tip_watch import flown_along
+
+    for (top, middle, bottom), name in zip(panels.T, shown, strict=True):
+        motion = contest.motions[name]
+        course = flown_along(mission.ship(), motion, mission.DURATION)
+        position = motion.evaluate(course.time).position
         for joint in range(6):
-            label = f"joint {joint + 1}" if key == keys[0] else None
-            top.plot(trajectory.time, trajectory.position[:, joint], label=label, **curve_style(joint))
-        middle.plot(trajectory.time, 1e3 * np.asarray(trajectory.tip_speed), color=COLOURS[0])
-        if contest.limits.tip_speed is not None:
-            middle.axhline(1e3 * contest.limits.tip_speed, color="black", linestyle=":", linewidth=0.8)
-        bottom.plot(trajectory.time, np.degrees(trajectory.rotation), color=COLOURS[1])
-        top.set_title(TITLES[key], fontsize=6.5)
+            label = f"joint {joint + 1}" if name == shown[0] else None
+            top.plot(course.time, position[:, joint], label=label, **curve_style(joint))
+        middle.plot(course.time, 1e3 * course.tip_speed, color=COLOURS[0])
+        middle.axhline(50.0, color="black", linestyle=":", linewidth=0.8)
+        bottom.plot(course.time, np.degrees(course.base_rotation), color=COLOURS[1])
+        top.set_title(TITLES[name])
         bottom.set_xlabel("time [s]")
     for axes, label in zip(panels[:, 0], ("joints [rad]", "tip speed [mm/s]", "base rotation [deg]"), strict=True):
         axes.set_ylabel(label)
@@ -182,33 +280,16 @@ def _motion_figure(contest: Contest) -> Figure:
 
 
 @styled
-def _cloud_figure(result: Result) -> Figure:
-    figure = wide_figure(2.3 * len(result.clouds))
-    panels = figure.subplots(len(result.clouds), 3, squeeze=False)
-    titles = ("(26) as printed", "(26) as intended", "sum of squared excursions")
-    for row, (family, cloud) in zip(panels, result.clouds.items(), strict=True):
-        for axes, title, values in zip(row, titles, (cloud.printed, cloud.intended, cloud.motion), strict=True):
-            axes.plot(values, -0.5 * cloud.log_det, ".", color=COLOURS[0], markersize=2.5)
-            axes.set_xscale("symlog", linthresh=max(float(np.quantile(np.abs(values), 0.1)), 1e-12), linscale=0.3)
-            rho, error = cloud.correlation(values)
-            axes.set_title(f"rank correlation {rho:.2f} ± {error:.2f}", fontsize=6.5)
-            axes.set_xlabel(f"{title} [m², rad²]")
-            axes.tick_params(axis="x", labelsize=5, labelrotation=45)
-        row[0].set_ylabel(f"{family}\ninformation [nats]")
-    return figure
-
-
-@styled
-def _weight_figure(result: Result) -> Figure:
-    figure = wide_figure(4.2)
-    panels = figure.subplots(2, 2, sharex=True, sharey="row")
-    for (top, bottom), (name, weights) in zip(panels.T, result.sensitivities.items(), strict=True):
-        for axes, values in ((top, weights.rate), (bottom, weights.accel)):
-            for k, key in enumerate(LOG_CHOLESKY):
-                axes.semilogy(weights.time, np.maximum(values[:, k], 1e-3), label=key, **curve_style(k))
-        top.set_title(TITLES[name])
-        bottom.set_xlabel("time [s]")
-    panels[0, 0].set_ylabel("rate [standard deviations]")
-    panels[1, 0].set_ylabel("acceleration [standard deviations]")
-    shared_legend(figure, panels[0, 0], 10)
+def _realised_figure(result: Result) -> Figure:
+    figure = wide_figure(2.2)
+    axes = figure.subplots()
+    axes.axhspan(1.0 - WITHIN, 1.0 + WITHIN, color="#e8e8e8", linewidth=0.0)
+    place = np.arange(10)
+    for index, (name, item) in enumerate(result.realised.items()):
+        moved = place + 0.1 * (index - 0.5 * (len(result.realised) - 1))
+        look = {"fmt": "o", "color": COLOURS[index], "markersize": 4, "capsize": 2}
+        axes.errorbar(moved, item.rms, item.rms_error, label=TITLES[name], **look)  # type: ignore[arg-type]
+    axes.set_xticks(place, LABELS)
+    axes.set_ylabel("realised / predicted")
+    axes.legend()
     return figure

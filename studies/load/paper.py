@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesid._math.arrays import Floats
-from bayesid.robot.inertial_parameters import InertialParameters
+from studies.common.quantities import inertia_matrix
 
-__all__ = ["GUESS", "RESULTS", "SCALE", "TRUTH", "Reading", "body", "errors", "readings"]
+__all__ = ["GUESS", "RESULTS", "SCALE", "TRUTH", "Reading", "errors", "readings"]
 
 TRUTH = np.array([370.0, 0.33, 0.50, 1.04, 700.0, 700.0, 700.0, 0.0, 0.0, 0.0])
 """True load: mass, centre of mass, inertia xx yy zz xy xz yz, in the order and units of
@@ -54,23 +54,12 @@ class Reading:
         return bool(self.moments[0] >= 0.0 and self.moments[0] + self.moments[1] >= self.moments[2] * (1.0 - 1e-12))
 
 
-def tensor(quantities: Floats) -> Floats:
-    """Return the inertia of ten quantities as a matrix, shape (3, 3)."""
-    xx, yy, zz, xy, xz, yz = quantities[4:]
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
 def readings(quantities: Floats) -> tuple[Reading, Reading]:
     """Return both readings of ten printed quantities: about the centre of mass, and about the link's origin."""
     mass, com = quantities[0], quantities[1:4]
     steiner = mass * (com @ com * np.eye(3) - np.outer(com, com))
-    printed = tensor(quantities)
+    printed = inertia_matrix(quantities)
     return (
         Reading("the load's centre of mass", np.linalg.eigvalsh(printed)),
         Reading("the link's origin", np.linalg.eigvalsh(printed - steiner)),
     )
-
-
-def body(quantities: Floats) -> InertialParameters:
-    """Return the body of ten quantities, the inertia taken about the centre of mass."""
-    return InertialParameters(quantities[0], quantities[1:4], tensor(quantities))

@@ -1,71 +1,60 @@
-"""ETS-VII with a load on its last link, the manoeuvres allowed, and MuJoCo as the spacecraft that flies them."""
+"""ETS-VII with a load on its last link, what is known of it, and MuJoCo as the spacecraft that flies the plans."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from bayesid import BodyPrior, Load, Model, Recording, Robot
 from bayesid._math.arrays import Floats
-from bayesid.design import Criterion, Limits, PaperExcitation, Plan, PlannedMotion, Problem, Tip, TrajectoryFamily
-from studies.common.ets7 import TIP, ets7
-from studies.common.ets7_model import NOISE, extended_start, orbiting_model
-from studies.common.flight import fly, readings
+from bayesid.design import PaperExcitation, PlannedMotion
+from bayesid.simulation.effects import AccelBias
+from bayesid.simulation.model import RATE_SIGMA, spread_links
+from studies.common import mission
+from studies.common.ets7 import BASE, BIAS, LIMITS
+from studies.common.ets7_model import NOISE, orbiting_model
+from studies.common.flight import readings
+from studies.common.quantities import body_of
 from studies.load import paper
 
-__all__ = ["LOAD", "MuJoCoSpacecraft", "excitation", "model", "problem", "ship"]
+__all__ = ["LOAD", "SAFE", "MuJoCoSpacecraft", "excitation", "ideal", "load_unknown", "ship"]
 
 LOAD, LINK = "load", "link6"
 """Name of the load, and link that carries it."""
 
-DURATION, INTERVAL = 120.0, 0.5
-"""Length of a manoeuvre, and time between samples of all sensors [s]."""
-
-RANGE = np.pi / 2.0
-"""Joint range that the paper states, either way [rad]."""
-
-LIMITS = Limits(joint_speed=0.2)
-"""Limits of the manoeuvres: a joint speed [rad/s], since the paper states none."""
-
-JOLT = 2.0
-"""Time to either side of the places where (27) meets its connecting splines, within which readings of the base's
-sensors are left out [s]. The third derivative of the joints jumps there, which no smoothing of samples at 2 Hz follows:
-accelerations of the joints are wrong by some fifteen standard deviations."""
-
-PLAN_STEP, TRUTH_STEP = 2.0, 0.1
-"""Integration steps of design and truth [s]."""
+SAFE = replace(LIMITS, base_rotation=0.5)
+"""Rule of the flight, and a bound on the rotation of the base [rad], which depends on the load."""
 
 
-def ship(load: Floats = paper.GUESS) -> Robot:
-    """Return ETS-VII with the paper's joint ranges and a load of ten quantities."""
-    shipped = ets7()
-    urdf = shipped.urdf.replace('"-6.283185307179586"', f'"{-RANGE!r}"').replace('"6.283185307179586"', f'"{RANGE!r}"')
-    return Robot.from_string(urdf).with_load(Load(LOAD, LINK, paper.body(load)))
+def ship(load: Floats = paper.GUESS, robot: Robot | None = None) -> Robot:
+    """Return ETS-VII, by default with the nominal arm, and a load of ten quantities."""
+    return (mission.ship() if robot is None else robot).with_load(Load(LOAD, LINK, body_of(load)))
 
 
-def model(spread: float, rate_sigma: float = 0.0) -> Model:
-    """Return what is known before the first manoeuvre: the paper's guess of the load, in orbit, at rest.
+def load_unknown(spread: float, arm_spread: float) -> Model:
+    """Return what is known before the first manoeuvre: the base exactly, the arm to some width, the paper's guess.
 
     Parameters
     ----------
-    spread : float
-        Relative width of the load's prior.
-    rate_sigma : float
-        Standard deviation of the prior of the initial rate [rad/s].
+    spread, arm_spread : float
+        Relative widths of the priors of the load and of the links.
     """
-    return orbiting_model(ship(), [BodyPrior(LOAD, paper.body(paper.GUESS), spread)], rate_sigma=rate_sigma)
+    robot = ship()
+    links = spread_links(robot, arm_spread, (BASE, LOAD))
+    prior = BodyPrior(LOAD, body_of(paper.GUESS), spread)
+    return orbiting_model(robot, [prior, *links], AccelBias(BIAS), rate_sigma=RATE_SIGMA)
+
+
+def ideal() -> Model:
+    """Return the model of the paper, without noise: exact arm, base at rest, no bias of the accelerometer."""
+    return orbiting_model(ship(), [BodyPrior(LOAD, body_of(paper.GUESS), 1.0)], rate_sigma=0.0)
 
 
 def excitation() -> PaperExcitation:
     """Return the paper's motion (27): the first three joints oscillate, the wrist is extended."""
-    return PaperExcitation(extended_start(), DURATION)
-
-
-def problem(known: Model, family: TrajectoryFamily, *criteria: Criterion, limits: Limits = LIMITS) -> Problem:
-    """Return the design problem of a family of manoeuvres."""
-    plan = Plan(known, family, interval=INTERVAL, tip=Tip.of(known.robot, TIP), step=PLAN_STEP, thinning=4)
-    return Problem(plan, limits, criteria)
+    return PaperExcitation(mission.start(), mission.DURATION)
 
 
 @dataclass(frozen=True)
@@ -75,24 +64,31 @@ class MuJoCoSpacecraft:
     Parameters
     ----------
     seed : int, optional
-        Seed of the noise; there is none where left out.
-    jolts : tuple of float
-        Times [s] about which the readings of the base's sensors are left out (`JOLT`).
+        Seed of arm, bias and noise; the arm is nominal and there is no noise where left out.
+    arm_spread : float
+        Relative width of the distribution from which the true arm is drawn.
     """
 
     seed: int | None = None
-    jolts: tuple[float, ...] = ()
+    arm_spread: float = 0.0
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot as it truly is."""
+        if self.seed is None or self.arm_spread == 0.0:
+            return ship(paper.TRUTH)
+        return ship(paper.TRUTH, mission.true_arm(mission.ship(), np.random.default_rng(self.seed), self.arm_spread))
+
+    def motion(self, plan: Recording) -> PlannedMotion:
+        """Return the motion of the joints that a plan leads to."""
+        return PlannedMotion(plan, [joint.name for joint in self.robot.joints])
 
     def execute(self, plan: Recording) -> Recording:
         """Fly a plan and return its recording."""
-        robot = ship(paper.TRUTH)
-        joints = [joint.name for joint in robot.joints]
-        run = fly(robot, PlannedMotion(plan, joints), plan.time, step=TRUTH_STEP)
+        truth = mission.fly(self.motion(plan), self.robot)
         rng = None if self.seed is None else np.random.default_rng([self.seed, *plan.name.encode()])
-        channels = readings(run, joints, NOISE, rng, by_channel=NOISE)
-        left_out = np.zeros(len(plan.time), dtype=bool)
-        for jolt in self.jolts:
-            left_out |= np.abs(plan.time - jolt) <= JOLT
-        for name in (name for name in channels if not name.startswith("position.")):
-            channels[name] = np.where(left_out, np.nan, channels[name])
+        if self.seed is not None:
+            bias = BIAS * np.random.default_rng([self.seed, 1]).standard_normal(3)
+            truth = truth._replace(accel=truth.accel + bias)
+        channels = readings(truth, [joint.name for joint in self.robot.joints], NOISE, rng, by_channel=NOISE)
         return Recording(plan.name, None, plan.time, channels)

@@ -1,0 +1,179 @@
+"""Fits of many noisy recordings of one manoeuvre, each with an arm of its own: what a predicted posterior is worth.
+
+Every recording is smoothed as a real one. What is shared is the whitening and the Jacobian of the planned manoeuvre:
+the mode is found by Gauss-Newton steps with that Jacobian, which is much cheaper than a fit from nothing and, where the
+recordings determine the base, ends within a small part of a standard deviation of it (`Fit.last_step`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.design import planned_manoeuvre, planned_posterior
+from bayesid.design.designed import sample_times
+from bayesid.design.predicted_posterior import Predicted, describe
+from bayesid.inference.data import Data, grids_of, stacked
+from bayesid.inference.noise_changes import relinearised
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.recorded_samples import RecordedSamples
+from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.simulation.model import Manoeuvre
+from studies.common import mission
+from studies.common.ets7 import BASE, INTERVAL
+from studies.common.models import ARM_SPREAD
+from studies.common.monte_carlo import run_trials
+
+__all__ = ["Realised", "Reference", "reference", "repeat"]
+
+STEPS = 4
+"""Number of Gauss-Newton steps of every fit."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Planned manoeuvre about which recordings are fitted.
+
+    Attributes
+    ----------
+    posterior : Posterior
+        Posterior of the manoeuvre as it would be recorded without noise.
+    inverse : (n, m) array
+        Pseudo-inverse of the Jacobian of its residuals, prior included.
+    predicted : Predicted
+        Predicted posterior of the base.
+    """
+
+    posterior: Posterior
+    inverse: Floats
+    predicted: Predicted
+
+    def given(self, manoeuvre: Manoeuvre) -> Posterior:
+        """Return the posterior of a recording with the whitening of the plan."""
+        model, plan = self.posterior.model, self.posterior.data
+        recorded = (RecordedSamples.of(model, manoeuvre),)
+        grids = grids_of(model, [manoeuvre], recorded, plan.step)
+        arrays = stacked(model, [manoeuvre], recorded, grids, plan.whitenings)
+        data = Data(model, (manoeuvre,), recorded, plan.whitenings, plan.left_out, plan.step, arrays)
+        return replace(self.posterior, data=data)
+
+
+@cache
+def reference(parameters: tuple[float, ...], points: int, arm_spread: float) -> Reference:
+    """Return what all fits of a manoeuvre share.
+
+    Parameters
+    ----------
+    parameters : tuple of float
+        Parameters of the manoeuvre among `studies.common.mission.splines`.
+    points : int
+        Number of free control points of every joint.
+    arm_spread : float
+        Relative width of the links' priors.
+    """
+    model, motion = mission.base_unknown(arm_spread), mission.splines(points).motion(np.array(parameters))
+    times = sample_times(mission.DURATION, INTERVAL)
+    plan = planned_posterior(model, [planned_manoeuvre(model, motion, times, "plan", mission.ENCODERS)])
+    z = np.zeros(plan.size)
+    plan = relinearised(plan, z)
+    jacobian = plan.jacobian(z)
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
+    return Reference(plan, covariance @ jacobian.T, describe(plan, z, covariance))
+
+
+@dataclass(frozen=True)
+class Realised:
+    """Errors of fits beside what was predicted of them.
+
+    Attributes
+    ----------
+    errors : (N, 10) array
+        Estimates of the base's quantities less the truth.
+    predicted : (10,) array
+        Predicted standard deviations.
+    last_step : (N,) array
+        Largest change of a coordinate in the last step of every fit, in predicted standard deviations.
+    """
+
+    errors: Floats
+    predicted: Floats
+    last_step: Floats
+
+    @property
+    def rms(self) -> Floats:
+        """Root mean square error over the predicted standard deviation, shape (10,)."""
+        return np.sqrt((self.errors**2).mean(axis=0)) / self.predicted
+
+    @property
+    def rms_error(self) -> float:
+        """Standard error of one entry of `rms` where the prediction is right."""
+        return float(1.0 / np.sqrt(2.0 * len(self.errors)))
+
+    @property
+    def ratio(self) -> float:
+        """Geometric mean of `rms`."""
+        return float(np.exp(np.log(self.rms).mean()))
+
+
+@dataclass(frozen=True)
+class _Task:
+    """One flight and its fit."""
+
+    parameters: tuple[float, ...]
+    points: int
+    arm_spread: float
+
+
+def repeat(
+    parameters: Floats,
+    points: int,
+    count: int,
+    *,
+    seed: int,
+    arm_spread: float = ARM_SPREAD,
+    store: Path | None = None,
+    workers: int = 1,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Realised:
+    """Fly a manoeuvre many times in MuJoCo, each time with an arm, a bias and noise of its own, and fit the base.
+
+    Parameters
+    ----------
+    parameters : (n,) array
+        Parameters of the manoeuvre.
+    points : int
+        Number of free control points of every joint.
+    count : int
+        Number of flights.
+    arm_spread : float
+        Relative width of the links' priors, from which the true arm of every flight is drawn.
+    seed, store, workers, progress
+        See `studies.common.monte_carlo.run_trials`.
+    """
+    task = _Task(tuple(map(float, parameters)), points, arm_spread)
+    outcomes = run_trials(estimate, [task] * count, store, seed=seed, workers=workers, progress=progress).complete()
+    shared = reference(task.parameters, points, arm_spread)
+    errors, last = (np.array([outcome[key] for outcome in outcomes]) for key in ("error", "last_step"))
+    return Realised(errors, shared.predicted.sd, last)
+
+
+def estimate(task: _Task, rng: np.random.Generator) -> dict[str, Any]:
+    """Fly once, fit, and return the error of the base's quantities and the last step of the fit."""
+    shared = reference(task.parameters, task.points, task.arm_spread)
+    robot = mission.true_arm(mission.ship(), rng, task.arm_spread)
+    motion = mission.splines(task.points).motion(np.array(task.parameters))
+    posterior = shared.given(mission.recorded(mission.fly(motion, robot), rng))
+    z, step = np.zeros(posterior.size), np.zeros(posterior.size)
+    for _ in range(STEPS):
+        step = shared.inverse @ posterior.least_squares(z)
+        z = z - step
+    truth = mass_com_inertia(robot.link(BASE).inertial.vector)
+    sd = np.linalg.norm(shared.inverse, axis=1)
+    found = mass_com_inertia(posterior.unknowns.inertials(z)[0].vector)
+    return {"error": found - truth, "last_step": float(np.abs(step / sd).max())}
