@@ -88,15 +88,18 @@ class FlightManoeuvre:
         Excursion between the ramps [rad].
     corner : float or None
         Length of the rounded corners of linear ramps [s]; None makes each ramp one quintic.
+    earlier : float
+        Time by which all of it happens earlier than `RAMPS` [s].
     """
 
     start: Floats
     excursion: Floats = field(default_factory=lambda: EXCURSION)
     corner: float | None = CORNER
+    earlier: float = 0.0
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,)."""
-        time = np.asarray(time, dtype=float)
+        time = np.asarray(time, dtype=float) + self.earlier
         share = np.zeros((3, len(time)))
         for sign, (begin, end) in zip((1.0, -1.0), RAMPS, strict=True):
             if self.corner is None:

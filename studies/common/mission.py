@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesid import BodyPrior, Kind, Manoeuvre, Model, Robot
+from bayesid import Kind, Manoeuvre, Model, Robot
 from bayesid._math.arrays import Floats
 from bayesid.design import BSplines, Criterion, Limits, Plan, Problem, Tip, TrajectoryFamily
 from bayesid.design.designed import sample_times
@@ -21,13 +21,37 @@ from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import draw_inertial
 from bayesid.simulation.model import spread_links
 from studies.common import flight
-from studies.common.ets7 import ACCEL, BASE, BIAS, ENCODER, INTERVAL, LIMITS, RATE, TIP, ets7
+from studies.common.ets7 import (
+    ACCEL,
+    BASE,
+    BIAS,
+    ENCODER,
+    EXCURSION,
+    INTERVAL,
+    LIMITS,
+    RAMPS,
+    RATE,
+    TIP,
+    FlightManoeuvre,
+    ets7,
+)
 from studies.common.ets7_model import extended_start
 from studies.common.models import ARM_SPREAD, base_model
 from studies.truth.mujoco import Truth
 
-__all__ = ["DURATION", "ENCODERS", "POINTS", "REACH", "ROWS", "TRUTH_STEP", "base_unknown", "fly", "problem", "recorded"]
-__all__ += ["ship", "splines", "start", "true_arm"]
+__all__ = [
+    "DURATION",
+    "ENCODERS",
+    "POINTS",
+    "REACH",
+    "ROWS",
+    "TRUTH_STEP",
+    "base_unknown",
+    "fly",
+    "problem",
+    "recorded",
+]
+__all__ += ["problem", "recorded", "ship", "splines", "start", "true_arm"]
 
 DURATION = 120.0
 """Length of every manoeuvre [s]."""
@@ -72,6 +96,12 @@ def base_unknown(arm_spread: float = ARM_SPREAD, **options: Any) -> Model:
     """
     options = {"robot": ship(), **options}
     return base_model({Kind.RATE: RATE, Kind.ACCEL: ACCEL}, arm_spread=arm_spread, **options)
+
+
+def flight_manoeuvre(size: float = 1.0) -> FlightManoeuvre:
+    """Return the flight's own manoeuvre, or a part of it, in the middle of the mission's duration."""
+    middle = 0.5 * (RAMPS[0][0] + RAMPS[-1][-1])
+    return FlightManoeuvre(start(), size * EXCURSION, earlier=middle - 0.5 * DURATION)
 
 
 def splines(points: int = POINTS, duration: float = DURATION) -> BSplines:

@@ -1,104 +1,134 @@
 """What ETS-VII itself could have identified within its flight rules, in what time, and with which sensors.
 
-A manoeuvre of all six joints is designed within 50 mm/s and 5 degrees a second at the tip. Its information is rescaled
-for other sensors, repeated, and evaluated with an arm that is not known exactly. It is compared with the flight's
-manoeuvre, and the predicted standard deviations are checked with MuJoCo. ``python -m studies.ets7_limits`` writes
+The d-optimal manoeuvre of `studies.excitation`, within 50 mm/s and 5 degrees a second at the tip, is taken from the
+table beside that study's report. Its information is rescaled for other sensors, repeated, and evaluated with an arm
+that is not known exactly, beside that of the flight's own manoeuvre. ``python -m studies.ets7_limits`` writes
 ``reports/ets7_limits.pdf``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from bayesid.app.compilation_cache import keep_compiled
-from bayesid.design import Search, Store
-from studies.common.command import TRIALS, Command
-from studies.common.models import ARM_SPREAD
-from studies.ets7_limits.analysis import ACCELS, CHECKED, RATES, answers, design_manoeuvre, information_of, widths
-from studies.ets7_limits.check import Planned, check
-from studies.ets7_limits.report import Result, write_report
-from studies.ets7_limits.setting import DURATION, POINTS, limits_problem
+from bayesid.recording.joint_motion import Motion
+from studies.common import mission
+from studies.common.command import Command
+from studies.common.quantities import HEADINGS
+from studies.ets7_limits.analysis import (
+    ACCELS,
+    DESIGN,
+    RATES,
+    USUAL,
+    Answer,
+    Widths,
+    answers,
+    designed_motion,
+    information_of,
+    read_rows,
+    widths,
+)
 
 __all__ = ["Result", "main", "run"]
-
-SEARCH = Search()
-"""Effort of the search."""
 
 REPETITIONS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5)
 """Numbers of repetitions at which the accuracy is drawn."""
 
 
+@dataclass(frozen=True)
+class Result:
+    """Content of the report.
+
+    Attributes
+    ----------
+    motion : Motion
+        The designed manoeuvre.
+    answers : mapping
+        Answers by labels of rate and accelerometer, then by whether the arm and the bias are known.
+    after : mapping of str to Widths
+        Standard deviations from the ``designed`` manoeuvre and from that of the ``flight``.
+    repetitions : sequence of float
+        Numbers of repetitions of the curves.
+    curves : mapping
+        Largest relative standard deviations by manoeuvre and whether the arm is known.
+    difference : float
+        Largest relative difference of the standard deviations from those that `studies.excitation` states.
+    realised : tuple of (int, float, float)
+        Number of flights of the same manoeuvre in `studies.excitation`, and smallest and largest ratio of realised to
+        predicted errors.
+    """
+
+    motion: Motion
+    answers: Mapping[tuple[str, str], Mapping[tuple[bool, bool], Answer]]
+    after: Mapping[str, Widths]
+    repetitions: Sequence[float]
+    curves: Mapping[tuple[str, bool], Sequence[float]]
+    difference: float
+    realised: tuple[int, float, float]
+
+
 def run(
+    folder: Path,
     *,
-    seed: int = 1,
-    duration: float = DURATION,
-    points: int = POINTS,
-    search: Search = SEARCH,
-    noises: int = 40,
     rates: Sequence[str] = tuple(RATES),
     accels: Sequence[str] = tuple(ACCELS),
-    arm_spread: float = ARM_SPREAD,
-    store: Store | None = None,
-    trials: Path | None = None,
-    workers: int = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the study.
 
     Parameters
     ----------
-    seed : int
-        Seed of all random numbers.
-    duration : float
-        Length of the designed manoeuvre [s].
-    points : int
-        Number of free control points of every joint.
-    search : Search
-        Effort of the search.
-    noises : int
-        Number of recordings of the check.
+    folder : Path
+        Folder with the tables of `studies.excitation`.
     rates, accels : sequence of str
         Labels of the sensors.
-    arm_spread : float
-        Relative width of the arm's priors where it is not known exactly; 0 where it always is.
-    store : Store, optional
-        Store that keeps the starts of the search.
-    trials, workers
-        File and number of processes of the check's fits; see `studies.common.monte_carlo.run_trials`.
     progress : callable
         Receives a line on what is being done.
     """
-    designed = design_manoeuvre(limits_problem(duration, points), seed, search, store or Store.forgetful(), progress)
-    both = dict(zip(("designed", "flight"), information_of(designed, arm_spread), strict=True))
-    table = answers(both["designed"], rates, {label: ACCELS[label] for label in accels}, progress)
+    motion = designed_motion(folder / "excitation-manoeuvres.csv")
+    information = information_of(motion)
+    table = answers(information["designed"], rates, {label: ACCELS[label] for label in accels}, progress)
     curves = {
-        (name, known): [information.repeated(CHECKED, known).worst(count) for count in REPETITIONS]
-        for name, information in both.items()
+        (name, known): [own.repeated(USUAL, known).worst(count) for count in REPETITIONS]
+        for name, own in information.items()
         for known in (True, False)
     }
-    progress("flights of the independent simulator")
-    planned = Planned(tuple(map(float, designed.optimum.parameters)), duration, points)
-    checked = check(planned, noises, seed, trials, workers, progress)
-    after_one = {name: widths(information) for name, information in both.items()}
-    return Result(designed, table, after_one["designed"], after_one["flight"], REPETITIONS, curves, checked, duration)
+    after = {name: widths(own) for name, own in information.items()}
+    return Result(motion, table, after, REPETITIONS, curves, _difference(after["designed"], folder), _realised(folder))
+
+
+def _difference(after: Widths, folder: Path) -> float:
+    """Return the largest relative difference from the standard deviations in the table of `studies.excitation`."""
+    stated = {row["arm"]: row for row in read_rows(folder / "excitation-predicted.csv") if row["manoeuvre"] == DESIGN}
+    found = dict(zip(mission.ROWS, (after.uncertain, after.exact), strict=True))
+    values = {arm: np.array([float(row[f"sd {heading}"]) for heading in HEADINGS]) for arm, row in stated.items()}
+    return float(max(np.abs(found[arm] / values[arm] - 1.0).max() for arm in mission.ROWS))
+
+
+def _realised(folder: Path) -> tuple[int, float, float]:
+    row = next(row for row in read_rows(folder / "excitation-realised.csv") if row["manoeuvre"] == DESIGN)
+    ratios = [float(row[f"rms / predicted sd, {heading}"]) for heading in HEADINGS]
+    return int(row["flights"]), min(ratios), max(ratios)
 
 
 COMMAND = Command(
     "ets7_limits",
     "Say what ETS-VII could have identified within its rules.",
-    seed=1,
-    extra={
-        "--store": {"type": Path, "help": "file that keeps the starts of the search, for an interrupted run"},
-        **TRIALS,
-    },
+    extra={"--tables": {"type": Path, "default": Path("reports"), "help": "folder with the tables of excitation"}},
 )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
+    from studies.common.provenance import MODELS, study_origin
+    from studies.ets7_limits.report import write_report
+
     options = COMMAND.parse(arguments)
     keep_compiled()
-    store = None if options.store is None else Store.open(options.store, f"ets7-limits {options.seed} {SEARCH}")
-    result = run(seed=options.seed, store=store, trials=options.trials, workers=options.workers, progress=print)
-    write_report(result, options.output)
+    inputs = [MODELS / "ets7.urdf", options.tables / "excitation-manoeuvres.csv"]
+    result = run(options.tables, progress=lambda text: print(text, flush=True))
+    write_report(result, options.output, study_origin("ets7_limits", options, inputs))

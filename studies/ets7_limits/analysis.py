@@ -1,26 +1,26 @@
-"""Evaluation of the designed manoeuvre and of the flown one."""
+"""Evaluation of the designed manoeuvre and of the flown one with many sensors."""
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from bayesid import White
+from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.design import Found, Problem, Search, Store, optimise
-from bayesid.design.design_problem import Reached
-from bayesid.design.plan import Trajectory
-from bayesid.design.trajectories import ParameterisedMotion
+from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.sensors import Noise, StarTracker
-from studies.common.ets7 import ACCEL, RATE, START, FlightManoeuvre
-from studies.common.models import ARM_SPREAD
+from studies.common import mission
+from studies.common.ets7 import ACCEL, RATE
 from studies.common.quantities import JUDGED
 from studies.ets7_limits.information import LONGEST, Grade, ManoeuvreInformation, wide_posterior
 
-__all__ = ["ACCELS", "CHECKED", "RATES", "Answer", "Designed", "Widths", "answers", "design_manoeuvre"]
-__all__ += ["information_of", "widths"]
+__all__ = ["ACCELS", "DESIGN", "RATES", "USUAL", "Answer", "Widths", "answers", "designed_motion", "information_of"]
+__all__ += ["read_rows", "widths"]
 
 RATES: dict[str, Noise] = {
     "star sensor 2″": StarTracker(2.0),
@@ -32,30 +32,11 @@ RATES: dict[str, Noise] = {
 ACCELS = {"none": None, "10⁻⁴": 1e-4, "10⁻⁵": 1e-5, "10⁻⁷": 1e-7, "10⁻⁹": 1e-9}
 """Noise per sample of the accelerometers by label [m/s2]."""
 
-CHECKED = Grade(White(RATE), ACCEL)
-"""Sensors of the flights in the independent simulator, and those that the manoeuvre is designed for."""
+USUAL = Grade(White(RATE), ACCEL)
+"""Sensors of the mission, for which the manoeuvre was designed."""
 
-
-@dataclass(frozen=True)
-class Designed:
-    """The designed manoeuvre.
-
-    Attributes
-    ----------
-    optimum : Found
-        Outcome of the search.
-    reached : list of Reached
-        Limits and the largest values along the manoeuvre.
-    trajectory : Trajectory
-        Motion of joints, tip and base.
-    motion : ParameterisedMotion
-        Motion of the joints.
-    """
-
-    optimum: Found
-    reached: list[Reached]
-    trajectory: Trajectory
-    motion: ParameterisedMotion
+DESIGN = "d-optimal"
+"""Manoeuvre of `studies.excitation` that is taken."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +63,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Widths:
-    """Standard deviations of the base's ten quantities from one manoeuvre with the sensors of `CHECKED`.
+    """Standard deviations of the base's ten quantities from one manoeuvre with the mission's sensors.
 
     Attributes
     ----------
@@ -99,44 +80,42 @@ class Widths:
     exact: Floats
     uncertain: Floats
 
-    @property
-    def worst(self) -> float:
-        """Largest relative standard deviation of mass and moments with the arm known exactly."""
-        return float((self.exact[JUDGED] / self.truth[JUDGED]).max())
+    def worst(self, known: bool) -> float:
+        """Return the largest relative standard deviation of mass and moments."""
+        return float(((self.exact if known else self.uncertain)[JUDGED] / self.truth[JUDGED]).max())
 
 
-def design_manoeuvre(
-    problem: Problem, seed: int, search: Search, store: Store, progress: Callable[[str], None]
-) -> Designed:
-    """Design the manoeuvre that leaves the posterior of the base the smallest volume."""
-    kept = store.of("d-optimal")
-    optimum = optimise(
-        problem,
-        problem.criteria[0],
-        np.random.default_rng(seed),
-        search,
-        known=kept.known,
-        keep=kept.keep,
-        progress=lambda fraction, text: progress(text),
-    )
-    parameters = optimum.parameters
-    motion = problem.plan.family.motion(parameters)
-    return Designed(optimum, problem.reached(parameters), problem.trajectory(parameters), motion)
+def read_rows(file: Path) -> list[dict[str, str]]:
+    """Return the rows of a table that another study has written beside its report.
+
+    Raises
+    ------
+    InputError
+        If there is no such file.
+    """
+    if not file.is_file():
+        raise InputError("the table is missing", file=file, remedy="Run python -m studies.excitation first")
+    with file.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
 
 
-def information_of(
-    designed: Designed, arm_spread: float = ARM_SPREAD
-) -> tuple[ManoeuvreInformation, ManoeuvreInformation]:
-    """Return the information of the designed manoeuvre and of the flight's."""
-    duration = designed.motion.family.duration
-    wide = wide_posterior(designed.motion, None, duration, arm_spread)
-    flown = wide_posterior(FlightManoeuvre(START), wide, duration)
-    return ManoeuvreInformation(wide), ManoeuvreInformation(flown)
+def designed_motion(file: Path) -> Motion:
+    """Return the d-optimal manoeuvre that `studies.excitation` has found, from the table that it wrote."""
+    row = next(row for row in read_rows(file) if row["manoeuvre"] == DESIGN)
+    names = [name for name in row if name != "manoeuvre"]
+    family = mission.splines(len(names) // 6)
+    return family.motion(np.array([float(row[name]) for name in family.names]))
+
+
+def information_of(motion: Motion) -> dict[str, ManoeuvreInformation]:
+    """Return the information of the designed manoeuvre and of the flight's, by name."""
+    posteriors = {"designed": wide_posterior(motion), "flight": wide_posterior(mission.flight_manoeuvre())}
+    return {name: ManoeuvreInformation(posterior) for name, posterior in posteriors.items()}
 
 
 def widths(information: ManoeuvreInformation) -> Widths:
     """Return the standard deviations from one manoeuvre."""
-    exact, uncertain = (information.repeated(CHECKED, known) for known in (True, False))
+    exact, uncertain = (information.repeated(USUAL, known) for known in (True, False))
     return Widths(information.prior.values, exact.sd(0.0), exact.sd(1.0), uncertain.sd(1.0))
 
 

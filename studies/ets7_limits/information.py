@@ -18,10 +18,9 @@ from bayesid.inference.noise_changes import with_sensors
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.sensors import Noise
-from studies.common.ets7 import ACCELEROMETER, ENCODER, INTERVAL
-from studies.common.models import ARM_SPREAD
+from studies.common import mission
+from studies.common.ets7 import ACCELEROMETER, INTERVAL
 from studies.common.quantities import JUDGED
-from studies.ets7_limits.setting import DURATION, model_of
 
 __all__ = ["LONGEST", "Grade", "ManoeuvreInformation", "Repeated", "wide_posterior"]
 
@@ -132,22 +131,7 @@ class ManoeuvreInformation:
         return Knowledge(*linearise(self.posterior, np.zeros(size)), np.eye(size))
 
 
-def wide_posterior(
-    motion: Motion, like: Posterior | None = None, duration: float = DURATION, arm_spread: float = ARM_SPREAD
-) -> Posterior:
-    """Return the posterior of a planned manoeuvre with the arm unknown too.
-
-    Parameters
-    ----------
-    motion : Motion
-        Planned motion of the joints.
-    like : Posterior, optional
-        Posterior whose model and whitening are taken.
-    duration : float
-        Length of the manoeuvre [s].
-    arm_spread : float
-        Relative width of the links' priors.
-    """
-    model = model_of(arm_spread) if like is None else like.model
-    manoeuvre = planned_manoeuvre(model, motion, sample_times(duration, INTERVAL), "manoeuvre", {0: ENCODER})
-    return planned_posterior(model, [manoeuvre], like)
+def wide_posterior(motion: Motion) -> Posterior:
+    """Return the posterior of a planned manoeuvre with the arm unknown too."""
+    model, times = mission.base_unknown(), sample_times(mission.DURATION, INTERVAL)
+    return planned_posterior(model, [planned_manoeuvre(model, motion, times, "plan", mission.ENCODERS)])

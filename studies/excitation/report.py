@@ -8,15 +8,25 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid.report import Document
-from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_legend, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent
 from studies.common import mission
 from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE
 from studies.common.goals import Goal, Verdict
+from studies.common.manoeuvre_figure import manoeuvre_figure
 from studies.common.quantities import HEADINGS, LABELS
 from studies.common.tables import add_number_table
-from studies.common.template import Finding, Setup, Statement, Summary, add_first_page, add_setup, add_statements
-from studies.common.template import write_study, write_table
+from studies.common.template import (
+    Finding,
+    Setup,
+    Statement,
+    Summary,
+    add_first_page,
+    add_setup,
+    add_statements,
+    write_study,
+    write_table,
+)
 from studies.excitation import Result
 from studies.excitation.contest import Contest
 
@@ -93,7 +103,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         goals=reached,
         valid=(
             f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and keep 50 "
-            "mm/s and 5 degrees per second at the tip; the base starts at rest and nothing but the gravity gradient acts"
+            "mm/s and 5 degrees per second at the tip; the base rests at first and only the gravity gradient acts."
         ),
         full=result.full,
     )
@@ -156,7 +166,10 @@ def _evidence(document: Document, result: Result) -> None:
                 )
             ]
             rows.append([title, *numbers])
-    header = ["manoeuvre", *(f"{key}, {arm}" for arm in ("5 %", "exact") for key in ("factor", "worst", "mass sd [kg]"))]
+    header = [
+        "manoeuvre",
+        *(f"{key}, {arm}" for arm in ("5 %", "exact") for key in ("factor", "worst", "mass sd [kg]")),
+    ]
     add_number_table(
         document,
         header,
@@ -164,8 +177,9 @@ def _evidence(document: Document, result: Result) -> None:
         "Predicted posteriors, arm known to 5 % and exactly. Factor: geometric-mean sd of (26) as printed over that of "
         "the manoeuvre; worst: largest relative sd of mass and moments of inertia; and the sd of the base's mass.",
     )
+    drawn = {TITLES[name]: contest.motions[name] for name in DRAWN if name in contest.motions}
     document.figure(
-        _motion_figure(contest), "Joint positions, speed of the tip (the rule dotted) and rotation of the base."
+        manoeuvre_figure(drawn), "Joint positions, speed of the tip (the rule dotted) and rotation of the base."
     )
 
 
@@ -225,7 +239,10 @@ def _write_tables(result: Result, output: Path) -> list[str]:
     tables = [
         write_table(output, "predicted", ["manoeuvre", "arm", *(f"sd {text}" for text in HEADINGS)], sds),
         write_table(
-            output, "manoeuvres", ["manoeuvre", *names], [[item.name, *map(float, item.parameters)] for item in designed]
+            output,
+            "manoeuvres",
+            ["manoeuvre", *names],
+            [[item.name, *map(float, item.parameters)] for item in designed],
         ),
     ]
     realised = [[name, len(item.errors), *map(float, item.rms)] for name, item in result.realised.items()]
@@ -245,37 +262,14 @@ def _factor_figure(contest: Contest) -> Figure:
     axes.axvline(1.0, color="#888888", linewidth=0.8)
     axes.axvline(WANTED, color="#888888", linewidth=0.8, linestyle=":")
     axes.text(WANTED, place[-1] + 0.45, " wanted of the condition number", va="bottom", ha="left", fontsize=7)
-    axes.set(xscale="log", xlabel="geometric-mean sd over that of the d-optimal manoeuvre", ylim=(-0.6, place[-1] + 1.2))
+    axes.set(
+        xscale="log", xlabel="geometric-mean sd over that of the d-optimal manoeuvre", ylim=(-0.6, place[-1] + 1.2)
+    )
     axes.set_yticks(place, [TITLES[name] for name in names])
     ticks = [value for value in (0.5, 1, 2, 5, 10, 20, 50, 100) if value < 1.2 * axes.get_xlim()[1]]
     axes.set_xticks(ticks, [f"{value:g}" for value in ticks])
     axes.minorticks_off()
     axes.legend(loc="lower right")
-    return figure
-
-
-@styled
-def _motion_figure(contest: Contest) -> Figure:
-    figure = wide_figure(4.2)
-    shown = [name for name in DRAWN if name in contest.motions]
-    panels = figure.subplots(3, len(shown), sharex=True, sharey="row", squeeze=False)
-    from studies.common.tip_watch import flown_along
-
-    for (top, middle, bottom), name in zip(panels.T, shown, strict=True):
-        motion = contest.motions[name]
-        course = flown_along(mission.ship(), motion, mission.DURATION)
-        position = motion.evaluate(course.time).position
-        for joint in range(6):
-            label = f"joint {joint + 1}" if name == shown[0] else None
-            top.plot(course.time, position[:, joint], label=label, **curve_style(joint))
-        middle.plot(course.time, 1e3 * course.tip_speed, color=COLOURS[0])
-        middle.axhline(50.0, color="black", linestyle=":", linewidth=0.8)
-        bottom.plot(course.time, np.degrees(course.base_rotation), color=COLOURS[1])
-        top.set_title(TITLES[name])
-        bottom.set_xlabel("time [s]")
-    for axes, label in zip(panels[:, 0], ("joints [rad]", "tip speed [mm/s]", "base rotation [deg]"), strict=True):
-        axes.set_ylabel(label)
-    shared_legend(figure, panels[0, 0], 6)
     return figure
 
 

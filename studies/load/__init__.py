@@ -72,13 +72,15 @@ COMMAND = Command(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
+    from studies.common.provenance import study_origin
     from studies.load.report import write_report
 
     options = COMMAND.parse(arguments)
     keep_compiled()
     folder = options.folder / ("full" if options.full else "quick")
     folder.mkdir(parents=True, exist_ok=True)
-    write_report(run(folder, full=options.full, seed=options.seed, progress=_show), options.output)
+    result = run(folder, full=options.full, seed=options.seed, progress=_show)
+    write_report(result, options.output, study_origin("load", options))
 
 
 def _show(fraction: float, text: str) -> None:

@@ -2,52 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
-
 import numpy as np
 from matplotlib.figure import Figure
 
-from bayesid.inference.body_quantities import BODY_QUANTITIES
-from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_legend, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
+from studies.common.quantities import LABELS
 from studies.load import paper
 from studies.load.noise_free import Iteration
-from studies.load.sampled import Flight
+from studies.load.safe_loop import GOAL, LIMITED, Flight
+from studies.load.setting import SAFE
 
-__all__ = ["error_figure", "motion_figure", "width_figure"]
+__all__ = ["TITLES", "error_figure", "loop_figure"]
 
-LABELS = [key.replace("inertia.", "I ").replace("com.", "c ") for key in BODY_QUANTITIES]
-"""Short labels of the ten quantities."""
+TITLES = {"loop": "arm known to 5 %", "exact": "arm known exactly"}
+"""What is known of the arm, the headline first."""
 
-FILLS = ("none", "full")
-"""Markers of the first and the second iteration or step, open and filled."""
+LIMIT_TITLES = {"tip_speed": "tip speed", "tip_rate": "tip rate", "base_rotation": "base rotation"}
+"""Titles of the limits."""
 
 
 @styled
-def motion_figure(iterations: Sequence[Iteration]) -> Figure:
-    """Draw the joints that move and the base's rate, in both noise-free iterations."""
-    figure = wide_figure(3.6)
-    panels = figure.subplots(2, 2, sharex=True)
-    for number, ((joints, rates), iteration) in enumerate(zip(panels.T, iterations, strict=True), start=1):
-        recording = iteration.recording
-        for index in range(3):
-            position = recording.channels[f"position.joint{index + 1}"]
-            joints.plot(recording.time, position, label=f"joint {index + 1}", **curve_style(index))
-        time, rate = recording.vector("rate")
-        for index, axis in enumerate("xyz"):
-            rates.plot(time, 1e3 * rate[:, index], label=axis, **curve_style(index))
-        joints.set_title(f"iteration {number}")
-        rates.set_xlabel("time [s]")
-    for row, label in zip(panels, ("joints [rad]", "rate of the base [mrad/s]"), strict=True):
-        row[0].set_ylabel(label)
-        row[1].legend(loc="upper right")
+def loop_figure(flights: dict[str, Flight]) -> Figure:
+    """Draw the error and the standard deviation of the mass after every manoeuvre, and what it used of the limits."""
+    figure = wide_figure(2.6)
+    left, right = figure.subplots(1, 2)
+    for index, (name, flight) in enumerate(flights.items()):
+        steps = np.arange(1, len(flight.bodies) + 1)
+        error = [abs(flight.error(step - 1)[0]) for step in steps]
+        sd = [flight.relative(step - 1)[0] for step in steps]
+        left.plot(steps, sd, "-", color=COLOURS[index], label=f"sd, {TITLES[name]}")
+        left.plot(steps, error, "o", color=COLOURS[index], markersize=4, label=f"error, {TITLES[name]}")
+    left.axhline(GOAL, color="#888888", linestyle=":")
+    left.text(0.55, 1.1 * GOAL, "wanted", fontsize=8, va="bottom")
+    flown = next(iter(flights.values()))
+    steps = np.arange(1, len(flown.bodies) + 1)
+    left.set(yscale="log", xlabel="manoeuvre", ylabel="of the load's mass", xlim=(0.5, steps[-1] + 0.5))
+    left.set_xticks(steps)
+    for index, name in enumerate(LIMITED):
+        part = np.array([row[name] for row in flown.largest]) / getattr(SAFE, name)
+        right.bar(steps + 0.25 * (index - 1), part, 0.22, color=COLOURS[index + 2], label=LIMIT_TITLES[name])
+    right.axhline(1.0, color="black", linewidth=0.8)
+    right.set(xlabel="manoeuvre", ylabel="used of the limit, in MuJoCo", ylim=(0.0, 1.45))
+    right.set_xticks(steps)
+    right.legend(loc="upper left", ncols=2)
+    shared_legend(figure, left, 4, place="outside lower center")
     return figure
 
 
 @styled
-def error_figure(iterations: Sequence[Iteration]) -> Figure:
+def error_figure(iterations: list[Iteration]) -> Figure:
     """Draw the relative errors of the ten quantities, as printed in the paper and as reached here."""
-    figure = wide_figure(2.8)
+    figure = wide_figure(2.4)
     axes = figure.subplots()
     place = np.arange(len(LABELS))
     series = {"paper": list(paper.RESULTS), "here, no noise": [item.estimate for item in iterations]}
@@ -55,37 +60,10 @@ def error_figure(iterations: Sequence[Iteration]) -> Figure:
         for number, estimate in enumerate(estimates):
             error = np.abs(paper.errors(estimate))
             error[error == 0.0] = np.nan  # printed exactly
-            look: dict[str, Any] = {
-                "color": colour,
-                "fillstyle": FILLS[number],
-                "label": f"{name}, iteration {number + 1}",
-            }
-            axes.plot(place, error, "os"[number], markersize=4, **look)
-    axes.axhline(1e-6, color="black", linewidth=0.8, linestyle="--")
-    axes.text(place[-1] + 0.4, 1.3e-6, "goal", ha="right", va="bottom")
-    axes.set(yscale="log", ylabel="relative error", ylim=(1e-11, 1.0))
+            fill = "full" if number else "none"
+            label = f"{name}, iteration {number + 1}"
+            axes.plot(place, error, "os"[number], color=colour, fillstyle=fill, markersize=4, label=label)  # type: ignore[arg-type]
+    axes.set(yscale="log", ylabel="relative error")
     axes.set_xticks(place, LABELS)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=4)
-    return figure
-
-
-@styled
-def width_figure(flights: Mapping[str, Flight], titles: Mapping[str, str]) -> Figure:
-    """Draw the posterior standard deviation of every step, and the last step's mean against the truth."""
-    figure = wide_figure(3.2)
-    widths, shifts = figure.subplots(1, 2)
-    place = np.arange(len(LABELS))
-    for index, (name, flight) in enumerate(flights.items()):
-        moved = place + 0.22 * (index - 0.5 * (len(flights) - 1))
-        for step in range(len(flight.bodies)):
-            look = {"color": COLOURS[index], "fillstyle": FILLS[step > 0], "label": f"{titles[name]}, step {step + 1}"}
-            widths.plot(moved, flight.relative(step), "os"[step > 0], markersize=4, **look)
-        if flight.bodies:
-            shifts.errorbar(moved, flight.shift(-1), 1.0, fmt="s", color=COLOURS[index], markersize=4, capsize=2)
-    widths.set(yscale="log", title="relative standard deviation")
-    shifts.axhline(0.0, color="black", linewidth=0.6)
-    shifts.set(title="last mean less truth [standard deviations]", ylim=(-4.0, 4.0))
-    for axes in (widths, shifts):
-        axes.set_xticks(place, LABELS, rotation=60)
-    shared_legend(figure, widths, 3, place="outside lower center")
+    shared_legend(figure, axes, 4, place="outside lower center")
     return figure
