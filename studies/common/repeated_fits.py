@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,19 +18,20 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.design import planned_manoeuvre, planned_posterior
 from bayesid.design.designed import sample_times
-from bayesid.design.predicted_posterior import Predicted, describe
+from bayesid.design.predicted_posterior import describe
 from bayesid.inference.data import Data, grids_of, stacked
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.recorded_samples import RecordedSamples
+from bayesid.recording.joint_motion import Motion
 from bayesid.robot.inertial_parameters import mass_com_inertia
-from bayesid.simulation.model import Manoeuvre
+from bayesid.simulation.model import Manoeuvre, Model
 from studies.common import mission
 from studies.common.ets7 import BASE, INTERVAL
 from studies.common.models import ARM_SPREAD
 from studies.common.monte_carlo import run_trials
 
-__all__ = ["Realised", "Reference", "reference", "repeat"]
+__all__ = ["Realised", "Reference", "repeat"]
 
 STEPS = 4
 """Number of Gauss-Newton steps of every fit."""
@@ -38,21 +39,47 @@ STEPS = 4
 
 @dataclass(frozen=True)
 class Reference:
-    """Planned manoeuvre about which recordings are fitted.
+    """Planned manoeuvre about which recordings are linearised.
 
     Attributes
     ----------
     posterior : Posterior
-        Posterior of the manoeuvre as it would be recorded without noise.
-    inverse : (n, m) array
-        Pseudo-inverse of the Jacobian of its residuals, prior included.
-    predicted : Predicted
-        Predicted posterior of the base.
+        Posterior of the manoeuvre as it would be recorded without noise, with its noise linearised at ``z``.
+    z : (n,) array
+        Linearisation point.
     """
 
     posterior: Posterior
-    inverse: Floats
-    predicted: Predicted
+    z: Floats
+
+    @classmethod
+    def of(cls, model: Model, motion: Motion, z: Floats | None = None) -> Reference:
+        """Return the reference of a motion of the mission, by default at the prior's centre."""
+        times = sample_times(mission.DURATION, INTERVAL)
+        manoeuvre = planned_manoeuvre(model, motion, times, "plan", mission.ENCODERS)
+        plan = planned_posterior(model, [manoeuvre], z=z)
+        at = np.zeros(plan.size) if z is None else z
+        return cls(relinearised(plan, at), at)
+
+    @cached_property
+    def jacobian(self) -> Floats:
+        """Jacobian of the residuals, prior included, shape (m, n)."""
+        return self.posterior.jacobian(self.z)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Predicted covariance of the coordinates, shape (n, n)."""
+        return np.linalg.inv(self.jacobian.T @ self.jacobian)
+
+    @cached_property
+    def inverse(self) -> Floats:
+        """Pseudo-inverse of the Jacobian, shape (n, m)."""
+        return self.covariance @ self.jacobian.T
+
+    @cached_property
+    def sd(self) -> Floats:
+        """Predicted standard deviations of the reported quantities."""
+        return describe(self.posterior, self.z, self.covariance).sd
 
     def given(self, manoeuvre: Manoeuvre) -> Posterior:
         """Return the posterior of a recording with the whitening of the plan."""
@@ -65,26 +92,10 @@ class Reference:
 
 
 @cache
-def reference(parameters: tuple[float, ...], points: int, arm_spread: float) -> Reference:
-    """Return what all fits of a manoeuvre share.
-
-    Parameters
-    ----------
-    parameters : tuple of float
-        Parameters of the manoeuvre among `studies.common.mission.splines`.
-    points : int
-        Number of free control points of every joint.
-    arm_spread : float
-        Relative width of the links' priors.
-    """
-    model, motion = mission.base_unknown(arm_spread), mission.splines(points).motion(np.array(parameters))
-    times = sample_times(mission.DURATION, INTERVAL)
-    plan = planned_posterior(model, [planned_manoeuvre(model, motion, times, "plan", mission.ENCODERS)])
-    z = np.zeros(plan.size)
-    plan = relinearised(plan, z)
-    jacobian = plan.jacobian(z)
-    covariance = np.linalg.inv(jacobian.T @ jacobian)
-    return Reference(plan, covariance @ jacobian.T, describe(plan, z, covariance))
+def _reference(parameters: tuple[float, ...], points: int, arm_spread: float) -> Reference:
+    """Return what all fits of a manoeuvre share in one process."""
+    motion = mission.splines(points).motion(np.array(parameters))
+    return Reference.of(mission.base_unknown(arm_spread), motion)
 
 
 @dataclass(frozen=True)
@@ -158,14 +169,14 @@ def repeat(
     """
     task = _Task(tuple(map(float, parameters)), points, arm_spread)
     outcomes = run_trials(estimate, [task] * count, store, seed=seed, workers=workers, progress=progress).complete()
-    shared = reference(task.parameters, points, arm_spread)
+    shared = _reference(task.parameters, points, arm_spread)
     errors, last = (np.array([outcome[key] for outcome in outcomes]) for key in ("error", "last_step"))
-    return Realised(errors, shared.predicted.sd, last)
+    return Realised(errors, shared.sd, last)
 
 
 def estimate(task: _Task, rng: np.random.Generator) -> dict[str, Any]:
     """Fly once, fit, and return the error of the base's quantities and the last step of the fit."""
-    shared = reference(task.parameters, task.points, task.arm_spread)
+    shared = _reference(task.parameters, task.points, task.arm_spread)
     robot = mission.true_arm(mission.ship(), rng, task.arm_spread)
     motion = mission.splines(task.points).motion(np.array(task.parameters))
     posterior = shared.given(mission.recorded(mission.fly(motion, robot), rng))

@@ -1,4 +1,4 @@
-"""Figures of the report."""
+"""Figure of the report."""
 
 from __future__ import annotations
 
@@ -7,46 +7,29 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from bayesid.design.plan import Trajectory
 from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
-from studies.common.ets7 import LIMITS
+from studies.common import mission
 
-__all__ = ["manoeuvre_figure", "repetition_figure"]
-
-
-@styled
-def manoeuvre_figure(trajectory: Trajectory) -> Figure:
-    """Draw the joints, the tip's speed and the base's rotation along a manoeuvre."""
-    figure = wide_figure(2.3)
-    left, middle, right = figure.subplots(1, 3)
-    for index, values in enumerate(np.asarray(trajectory.position).T):
-        left.plot(trajectory.time, values, color=COLOURS[index], label=f"joint {index + 1}")
-    left.set(ylabel="position [rad]")
-    middle.plot(trajectory.time, 1e3 * np.asarray(trajectory.tip_speed), color=COLOURS[0])
-    middle.axhline(1e3 * (LIMITS.tip_speed or 0.0), color="#888888", linestyle="--")
-    middle.set(ylabel="speed of the tip [mm/s]")
-    right.plot(trajectory.time, np.degrees(np.asarray(trajectory.rotation)), color=COLOURS[0])
-    right.set(ylabel="rotation of the base [deg]")
-    for axes in (left, middle, right):
-        axes.set_xlabel("time [s]")
-    shared_legend(figure, left, 6)
-    return figure
+__all__ = ["repetition_figure"]
 
 
 @styled
-def repetition_figure(
-    repetitions: Sequence[float], curves: Mapping[tuple[str, bool], Sequence[float]], duration: float
-) -> Figure:
+def repetition_figure(repetitions: Sequence[float], curves: Mapping[tuple[str, bool], Sequence[float]]) -> Figure:
     """Draw the worst relative standard deviation against the time spent moving."""
-    figure = wide_figure(2.6)
+    figure = wide_figure(2.7)
     axes = figure.subplots()
-    hours = np.array(repetitions) * duration / 3600.0
+    hours = np.array(repetitions) * mission.DURATION / 3600.0
     for index, ((name, known), values) in enumerate(curves.items()):
-        label = f"{name} manoeuvre, arm {'known exactly' if known else 'known to 5 %'}"
-        axes.plot(
-            hours, 100.0 * np.array(values), color=COLOURS[index // 2], linestyle="-" if known else "--", label=label
-        )
+        label = f"{name} manoeuvre, arm {'exact' if known else '5 %'}"
+        line = "--" if known else "-"
+        axes.plot(hours, 100.0 * np.array(values), color=COLOURS[index // 2], linestyle=line, label=label)
     axes.axhline(1.0, color="#888888", linewidth=0.8)
     axes.set(xscale="log", yscale="log", xlabel="time spent moving [h]", ylabel="largest relative sd [%]")
-    axes.legend()
+    axes.set_yticks(*_ticks(axes.get_ylim()))
+    shared_legend(figure, axes, 2, place="outside lower center")
     return figure
+
+
+def _ticks(limits: tuple[float, float]) -> tuple[list[float], list[str]]:
+    values = [value for value in (0.001, 0.01, 0.1, 1.0, 10.0, 100.0) if limits[0] <= value <= limits[1]]
+    return values, [f"{value:g}" for value in values]

@@ -2,62 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from bayesid._io.words import counted
 from bayesid.report import Document
-from bayesid.report.numbers import format_fixed, format_number, format_percent, format_signed, format_vector
-from studies.common.ets7 import ACCEL, ACCELEROMETER, BIAS, CORNER, ENCODER, EXCURSION, INTERVAL, RAMPS, RATE, START
+from bayesid.report.numbers import format_number, format_percent, format_vector
+from studies.common import mission
+from studies.common.ets7 import ACCEL, ACCELEROMETER, BIAS, CORNER, ENCODER, EXCURSION, INTERVAL, RAMPS, RATE
+from studies.common.goals import Goal, Verdict
+from studies.common.manoeuvre_figure import manoeuvre_figure
 from studies.common.quantities import HEADINGS
 from studies.common.tables import add_number_table
-from studies.ets7_limits.analysis import Answer, Designed, Widths
-from studies.ets7_limits.check import RATE_AT_START, Check
-from studies.ets7_limits.figures import manoeuvre_figure, repetition_figure
+from studies.common.template import (
+    Finding,
+    Setup,
+    Statement,
+    Summary,
+    add_first_page,
+    add_setup,
+    add_statements,
+    write_study,
+    write_table,
+)
+from studies.ets7_limits import Result
+from studies.ets7_limits.analysis import Answer
+from studies.ets7_limits.figures import repetition_figure
 from studies.ets7_limits.information import LONGEST
 
-__all__ = ["Result", "time_needed", "write_report"]
+__all__ = ["goals", "time_needed", "write_report"]
 
 YEAR = 3.156e7
 """Length of a year [s]."""
 
-SENSORS = f"{format_number(RATE)} rad/s and {format_number(ACCEL)} m/s² per sample"
-"""Sensors that the manoeuvre is designed for."""
+WANTED, ALIKE, WITHIN = 0.01, 0.01, 0.05
+"""Largest relative sd that is wanted, and largest differences from another report and from realised errors."""
 
-
-@dataclass(frozen=True)
-class Result:
-    """Content of the report.
-
-    Attributes
-    ----------
-    designed : Designed
-        The designed manoeuvre.
-    answers : mapping
-        Answers by labels of rate and accelerometer, then by whether the arm and the bias are known.
-    after_designed, after_flight : Widths
-        Standard deviations from the designed manoeuvre and from the flight's.
-    repetitions : sequence of float
-        Numbers of repetitions of the curves.
-    curves : mapping
-        Largest relative standard deviations by manoeuvre and whether the arm is known.
-    check : Check
-        Estimates from flights of the independent simulator.
-    duration : float
-        Length of both manoeuvres [s].
-    """
-
-    designed: Designed
-    answers: Mapping[tuple[str, str], Mapping[tuple[bool, bool], Answer]]
-    after_designed: Widths
-    after_flight: Widths
-    repetitions: Sequence[float]
-    curves: Mapping[tuple[str, bool], Sequence[float]]
-    check: Check
-    duration: float
+USUAL = ("10⁻⁵ rad/s", "10⁻⁵")
+"""Labels of the mission's sensors."""
 
 
 def time_needed(answer: Answer, duration: float) -> str:
@@ -73,158 +55,203 @@ def time_needed(answer: Answer, duration: float) -> str:
     return f"{format_number(hours, 2)} h" if hours < 48.0 else f"{format_number(hours / 24.0, 2)} days"
 
 
-def write_report(result: Result, output: Path) -> None:
-    """Write the report as PDF."""
+def goals(result: Result) -> tuple[Goal, ...]:
+    """Return the goals of the study with what was reached."""
+    rows = []
+    for known, title in ((False, "known to 5 %"), (True, "known exactly")):
+        once = result.after["designed"].worst(known)
+        needed = time_needed(result.answers[USUAL][known, False], mission.DURATION)
+        text = f"Base's mass and moments known to {WANTED:.0%} after one manoeuvre, arm {title}"
+        reached = f"{format_percent(once, 2)} after one; time until {WANTED:.0%}: {needed}"
+        rows.append(Goal(text, reached, Verdict.of(once <= WANTED)))
+    rows.append(
+        Goal(
+            f"Standard deviations agree within {ALIKE:.0%} with those of the report on excitation, same manoeuvre",
+            f"{format_percent(result.difference, 2)} at most, both rows of the arm",
+            Verdict.of(result.difference <= ALIKE),
+        )
+    )
+    count, least, most = result.realised
+    error = 1.0 / np.sqrt(2.0 * count)
+    away = max(1.0 - least, most - 1.0)
+    verdict = Verdict.FAIL if away > WITHIN + 2.0 * error else Verdict.OPEN if away > WITHIN else Verdict.PASS
+    rows.append(
+        Goal(
+            f"Realised errors of this manoeuvre within {WITHIN:.0%} of predicted, mission's sensors, arm 5 %",
+            f"{least:.3f} to {most:.3f} by parameter over {count} flights in MuJoCo, each ± {error:.3f} (report on "
+            "excitation)",
+            verdict,
+        )
+    )
+    rows.append(Goal("The same with the other sensors", "no flight was made", Verdict.NOT_TESTED))
+    return tuple(rows)
+
+
+def write_report(result: Result, output: Path, origin: str | None = None) -> None:
+    """Write the report as PDF, and its tables beside it."""
     document = Document("What ETS-VII could have identified", "Within 50 mm/s and 5 degrees per second at the tip")
-    document.section("Questions and answers")
-    document.paragraph(
-        "How long must the arm move, within the rules of the flight, until mass and moments of inertia of the base are "
-        "known to 1 % (the largest of the four relative standard deviations), and what must the sensors be? To answer "
-        f"this, a manoeuvre of all six joints of {result.duration:g} s was designed by d-optimality. The information "
-        "of that one manoeuvre is computed anew with the noise of other sensors, and added up for longer times, in "
-        "which the manoeuvre is repeated. The initial rate is new and unknown in every repetition; accelerometer bias "
-        "and arm are the same in all."
+    usual = result.answers[USUAL]
+    summary = Summary(
+        question=(
+            "How long must the arm move within the flight's rule until mass and moments of inertia of the base are "
+            "known to 1 %, and with which sensors?"
+        ),
+        answer=(
+            f"With the arm known to 5 % of each link's mass no time and no sensor is enough: at least "
+            f"{format_percent(_least(result), 2)} are left, since nothing but the arm's mass sets the scale. With the "
+            f"arm known exactly, sensors of 10⁻⁵ rad/s and 10⁻⁵ m/s² need "
+            f"{time_needed(usual[True, False], mission.DURATION)}."
+        ),
+        goals=goals(result),
+        valid=(
+            "wheels, fuel, paddles and thrusters do not act, attitude control is off, the initial attitude is known "
+            "and noise white. Every repetition starts at a new unknown rate; bias and arm stay the same."
+        ),
+        full=True,
     )
-    for text in _findings(result):
-        document.paragraph(text)
-    _times(document, result)
-    _manoeuvre(document, result)
-    _after_one(document, result)
-    _checked(document, result.check)
-    document.section("Assumptions")
-    document.items(_assumptions())
-    document.write(output)
-
-
-def _findings(result: Result) -> list[str]:
-    texts = [
-        f"With {SENSORS} and the arm known exactly, one designed manoeuvre leaves "
-        f"{format_percent(result.after_designed.worst, 2)}, the flight's manoeuvre "
-        f"{format_percent(result.after_flight.worst, 2)}."
-    ]
-    floors = [
-        answer.floor
-        for row in result.answers.values()
-        for (known, _), answer in row.items()
-        if not known and answer.floored
-    ]
-    if floors:
-        texts.append(
-            "With the arm's masses known to 5 % no time is enough. Nothing but the mass of the arm sets the scale of "
-            f"the base's mass, since no external force of known size acts. {format_percent(min(floors), 2)} or more "
-            "are left, whatever the sensors."
-        )
-    return texts
-
-
-def _times(document: Document, result: Result) -> None:
-    document.section("Time needed for 1 %")
-    for known, title in ((True, "Arm known exactly"), (False, "Arm known to 5 % (log-Cholesky width 0.025)")):
-        caption = (
-            f"{title}: largest relative standard deviation after one manoeuvre with unknown bias, and time until 1 %. "
-            "'Never' means that more time no longer helps, with the lower limit in brackets. One manoeuvre of "
-            f"{result.duration:g} s is the shortest time that was considered."
-        )
-        if not known:
-            caption += " Where rates alone need years, they never suffice: the lower limit is at least as high."
-        rows = [
-            [
-                rate,
-                accel,
-                format_number(100.0 * row[known, False].once, 2),
-                time_needed(row[known, False], result.duration),
-                "same" if accel == "none" else time_needed(row[known, True], result.duration),
-            ]
-            for (rate, accel), row in result.answers.items()
-        ]
-        header = ["rate sensor", "accelerometer [m/s²]", "after one [%]", "time, bias unknown", "time, bias known"]
-        add_number_table(document, header, rows, caption, words=2)
-    document.figure(
-        repetition_figure(result.repetitions, result.curves, result.duration),
-        f"Largest of the relative standard deviations of mass and moments of inertia, with {SENSORS} and unknown bias. "
-        "The grey line is 1 %.",
-    )
-
-
-def _manoeuvre(document: Document, result: Result) -> None:
-    document.section("The designed manoeuvre")
-    costs = result.designed.optimum.costs
-    limits = "; ".join(
-        f"the {item.name.replace('_', ' ')} reaches {format_number(item.largest)} of {format_number(item.limit)} "
-        f"{item.unit}"
-        for item in result.designed.reached
-        if item.name.startswith("tip")
-    )
-    document.paragraph(
-        f"SLSQP from {counted(len(costs), 'random start')} ended at half log-determinants of "
-        f"{', '.join(format_fixed(cost, 2) for cost in costs)}, so better manoeuvres may exist. Limits: {limits}."
-    )
-    document.figure(
-        manoeuvre_figure(result.designed.trajectory),
-        "Joints, speed of the tip (limit dashed) and rotation of the base.",
-    )
-
-
-def _after_one(document: Document, result: Result) -> None:
-    document.section("One manoeuvre: designed, and as flown")
-    designed, flight = result.after_designed, result.after_flight
-    columns = (designed.prior, flight.exact, flight.uncertain, designed.exact, designed.uncertain)
-    add_number_table(
+    add_first_page(
         document,
-        ["base", "true", "prior", "flight", "flight, arm 5 %", "designed", "designed, arm 5 %"],
-        [
-            [heading, format_number(designed.truth[k], 4), *(format_number(float(sd[k]), 2) for sd in columns)]
-            for k, heading in enumerate(HEADINGS)
-        ],
-        f"Standard deviations (to first order) from one manoeuvre, with {SENSORS} and unknown bias.",
+        summary,
+        repetition_figure(result.repetitions, result.curves),
+        "Largest of the relative standard deviations of mass and moments of inertia against the time spent moving, "
+        "with 10⁻⁵ rad/s, 10⁻⁵ m/s² and an unknown bias. The grey line is 1 %.",
     )
+    add_setup(document, _setup())
+    document.figure(
+        manoeuvre_figure({"d-optimal manoeuvre": result.motion, "the flight's own": mission.flight_manoeuvre()}),
+        "The two manoeuvres in MuJoCo: joints, speed of the tip with the rule dotted, and rotation of the base.",
+    )
+    _failures(document, result)
+    _evidence(document, result)
+    add_statements(document, _statements(result))
+    tables = _write_tables(result, output)
+    document.paragraph(f"Tables beside this report: {', '.join(tables)}.")
+    write_study(document, summary, output, origin)
+
+
+def _least(result: Result) -> float:
+    """Return the smallest of all lower limits with the arm known to 5 %."""
+    return min(answer.floor for row in result.answers.values() for (known, _), answer in row.items() if not known)
+
+
+def _setup() -> Setup:
     (begin, end), (again, _) = RAMPS
-    document.paragraph(
-        f"The flight's manoeuvre turns joints 2 to 4 by {', '.join(format_number(turn) for turn in EXCURSION[1:4])} "
-        f"rad out and back, in {end - begin:g} s each and {again - end:g} s apart, with corners rounded over "
-        f"{CORNER:g} s. The time around it is recorded too, so that both manoeuvres last {result.duration:g} s."
+    return Setup(
+        robot=(
+            "ETS-VII with the published base and nominal links. The accelerometer is at "
+            f"{format_vector(ACCELEROMETER)} m, which is not published."
+        ),
+        manoeuvre=(
+            f"Two of {mission.DURATION:g} s from the posture with the wrist extended: the d-optimal one of the report "
+            "on excitation, at the speed that the rule allows, and the flight's own, which turns joints 2 to 4 by "
+            f"{', '.join(format_number(turn) for turn in EXCURSION[1:4])} rad out and back within {end - begin:g} "
+            f"s each, {again - end:g} s apart, with corners rounded over {CORNER:g} s."
+        ),
+        sensors=(
+            f"Every {INTERVAL:g} s rates and accelerations with the noise in the table, encoders with "
+            f"{format_number(ENCODER)} rad. The mission's are {format_number(RATE)} rad/s and {format_number(ACCEL)} "
+            "m/s². The star sensor's 2 seconds of arc are differenced and taken as white."
+        ),
+        known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link, or exactly.",
+        unknown=f"The base, the rate at the start, and the accelerometer's bias within {format_number(BIAS)} m/s².",
+        replicates="Standard deviations to first order; those above some 30 % are rough.",
     )
 
 
-def _checked(document: Document, check: Check) -> None:
-    document.section("Accuracy of the prediction")
-    document.paragraph(
-        f"MuJoCo flew the designed manoeuvre with an initial rate of {format_vector(RATE_AT_START)} rad/s that the "
-        f"fits do not know. {len(check.estimates)} recordings with fresh noise of all sensors and joints were fitted. "
-        "The root mean square error over the predicted standard deviation should be one within "
-        f"{check.sampling_error:.2f}; the mean error, in units of its standard deviation, should be a standard normal "
-        f"number. Chi-square per sample is {check.chi2.mean():.3f} on average."
+def _failures(document: Document, result: Result) -> None:
+    document.section("Calibration and failures")
+    flight, designed = result.after["flight"], result.after["designed"]
+    document.items(
+        [
+            f"The flight's own manoeuvre leaves {format_percent(flight.worst(False), 2)} of the worst of mass and "
+            f"moments (arm 5 %) and {format_percent(flight.worst(True), 2)} (arm exact), where the designed one leaves "
+            f"{format_percent(designed.worst(False), 2)} and {format_percent(designed.worst(True), 2)}.",
+            "The manoeuvre was designed for the mission's sensors alone; a design for others would need less time with "
+            "them. The smoothing of the joints was judged on the planned motion.",
+            "The encoders' noise reaches the accelerometer, so that one of 10⁻⁹ m/s² is not a hundred times better "
+            "than one of 10⁻⁷. Collisions and true joint ranges, which are not published, are not considered.",
+        ]
     )
+
+
+def _evidence(document: Document, result: Result) -> None:
+    document.section("Evidence")
+    rows = []
+    for (rate, accel), row in result.answers.items():
+        cells = [
+            cell
+            for known in (False, True)
+            for cell in (
+                format_percent(row[known, False].once, 2),
+                time_needed(row[known, False], mission.DURATION),
+            )
+        ]
+        rows.append([rate, accel, *cells])
     add_number_table(
         document,
-        ["base", "predicted sd", "rms error / predicted", "mean error [sd of mean]"],
+        ["rate sensor", "accelerometer [m/s²]", "once, arm 5 %", "1 % after", "once, arm exact", "1 % after"],
+        rows,
+        "Largest relative sd of mass and moments after one designed manoeuvre, and time until 1 %, bias unknown. "
+        f"“Never” has the lower limit in brackets. The shortest time considered is {mission.DURATION:g} s.",
+        words=2,
+    )
+    designed, flight = result.after["designed"], result.after["flight"]
+    columns = (designed.prior, flight.uncertain, flight.exact, designed.uncertain, designed.exact)
+    add_number_table(
+        document,
+        ["base", "true", "prior", "flight, arm 5 %", "flight, exact", "designed, arm 5 %", "designed, exact"],
         [
-            [
-                heading,
-                format_number(float(check.predicted[k]), 3),
-                format_fixed(check.ratio[k], 2),
-                format_signed(check.offset[k]),
-            ]
+            [heading, format_number(designed.truth[k], 4), *(format_number(float(sd[k]), 3) for sd in columns)]
             for k, heading in enumerate(HEADINGS)
         ],
-        "Estimates from flights of the independent simulator against the prediction.",
+        "Standard deviations from one manoeuvre with the mission's sensors and unknown bias.",
     )
 
 
-def _assumptions() -> list[str]:
+def _statements(result: Result) -> list[Statement]:
+    star, good = ("star sensor 2″", "10⁻⁵"), ("star sensor 2″", "10⁻⁹")
+    cells = result.answers
+    reasons = [
+        f"{label} m/s²: {format_percent(cells[key][True, False].once, 2)} after one manoeuvre, "
+        f"{time_needed(cells[key][True, False], mission.DURATION)} until 1 %"
+        for label, key in (("10⁻⁵", star), ("10⁻⁹", good))
+        if key in cells
+    ]
+    once = cells[star][True, False].once if star in cells else float("nan")
     return [
-        "The base is that published in the paper, under a prior of relative width one; the arm has nominal inertias. "
-        f"Every manoeuvre starts with the joints at {format_vector(START)} rad; the accelerometer is at "
-        f"{format_vector(ACCELEROMETER)} m. Neither is published.",
-        f"There is a sample each {INTERVAL:g} s, with white noise. The star sensor's 2 seconds of arc are differenced "
-        f"and taken as white too (2.7 × 10⁻⁵ rad/s). The joints have {format_number(ENCODER)} rad of noise and are "
-        "smoothed. Their noise reaches the accelerometer, so that one of 10⁻⁹ m/s² is not a hundred times better than "
-        "one of 10⁻⁷. The smoothing was judged on the planned motion; the check was made at 10⁻⁵ m/s² only.",
-        "The initial rate is unknown and the initial attitude is known exactly. The accelerometer bias, where unknown, "
-        f"is within {format_number(BIAS)} m/s² and the same in all repetitions. The gravity gradient is modelled; "
-        "wheels, fuel, paddles and thrusters do not act, and the attitude control is off.",
-        "The manoeuvre was designed once, for one grade of sensors and an arm that is known. Designs for another grade "
-        "would need somewhat less time there. Collisions and true joint ranges, which are not published, are not "
-        "considered.",
-        "Standard deviations are to first order; those above some 30 % are rough.",
+        Statement(
+            "Rates to 2 seconds of arc and accelerations to 10⁻⁵ to 10⁻⁹ m/s² are available (4.3).",
+            Finding.REFUTED if once > 0.02 else Finding.CONFIRMED,
+            f"Read as enough for the 2 % that the paper names, with the arm exact. {'; '.join(reasons)}.",
+        ),
+        Statement(
+            "The arm's parameters can be assumed known, generally to 5 % accuracy (1).",
+            Finding.REFUTED,
+            f"5 % of each link's mass leave {format_percent(_least(result), 2)} of the base's, whatever the sensors.",
+        ),
+    ]
+
+
+def _write_tables(result: Result, output: Path) -> list[str]:
+    times = [
+        [
+            *labels,
+            "exactly" if known else "5 %",
+            "known" if bias else "unknown",
+            item.once,
+            item.repetitions,
+            item.floor,
+        ]
+        for labels, row in result.answers.items()
+        for (known, bias), item in row.items()
+    ]
+    header = ["rate sensor", "accelerometer [m/s2]", "arm", "bias", "once", "repetitions until 1 %", "lower limit"]
+    sds = [
+        [name, arm, *map(float, values)]
+        for name, item in result.after.items()
+        for arm, values in zip(mission.ROWS, (item.uncertain, item.exact), strict=True)
+    ]
+    return [
+        write_table(output, "times", header, times),
+        write_table(output, "predicted", ["manoeuvre", "arm", *(f"sd {text}" for text in HEADINGS)], sds),
     ]

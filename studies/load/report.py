@@ -27,7 +27,7 @@ from studies.common.template import (
 from studies.load import Result, paper
 from studies.load.figures import LIMIT_TITLES, TITLES, error_figure, loop_figure
 from studies.load.safe_loop import AT_MOST, GOAL, SPREAD, Flight
-from studies.load.setting import LOAD, SAFE, MuJoCoSpacecraft, ship
+from studies.load.setting import LOAD, SAFE, excitation, ship
 
 __all__ = ["goals", "write_report"]
 
@@ -108,7 +108,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         "speed, tip rate and rotation of the base over their limits, as MuJoCo flew them; the loop plans them for 99 % "
         "of what it holds possible.",
     )
-    motion = MuJoCoSpacecraft().motion(result.iterations[-1].recording)
+    motion = excitation().motion(result.iterations[-1].parameters)
     times = np.array([0.0, 0.5 * mission.DURATION])
     add_setup(
         document,

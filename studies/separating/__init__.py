@@ -7,78 +7,128 @@ manoeuvre. ``python -m studies.separating`` writes ``reports/separating.pdf``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+from bayesid._math.arrays import Floats
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import Search, Store
 from bayesid.recording.joint_motion import Motion
-from studies.common.command import Command
-from studies.common.ets7 import START, FlightManoeuvre
-from studies.ets7_limits.setting import DURATION, POINTS
-from studies.separating.analysis import Result, diagnosed_causes, expectations, realise
-from studies.separating.expected import pairs
-from studies.separating.manoeuvres import design_both, separating_problem
-from studies.separating.report import write_report
+from studies.common import mission
+from studies.common.command import TRIALS, Command
+from studies.separating.analysis import Realised, expectations, realise, references, similar
+from studies.separating.linear_evidence import Expected, Pair
+from studies.separating.manoeuvres import Designed, design_both, separating_problem
 
 __all__ = ["Result", "main", "run"]
 
-SEARCH = Search()
-"""Effort of each design, minutes on two cores."""
+FULL, QUICK = Search(), Search(starts=3, iterations=60)
+"""Effort of each search of a full and of a quick run."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """Outcome of the study.
+
+    Attributes
+    ----------
+    pairs : sequence of Pair
+        All pairs of candidates on the first manoeuvre.
+    designs : mapping of str to Designed
+        Designed manoeuvres by their criterion.
+    motions : mapping of str to Motion
+        All manoeuvres, the ``first`` among them.
+    expected : mapping of (truth, stage) to Expected
+        Expectations of linear theory.
+    directions : mapping of (truth, stage) to (n,) array
+        Values lambda (1 - rho^2) / 2 of effects of the same size in random directions.
+    realised : sequence of Realised
+        Realised log Bayes factors, one for each truth.
+    search : Search
+        Effort of each search.
+    full : bool
+    """
+
+    pairs: Sequence[Pair]
+    designs: Mapping[str, Designed]
+    motions: Mapping[str, Motion]
+    expected: Mapping[tuple[str, str], Expected]
+    directions: Mapping[tuple[str, str], Floats]
+    realised: Sequence[Realised]
+    search: Search
+    full: bool
 
 
 def run(
     *,
+    full: bool = False,
     seed: int = 1,
-    duration: float = DURATION,
-    points: int = POINTS,
-    search: Search = SEARCH,
-    noises: int = 10,
-    diagnosed: bool = True,
+    points: int = mission.POINTS,
+    search: Search | None = None,
+    noises: int | None = None,
     store: Store | None = None,
+    trials: Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the study.
 
     Parameters
     ----------
+    full : bool
+        True for the default effort of each search and 400 flights for each truth.
     seed : int
         Seed of all random numbers.
-    duration : float
-        Duration of every manoeuvre [s].
     points : int
         Number of free control points of every joint.
-    search : Search
+    search : Search, optional
         Effort of each design.
-    noises : int
-        Number of noisy recordings of every flight.
-    diagnosed : bool
-        True to run the package's diagnosis too.
+    noises : int, optional
+        Number of sets of flights for each truth.
     store : Store, optional
         Store that keeps the results of the searches.
+    trials : path, optional
+        File that keeps the flights.
     progress : callable, optional
         Receives a line on what is being done.
     """
-    designs = design_both(separating_problem(duration, points), seed, search, store or Store.forgetful(), progress)
-    motions: dict[str, Motion] = {"first": FlightManoeuvre(START)}
+    search = search or (FULL if full else QUICK)
+    noises = (400 if full else 40) if noises is None else noises
+    designs = design_both(separating_problem(points), seed, search, store or Store.forgetful(), progress)
+    motions: dict[str, Motion] = {"first": mission.flight_manoeuvre()}
     motions |= {name: item.motion for name, item in designs.items()}
-    expected, directions = expectations(motions, duration, seed)
-    realised, sampled = realise(motions, duration, noises, seed, progress)
-    verdicts = diagnosed_causes(motions, duration, seed, progress) if diagnosed else {}
-    return Result(pairs(duration), designs, expected, directions, realised, sampled, verdicts, duration)
+    known = references(motions)
+    expected, directions = expectations(known, seed)
+    realised = realise(motions, known, noises, seed, trials, progress)
+    return Result(similar(known), designs, motions, expected, directions, realised, search, full)
 
 
 COMMAND = Command(
     "separating",
     "Tell apart what a first manoeuvre confuses.",
+    full="the default effort of each search, 400 sets of flights for each cause",
     seed=1,
-    extra={"--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"}},
+    extra={
+        "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
+        "--trials": TRIALS["--trials"],
+    },
 )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
+    from studies.common.provenance import study_origin
+    from studies.separating.report import write_report
+
     options = COMMAND.parse(arguments)
     keep_compiled()
-    store = None if options.store is None else Store.open(options.store, f"separating {options.seed} {SEARCH}")
-    write_report(run(seed=options.seed, store=store, progress=print), options.output)
+    effort = FULL if options.full else QUICK
+    store = None if options.store is None else Store.open(options.store, f"separating {options.seed} {effort}")
+    result = run(
+        full=options.full,
+        seed=options.seed,
+        store=store,
+        trials=options.trials,
+        progress=lambda text: print(text, flush=True),
+    )
+    write_report(result, options.output, study_origin("separating", options))

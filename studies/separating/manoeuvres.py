@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
 
 import numpy as np
 
-from bayesid._math.arrays import Floats
-from bayesid.design import BSplines, DOptimal, Plan, Problem, Search, Separation, Store, Tip, optimise
+from bayesid.design import DOptimal, Problem, Search, Separation, Store, optimise
 from bayesid.design.design_problem import Known
-from bayesid.design.plan import Trajectory
 from bayesid.design.trajectories import ParameterisedMotion
-from studies.common.ets7 import LIMITS, START, TIP
-from studies.ets7_limits.setting import DURATION, INTERVAL, POINTS
+from studies.common import mission
 from studies.separating.setting import RIVALS, drifting, rival_model
 
 __all__ = ["Designed", "design_both", "separating_problem"]
@@ -26,42 +23,34 @@ class Designed:
 
     Attributes
     ----------
-    parameters : (n,) array
-        Parameters of the motion in its family.
     costs : mapping of str to float
         Values of both criteria by name.
     largest : dict of str to float
         Largest values of the limited quantities by name.
     motion : ParameterisedMotion
         Motion of the joints.
-    trajectory : Trajectory
-        Motion of the robot at the prior's centre.
     """
 
-    parameters: Floats
     costs: dict[str, float]
     largest: dict[str, float]
     motion: ParameterisedMotion
-    trajectory: Trajectory
 
 
-def separating_problem(duration: float = DURATION, points: int = POINTS, thinning: int = 4) -> Problem:
-    """Return the problem: six joints on B-splines within the flight rules, separation and volume as criteria.
+def separating_problem(points: int = mission.POINTS) -> Problem:
+    """Return the problem: six joints on B-splines within the flight's rule, separation and volume as criteria.
 
     Manoeuvres start at the rate that the first manoeuvre has shown.
     """
-    model = rival_model(RIVALS)
-    family = BSplines(START, range(len(START)), duration, points)
-    plan = Plan(model, family, INTERVAL, Tip.of(model.robot, TIP), thinning=thinning)
-    criteria: Any = (Separation(RIVALS), DOptimal())  # frozen, which the protocol's attributes are not
-    return Problem(plan, LIMITS, criteria, Known(drifting(plan.unknowns), np.eye(plan.unknowns.size)))
+    own = mission.problem(rival_model(RIVALS), mission.splines(points), DOptimal(), Separation(RIVALS))
+    unknowns = own.plan.unknowns
+    return own.knowing(Known(drifting(unknowns), np.eye(unknowns.size)))
 
 
 def design_both(
     problem: Problem, seed: int, search: Search, store: Store, progress: Callable[[str], None]
 ) -> dict[str, Designed]:
-    """Design by both criteria, each from the same random starts."""
-    designs = {}
+    """Design by both criteria from the same random starts, the second also from the first's best."""
+    found: list[np.ndarray] = []
     for criterion in problem.criteria:
         kept = store.of(criterion.name)
         best = optimise(
@@ -69,15 +58,21 @@ def design_both(
             criterion,
             np.random.default_rng(seed),
             search,
+            first=found,
             known=kept.known,
             keep=kept.keep,
-            progress=lambda fraction, text: progress(text),
-        ).parameters
-        designs[criterion.name] = Designed(
-            parameters=best,
+            progress=partial(_tell, progress),
+        )
+        found.append(best.parameters)
+    return {
+        criterion.name: Designed(
             costs=problem.costs(best),
             largest={item.name: item.largest for item in problem.reached(best)},
             motion=problem.plan.family.motion(best),
-            trajectory=problem.trajectory(best),
         )
-    return designs
+        for criterion, best in zip(problem.criteria, found, strict=True)
+    }
+
+
+def _tell(progress: Callable[[str], None], fraction: float, text: str) -> None:
+    progress(text)

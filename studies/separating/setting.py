@@ -1,4 +1,4 @@
-"""The robot, the rivals and the first manoeuvre of the study."""
+"""The rivals of the study, and the models that hold them."""
 
 from __future__ import annotations
 
@@ -9,22 +9,15 @@ import numpy as np
 
 from bayesid import Effect, Model
 from bayesid._math.arrays import Floats
-from bayesid.design import Linear
 from bayesid.inference.unknowns import Unknowns
-from bayesid.simulation.effects import AccelBias, GravityGradient, RateBias, RateDrift, ThrusterLeak, WheelMomentum
-from studies.common.ets7 import START, FlightManoeuvre
-from studies.ets7_limits.setting import DURATION, model_of
+from bayesid.simulation.effects import RateBias, RateDrift, ThrusterLeak, WheelMomentum
+from studies.common import mission
+from studies.common.models import ARM_SPREAD
 
-__all__ = ["CANDIDATES", "DRIFT", "RIVALS", "SPREAD", "STAGES", "TRUTHS", "FlightFamily"]
+__all__ = ["CANDIDATES", "DRIFT", "RIVALS", "SPREAD", "STAGES", "TRUTHS"]
 __all__ += ["amplitude", "drifting", "rival_model", "rival_of"]
 
-CANDIDATES: tuple[Effect, ...] = (
-    WheelMomentum(1.0),
-    ThrusterLeak(5e-4, 5e-4),
-    RateDrift(1e-7),
-    RateBias(5e-5),
-    AccelBias(2e-5),
-)
+CANDIDATES: tuple[Effect, ...] = (WheelMomentum(1.0), ThrusterLeak(5e-4, 5e-4), RateDrift(1e-7), RateBias(5e-5))
 """Effects from which a pair is chosen, with the widths of their priors; the leak is a small one, of half a
 millinewton."""
 
@@ -51,30 +44,15 @@ DRIFT = np.array([3e-4, -2e-4, 2.5e-4])
 """Rate of the base when a manoeuvre starts, about a degree in a minute [rad/s]; unknown to every fit."""
 
 
-class FlightFamily(Linear):
-    """Manoeuvre of the flight times a factor."""
-
-    name = "flight"
-
-    def __init__(self, duration: float = DURATION) -> None:
-        self.duration, self.names = duration, ("size",)
-        self.scale, self.centre = np.ones(1), np.ones(1)
-
-    def matrices(self, time: Floats) -> tuple[Floats, Floats]:
-        """Return rest (3, T, joints) and basis (3, T, joints, 1)."""
-        rest = np.stack(FlightManoeuvre(START, 0.0 * START).evaluate(time))
-        return rest, (np.stack(FlightManoeuvre(START).evaluate(time)) - rest)[..., None]
-
-
 def rival_of(label: str) -> str:
     """Return the label of the other rival."""
     return next(other for other in RIVALS if other != label)
 
 
-def rival_model(labels: Sequence[str]) -> Model:
-    """Return the model with some of the candidates, given by their labels."""
-    effects = tuple(effect for effect in CANDIDATES if effect.label in labels)
-    return replace(model_of(spread=SPREAD), effects=(GravityGradient(), *effects))
+def rival_model(labels: Sequence[str], arm_spread: float = ARM_SPREAD) -> Model:
+    """Return the mission's model with some of the candidates, given by their labels."""
+    model = mission.base_unknown(arm_spread, base_spread=SPREAD)
+    return replace(model, effects=(*model.effects, *(effect for effect in CANDIDATES if effect.label in labels)))
 
 
 def amplitude(label: str) -> Floats:
