@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bayesid._io.errors import InputError
 from bayesid.identifiability.local_knowledge import Knowledge
+from studies.common import mission
 from studies.common.ets7 import EXCURSION, RAMPS, START, FlightManoeuvre
-from studies.ets7_limits.analysis import Answer
+from studies.common.template import write_table
+from studies.ets7_limits.analysis import Answer, designed_motion
 from studies.ets7_limits.information import Repeated
 from studies.ets7_limits.report import time_needed
 
@@ -61,3 +64,13 @@ def test_what_is_not_seen_sets_a_floor():
 )
 def test_times_in_words(repetitions: float, floored: bool, words: str):
     assert time_needed(Answer(0.5, repetitions, 0.0234, floored), 240.0) == words
+
+
+def test_the_manoeuvre_is_read_from_the_table_of_the_other_study(tmp_path):
+    file = tmp_path / "excitation-manoeuvres.csv"
+    with pytest.raises(InputError, match="python -m studies"):
+        designed_motion(file)
+    names = mission.splines(2).names
+    values = 0.01 * np.arange(len(names))
+    write_table(tmp_path / "excitation.pdf", "manoeuvres", ["manoeuvre", *names], [["d-optimal", *values]])
+    np.testing.assert_allclose(designed_motion(file).parameters, values)

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bayesid.design import Paper26, Search
+from bayesid.design import Search
 from studies.base_body import paper
-from studies.common.ets7 import LIMITS
+from studies.common import mission
+from studies.common.goals import Verdict
+from studies.common.repeated_fits import Realised, Reference
 from studies.excitation import run
 from studies.excitation.cloud import Cloud
-from studies.excitation.contest import shrunk
-from studies.excitation.realised import Realised
-from studies.excitation.report import write_report
-from studies.excitation.world import paper_family, problem
+from studies.excitation.contest import paper_problem, shrunk
+from studies.excitation.report import goals, write_report
+from tests.report_rules import broken_rules
 
 
 def test_the_printed_optimum_is_made_smaller_until_it_keeps_the_rule():
-    own = problem(paper_family(), LIMITS, (Paper26(),))
+    own = paper_problem()
     parameters, part = shrunk(own, paper.EXCITATION)
     assert 0.01 < part < 0.5  # it is far faster
     reached = {item.name: item for item in own.reached(parameters)}
@@ -29,31 +32,47 @@ def test_the_printed_optimum_is_made_smaller_until_it_keeps_the_rule():
 def test_realised_errors_are_counted_in_predicted_deviations():
     rng = np.random.default_rng(1)
     predicted = np.geomspace(1e-3, 1e3, 10)
-    errors = predicted * rng.normal(size=(4000, 10))
-    own = Realised(errors, predicted, 0.0 * predicted, predicted, (errors**2 / predicted**2).sum(axis=1))
+    own = Realised(predicted * rng.normal(size=(4000, 10)), predicted, np.zeros(4000))
     np.testing.assert_allclose(own.rms, 1.0, atol=5.0 * own.rms_error)
     assert own.rms_error == pytest.approx(1.0 / np.sqrt(8000.0))
+    assert own.ratio == pytest.approx(1.0, abs=0.02)
 
 
 def test_rank_correlation_of_a_cloud():
     information = np.random.default_rng(2).normal(size=400)
-    cloud = Cloud(np.exp(information), -information, np.zeros(400), -2.0 * information)
+    cloud = Cloud(np.exp(information), -information, np.zeros(400), information)
     assert cloud.correlation(cloud.printed)[0] == pytest.approx(1.0)
     assert cloud.correlation(cloud.intended)[0] == pytest.approx(-1.0)
 
 
+def test_the_flight_s_manoeuvre_lies_in_the_middle_of_the_mission():
+    state = mission.flight_manoeuvre().evaluate(np.array([0.0, 0.5 * mission.DURATION, mission.DURATION]))
+    np.testing.assert_allclose(state.position[[0, 2]], np.tile(mission.start(), (2, 1)), atol=1e-9)
+    np.testing.assert_allclose(state.position[1] - mission.start(), [0.0, 0.264, -0.321, 0.057, 0.0, 0.0], atol=1e-9)
+
+
+@pytest.mark.usefixtures("slow")
+def test_a_recording_without_noise_is_fitted_at_the_truth():
+    reference = Reference.of(mission.base_unknown(0.0), mission.flight_manoeuvre())
+    plan = reference.posterior
+    np.testing.assert_allclose(plan.residuals(reference.z), 0.0, atol=1e-6)
+    again = reference.given(plan.manoeuvres[0])
+    np.testing.assert_array_equal(again.residuals(reference.z), plan.residuals(reference.z))
+    np.testing.assert_allclose(reference.inverse @ reference.jacobian, np.eye(plan.size), atol=1e-6)
+
+
 @pytest.mark.usefixtures("slow")
 def test_the_whole_study_small(tmp_path):
-    rule = "within the flight's rule"
-    result = run(seed=2, search=Search(starts=1, iterations=4), repeats=6, random=12, points=2, sets=(rule,))
-    (contest,) = result.contests.values()
-    for name, item in contest.designs.items():
+    result = run(seed=2, search=Search(starts=1, iterations=4), repeats=6, random=12, points=2)
+    for name, item in result.contest.designs.items():
         assert all(reached.kept for reached in item.reached), name
-    assert contest.relative("paper-26") == pytest.approx((0.0, 1.0, 1.0))
-    # squared distances of the truth: chi-square of ten, over six recordings
+    for row in mission.ROWS:
+        assert result.contest.factor("paper-26", "paper-26", row) == pytest.approx(1.0)
     (own,) = result.realised.values()
-    assert own.distances.mean() == pytest.approx(10.0, abs=4.0 * np.sqrt(20.0 / 6.0))
-    for cloud in result.clouds.values():
-        assert np.all(cloud.intended <= cloud.motion + 1e-12)  # differences only take away
+    assert 0.3 < own.ratio < 2.0
+    assert own.last_step.max() < 0.5
+    assert np.all(result.cloud.intended <= result.cloud.motion + 1e-12)  # differences only take away
     write_report(result, tmp_path / "report.pdf")
-    assert (tmp_path / "report.pdf").stat().st_size > 20_000
+    assert broken_rules(tmp_path / "report.pdf") == []
+    wrong = {"d-optimal": replace(own, errors=3.0 * own.errors)}
+    assert Verdict.FAIL in [goal.verdict for goal in goals(replace(result, realised=wrong))]

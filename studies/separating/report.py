@@ -164,13 +164,13 @@ def _setup(result: Result) -> Setup:
         known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link.",
         unknown=(
             f"The base within {2.0 * SPREAD:.0%} of its mass, the rate {format_vector(DRIFT)} rad/s at the start, the "
-            f"bias within {format_number(BIAS)} m/s², the links; and the cause, within 1 N m s of wheels, or 0.5 mN and 0.5 "
-            "mN m of leak, per axis."
+            f"bias within {format_number(BIAS)} m/s², the links; and the cause, within 1 N m s of wheels, or 0.5 mN "
+            "and 0.5 mN m of leak, per axis."
         ),
         replicates=(
             f"{len(result.realised[0].detected)} sets of flights for each cause, each with an arm, a bias and noise of "
-            f"its own; {result.search.starts} starts for each design. Models are compared by their evidence, linearised "
-            "about the plan."
+            f"its own; {result.search.starts} starts for each design. Evidences are linearised about the "
+            "plan."
         ),
     )
 
@@ -216,8 +216,8 @@ def _evidence(document: Document, result: Result) -> None:
         ["hidden", "manoeuvres", *titles],
         rows,
         "λ is the energy of the hidden cause's signal in units of the noise, all other unknowns marginalised; λ(1−ρ²) "
-        "is the part that the rival cannot imitate. The expected ln B adds what each prior costs. Named: flights with ln B "
-        f"above {RIVALRY}; directions: share of random directions with λ(1−ρ²)/2 above it.",
+        "is the part that the rival cannot imitate. The expected ln B adds what each prior costs. Named: flights with "
+        f"ln B above {RIVALRY}; directions: share of random directions with λ(1−ρ²)/2 above it.",
         columns("llrrrrrrrr"),
     )
     document.table(
