@@ -26,7 +26,7 @@ __all__ = ["Iteration", "iterate"]
 ITERATIONS = 2
 """Number of iterations, as in the paper."""
 
-STEP = 0.5
+STEP = 0.25
 """Integration step of the fit [s]."""
 
 

@@ -18,6 +18,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
 from bayesid.recording.recording import Recording
 from studies.common import mission
+from studies.common.errors_in_deviations import squared_distances
 from studies.common.models import ARM_SPREAD
 from studies.common.quantities import JUDGED
 from studies.common.tip_watch import flown_along
@@ -69,9 +70,10 @@ class Flight:
         """Return the posterior standard deviations over `paper.SCALE`, shape (10,)."""
         return self.bodies[step].sd / paper.SCALE
 
-    def shift(self, step: int) -> Floats:
-        """Return the posterior mean less the truth, in standard deviations, shape (10,)."""
-        return (self.bodies[step].mean - paper.TRUTH) / self.bodies[step].sd
+    def distance(self, step: int) -> float:
+        """Return the squared Mahalanobis distance of the truth from the posterior mean; ten on average."""
+        body = self.bodies[step]
+        return float(squared_distances(body.mean - paper.TRUTH, np.cov(body.values.T)))
 
     def worst(self, step: int) -> tuple[float, float]:
         """Return largest relative error and standard deviation of mass and moments of inertia."""
