@@ -91,6 +91,15 @@ def test_the_width_is_that_of_a_linearisation(predictor):
     assert prediction.tip.pose().millimetres.sd.max() > 0.01
 
 
+def test_a_region_holds_what_it_states_of_draws_with_heavy_tails():
+    rng = np.random.default_rng(3)
+    draws = rng.normal(size=(60, 500, 3)) * rng.lognormal(sigma=0.5, size=(60, 500, 1)) * [3.0, 2.0, 0.1]
+    held = [Region.of(own[:400]).holds(own[400:]).mean() for own in draws]
+    normal = [Region(own[:400].mean(axis=0), np.cov(own[:400].T)).holds(own[400:]).mean() for own in draws]
+    np.testing.assert_allclose(np.mean(held), 0.95, atol=0.012)  # three standard errors, and what 400 draws leave
+    assert np.mean(normal) < 0.93
+
+
 def test_a_region_is_an_ellipsoid():
     covariance = np.diag([4.0, 9.0, 1.0])
     region = Region(np.array([1.0, 2.0, 3.0]), covariance)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
-from bayesid.design.pose_region import REACH, Pose, Region
+from bayesid.design.pose_region import Pose, Region
 from bayesid.design.pose_trajectory import PoseTrajectory
 from bayesid.report.figures.figure_style import curve_style, ellipse_outline, styled, wide_figure
 
@@ -66,7 +67,7 @@ def final_positions(poses: Mapping[str, Pose], truth: Floats | None = None) -> F
     origin = next(iter(poses.values())).millimetres.mean if truth is None else 1e3 * truth
     for number, (name, pose) in enumerate(poses.items()):
         draws, region = 1e3 * pose.position - origin, pose.millimetres
-        moved = Region(region.mean - origin, region.covariance)
+        moved = replace(region, mean=region.mean - origin)
         for axes, plane in zip(panels, PLANES, strict=True):
             _shadow(axes, draws[:, plane], moved, plane, name if plane == PLANES[0] else None, number)
     for axes, (first, second) in zip(panels, PLANES, strict=True):
@@ -86,6 +87,6 @@ def _shadow(axes: Axes, draws: Floats, region: Region, plane: tuple[int, int], n
     """Draw the samples and the projection of the ellipsoid onto a plane."""
     style = curve_style(number)
     covariance = region.covariance[np.ix_(plane, plane)]
-    outline = ellipse_outline(covariance, REACH) + region.mean[list(plane)][:, None]
+    outline = ellipse_outline(covariance, region.reach) + region.mean[list(plane)][:, None]
     axes.plot(draws[:, 0], draws[:, 1], ".", color=style["color"], markersize=1.5, alpha=0.35, markeredgewidth=0.0)
     axes.plot(outline[0], outline[1], label=name, **style)
