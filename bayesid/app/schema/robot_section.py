@@ -35,7 +35,7 @@ HIGHEST_ORBIT = 1.5e9
 
 
 class BodySection(Section):
-    """Inertial parameters of a rigid body, in its link's axes.
+    """Section ``[unknowns.prior.BODY]``, the inertial parameters of a rigid body in its link's axes.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class LoadSection(BodySection):
     Parameters
     ----------
     name, link : str
-        Name of the load and of the link that carries it; the other parameters are those of `BodySection`.
+        Name of the load and of the link that carries it, in whose axes the other parameters are.
     """
 
     name: Name

@@ -1,0 +1,40 @@
+"""The manual: prose beside what the code says of itself, so that the two cannot disagree.
+
+Commands, keys of the study file, effects, criteria, rooms and public names are read from the code (`content`); the
+prose that explains them is `manual.typ`, a document of Typst. An effect without a formula stops the build.
+``python -m studies.manual`` writes ``reports/manual.pdf``.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import typst
+
+from bayesid._io.files import complete_file
+from studies.common.command import Command
+from studies.manual.content import content
+
+__all__ = ["main", "run"]
+
+PROSE = Path(__file__).with_name("manual.typ")
+"""Text of the manual, which sets ``content.json`` beside it."""
+
+
+def run(output: Path) -> None:
+    """Write the manual as PDF, whole or not at all."""
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / PROSE.name
+        source.write_bytes(PROSE.read_bytes())
+        (Path(folder) / "content.json").write_text(json.dumps(content()), encoding="utf-8")
+        pdf = typst.compile(str(source), root=folder, format="pdf")
+    with complete_file(output) as part:
+        part.write_bytes(pdf)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Write the manual as the command line says."""
+    run(Command("manual", "Write the manual from the code and its prose.").parse(arguments).output)

@@ -1,0 +1,5 @@
+"""Command line of the manual."""
+
+from studies.manual import main
+
+main()

@@ -1,0 +1,117 @@
+"""The manual names every command, option, key, effect and criterion that the code has."""
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import typer
+
+import bayesid
+from bayesid.app.command_line import app
+from bayesid.app.schema.design_section import CriterionName
+from bayesid.app.schema.editor_schema import editor_schema
+from bayesid.diagnosis.status import Status
+from bayesid.inference.recording_check import ChannelSampling, JointCheck, RecordingCheck, SensorCheck
+from bayesid.report.effect_catalogue import catalogue
+from bayesid.simulation.effects.register import known_effects
+from studies import manual
+from tests.pdf_text import PdfText
+
+ROOT = Path(__file__).resolve().parents[1]
+CONTRACT = ROOT.parent / "shared" / "CONTRACT.md"
+
+WRITERS = (
+    "app.check_command",
+    "app.design_command",
+    "app.identifiability_command",
+    "app.import_command",
+    "app.predict_command",
+    "app.simulate_command",
+    "design.base_prediction",
+    "design.designed",
+    "design.go_no_go",
+    "design.loop_goals",
+    "design.pose_trajectory",
+    "design.step_review",
+    "diagnosis.diagnosis_file",
+    "identifiability.advice",
+    "identifiability.directions",
+    "identifiability.parameter_table",
+    "identifiability.practical_identifiability",
+    "inference.contraction",
+    "inference.identification",
+)
+"""Modules whose dictionaries become JSON files."""
+
+
+@pytest.fixture(scope="module")
+def text(tmp_path_factory: pytest.TempPathFactory) -> PdfText:
+    file = tmp_path_factory.mktemp("manual") / "manual.pdf"
+    manual.run(file)
+    return PdfText.read(file)
+
+
+def results() -> set[str]:
+    """Words set as code in the chapter on results, and the keys in the first column of its tables."""
+    chapter = manual.PROSE.read_text(encoding="utf-8").partition("\n= Results\n")[2].partition("\n= ")[0]
+    code = re.findall(r"`([^`]+)`", chapter)
+    columns = [word for cell in re.findall(r'^  "([\w ]+)", \[', chapter, flags=re.MULTILINE) for word in cell.split()]
+    return {*code, *columns, "mean", "sd", "unit"}
+
+
+def keys_of(module: str) -> set[str]:
+    """Texts that are keys of the dictionaries in a module."""
+    tree = ast.parse(inspect.getsource(importlib.import_module(f"bayesid.{module}")))
+    keys = [key for item in ast.walk(tree) if isinstance(item, ast.Dict) for key in item.keys]
+    return {key.value for key in keys if isinstance(key, ast.Constant) and isinstance(key.value, str)}
+
+
+def test_every_command_and_option_is_in_the_manual(text):
+    for name, command in typer.main.get_command(app).commands.items():
+        assert f"bayesid {name}" in text
+        for option in (word for item in command.params for word in (*item.opts, *item.secondary_opts)):
+            assert not option.startswith("-") or option in text, f"{name} {option}"
+
+
+def test_every_key_of_the_study_file_is_in_the_manual(text):
+    schema = editor_schema()
+    keys = {key for section in (schema, *schema["$defs"].values()) for key in section["properties"]}
+    assert len(keys) > 60
+    assert [key for key in keys if key not in text] == []
+
+
+def test_every_effect_criterion_verdict_and_public_name_is_in_the_manual(text):
+    effects = {entry.name for entry in catalogue()} | set(known_effects())
+    names = [*effects, *CriterionName.__args__, *(status.value for status in Status), *bayesid.__all__]
+    assert [name for name in names if name not in text] == []
+
+
+@pytest.mark.parametrize("module", WRITERS)
+def test_every_key_of_the_results_is_explained(module):
+    units = {"position", "velocity", "torque", "rate", "accel"}  # words of sentences, which are no keys
+    assert keys_of(module) - results() - units == set()
+
+
+@pytest.mark.parametrize("kind", [RecordingCheck, JointCheck, SensorCheck, ChannelSampling])
+def test_every_key_of_a_check_is_explained(kind):
+    assert {field.name for field in dataclasses.fields(kind)} <= results()
+
+
+def test_the_release_notes_have_the_version(text):
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    assert f"Manual of bayesid {version}" in text
+    assert f"\n== {version}\n" in manual.PROSE.read_text(encoding="utf-8").partition("= Release notes")[2]
+
+
+@pytest.mark.skipif(not CONTRACT.is_file(), reason="the contract lies beside the repository")
+def test_every_name_of_the_contract_is_in_the_manual(text):
+    catalogue_of_names = CONTRACT.read_text(encoding="utf-8").partition("## The catalogue's names")[2]
+    cells = re.findall(r"^\| ([^|]+) \|", catalogue_of_names, flags=re.MULTILINE)[1:]
+    names = [name for cell in cells for name in cell.split(", ")]
+    assert len(names) > 30
+    assert [name for name in names if name not in text] == []
