@@ -30,7 +30,7 @@ def run(output: Path) -> None:
         source = Path(folder) / PROSE.name
         source.write_bytes(PROSE.read_bytes())
         (Path(folder) / "content.json").write_text(json.dumps(content()), encoding="utf-8")
-        pdf = typst.compile(str(source), root=folder, format="pdf")
+        pdf = typst.compile(str(source), root=folder, format="pdf", pdf_tags=False)  # tags triple the size
     with complete_file(output) as part:
         part.write_bytes(pdf)
 

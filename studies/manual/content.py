@@ -55,7 +55,9 @@ def content() -> dict[str, Any]:
         "hooks": [
             {"name": name, "text": _first(value)}
             for name, value in vars(Effect).items()
-            if not name.startswith("_") and (callable(value) or isinstance(value, (property, classmethod)))
+            if not name.startswith("_")
+            and name != "uses"
+            and (callable(value) or isinstance(value, (property, classmethod)))
         ],
         "studies": list(_studies()),
     }
