@@ -1,31 +1,39 @@
-"""The picture of the README: the demonstration's first recording, measured and simulated.
+"""The picture of the README: the head of a diagnosis report.
 
-``python -m studies.picture`` writes ``reports/demo.png``.
+``python -m studies.picture out/report.pdf`` writes ``reports/demo.png`` from what ``bayesid demo --output out`` made.
 """
 
 from __future__ import annotations
 
-import tempfile
+import argparse
 from pathlib import Path
 
-import numpy as np
+import typst
 
-from bayesid import Study, load_posterior
-from bayesid.app.demonstration import write_demo
-from bayesid.inference import maximise
-from bayesid.inference.sensor_fit import sensor_fits
-from bayesid.report import figures
+from bayesid._io.files import complete_file
+
+SHOWN = "176mm"
+"""Height of what is shown of the first page: decision, figure and first table."""
+
+RESOLUTION = 100
+"""Resolution of the picture [dots per inch]."""
 
 
-def run(output: Path, *, seed: int = 0) -> None:
-    """Identify the demonstration's base and draw its first recording."""
-    with tempfile.TemporaryDirectory() as folder:
-        write_demo(Path(folder), seed)
-        posterior, optimum = maximise(
-            load_posterior(Study.load(Path(folder) / "study.toml")), np.random.default_rng(seed)
-        )
-        figures.measured_against_simulated(sensor_fits(posterior, optimum.z)[0]).savefig(output, dpi=110)
+def run(report: Path, output: Path) -> None:
+    """Draw the head of the first page of a report."""
+    page = f'image("{report.name}", page: 1, width: 210mm, height: 297mm)'
+    source = (
+        "#set page(width: 180mm, height: auto, margin: 0mm)\n"
+        f"#box(clip: true, height: {SHOWN}, width: 180mm, place(top + left, dx: -15mm, dy: -16mm, {page}))"
+    )
+    picture = typst.compile(source.encode(), root=report.parent, format="png", ppi=RESOLUTION)
+    with complete_file(output) as part:
+        part.write_bytes(picture)
 
 
 if __name__ == "__main__":
-    run(Path("reports/demo.png"))
+    parser = argparse.ArgumentParser(prog="python -m studies.picture", description="Draw the picture of the README.")
+    parser.add_argument("report", type=Path, help="report.pdf of a diagnosis")
+    parser.add_argument("--output", type=Path, default=Path("reports/demo.png"))
+    given = parser.parse_args()
+    run(given.report, given.output)
