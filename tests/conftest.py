@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
-import jax
 import numpy as np
 import pytest
 
@@ -81,7 +80,6 @@ ORBIT = mj.Orbit(6.878e6)
 def _forget_compiled() -> Iterator[None]:
     """Compiled functions of past files would fill the memory; those on disk stay."""
     yield
-    jax.clear_caches()
     forget_executables()
 
 

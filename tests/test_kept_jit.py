@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,10 +56,25 @@ def test_another_process_need_not_trace(folder):
     assert float(scaled(10, X)) == 28.0
     assert TRACED == [10]
     forget_executables()
-    jax.clear_caches()
     assert float(scaled(10, {"a": 2.0 * X["a"]})) == 112.0
     assert TRACED == [10]
     assert len(kept(folder)) == 1
+
+
+def test_what_is_forgotten_is_freed_and_so_is_what_jax_compiled(folder):
+    traced = []
+    plain = jax.jit(lambda x: traced.append(x.shape) or x**2)
+    for _ in range(2):
+        scaled(10, X)
+        plain(X["a"])
+    (executable,) = scaled._ready.values()
+    held = weakref.ref(executable)
+    del executable
+    forget_executables()
+    gc.collect()
+    assert held() is None
+    plain(X["a"])
+    assert traced == [(4,), (4,)]
 
 
 def test_other_static_arguments_and_other_shapes_are_other_executables(folder):
@@ -87,7 +104,6 @@ def test_an_executable_of_jaxs_own_cache_is_not_kept_in_its_place(folder):
     jax.clear_caches()
     scaled(10, X)
     forget_executables()
-    jax.clear_caches()
     assert float(scaled(10, X)) == 28.0
     assert TRACED == [10]
 

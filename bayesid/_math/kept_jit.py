@@ -88,9 +88,13 @@ _BESIDE = _BesideTheCache()
 
 
 def forget_executables() -> None:
-    """Release the memory of all executables; those on disk stay."""
+    """Release the memory of all executables, and of all that JAX has traced and compiled; what is on disk stays.
+
+    A process that works on many studies, one after the other, would otherwise hold the code of all of them.
+    """
     for function in _known:
         function._ready.clear()
+    jax.clear_caches()
 
 
 class KeptJit:

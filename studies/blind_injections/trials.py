@@ -14,6 +14,8 @@ import numpy as np
 from scipy import stats
 
 from bayesid._math.arrays import Floats
+from bayesid._math.kept_jit import forget_executables
+from bayesid.app.compilation_cache import keep_compiled
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Frame, diagnose
@@ -217,8 +219,15 @@ def read(kept: Path) -> list[Trial]:
 
 
 def _weighed_trial(item: Plan, rng: np.random.Generator) -> dict[str, Any]:
-    """Make a trial, whose random numbers follow from the seed of its plan."""
-    return asdict(make(item))
+    """Make a trial, whose random numbers follow from the seed of its plan.
+
+    What was compiled for its robot, recordings and causes stays on disk alone: the memory of a long run would fill.
+    """
+    keep_compiled()  # trials may run in processes of their own
+    try:
+        return asdict(make(item))
+    finally:
+        forget_executables()
 
 
 def _trial(content: Mapping[str, Any]) -> Trial:
