@@ -7,6 +7,8 @@ static arguments, the shapes of the others, and the source of this package.
 
 from __future__ import annotations
 
+import ctypes
+import gc
 import hashlib
 import os
 import pickle
@@ -95,6 +97,10 @@ def forget_executables() -> None:
     for function in _known:
         function._ready.clear()
     jax.clear_caches()
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
+    if trim is not None:  # glibc would keep most of what was freed
+        trim(0)
 
 
 class KeptJit:
