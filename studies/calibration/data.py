@@ -1,0 +1,167 @@
+"""Truths drawn from the prior, and the recordings that the sensors take of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from bayesid import InertialParameters, Manoeuvre, Posterior, Robot
+from bayesid._math.arrays import Floats
+from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
+from bayesid.recording.recording import Recording
+from bayesid.robot.composite_tables import composite_rows
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.log_cholesky import log_cholesky_vector
+from bayesid.simulation.dynamics import composite
+from bayesid.simulation.effects import AccelBias
+from bayesid.simulation.model import Model
+from studies.calibration.cases import INDEPENDENT, Case, model_of
+from studies.common.ets7 import BIAS, ENCODER, INTERVAL
+from studies.common.ets7_model import NOISE
+from studies.common.flight import prescribed, readings, smoothed, true_robot
+from studies.truth.mujoco import smooth_motion
+
+__all__ = ["Recorded", "Truth", "draw_truth", "point", "record"]
+
+DURATION = 120.0
+"""Length of a recording [s]."""
+
+STEP = 0.1
+"""Longest integration step of both simulators [s]."""
+
+AMPLITUDE = 0.5
+"""Typical excursion of a joint [rad]."""
+
+POSTURE = np.array([0.2, -0.8, 1.2, -0.5, 0.6, 0.3])
+"""Joint positions before and after the motion [rad]; the planar robot has the first two."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is true in one replicate.
+
+    Attributes
+    ----------
+    bodies, bias : arrays
+        Coordinates of all unknown bodies, shape (10 B,), and of the accelerometer's constant error, shape (3,).
+    rates : (R, 3) array
+        Initial rate of every recording [rad/s], the base's own or that of `Recorded`.
+    """
+
+    bodies: Floats
+    bias: Floats
+    rates: Floats
+
+
+@dataclass(frozen=True)
+class SmoothMotion:
+    """Smooth random motion of all joints from rest to rest; a `bayesid.recording.joint_motion.Motion`."""
+
+    joints: int
+    seed: int
+
+    def evaluate(self, time: Floats) -> JointState:
+        """Return the joint state at the times, shape (T,)."""
+        motion = smooth_motion(self.joints, DURATION, self.seed, amplitude=AMPLITUDE, centre=POSTURE[: self.joints])
+        return JointState(*(np.array(part) for part in zip(*map(motion, map(float, time)), strict=True)))
+
+
+def draw_truth(model: Model, rng: np.random.Generator) -> Truth:
+    """Draw bodies, accelerometer error and the initial rate of one recording from the prior."""
+    rate = model.rate_sigma * rng.normal(size=(1, 3))
+    return Truth(rng.normal(size=10 * len(model.priors)), rng.normal(size=3), rate)
+
+
+def point(posterior: Posterior, truth: Truth) -> Floats:
+    """Return the coordinates of a truth, shape (size,)."""
+    unknowns, layout = posterior.unknowns, posterior.unknowns.layout
+    z = np.zeros(posterior.size)
+    z[layout.all_bodies] = truth.bodies
+    z[unknowns.effect_indices(AccelBias.name)] = truth.bias
+    if layout.rates:
+        z[layout.all_rates] = (truth.rates / unknowns.rate_sigma).ravel()
+    if layout.joints:  # joints that truly rest at time 0
+        smooth = [manoeuvre.motion.evaluate(np.zeros(1)).velocity[0] for manoeuvre in posterior.manoeuvres]
+        z[layout.all_speeds] = (np.array(smooth) / np.array(unknowns.speed_sigma)).ravel()
+    return z
+
+
+class Recorded(NamedTuple):
+    """Recording of one replicate.
+
+    Attributes
+    ----------
+    manoeuvre : Manoeuvre
+    rate : (3,) array
+        Initial rate that the model must take with the joints as they were smoothed [rad/s]. The momentum at time 0 is
+        the same: what the smoothed joints are too fast by, the base is too slow by.
+    """
+
+    manoeuvre: Manoeuvre
+    rate: Floats
+
+
+def record(case: Case, truth: Truth, rng: np.random.Generator) -> Recorded:
+    """Move the true robot, record it with noise, and smooth its joints where they are not known exactly."""
+    model = model_of(case)
+    robot = _true_robot(model, truth)
+    time = np.arange(0.0, DURATION + 1e-9, INTERVAL)
+    motion = SmoothMotion(len(robot.joints), int(rng.integers(2**31)))
+    attitude = rng.normal(size=4)
+    attitude /= np.linalg.norm(attitude)
+    make = _flown if case in INDEPENDENT else _simulated
+    channels = make(model, truth, motion, attitude, time, rng)
+    if case is Case.EXACT:
+        return Recorded(Manoeuvre(Recording(case, None, time, channels), motion, attitude), truth.rates[-1])
+    manoeuvre = replace(smoothed(case, time, channels, robot, ENCODER), attitude=attitude)
+    exact, smooth = (item.evaluate(np.zeros(1)) for item in (motion, manoeuvre.motion))
+    excess = JointState(exact.position, smooth.velocity - exact.velocity, 0.0 * exact.acceleration)
+    body = composite(jnp.asarray(composite_rows(robot, kinematics(robot, excess))[0]))
+    return Recorded(manoeuvre, truth.rates[-1] - np.asarray(body.inverse @ body.spin))
+
+
+def _true_robot(model: Model, truth: Truth) -> Robot:
+    """Return the robot with the true bodies."""
+    robot = model.robot
+    for prior, z in zip(model.priors, truth.bodies.reshape(-1, 10), strict=True):
+        vector = log_cholesky_vector(prior.centre, jnp.asarray(prior.spread * z))
+        robot = robot.with_inertial(prior.name, InertialParameters.from_vector(np.asarray(vector)))
+    return robot
+
+
+def _simulated(
+    model: Model,
+    truth: Truth,
+    motion: SmoothMotion,
+    attitude: Floats,
+    time: Floats,
+    rng: np.random.Generator,
+) -> dict[str, Floats]:
+    """Return channels that the package's own simulator makes."""
+    names = [f"position.{joint.name}" for joint in model.robot.joints]
+    exact = dict(zip(names, motion.evaluate(time).position.T, strict=True))
+    planned = Recording("planned", None, time, {**exact, **blank_channels(model.sensors, len(time))})
+    posterior = Posterior.of(model, [Manoeuvre(planned, motion, attitude)], step=STEP, window=0)
+    channels = simulate_recordings(posterior, rng, point(posterior, truth))[0].channels
+    return {**channels, **{name: exact[name] + ENCODER * rng.normal(size=len(time)) for name in names}}
+
+
+def _flown(
+    model: Model,
+    truth: Truth,
+    motion: SmoothMotion,
+    attitude: Floats,
+    time: Floats,
+    rng: np.random.Generator,
+) -> dict[str, Floats]:
+    """Return channels that MuJoCo makes."""
+    robot = _true_robot(model, truth)
+    flown = true_robot(robot).run(
+        prescribed(motion, time, STEP), time, rate0=truth.rates[-1], attitude0=attitude, step=STEP
+    )
+    biased = flown._replace(accel=flown.accel + BIAS * truth.bias)
+    return readings(biased, [joint.name for joint in robot.joints], NOISE, rng)

@@ -1,0 +1,195 @@
+"""One replicate: a truth, its recording, its posterior by all methods, and where the truth ranks among their draws.
+
+If the whole chain is right, the rank of the truth among draws of the posterior is uniform, for every function of
+unknowns and data (Talts et al. 2018; Modrák et al. 2023 for the log likelihood). Around one data set, the truth is
+drawn from its posterior and the replicate's posterior is that of both data sets (Säilynoja et al. 2025).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bayesid import Manoeuvre, Posterior
+from bayesid._math.arrays import Floats
+from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of
+from bayesid.inference.ensemble import sample
+from bayesid.inference.importance import choose_parameterisation, weighted_draws
+from bayesid.inference.mode import Optimum, maximise
+from studies.calibration.cases import REPLICATES, Case, model_of
+from studies.calibration.data import Truth, draw_truth, point, record
+
+__all__ = ["LOG_LIKELIHOOD", "Method", "Plan", "make", "plan"]
+
+DRAWS = 499
+"""Number of posterior draws among which the truth is ranked."""
+
+WEIGHTED = 1500
+"""Number of draws of importance sampling; the package's default of 4,000 gives the same ranks at a higher price."""
+
+EFFECTIVE = 1000.0
+"""Effective samples of emcee."""
+
+EVERY = 20
+"""Of so many replicates of a case, emcee samples the posterior of one."""
+
+SMALL = (Case.EXACT, Case.BASE, Case.MUJOCO)
+"""Cases of the small plan."""
+
+FIRST_SEED = 20_000
+"""Seed of the data set around which replicates are drawn."""
+
+LOG_LIKELIHOOD = "log likelihood"
+
+
+class Method(StrEnum):
+    """Method by which the posterior is described."""
+
+    LAPLACE = "Laplace"
+    IMPORTANCE = "importance sampling"
+    EMCEE = "emcee"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One replicate to be made: its case, and whether emcee samples its posterior too."""
+
+    case: Case
+    sampled: bool = False
+
+
+def make(plan: Plan, rng: np.random.Generator) -> dict[str, Any]:
+    """Make one replicate.
+
+    Returns
+    -------
+    dict
+        Ranks of the truth in (0, 1) by method and unknown; chi-square of the data at the truth with its number of
+        samples, by sensor; by how many stated standard deviations the initial rate of the smoothed joints differs from
+        the base's own; Pareto k-hat and effective samples of the weights; whether the search for the mode and emcee
+        converged; processor time [s].
+    """
+    began = time.process_time()
+    truth, manoeuvres, own_rate = _data(plan.case, rng)
+    posterior = Posterior.of(model_of(plan.case), manoeuvres)
+    z = point(posterior, truth)
+    refined, optimum = maximise(posterior, rng)
+    parameterisation = choose_parameterisation(refined, optimum, rng)
+    weighted = weighted_draws(parameterisation, optimum, rng, WEIGHTED)
+    laplace = rng.multivariate_normal(optimum.z, optimum.covariance, DRAWS, method="cholesky")
+    draws = {
+        Method.LAPLACE: laplace,
+        Method.IMPORTANCE: weighted.z[rng.choice(len(weighted.z), DRAWS, p=weighted.weights)],
+    }
+    chains = None
+    if plan.sampled:
+        seed = np.random.SeedSequence(int(rng.integers(2**31)))
+        chains = sample(parameterisation, optimum, seed, effective_samples=EFFECTIVE)
+        draws[Method.EMCEE] = rng.choice(chains.flat, DRAWS)
+    return {
+        "ranks": {method: _ranks(refined, z, points, rng) for method, points in draws.items()},
+        "rate_shift": _rate_shift(refined, optimum, truth.rates[-1] - own_rate),
+        "chi2": _chi_squares(refined, z),
+        "pareto_k": round(weighted.pareto_k, 3),
+        "effective": round(weighted.effective_samples, 1),
+        "converged": optimum.converged,
+        "emcee_converged": None if chains is None else chains.converged,
+        "seconds": round(time.process_time() - began, 2),
+    }
+
+
+class _First(NamedTuple):
+    """One data set with weighted draws of its posterior, and the prior's width of its initial rate."""
+
+    manoeuvre: Manoeuvre
+    z: Floats
+    weights: Floats
+    rate_sigma: float
+
+
+@cache
+def _first(case: Case) -> _First:
+    """Return the data set around which replicates are drawn."""
+    rng, model = np.random.default_rng(FIRST_SEED), model_of(case)
+    manoeuvre = record(case, draw_truth(model, rng), rng).manoeuvre
+    posterior, optimum = maximise(Posterior.of(model, [manoeuvre]), rng)
+    weighted = weighted_draws(choose_parameterisation(posterior, optimum, rng), optimum, rng, 20_000)
+    return _First(manoeuvre, weighted.z, weighted.weights, posterior.unknowns.rate_sigma)
+
+
+def _data(case: Case, rng: np.random.Generator) -> tuple[Truth, list[Manoeuvre], Floats]:
+    """Return a truth, its recordings, and the base's own initial rate in the last [rad/s].
+
+    Around one data set, that data set is the first of two recordings.
+    """
+    model = model_of(case)
+    new = draw_truth(model, rng)
+    if case is not Case.AROUND:
+        recorded = record(case, new, rng)
+        return replace(new, rates=recorded.rate[None]), [recorded.manoeuvre], new.rates[-1]
+    first = _first(case)
+    bodies, rate, bias = np.split(
+        first.z[rng.choice(len(first.z), p=first.weights)], [10 * len(model.priors), 10 * len(model.priors) + 3]
+    )
+    recorded = record(case, Truth(bodies, bias, new.rates), rng)
+    rates = np.stack([first.rate_sigma * rate, recorded.rate])
+    return Truth(bodies, bias, rates), [first.manoeuvre, recorded.manoeuvre], new.rates[-1]
+
+
+def _ranks(posterior: Posterior, truth: Floats, draws: Floats, rng: np.random.Generator) -> dict[str, float]:
+    """Return the ranks of the truth among draws, spread evenly within (0, 1)."""
+    values = _tested(posterior, np.concatenate([truth[None], draws]))
+    share = rng.uniform(size=len(values))
+    ranks = {
+        name: (np.count_nonzero(column[1:] < column[0]) + u) / (len(draws) + 1.0)
+        for (name, column), u in zip(values.items(), share, strict=True)
+    }
+    return {name: round(float(rank), 5) for name, rank in ranks.items()}
+
+
+def _tested(posterior: Posterior, z: Floats) -> dict[str, Floats]:
+    """Return what is ranked at points (n, size): quantities of identified bodies, other unknowns, log likelihood."""
+    values: dict[str, Floats] = {}
+    for body in bodies_of(posterior, z).values():
+        values |= {f"{body.name}.{key}": body.values[:, index] for index, key in enumerate(BODY_QUANTITIES)}
+    left = sorted(set(range(posterior.size)) - set(posterior.unknowns.body_indices()))
+    values |= {posterior.unknowns.names[index]: z[:, index] for index in left}
+    return values | {LOG_LIKELIHOOD: posterior.log_likelihoods(z).sum(axis=1)}
+
+
+def _rate_shift(posterior: Posterior, optimum: Optimum, shift: Floats) -> list[float]:
+    """Return a change of the last initial rate [rad/s] in stated standard deviations, none from rest."""
+    rates = posterior.unknowns.layout.all_rates
+    if rates.stop == rates.start:
+        return []
+    sd = posterior.unknowns.rate_sigma * np.sqrt(np.diag(optimum.covariance)[rates][-3:])
+    return [round(float(value), 3) for value in shift / sd]
+
+
+def _chi_squares(posterior: Posterior, z: Floats) -> dict[str, tuple[float, int]]:
+    """Return chi-square and number of samples of each sensor, all recordings together."""
+    squares = posterior.residuals(z) ** 2
+    result = {}
+    for kind in posterior.model.channels.kinds:
+        columns = posterior.model.channels.of(kind)
+        count = sum(int(item.outputs[:, columns].sum()) for item in posterior.whitenings)
+        result[kind.value] = (round(float(squares[:, :, columns].sum()), 2), count)
+    return result
+
+
+def plan(full: bool) -> list[Plan]:
+    """Return the plans of all replicates: of the full plan, or one of every case that one compilation serves.
+
+    Replicates of a case are independent, so that the first ones of a run that was stopped are a random sample. Cases
+    advance in proportion to the root of their number, so that such a run has some of each.
+    """
+    counts = REPLICATES if full else dict.fromkeys(SMALL, 1)
+    order = [(number / np.sqrt(count), case, number) for case, count in counts.items() for number in range(count)]
+    return [
+        Plan(case, full and number % EVERY == EVERY // 2) for _, case, number in sorted(order, key=lambda item: item[0])
+    ]
