@@ -1,17 +1,24 @@
 """The campaign on two trials: kept, resumed, reported."""
 
-from dataclasses import replace
+import gzip
+from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bayesid.diagnosis import Status
+from bayesid.report.verdict_record import Share, record_sentence, shipped_record
 from studies.blind_injections import Trial, plan, run, write_report
-from studies.blind_injections.goals import _least, _most, _rate, _scatter, interval
+from studies.blind_injections.goals import _least, _most, _rate, _scatter
+from studies.blind_injections.record import record_of
 from studies.blind_injections.report import confusion, rates, reliability, scores, statements
 from studies.blind_injections.trials import Plan, read
 from studies.common.goals import Verdict
 from studies.common.monte_carlo import read_store
 from studies.truth import hidden_causes
+
+REPORTS = Path(__file__).resolve().parents[1] / "reports"
 
 PLANS = [Plan("rate-bias", 5, 0.3), Plan("null, three joints", 5)]
 
@@ -124,9 +131,28 @@ def test_the_plans_hide_everything_and_nothing():
     assert sum(item.case.startswith("null") for item in plans) == 1000
 
 
+def test_the_record_that_is_shipped_is_that_of_the_committed_trials(tmp_path):
+    committed = tmp_path / "trials.jsonl"
+    committed.write_bytes(gzip.decompress((REPORTS / "blind_injections.jsonl.gz").read_bytes()))
+    trials = read(committed)
+    record = record_of(trials)
+    assert {name: asdict(share) for name, share in shipped_record().items()} == record
+    assert sum(record[status.value]["total"] for status in Status) == len(trials) > 100
+
+
+def test_a_verdict_is_shown_with_its_record(monkeypatch):
+    shares = {status.value: Share(9, 10) for status in Status} | {"unresolved": Share(0, 0)}
+    shares |= {"quiet": Share(20, 20), "loud": Share(7, 8)}
+    monkeypatch.setattr("bayesid.report.verdict_record.shipped_record", lambda: shares)
+    assert "9 of 10 (55 to 100 %) named nothing but what was hidden" in record_sentence(Status.EXPLAINED)
+    assert "20 of 20 (83 to 100 %) raised no alarm" in record_sentence(Status.ADEQUATE)
+    assert "7 of 8 (47 to 100 %) raised one" in record_sentence(Status.ADEQUATE)
+    assert record_sentence(Status.UNRESOLVED) is None
+
+
 def test_a_goal_is_decided_by_its_interval():
     """By hand: 0 of 1,000, and 30 of 1,000, where one per cent is due; 95 % of many, of few, and of none."""
-    assert interval(0, 10) == pytest.approx((0.0, 1.0 - 0.025**0.1))
+    assert Share(0, 10).interval == pytest.approx((0.0, 1.0 - 0.025**0.1))
     assert _rate("", 0.01, 12, 1000).verdict is Verdict.PASS
     assert _rate("", 0.01, 30, 1000).verdict is Verdict.FAIL
     assert _rate("", 0.01, 1, 100).verdict is Verdict.OPEN

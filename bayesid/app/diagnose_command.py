@@ -76,6 +76,7 @@ def diagnose_study(
     from bayesid.inference.posterior_file import write_netcdf
     from bayesid.report import diagnosis_report
     from bayesid.report.sentences.diagnosis_sentences import diagnosis_sentences
+    from bayesid.report.verdict_record import record_sentence
 
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
@@ -103,7 +104,8 @@ def diagnose_study(
             write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
         asked = ["--no-sample"] if effective_samples is None else ["--samples", f"{effective_samples:g}"]
         origin = report_origin(study, "diagnose", seed, ["--output", output.name, *asked])
-        diagnosis_report(result, identification, study.title, folder / "report.pdf", origin=origin)
+        record = record_sentence(result.verdict.status)
+        diagnosis_report(result, identification, study.title, folder / "report.pdf", record=record, origin=origin)
         clock.ends("report")
         content = result.to_dict(identification)
         write_json(folder / "diagnosis.json", content | {"seconds": content["seconds"] | clock.seconds})

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
 
+from bayesid.report.verdict_record import Share
 from studies.blind_injections.trials import Trial
 from studies.common.goals import Goal, Verdict
 
-__all__ = ["CLEAR", "LEFT", "goals_of", "interval", "share_text"]
+__all__ = ["CLEAR", "LEFT", "goals_of", "share_text"]
 
 CLEAR = 7.0
 """Signal-to-noise ratio from which the hidden causes should be named."""
@@ -25,19 +25,9 @@ LEAST_NULLS = 1000
 """Trials without anything hidden below which a rate of 1 % is not decided."""
 
 
-def interval(count: int, total: int) -> tuple[float, float]:
-    """Return the 95 % Clopper-Pearson interval of a share."""
-    low = float(stats.beta.ppf(0.025, count, total - count + 1)) if count else 0.0
-    high = float(stats.beta.ppf(0.975, count + 1, total - count)) if count < total else 1.0
-    return low, high
-
-
 def share_text(count: int, total: int) -> str:
     """Return a share with its interval."""
-    if total == 0:
-        return "none"
-    low, high = interval(count, total)
-    return f"{count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
+    return str(Share(count, total)) if total else "none"
 
 
 def goals_of(trials: Sequence[Trial]) -> list[Goal]:
@@ -56,7 +46,7 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
         Goal(
             f"named alone at {CLEAR:g} sigma and more, relative to the simulated limit: 0.97",
             f"{sum(t.named_rightly for t in limited) / limit:.2f} ({len(limited)} trials)" if limited else "-",
-            _verdict(*interval(sum(t.named_rightly for t in limited), len(limited)), 0.97)
+            _verdict(*Share(sum(t.named_rightly for t in limited), len(limited)).interval, 0.97)
             if limited
             else Verdict.NOT_TESTED,
         ),
@@ -81,7 +71,9 @@ def _verdict(low: float, high: float, goal: float) -> Verdict:
 def _least(text: str, goal: float, count: int, total: int) -> Goal:
     goal_text = f"{text}: at least {100.0 * goal:g} %"
     return Goal(
-        goal_text, share_text(count, total), _verdict(*interval(count, total), goal) if total else Verdict.NOT_TESTED
+        goal_text,
+        share_text(count, total),
+        _verdict(*Share(count, total).interval, goal) if total else Verdict.NOT_TESTED,
     )
 
 
@@ -89,7 +81,7 @@ def _most(text: str, goal: float, count: int, total: int) -> Goal:
     goal_text = f"{text}: at most {100.0 * goal:g} %"
     if not total:
         return Goal(goal_text, share_text(count, total), Verdict.NOT_TESTED)
-    low, high = interval(count, total)
+    low, high = Share(count, total).interval
     return Goal(goal_text, share_text(count, total), _verdict(1.0 - high, 1.0 - low, 1.0 - goal))
 
 
@@ -97,7 +89,7 @@ def _rate(text: str, goal: float, count: int, total: int) -> Goal:
     goal_text = f"{text}: consistent with {100.0 * goal:g} % in {LEAST_NULLS} trials"
     if not total:
         return Goal(goal_text, share_text(count, total), Verdict.NOT_TESTED)
-    low, high = interval(count, total)
+    low, high = Share(count, total).interval
     verdict = Verdict.FAIL if not low <= goal <= high else Verdict.PASS if total >= LEAST_NULLS else Verdict.OPEN
     return Goal(goal_text, share_text(count, total), verdict)
 

@@ -13,9 +13,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
+from bayesid._io.files import write_json
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from studies.blind_injections.goals import goals_of, share_text
+from studies.blind_injections.record import record_of
 from studies.blind_injections.trials import Trial, plan, read, run
 from studies.common.command import Command
 from studies.common.goals import add_goals
@@ -41,6 +43,7 @@ COMMAND = Command(
     extra={
         "--trials": {"type": Path, "default": Path("out/blind_injections.jsonl"), "help": "kept between runs"},
         "--made": {"action": "store_true", "help": "report the trials made so far, make no more"},
+        "--record": {"type": Path, "help": "file for the counts that the package ships"},
         "--workers": {"type": int, "default": 1, "help": "processes that make trials"},
     },
 )
@@ -56,6 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     plans = plan(options.full)
     trials = read(options.trials) if options.made else run(plans, options.trials, show, options.workers)
     write_report(trials, options.output, planned=len(plans))
+    if options.record is not None:
+        write_json(options.record, record_of(trials))
     print(f"Wrote {options.output}.")
 
 
