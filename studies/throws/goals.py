@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from bayesid.diagnosis import Diagnosis
 from bayesid.diagnosis.probable_verdict import NAMED
-from studies.blind_injections.goals import interval
+from bayesid.report.verdict_record import Share
 from studies.common.goals import Goal, Verdict
 from studies.throws.smooth_widths import LARGEST
 
@@ -80,7 +80,7 @@ def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
 
 def _coverage(result: Result) -> Goal:
     count, total = held_in_all(result)
-    low, high = interval(count, total)
+    low, high = Share(count, total).interval
     inside = low >= LOW and high <= HIGH
     outside = high < LOW or low > HIGH
     text = f"95 % intervals of single throws hold the truth in {100 * LOW:.0f} to {100 * HIGH:.0f} % of cases"
