@@ -132,13 +132,17 @@ class Case:
         return np.array([attitude.missed[-1] / attitude.sd[-1] for attitude in self.attitudes])
 
 
-def analyse(world: World, seed: int, progress: Progress = silent, *, names: Sequence[str] | None = None) -> Case:
+def analyse(
+    world: World, spread: float, seed: int, progress: Progress = silent, *, names: Sequence[str] | None = None
+) -> Case:
     """Diagnose the rates of a world; the attitude is not used, but compared with.
 
     Parameters
     ----------
     world : World
         What truly happens.
+    spread : float
+        Relative width of the base's prior.
     seed : int
         Seed of the diagnosis, and of the draws for the band.
     progress : callable, optional
@@ -146,7 +150,7 @@ def analyse(world: World, seed: int, progress: Progress = silent, *, names: Sequ
     names : sequence of str, optional
         Names of the candidates, by default the whole catalogue.
     """
-    model = model_of()
+    model = model_of(spread)
     effects = None if names is None else [create(name).attach(model.robot) for name in names]
     result = diagnose(model, world.manoeuvres, seed, effects=effects, progress=progress)
     attitudes = tuple(_attitudes(model, result, np.random.default_rng(seed)))
@@ -178,13 +182,16 @@ def _amplitudes(world: World, result: Diagnosis) -> Iterator[Amplitude]:
 
 
 def _attitudes(model: Model, result: Diagnosis, rng: np.random.Generator) -> Iterator[Attitude]:
-    before = result.before.fit.z[result.before.engine.free]
+    before, present = result.before.fit.z[result.before.engine.free], _watched(model, result)
+    extended = _watched(result.posterior.model, result)
     simulated = {
-        "plain": _simulated(model, result, np.zeros_like(before)),
-        "fitted": _simulated(model, result, before),
-        "extended": _simulated(result.posterior.model, result, result.start),
+        "plain": _simulated(present, np.zeros_like(before)),
+        "fitted": _simulated(present, before),
+        "extended": _simulated(extended, result.start),
     }
-    draws = _draws(result, rng)
+    # draws from the posterior of the extended model, linearised at its fit
+    root = np.linalg.cholesky(Knowledge.at(result.posterior, result.start).coordinates)
+    draws = [_simulated(extended, result.start + root @ rng.standard_normal(len(root))) for _ in range(DRAWS)]
     for index, manoeuvre in enumerate(result.before.fit.posterior.manoeuvres):
         time, recorded = manoeuvre.recording.vector("attitude", ("x", "y", "z", "w"))
         measured, start = Rotation.from_quat(recorded), Rotation.from_quat(manoeuvre.attitude).inv()
@@ -204,21 +211,16 @@ def _attitudes(model: Model, result: Diagnosis, rng: np.random.Generator) -> Ite
         )
 
 
-def _draws(result: Diagnosis, rng: np.random.Generator) -> list[list[Floats]]:
-    """Return attitudes of all recordings by draws from the posterior of the extended model, linearised at its fit."""
-    root = np.linalg.cholesky(Knowledge.at(result.posterior, result.start).coordinates)
-    return [
-        _simulated(result.posterior.model, result, result.start + root @ rng.standard_normal(len(root)))
-        for _ in range(DRAWS)
-    ]
-
-
 def _angles(turned: Rotation) -> Floats:
     return np.unwrap(turned.as_euler("xyz", degrees=True), axis=0, period=360.0)
 
 
-def _simulated(model: Model, result: Diagnosis, z: Floats) -> list[Floats]:
-    """Return the simulated attitudes of all recordings."""
+def _watched(model: Model, result: Diagnosis) -> Posterior:
+    """Return the posterior of a model that has the attitude as a sensor too."""
     sensors = (*model.sensors, Sensor(Kind.ATTITUDE, White(ATTITUDE_SIGMA)))
-    posterior = Posterior.of(replace(model, sensors=sensors), result.posterior.manoeuvres)
+    return Posterior.of(replace(model, sensors=sensors), result.posterior.manoeuvres)
+
+
+def _simulated(posterior: Posterior, z: Floats) -> list[Floats]:
+    """Return the simulated attitudes of all recordings."""
     return [np.asarray(predicted.attitude) for predicted in predicted_readings(posterior, z)]

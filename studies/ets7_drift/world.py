@@ -13,7 +13,7 @@ from studies.common.ets7 import BASE, RADIUS, FlightManoeuvre, ets7
 from studies.common.flight import ORBIT, fly, light_wheel, record
 from studies.truth.mujoco import Body, nearby
 
-__all__ = ["DURATION", "MOTION", "SPREAD", "World", "draw_world", "model_of"]
+__all__ = ["DURATION", "KNOWN", "MOTION", "World", "draw_world", "model_of"]
 
 DURATION = 300.0
 """Duration of a recording [s]; the attitude control is off throughout."""
@@ -37,8 +37,8 @@ MOMENTUM = (0.6, -0.4, 0.8)
 RATE = 3e-4
 """Standard deviation of the initial rates about each axis [rad/s]: a degree in a minute."""
 
-SPREAD = 0.025
-"""Relative width of the base's prior, of which the true base is a draw about the published one: a mass known to 5 %."""
+KNOWN = {"5 %": 0.025, "1 %": 0.005}
+"""To what the base's mass is known -> relative width of the base's prior, of which the true base is a draw."""
 
 
 @dataclass(frozen=True)
@@ -63,19 +63,21 @@ class World:
     manoeuvres: tuple[Manoeuvre, ...]
 
 
-def draw_world(recordings: int, seed: int, duration: float = DURATION) -> World:
+def draw_world(recordings: int, seed: int, spread: float, duration: float = DURATION) -> World:
     """Draw a true base, attitudes, places on the orbit and initial rates; simulate and measure.
 
     Parameters
     ----------
     recordings, seed : int
         Number of recordings, and seed of all random numbers.
+    spread : float
+        Relative width of the draw of the true base about the published one.
     duration : float
         Duration of a recording [s].
     """
     rng, robot = np.random.default_rng(seed), ets7()
     published = robot.link(BASE).inertial
-    base = nearby(Body(published.mass, published.com, published.inertia), rng, SPREAD)
+    base = nearby(Body(published.mass, published.com, published.inertia), rng, spread)
     wheels = np.array(MOMENTUM)
     manoeuvres, rates = [], RATE * rng.standard_normal((recordings, 3))
     time = np.arange(0.0, duration + 0.5 * INTERVAL, INTERVAL)
@@ -91,7 +93,7 @@ def draw_world(recordings: int, seed: int, duration: float = DURATION) -> World:
     return World(wheels, rates, base.quantities, tuple(manoeuvres))
 
 
-def model_of() -> Model:
+def model_of(spread: float) -> Model:
     """Return the model that starts at rest and has no disturbance, with the published base as prior.
 
     It uses the rates alone; the measured attitude is kept for comparison.
@@ -100,7 +102,7 @@ def model_of() -> Model:
     return Model(
         robot,
         (Sensor(Kind.RATE, White(RATE_SIGMA)),),
-        (BodyPrior(BASE, robot.link(BASE).inertial, SPREAD),),
+        (BodyPrior(BASE, robot.link(BASE).inertial, spread),),
         orbit=Orbit(RADIUS),
         rate_sigma=0.0,
     )
