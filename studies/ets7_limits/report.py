@@ -61,12 +61,12 @@ def goals(result: Result) -> tuple[Goal, ...]:
     for known, title in ((False, "known to 5 %"), (True, "known exactly")):
         once = result.after["designed"].worst(known)
         needed = time_needed(result.answers[USUAL][known, False], mission.DURATION)
-        text = f"Base's mass and moments known to {WANTED:.0%} after one manoeuvre, arm {title}"
-        reached = f"{format_percent(once, 2)} after one; time until {WANTED:.0%}: {needed}"
+        text = f"Base's mass and moments known to {format_percent(WANTED)} after one manoeuvre, arm {title}"
+        reached = f"{format_percent(once, 2)} after one; time until {format_percent(WANTED)}: {needed}"
         rows.append(Goal(text, reached, Verdict.of(once <= WANTED)))
     rows.append(
         Goal(
-            f"Standard deviations agree within {ALIKE:.0%} with those of the report on excitation, same manoeuvre",
+            f"Standard deviations agree within {format_percent(ALIKE)} with those of the report on excitation, same manoeuvre",
             f"{format_percent(result.difference, 2)} at most, both rows of the arm",
             Verdict.of(result.difference <= ALIKE),
         )
@@ -77,7 +77,7 @@ def goals(result: Result) -> tuple[Goal, ...]:
     verdict = Verdict.FAIL if away > WITHIN + 2.0 * error else Verdict.OPEN if away > WITHIN else Verdict.PASS
     rows.append(
         Goal(
-            f"Realised errors of this manoeuvre within {WITHIN:.0%} of predicted, mission's sensors, arm 5 %",
+            f"Realised errors of this manoeuvre within {format_percent(WITHIN)} of predicted, mission's sensors, arm 5 %",
             f"{least:.3f} to {most:.3f} by parameter over {count} flights in MuJoCo, each ± {error:.3f} (report on "
             "excitation)",
             verdict,

@@ -74,7 +74,9 @@ def goals(result: Result) -> tuple[Goal, ...]:
             f"{TITLES[name]}: {item.rms.min():.3f} to {item.rms.max():.3f} of the predicted sd over "
             f"{len(item.errors)} flights, each ± {item.rms_error:.3f}; geometric mean {item.ratio:.3f}"
         )
-        rows.append(Goal(f"Realised errors within {WITHIN:.0%} of predicted for every parameter", reached, verdict))
+        rows.append(
+            Goal(f"Realised errors within {format_percent(WITHIN)} of predicted for every parameter", reached, verdict)
+        )
     rows.append(
         Goal(
             "By every criterion, the manoeuvre designed for it is the best of all",
@@ -129,8 +131,8 @@ def _setup(result: Result) -> Setup:
         robot=f"ETS-VII with the published base, nominal links, joints within ±{mission.REACH:g} rad.",
         manoeuvre=(
             f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight's rule allows. "
-            f"The paper's optimum had to be made smaller, to {shrink['printed']:.1%} of its amplitudes, and its poor "
-            f"neighbour to {shrink['poor']:.1%}."
+            f"The paper's optimum had to be made smaller, to {format_percent(shrink['printed'], 2)} of its amplitudes, and its poor "
+            f"neighbour to {format_percent(shrink['poor'], 2)}."
         ),
         sensors=(
             f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with {format_number(ACCEL)} "
@@ -189,8 +191,8 @@ def _calibration(document: Document, result: Result) -> None:
         title = TITLES[name]
         beyond = [LABELS[k] for k in range(10) if abs(item.rms[k] - 1.0) > WITHIN]
         document.paragraph(
-            f"MuJoCo flew the {title} manoeuvre {len(item.errors)} times. Not within {WITHIN:.0%} of the predicted sd: "
-            f"{', '.join(beyond) or 'none'}; one standard error of a ratio is {item.rms_error:.1%}, so that of ten "
+            f"MuJoCo flew the {title} manoeuvre {len(item.errors)} times. Not within {format_percent(WITHIN)} of the predicted sd: "
+            f"{', '.join(beyond) or 'none'}; one standard error of a ratio is {format_percent(item.rms_error, 2)}, so that of ten "
             "ratios some lie outside by chance alone. Each mode was found by Gauss-Newton steps with the Jacobian of "
             f"the plan, of which the last changed no coordinate by more than {item.last_step.max():.2g} standard "
             "deviations."

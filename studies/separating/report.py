@@ -48,7 +48,7 @@ HIDDEN = {
 }
 """Words for what is hidden."""
 
-NAMES = {"wheel-momentum": "wheels", "thruster-leak": "leak"}
+NAMES = {"wheel-momentum": "wheel momentum", "thruster-leak": "leak"}
 """Short names of the two causes."""
 
 
@@ -63,13 +63,13 @@ def goals(result: Result) -> tuple[Goal, ...]:
     rows = []
     for item in result.realised:
         values = item.factors[LAST]
-        text = f"Hidden {NAMES[item.truth]}: ln B over the rival above {RIVALRY} in {SURE:.0%} of flights"
+        text = f"Hidden {NAMES[item.truth]}: ln B over the rival above {RIVALRY} in {format_percent(SURE)} of flights"
         reached = f"{_named(item, LAST)}, mean {format_fixed(values.mean(), 1)}"
         rows.append(Goal(text, reached, Verdict.of((values > RIVALRY).mean() >= SURE)))
     for truth in RIVALS:
         share = (result.directions[truth, LAST] > RIVALRY).mean()
-        text = f"Hidden {NAMES[truth]}, same size in random directions: expected above {RIVALRY} in {SURE:.0%} of them"
-        rows.append(Goal(text, f"{share:.0%}", Verdict.of(share >= SURE)))
+        text = f"Hidden {NAMES[truth]}, same size in random directions: expected above {RIVALRY} in {format_percent(SURE)} of them"
+        rows.append(Goal(text, format_percent(share, 3), Verdict.of(share >= SURE)))
     for item in result.realised:
         gain = item.factors[LAST] - item.factors["first, d-optimal"]
         error = gain.std(ddof=1) / np.sqrt(len(gain))
@@ -96,8 +96,8 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
     """Write the report as PDF, and its tables beside it."""
     document = Document("Telling two causes apart", "A manoeuvre designed to separate rivals, ETS-VII in MuJoCo")
     parts = [
-        f"a hidden {NAMES[item.truth]} cause is named in {_named(item, LAST)} flights, where the first manoeuvre alone "
-        f"names it in {_named(item, 'first alone')} and a d-optimal second one in {_named(item, 'first, d-optimal')}"
+        f"a hidden {NAMES[item.truth]} is named in {_named(item, LAST)} flights ({_named(item, 'first alone')} with the "
+        f"first manoeuvre alone, {_named(item, 'first, d-optimal')} with a d-optimal second one)"
         for item in result.realised
     ]
     summary = Summary(
@@ -105,11 +105,11 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
             "Wheels with momentum left and a leaking valve push a slowly drifting base alike. Does a second manoeuvre "
             "that is designed to separate them decide which it is?"
         ),
-        answer=f"With the separating manoeuvre {'; '.join(parts)}.",
+        answer=f"With the separating manoeuvre {' and '.join(parts)}.",
         goals=goals(result),
         valid=(
             "one of the two acts and nothing else, with the same size in both manoeuvres; the base is known to "
-            f"{2.0 * SPREAD:.0%} of its mass and drifts by a degree in a minute. The design knows that rate."
+            f"{format_percent(2.0 * SPREAD)} of its mass and drifts by a degree in a minute. The design knows that rate."
         ),
         full=result.full,
     )
@@ -163,7 +163,7 @@ def _setup(result: Result) -> Setup:
         ),
         known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link.",
         unknown=(
-            f"The base within {2.0 * SPREAD:.0%} of its mass, the rate {format_vector(DRIFT)} rad/s at the start, the "
+            f"The base within {format_percent(2.0 * SPREAD)} of its mass, the rate {format_vector(DRIFT)} rad/s at the start, the "
             f"bias within {format_number(BIAS)} m/s², the links; and the cause, within 1 N m s of wheels, or 0.5 mN "
             "and 0.5 mN m of leak, per axis."
         ),
@@ -210,7 +210,7 @@ def _evidence(document: Document, result: Result) -> None:
             ]
             share = (result.directions[item.truth, stage] > RIVALRY).mean()
             numbers = [format_fixed(float(cell), 1) for cell in cells]
-            rows.append([NAMES[item.truth], stage, *numbers, _named(item, stage), f"{share:.0%}"])
+            rows.append([NAMES[item.truth], stage, *numbers, _named(item, stage), format_percent(share, 3)])
     titles = ["λ", "λ(1−ρ²)/2", "expected ln B", "mean ln B", "sd ln B", "expected sd", "named", "directions"]
     document.table(
         ["hidden", "manoeuvres", *titles],
