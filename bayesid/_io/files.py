@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,7 +16,10 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 
-__all__ = ["complete_file", "complete_folder", "create_folder", "write_json", "write_text"]
+if sys.platform != "win32":
+    import fcntl
+
+__all__ = ["claimed_folder", "complete_file", "complete_folder", "create_folder", "write_json", "write_text"]
 
 
 @contextmanager
@@ -57,11 +61,55 @@ def create_folder(folder: Path) -> None:
         ) from None
 
 
+_claimed: set[Path] = set()
+
+
+@contextmanager
+def claimed_folder(folder: Path) -> Iterator[None]:
+    """Create a folder for results and keep other processes out of it; what a killed run left unfinished is removed.
+
+    The system ends the claim of a process that is killed. A block within another one of the same process is part of it.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be created, or another process has claimed it.
+    """
+    create_folder(folder)
+    key = folder.resolve()
+    if key in _claimed or sys.platform == "win32":
+        yield
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        _lock(handle, folder)
+        _claimed.add(key)
+        for item in [*folder.glob(".part-*"), *folder.glob(".*.part")]:
+            shutil.rmtree(item) if item.is_dir() else item.unlink()
+        yield
+    finally:
+        _claimed.discard(key)
+        os.close(handle)
+
+
+def _lock(handle: int, folder: Path) -> None:
+    """Lock an open folder until it is closed, where the file system has locks."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise InputError(
+            "another run is writing into this folder",
+            file=folder,
+            remedy="Wait until it ends, or choose another output folder",
+        ) from None
+    except OSError:
+        pass
+
+
 @contextmanager
 def complete_folder(output: Path) -> Iterator[Path]:
     """Yield a temporary folder whose files are moved to the output together, unless the block fails."""
-    create_folder(output)
-    with tempfile.TemporaryDirectory(dir=output, prefix=".part-") as name:
+    with claimed_folder(output), tempfile.TemporaryDirectory(dir=output, prefix=".part-") as name:
         yield Path(name)
         for item in sorted(Path(name).iterdir()):
             shutil.move(str(item), output / item.name)

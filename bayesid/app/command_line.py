@@ -9,6 +9,7 @@ errors in the file appear at once.
 
 from __future__ import annotations
 
+import errno
 import importlib
 import inspect
 import pkgutil
@@ -32,6 +33,14 @@ __all__ = ["app", "main"]
 
 SUFFIX = "_command"
 """Ending of the names of those modules of this folder that are commands."""
+
+FULL, CLOSED = "Free space there, and call the command again", "Choose another output folder, or allow writing there"
+
+REMEDIES = {
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), FULL),
+    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), CLOSED),
+}
+"""Remedies by the number of an error of the system."""
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
 """Application of typer, to which the commands are added below."""
@@ -80,14 +89,21 @@ def _console() -> Console:
 
 @contextmanager
 def _reported() -> Iterator[None]:
-    """Turn errors in the user's input into one message and exit status 2."""
+    """Turn errors in the user's input, and of the disk, into one message and exit status 2."""
     try:
         yield
     except InputError as error:
         typer.secho(f"Error: {error}", fg="red", err=True)
         raise typer.Exit(2) from None
+    except OSError as error:
+        if error.errno == errno.EPIPE:  # the reader of the output is gone, which click handles
+            raise
+        where = "" if error.filename is None else f"{error.filename}: "
+        remedy = REMEDIES.get(error.errno or 0, "Check the disk, or choose another output folder")
+        typer.secho(f"Error: {where}{error.strerror or error}. {remedy}", fg="red", err=True)
+        raise typer.Exit(2) from None
     except KeyboardInterrupt:
-        typer.echo("Interrupted; the same command continues from the results kept so far.", err=True)
+        typer.echo("Interrupted; called again, the command goes on from what it has kept, or starts anew.", err=True)
         raise typer.Exit(130) from None
 
 

@@ -34,7 +34,8 @@ def run(
 
     study = Study.load(file)
 
-    from bayesid._io.files import complete_folder, write_json
+    import bayesid
+    from bayesid._io.files import claimed_folder, complete_folder, write_json
     from bayesid._io.store import content_key
     from bayesid.app.study_to_design import defining_files, load_problem, separating
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
@@ -55,21 +56,26 @@ def run(
         yield f"The study gives no sensors.encoder.sigma of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
     progress(0.0, "compiling")
     effort = Search(starts, iterations)
-    key = content_key(*defining_files(study), seed, effort, *(separate or ()))
-    store = Store.open(output / "search.json", key)
-    try:
-        with ThreadPoolExecutor(os.cpu_count()) as executor:
-            designs = design(problem, seed, noise, replace(effort, executor=executor), store=store, progress=progress)
-        best = best_design(designs)
-    except InputError as error:
-        raise error.within(file=file) from None
-    with complete_folder(output) as folder:
-        content = {"title": study.title, "seed": seed, "manoeuvres": [item.to_dict() for item in designs]}
-        write_json(folder / "design.json", {**content, "best": best.name})
-        for item in designs:
-            joints = {key: values for key, values in item.manoeuvre.recording.channels.items() if "position." in key}
-            Recording(item.name, None, item.manoeuvre.recording.time, joints).write(folder / f"{item.name}.csv")
-        design_report(designs, best, study.title, folder / "report.pdf")
-    store.remove()
+    key = content_key(bayesid.__version__, *defining_files(study), seed, effort, *(separate or ()))
+    with claimed_folder(output):
+        store = Store.open(output / "search.json", key)
+        try:
+            with ThreadPoolExecutor(os.cpu_count()) as executor:
+                designs = design(
+                    problem, seed, noise, replace(effort, executor=executor), store=store, progress=progress
+                )
+            best = best_design(designs)
+        except InputError as error:
+            raise error.within(file=file) from None
+        with complete_folder(output) as folder:
+            content = {"title": study.title, "seed": seed, "manoeuvres": [item.to_dict() for item in designs]}
+            write_json(folder / "design.json", {**content, "best": best.name})
+            for item in designs:
+                joints = {
+                    key: values for key, values in item.manoeuvre.recording.channels.items() if "position." in key
+                }
+                Recording(item.name, None, item.manoeuvre.recording.time, joints).write(folder / f"{item.name}.csv")
+            design_report(designs, best, study.title, folder / "report.pdf")
+        store.remove()
     yield from design_sentences(designs, best)
     yield f"Wrote {output / 'report.pdf'}."

@@ -25,7 +25,7 @@ def run(
 
     import numpy as np
 
-    from bayesid._io.files import complete_folder, create_folder
+    from bayesid._io.files import claimed_folder, complete_folder
     from bayesid.app.study_to_model import load_posterior
     from bayesid.inference import identify
     from bayesid.inference.identified_robot import write_identified
@@ -38,17 +38,17 @@ def run(
     if not posterior.size:
         raise InputError("nothing is unknown", file=file, place="unknowns.bodies", remedy="Name a body to identify")
     yield f"{study.title}: {posterior.samples} samples, {posterior.size} unknowns, step {posterior.step:g} s."
-    create_folder(output)
-    progress(0.0, "fitting")
-    kept = output / "samples.h5"
-    result = identify(posterior, seed, effective_samples=samples, file=kept, progress=progress)
-    with complete_folder(output) as folder:
-        result.write_json(folder / "identification.json")
-        write_netcdf(result, folder / "posterior.nc", np.random.default_rng(seed))
-        if result.posterior.model.priors:
-            write_identified(result, folder)
-        identification_report(result, study.title, [], folder / "report.pdf")
-    kept.unlink(missing_ok=True)
+    with claimed_folder(output):
+        progress(0.0, "fitting")
+        kept = output / "samples.h5"
+        result = identify(posterior, seed, effective_samples=samples, file=kept, progress=progress)
+        with complete_folder(output) as folder:
+            result.write_json(folder / "identification.json")
+            write_netcdf(result, folder / "posterior.nc", np.random.default_rng(seed))
+            if result.posterior.model.priors:
+                write_identified(result, folder)
+            identification_report(result, study.title, [], folder / "report.pdf")
+        kept.unlink(missing_ok=True)
     yield from _summary(result)
     yield f"Wrote {output / 'report.pdf'}."
 

@@ -47,6 +47,7 @@ def run(
 
     study = Study.load(file)
 
+    from bayesid._io.files import claimed_folder
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_causes import loop_review
     from bayesid.app.study_to_design import load_loop_problem
@@ -68,12 +69,16 @@ def run(
         identifier=Sampled(samples),
         reviewer=loop_review(study) if diagnose else None,
     )
-    history = loop.run(Nobody() if spacecraft is None else load_spacecraft(spacecraft), output, progress)
+    executing = Nobody() if spacecraft is None else load_spacecraft(spacecraft)
+    with claimed_folder(output):
+        history = loop.run(executing, output, progress)
+        written = any("identification" in step for step in history.steps)
+        if written:
+            options = ["--output", output.name, "--at-most", str(at_most)]
+            options += [] if spacecraft is None else ["--spacecraft", spacecraft.name]
+            origin = report_origin(study, "loop", seed, options)
+            loop_report(history, study.title, output / "report.pdf", origin=origin)
     yield from loop_sentences(history)
-    if any("identification" in step for step in history.steps):
-        options = ["--output", output.name, "--at-most", str(at_most)]
-        options += [] if spacecraft is None else ["--spacecraft", spacecraft.name]
-        origin = report_origin(study, "loop", seed, options)
-        loop_report(history, study.title, output / "report.pdf", origin=origin)
+    if written:
         yield f"Wrote {output / 'report.pdf'}."
     yield f"Wrote {history.folder / 'loop.json'}."

@@ -15,6 +15,7 @@ from bayesid.app.user_files import run_user_file
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
 from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
@@ -22,6 +23,7 @@ from bayesid.simulation.effects import AccelBias, Effect, RateBias, create
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
 from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.own_effects import check_own_effect
 from bayesid.simulation.sensors import Filter, Kind, Sensor, White
 
 __all__ = ["load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
@@ -99,7 +101,7 @@ def load_model(study: Study) -> Model:
     robot, carried = _load_robot(study)
     try:
         priors, mixing = _priors(study, robot, carried)
-        return Model(
+        model = Model(
             robot=robot,
             sensors=_sensors(study),
             priors=priors,
@@ -109,8 +111,11 @@ def load_model(study: Study) -> Model:
             mixing=mixing,
             torque=_torque(study, robot),
         )
+        for effect in model.effects:
+            check_own_effect(effect, robot, model.sensors)
     except InputError as error:
         raise error.within(file=study.file) from None
+    return model
 
 
 def _priors(study: Study, robot: Robot, carried: JointPrior | None) -> tuple[tuple[BodyPrior, ...], Mixing | None]:
@@ -134,6 +139,7 @@ def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:
 def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
     recording = Recording.read(section.file)
+    refuse_impossible_joints(recording, robot)  # before they are smoothed and simulated
     motion = MeasuredMotion.from_recording(recording, robot, sigma=encoder_noise(study, robot), start=section.start)
     return Manoeuvre(
         recording=recording,

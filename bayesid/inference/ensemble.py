@@ -17,6 +17,7 @@ from emcee.autocorr import auto_window
 from emcee.moves import DEMove, DESnookerMove
 from emcee.moves.red_blue import RedBlueMove
 
+import bayesid
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._io.store import content_key, refuse_other
@@ -164,7 +165,7 @@ def sample(
     sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
     # the mode stands for data and model in the key; it is rounded, so that rounding errors do not change the key
     mode = np.round(optimum.z, 6) + 0.0
-    key = content_key(posterior.unknowns.names, sequence.entropy, sequence.spawn_key, mode)
+    key = content_key(bayesid.__version__, posterior.unknowns.names, sequence.entropy, sequence.spawn_key, mode)
     samplers = []
     for number, child in enumerate(sequence.spawn(ENSEMBLES)):
         backend = _backend(file, number, key)

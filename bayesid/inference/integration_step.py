@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Traceable
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Numbers, Simulated, Structure
 from bayesid.inference.data import attitudes_of, grids_of
@@ -25,6 +25,9 @@ LONGEST_STEP = 2.0
 STEP_TOLERANCE = 0.01
 """Largest integration error allowed, in standard deviations of a sample."""
 
+HOPELESS = 1.0 / 64.0
+"""Part of the first step at which a simulation without finite readings is given up."""
+
 FEWEST_STEPS = 512
 """Smallest number of steps to which simulations of different steps are padded; larger numbers are powers of two."""
 
@@ -40,6 +43,7 @@ def choose_step(
     """Return the longest step [s], by halving from `LONGEST_STEP`, whose error at ``z`` is within `STEP_TOLERANCE`."""
     shortest = min(float(samples.time[-1]) for samples in recorded)
     step = min([LONGEST_STEP, 0.25 * shortest, *(effect.longest_step for effect in model.effects)])
+    coarsest = step
     grids = {step: grids_of(model, manoeuvres, recorded, step)}
     while True:
         finer = grids_of(model, manoeuvres, recorded, 0.5 * step)
@@ -47,6 +51,12 @@ def choose_step(
         if error <= STEP_TOLERANCE:
             return step
         step *= 0.5
+        if np.isinf(error) and step < HOPELESS * coarsest:
+            named = f", and the effects {', '.join(effect.label for effect in model.effects)}" if model.effects else ""
+            raise InputError(
+                "the simulation gives no finite readings about the prior's centre",
+                remedy=f"Check the units of joint motion and of the robot's inertial parameters{named}",
+            )
         grids = {step: finer}
         if step < 1e-4 * LONGEST_STEP:
             raise InputError(
@@ -99,9 +109,15 @@ def _error(
     worst = 0.0
     for kind in model.channels.kinds:
         sigma = np.stack([item.sigma(kind) for item in recorded])
-        first, second = (np.asarray(item.channels[kind.value]) for item in (coarse, fine))
-        worst = max(worst, float((np.abs(first - second)[..., : kind.size] / sigma[:, None]).max()))
+        first, second = (item.channels[kind.value] for item in (coarse, fine))  # of JAX, which does not warn
+        worst = max(worst, _largest((first - second)[..., : kind.size] / sigma[:, None]))
     if model.torque is not None:
-        change = np.abs(np.asarray(coarse.torque - fine.torque))[..., model.torque.columns(model.robot)]
-        worst = max(worst, float((change / np.array(model.torque.sigma)).max()))
+        change = np.asarray(coarse.torque - fine.torque)[..., model.torque.columns(model.robot)]
+        worst = max(worst, _largest(change / np.array(model.torque.sigma)))
     return worst * 16.0 / 15.0  # error of a fourth-order method from the difference to half the step
+
+
+def _largest(change: Traceable) -> float:
+    """Return the largest absolute value, infinite where one is not finite."""
+    largest = float(jnp.abs(change).max())
+    return largest if np.isfinite(largest) else float("inf")

@@ -34,7 +34,7 @@ def create(label: str, **options: Any) -> Effect:
     Raises
     ------
     InputError
-        If no effect of that name is registered.
+        If no effect of that name is registered, or it cannot be made.
     """
     name, _, place = label.partition(":")
     if name not in _REGISTER:
@@ -43,4 +43,12 @@ def create(label: str, **options: Any) -> Effect:
             remedy=f"Choose from {', '.join(sorted(_REGISTER))}, or name your file under model.plugins",
         )
     build: Callable[..., Effect] = _REGISTER[name]
-    return build(place, **options) if place else build(**options)
+    try:
+        return build(place, **options) if place else build(**options)
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(
+            f"effect {label!r} cannot be made: {type(error).__name__}: {error}",
+            remedy="Give the place that it needs, as NAME:PLACE, or correct the effect",
+        ) from error
