@@ -14,7 +14,9 @@ from scipy.interpolate import make_interp_spline
 from test_cli import run
 
 from bayesid._io.errors import InputError
+from bayesid._io.progress import silent
 from bayesid.app import study_to_design
+from bayesid.app.fly_next import fly_next, write_motion
 from bayesid.app.schema import Study
 from bayesid.app.study_to_design import load_problem
 from bayesid.app.study_to_encoders import assume_missing, encoder_noise
@@ -289,3 +291,25 @@ def test_the_expected_probability_is_that_of_simulated_rivals():
         assert expected_probability(noncentrality) == pytest.approx(drawn.mean(), abs=4.0 * drawn.std() / 632.0)
     assert expected_probability(0.0) == pytest.approx(0.5)
     assert expected_probability(noncentrality_for(0.95)) == pytest.approx(0.95)
+
+
+@pytest.mark.usefixtures("slow")
+def test_the_next_manoeuvre_keeps_the_limits_and_is_written_as_joint_motion(tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_text(STUDY, encoding="utf-8")
+    study = Study.load(file)
+    designed = fly_next(study, ("rate-bias", "rate-scale"), 1, silent)
+    assert designed.criterion == "separation"
+    assert all(item.largest <= item.limit * (1.0 + 1e-9) for item in designed.reached)
+    write_motion(designed, tmp_path / "next.csv")
+    flown = Recording.read(tmp_path / "next.csv")
+    assert set(flown.channels) == {"position.joint1", "position.joint2"}
+    assert flown.time[-1] == 30.0
+    assert np.ptp(flown.channels["position.joint1"]) > 0.05
+
+
+def test_no_manoeuvre_is_designed_for_causes_that_the_design_cannot_weigh(tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_text(STUDY, encoding="utf-8")
+    with pytest.raises(InputError, match="no unknown size"):
+        fly_next(Study.load(file), ("rate-bias", "gravity-gradient"), 1, silent)

@@ -43,7 +43,7 @@ from bayesid.report.sentences.conditions import conditions_text
 from bayesid.report.sentences.diagnosis_method import GLOSSARY, computation_sentence, method_sentences
 from bayesid.report.sentences.model_assumptions import model_sentences
 from bayesid.report.sentences.next_experiment import ANYTHING, advice
-from bayesid.report.sentences.next_steps import action_sentence, advice_sentences
+from bayesid.report.sentences.next_steps import action_sentence, advice_sentences, rival_pair
 from bayesid.report.sentences.size_words import size_text, vector_text
 from bayesid.report.set_sizes import set_sizes
 from bayesid.report.simulation_errors import simulation_errors, strongest_recording
@@ -346,7 +346,15 @@ def test_the_advice_is_on_the_causes_in_which_the_alternatives_differ(biased):
     assert said == [f"{name}: {advice(name)}" for name in ("rate-bias", "wheel-momentum")]
     assert design.endswith("bayesid design STUDY.toml --separate rate-bias wheel-momentum")
     assert f"rate-bias: {advice('rate-bias')}" in action_sentence(result)
+    assert rival_pair(result) == ("rate-bias", "wheel-momentum")
     assert list(advice_sentences(judged(biased, Status.EXPLAINED))) == []
+    assert rival_pair(judged(biased, Status.EXPLAINED)) is None
+
+
+def test_rivals_of_an_unresolved_verdict_are_the_most_probable_of_unknown_size(biased):
+    """A fault of the noise has no size that a manoeuvre could tell from another's."""
+    sets = ((("rate-noise",), None, 40.0), (("accel-bias",), None, 38.0), (("rate-bias",), None, 37.0))
+    assert rival_pair(judged(weighed(biased, *sets), Status.UNRESOLVED)) == ("accel-bias", "rate-bias")
 
 
 def test_what_to_do_follows_from_the_verdict(biased):
@@ -790,7 +798,10 @@ def test_the_report_of_every_verdict_holds_its_sentences_and_tables(printed, sta
 
 @pytest.mark.parametrize("status", list(Status))
 def test_the_decision_stands_on_the_first_page(printed, status):
-    result, text = printed(status, record="Right in 97 of 100 cases.", origin="study.toml 0a1b; seed 3")
+    result, text = printed(
+        status, record="Right in 97 of 100 cases.", advice="Fly next.csv, 60 s.", origin="study.toml 0a1b; seed 3"
+    )
+    assert "Fly next.csv, 60 s." in text
     first = PdfText(text.pages[:1])
     assert "Decision. " + status.value.capitalize() in first
     entries = decision_entries(

@@ -37,10 +37,10 @@ def run(
     import bayesid
     from bayesid._io.files import claimed_folder, complete_folder, write_json
     from bayesid._io.store import content_key
+    from bayesid.app.fly_next import write_motion
     from bayesid.app.study_to_design import defining_files, load_problem, separating
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
     from bayesid.design import Search, Store, best_design, design
-    from bayesid.recording.recording import Recording
     from bayesid.report import design_report
     from bayesid.report.sentences.design_sentences import design_sentences
 
@@ -71,10 +71,7 @@ def run(
             content = {"title": study.title, "seed": seed, "manoeuvres": [item.to_dict() for item in designs]}
             write_json(folder / "design.json", {**content, "best": best.name})
             for item in designs:
-                joints = {
-                    key: values for key, values in item.manoeuvre.recording.channels.items() if "position." in key
-                }
-                Recording(item.name, None, item.manoeuvre.recording.time, joints).write(folder / f"{item.name}.csv")
+                write_motion(item, folder / f"{item.name}.csv")
             design_report(designs, best, study.title, folder / "report.pdf")
         store.remove()
     yield from design_sentences(designs, best)

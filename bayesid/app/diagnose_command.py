@@ -28,11 +28,12 @@ def run(
     seed: Seed = 0,
     samples: Samples = 4000.0,
     sample: Annotated[bool, typer.Option(help="Sample the extended model with emcee at the end.")] = True,
+    fly_next: Annotated[bool, typer.Option(help="Design the next manoeuvre where the verdict is undecided.")] = True,
 ) -> Iterator[str]:
     """Show how the simulation deviates, name the cause, extend the model by it and measure the gain."""
     from bayesid.app.schema import Study
 
-    yield from diagnose_study(Study.load(file), output, seed, samples if sample else None, progress)
+    yield from diagnose_study(Study.load(file), output, seed, samples if sample else None, progress, plan=fly_next)
 
 
 def diagnose_study(
@@ -42,6 +43,7 @@ def diagnose_study(
     effective_samples: float | None,
     progress: Progress = silent,
     keep: Callable[[Diagnosis], object] = lambda result: None,
+    plan: bool = False,
 ) -> Iterator[str]:
     """Write diagnosis.json, unexplained.csv, posterior.nc of the extended model and report.pdf of a study.
 
@@ -59,6 +61,8 @@ def diagnose_study(
         Receiver of the fraction done.
     keep : callable
         Function that receives the diagnosis.
+    plan : bool
+        Whether to design the manoeuvre that would decide an undecided verdict.
 
     Yields
     ------
@@ -67,15 +71,19 @@ def diagnose_study(
     """
     import numpy as np
 
+    from bayesid._io.errors import InputError
     from bayesid._io.files import complete_folder, write_json
     from bayesid._io.phase_clock import PhaseClock
+    from bayesid.app.fly_next import FILE, fly_next, write_motion
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_causes import cause_prior, stated_bounds
     from bayesid.app.study_to_model import load_manoeuvres, load_model
     from bayesid.diagnosis import diagnose, identify_extended
     from bayesid.inference.posterior_file import write_netcdf
     from bayesid.report import diagnosis_report
+    from bayesid.report.sentences.design_sentences import separation_sentence
     from bayesid.report.sentences.diagnosis_sentences import diagnosis_sentences
+    from bayesid.report.sentences.next_steps import rival_pair
     from bayesid.report.verdict_record import record_sentence
 
     model = load_model(study)
@@ -98,14 +106,28 @@ def diagnose_study(
         sampling(0.0, "sampling the extended model")
         identification = identify_extended(result, seed, effective_samples=effective_samples, progress=sampling)
     clock.ends("sample")
+    advice, designed = None, None
+    if plan and (rivals := rival_pair(result)):
+        progress(1.0, "designing the next manoeuvre")
+        try:
+            designed = fly_next(study, rivals, seed, silent)
+        except InputError as error:
+            advice = f"No manoeuvre was designed that tells {' and '.join(rivals)} apart: {error}."
+        else:
+            advice = f"Fly {FILE}, {designed.problem.plan.family.duration:g} s. {separation_sentence(designed)}"
+        yield advice
+    clock.ends("design")
     with complete_folder(output) as folder:
         result.unexplained.write(folder / "unexplained.csv")
+        if designed is not None:
+            write_motion(designed, folder / FILE)
         if identification is not None:
             write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
         asked = ["--no-sample"] if effective_samples is None else ["--samples", f"{effective_samples:g}"]
         origin = report_origin(study, "diagnose", seed, ["--output", output.name, *asked])
         record = record_sentence(result.verdict.status)
-        diagnosis_report(result, identification, study.title, folder / "report.pdf", record=record, origin=origin)
+        said = {"record": record, "advice": advice, "origin": origin}
+        diagnosis_report(result, identification, study.title, folder / "report.pdf", **said)
         clock.ends("report")
         content = result.to_dict(identification)
         write_json(folder / "diagnosis.json", content | {"seconds": content["seconds"] | clock.seconds})

@@ -26,6 +26,7 @@ def diagnosis_report(
     file: Path,
     *,
     record: str | None = None,
+    advice: str | None = None,
     origin: str | None = None,
 ) -> None:
     """Write the report of a diagnosis as PDF, whole or not at all.
@@ -40,6 +41,8 @@ def diagnosis_report(
     file : path
     record : str, optional
         How often such a verdict was right where the truth was known, as a sentence.
+    advice : str, optional
+        Manoeuvre that was designed to decide an undecided verdict, as a sentence.
     origin : str, optional
         Where the report comes from: files with their hashes, version, seed and command.
     """
@@ -50,7 +53,7 @@ def diagnosis_report(
     add_evidence(document, result)
     add_causes(document, result)
     add_consequences(document, result, changes)
-    add_limits(document, result)
+    add_limits(document, result, advice)
     if identification is None:
         add_assumptions(document, result)
     add_appendix(document, result)

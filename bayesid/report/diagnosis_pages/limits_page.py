@@ -26,11 +26,11 @@ PAIRS = 10
 """Largest number of pairs in the table of causes that imitate each other."""
 
 
-def add_limits(document: Document, result: Diagnosis) -> None:
+def add_limits(document: Document, result: Diagnosis, advice: str | None = None) -> None:
     """Add the manoeuvres to fly, the candidates out of reach, the pairs that imitate each other, and the method."""
     document.section(NEXT)
     document.paragraph(action_sentence(result))
-    document.items(list(advice_sentences(result)))
+    document.items([*advice_sentences(result), *([advice] if advice else [])])
     _add_unseen(document, result)
     if pairs := inseparable_pairs(result, PAIRS):
         document.table(
