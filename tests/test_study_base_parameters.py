@@ -11,8 +11,10 @@ from bayesid.identifiability import base_parameters
 from bayesid.robot.robot import Robot
 from studies.base_parameters import Result, run
 from studies.base_parameters.peers import compare
-from studies.base_parameters.report import write_report
+from studies.base_parameters.report import goals_of, write_report
 from studies.base_parameters.texts import regrouping_rows, symbol, unchanged
+from studies.common.goals import Verdict
+from tests.report_rules import broken_rules
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +78,8 @@ def test_pinocchios_rank_agrees_without_the_other_tool(result):
 
 def test_the_report_is_written(result, tmp_path):
     write_report(result, tmp_path / "report.pdf")
-    assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert broken_rules(tmp_path / "report.pdf") == []
+    assert {goal.verdict for goal in goals_of(result)[:-1]} == {Verdict.PASS}
 
 
 @pytest.mark.skipif(importlib.util.find_spec("figaroh") is None, reason="FIGAROH is in the extra peers only")

@@ -21,6 +21,7 @@ from studies.base_parameters.scale import scale_cases
 from studies.base_parameters.structure import equations_at, structure
 from studies.common.command import Command
 from studies.common.ets7 import ets7
+from studies.common.provenance import MODELS, study_origin
 
 __all__ = ["Result", "main", "run"]
 
@@ -49,4 +50,5 @@ COMMAND = Command("base_parameters", "Say which inertial parameters can be ident
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     options = COMMAND.parse(arguments)
-    write_report(run(seed=options.seed), options.output)
+    robots = [MODELS / f"{name}.urdf" for name in ("planar", "ets7")]
+    write_report(run(seed=options.seed), options.output, origin=study_origin(COMMAND.name, options, robots))

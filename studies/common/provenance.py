@@ -11,7 +11,7 @@ from pathlib import Path
 
 from bayesid.app.report_origin import origin_text
 
-__all__ = ["study_origin"]
+__all__ = ["MODELS", "processor", "study_origin"]
 
 ROOT = Path(__file__).resolve().parents[2]
 """Folder of the checkout."""
