@@ -71,6 +71,6 @@ def _bars(axes: Axes, spreads: Sequence[Spread], chosen: Sequence[int], index: i
     bias = np.array([100.0 * spread.bias[k] for spread, k in rows])
     sd = np.array([100.0 * spread.sd[k] for spread, k in rows])
     error = np.array([100.0 * spread.bias_error[k] for spread, k in rows])
-    colour = COLOURS[index]
+    colour = COLOURS[2 + index]  # neither of the colours of before and after
     axes.errorbar(bias, place, xerr=sd, fmt="o", markersize=2.5, color=colour, linewidth=0.8, capsize=2.0, label=label)
     axes.errorbar(bias, place, xerr=error, fmt="none", color=colour, linewidth=2.6)

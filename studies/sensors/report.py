@@ -137,7 +137,7 @@ def _honest(name: str, spreads: dict[str, Spread]) -> Goal:
     reached = f"{format_range(ratios.ravel(), 2)}; {len(inside)} of {len(spreads)} levels"
     return Goal(
         f"actual over stated errors of mass and moments within {HONEST[0]:g} and {HONEST[1]:g} at every level: {name}",
-        reached + (f"; not at {format_text(', '.join(outside))}" if outside else ""),
+        reached + (f"; not at {format_text('; '.join(outside))}" if outside else ""),
         Verdict.of(not outside),
     )
 
@@ -218,7 +218,7 @@ def _refits(result: Result) -> str:
     ]
     gap = max(float(procedures[LIKELIHOOD].difference[JUDGED].max()) for procedures in result.refits.values())
     return (
-        f"Nonlinear fits: by the paper's procedure {', '.join(diverged)} diverge, so that its errors of tens of "
+        f"Nonlinear fits: by the paper's procedure {'; '.join(diverged)} diverge, so that its errors of tens of "
         "percent are orders of magnitude only. By the likelihood they differ from first order by a median of at most "
         f"{format_fixed(gap, 2)} sd."
     )
