@@ -79,11 +79,11 @@ class Statement:
     reason: str
 
 
-def add_first_page(document: Document, summary: Summary, figure: Figure, caption: str, width: str = "100%") -> None:
+def add_first_page(document: Document, summary: Summary, figure: Figure, caption: str) -> None:
     """Add the answer in a box, the figure that decides, and the table of goals."""
     run = "full run" if summary.full else "quick run: read it as an example, not as the result"
     document.decision(summary.answer, [("Question", summary.question), ("Valid when", summary.valid), ("Effort", run)])
-    document.figure(figure, caption, width)
+    document.figure(figure, caption)
     add_goals(document, summary.goals)
 
 

@@ -261,7 +261,6 @@ def _evidence(document: Document, result: Result, output: Path) -> None:
         document.figure(
             _coverage_figure(result.coverage),
             "Squared distances of the truth in the drawn systems, sorted, against quantiles of chi-square.",
-            "80%",
         )
     files = [
         write_table(
