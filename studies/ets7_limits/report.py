@@ -66,7 +66,8 @@ def goals(result: Result) -> tuple[Goal, ...]:
         rows.append(Goal(text, reached, Verdict.of(once <= WANTED)))
     rows.append(
         Goal(
-            f"Standard deviations agree within {format_percent(ALIKE)} with those of the report on excitation, same manoeuvre",
+            f"Standard deviations agree within {format_percent(ALIKE)} with those of the report on "
+            f"excitation, same manoeuvre",
             f"{format_percent(result.difference, 2)} at most, both rows of the arm",
             Verdict.of(result.difference <= ALIKE),
         )
@@ -77,7 +78,8 @@ def goals(result: Result) -> tuple[Goal, ...]:
     verdict = Verdict.FAIL if away > WITHIN + 2.0 * error else Verdict.OPEN if away > WITHIN else Verdict.PASS
     rows.append(
         Goal(
-            f"Realised errors of this manoeuvre within {format_percent(WITHIN)} of predicted, mission's sensors, arm 5 %",
+            f"Realised errors of this manoeuvre within {format_percent(WITHIN)} of predicted, mission's "
+            f"sensors, arm 5 %",
             f"{least:.3f} to {most:.3f} by parameter over {count} flights in MuJoCo, each ± {error:.3f} (report on "
             "excitation)",
             verdict,

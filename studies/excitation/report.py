@@ -131,7 +131,8 @@ def _setup(result: Result) -> Setup:
         robot=f"ETS-VII with the published base, nominal links, joints within ±{mission.REACH:g} rad.",
         manoeuvre=(
             f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight's rule allows. "
-            f"The paper's optimum had to be made smaller, to {format_percent(shrink['printed'], 2)} of its amplitudes, and its poor "
+            f"The paper's optimum had to be made smaller, to {format_percent(shrink['printed'], 2)} of its "
+            f"amplitudes, and its poor "
             f"neighbour to {format_percent(shrink['poor'], 2)}."
         ),
         sensors=(
@@ -191,8 +192,10 @@ def _calibration(document: Document, result: Result) -> None:
         title = TITLES[name]
         beyond = [LABELS[k] for k in range(10) if abs(item.rms[k] - 1.0) > WITHIN]
         document.paragraph(
-            f"MuJoCo flew the {title} manoeuvre {len(item.errors)} times. Not within {format_percent(WITHIN)} of the predicted sd: "
-            f"{', '.join(beyond) or 'none'}; one standard error of a ratio is {format_percent(item.rms_error, 2)}, so that of ten "
+            f"MuJoCo flew the {title} manoeuvre {len(item.errors)} times. Not within "
+            f"{format_percent(WITHIN)} of the predicted sd: "
+            f"{', '.join(beyond) or 'none'}; one standard error of a ratio is "
+            f"{format_percent(item.rms_error, 2)}, so that of ten "
             "ratios some lie outside by chance alone. Each mode was found by Gauss-Newton steps with the Jacobian of "
             f"the plan, of which the last changed no coordinate by more than {item.last_step.max():.2g} standard "
             "deviations."

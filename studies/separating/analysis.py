@@ -55,10 +55,8 @@ class Realised:
 def references(motions: Mapping[str, Motion]) -> dict[str, Reference]:
     """Return the manoeuvres linearised about the drifting base, with all candidates as unknowns."""
     model = rival_model(LABELS)
-    first = {name: Reference.of(model, motion) for name, motion in motions.items()}
-    return {
-        name: Reference.of(model, motion, drifting(first[name].posterior.unknowns)) for name, motion in motions.items()
-    }
+    z = drifting(mission.problem(model, mission.splines()).plan.unknowns)
+    return {name: Reference.of(model, motion, z) for name, motion in motions.items()}
 
 
 def similar(known: Mapping[str, Reference]) -> Sequence[Pair]:

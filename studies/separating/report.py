@@ -68,7 +68,10 @@ def goals(result: Result) -> tuple[Goal, ...]:
         rows.append(Goal(text, reached, Verdict.of((values > RIVALRY).mean() >= SURE)))
     for truth in RIVALS:
         share = (result.directions[truth, LAST] > RIVALRY).mean()
-        text = f"Hidden {NAMES[truth]}, same size in random directions: expected above {RIVALRY} in {format_percent(SURE)} of them"
+        text = (
+            f"Hidden {NAMES[truth]}, same size in random directions: expected above {RIVALRY} in "
+            f"{format_percent(SURE)} of them"
+        )
         rows.append(Goal(text, format_percent(share, 3), Verdict.of(share >= SURE)))
     for item in result.realised:
         gain = item.factors[LAST] - item.factors["first, d-optimal"]
@@ -96,7 +99,8 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
     """Write the report as PDF, and its tables beside it."""
     document = Document("Telling two causes apart", "A manoeuvre designed to separate rivals, ETS-VII in MuJoCo")
     parts = [
-        f"a hidden {NAMES[item.truth]} is named in {_named(item, LAST)} flights ({_named(item, 'first alone')} with the "
+        f"a hidden {NAMES[item.truth]} is named in {_named(item, LAST)} flights "
+        f"({_named(item, 'first alone')} with the "
         f"first manoeuvre alone, {_named(item, 'first, d-optimal')} with a d-optimal second one)"
         for item in result.realised
     ]
@@ -109,7 +113,8 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         goals=goals(result),
         valid=(
             "one of the two acts and nothing else, with the same size in both manoeuvres; the base is known to "
-            f"{format_percent(2.0 * SPREAD)} of its mass and drifts by a degree in a minute. The design knows that rate."
+            f"{format_percent(2.0 * SPREAD)} of its mass and drifts by a degree in a minute. The design "
+            f"knows that rate."
         ),
         full=result.full,
     )
@@ -163,7 +168,8 @@ def _setup(result: Result) -> Setup:
         ),
         known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link.",
         unknown=(
-            f"The base within {format_percent(2.0 * SPREAD)} of its mass, the rate {format_vector(DRIFT)} rad/s at the start, the "
+            f"The base within {format_percent(2.0 * SPREAD)} of its mass, the rate {format_vector(DRIFT)} "
+            f"rad/s at the start, the "
             f"bias within {format_number(BIAS)} m/s², the links; and the cause, within 1 N m s of wheels, or 0.5 mN "
             "and 0.5 mN m of leak, per axis."
         ),
