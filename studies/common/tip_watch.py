@@ -28,15 +28,15 @@ class _Watched(TruthModel):
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
-        self.base: list[Floats] = []
-        self.tip: list[Floats] = []
+        self.base_poses: list[Floats] = []
+        self.tip_poses: list[Floats] = []
 
     def _read(self, *arguments: Any) -> tuple[Any, ...]:
         row: tuple[Any, ...] = super()._read(*arguments)
         w, x, y, z = self.data.qpos[3:7]
         body = self.data.body(TIP)
-        self.base.append(_pose(Rotation.from_quat([x, y, z, w]).as_matrix(), self.data.qpos[:3]))
-        self.tip.append(_pose(np.array(body.xmat).reshape(3, 3), body.xpos))
+        self.base_poses.append(_pose(Rotation.from_quat([x, y, z, w]).as_matrix(), self.data.qpos[:3]))
+        self.tip_poses.append(_pose(np.array(body.xmat).reshape(3, 3), body.xpos))
         return row
 
 
@@ -73,7 +73,7 @@ def flown_along(robot: Robot, motion: Motion, duration: float) -> Flown:
         model = _Watched(urdf, orbit=ORBIT)
         times = STEP * np.arange(round(duration / STEP) + 1)
         model.run(prescribed(motion, times, STEP), times, step=STEP)
-    base, tip = np.array(model.base), np.array(model.tip)
+    base, tip = np.array(model.base_poses), np.array(model.tip_poses)
     poses = tip, np.linalg.inv(base) @ tip
     speeds = [np.linalg.norm(np.gradient(pose[:, :3, 3], STEP, axis=0), axis=1) for pose in poses]
     rates = [np.append(0.0, _turns(pose[:-1], pose[1:]) / STEP) for pose in poses]
@@ -89,4 +89,4 @@ def _pose(rotation: Floats, position: Floats) -> Floats:
 
 def _turns(before: Floats, after: Floats) -> Floats:
     """Return the angles between pairs of attitudes [rad]."""
-    return Rotation.from_matrix(before[:, :3, :3].transpose(0, 2, 1) @ after[:, :3, :3]).magnitude()
+    return np.asarray(Rotation.from_matrix(before[:, :3, :3].transpose(0, 2, 1) @ after[:, :3, :3]).magnitude())

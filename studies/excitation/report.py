@@ -263,7 +263,7 @@ def _factor_figure(contest: Contest) -> Figure:
     place = np.arange(len(names))
     for row, fill in zip(mission.ROWS, ("full", "none"), strict=True):
         values = [contest.factor("d-optimal", name, row) for name in names]
-        axes.plot(values, place, "o", color=COLOURS[0], fillstyle=fill, label=row)  # type: ignore[arg-type]
+        axes.plot(values, place, "o", color=COLOURS[0], fillstyle=fill, label=row)
     axes.axvline(1.0, color="#888888", linewidth=0.8)
     axes.axvline(WANTED, color="#888888", linewidth=0.8, linestyle=":")
     axes.text(WANTED, place[-1] + 0.45, " wanted of the condition number", va="bottom", ha="left", fontsize=7)

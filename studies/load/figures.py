@@ -28,8 +28,8 @@ def loop_figure(flights: dict[str, Flight]) -> Figure:
     left, right = figure.subplots(1, 2)
     for index, (name, flight) in enumerate(flights.items()):
         steps = np.arange(1, len(flight.bodies) + 1)
-        error = [abs(flight.error(step - 1)[0]) for step in steps]
-        sd = [flight.relative(step - 1)[0] for step in steps]
+        error = [abs(flight.error(step)[0]) for step in range(len(steps))]
+        sd = [flight.relative(step)[0] for step in range(len(steps))]
         left.plot(steps, sd, "-", color=COLOURS[index], label=f"sd, {TITLES[name]}")
         left.plot(steps, error, "o", color=COLOURS[index], markersize=4, label=f"error, {TITLES[name]}")
     left.axhline(GOAL, color="#888888", linestyle=":")
@@ -62,7 +62,7 @@ def error_figure(iterations: list[Iteration]) -> Figure:
             error[error == 0.0] = np.nan  # printed exactly
             fill = "full" if number else "none"
             label = f"{name}, iteration {number + 1}"
-            axes.plot(place, error, "os"[number], color=colour, fillstyle=fill, markersize=4, label=label)  # type: ignore[arg-type]
+            axes.plot(place, error, "os"[number], color=colour, fillstyle=fill, markersize=4, label=label)
     axes.set(yscale="log", ylabel="relative error")
     axes.set_xticks(place, LABELS)
     shared_legend(figure, axes, 4, place="outside lower center")
