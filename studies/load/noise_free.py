@@ -21,12 +21,12 @@ from studies.common.ets7 import INTERVAL
 from studies.load import paper
 from studies.load.setting import MuJoCoSpacecraft, excitation, ideal
 
-__all__ = ["Iteration", "iterate"]
+__all__ = ["STEP", "Iteration", "iterate"]
 
 ITERATIONS = 2
 """Number of iterations, as in the paper."""
 
-STEP = 0.25
+STEP = 0.5
 """Integration step of the fit [s]."""
 
 

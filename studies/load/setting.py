@@ -24,9 +24,6 @@ __all__ = ["LOAD", "SAFE", "MuJoCoSpacecraft", "excitation", "ideal", "load_unkn
 LOAD, LINK = "load", "link6"
 """Name of the load, and link that carries it."""
 
-FINE = 0.05
-"""Integration step of MuJoCo where there is no noise to hide its error [s]."""
-
 SAFE = replace(LIMITS, base_rotation=0.5)
 """Rule of the flight, and a bound on the rotation of the base [rad], which depends on the load."""
 
@@ -88,8 +85,7 @@ class MuJoCoSpacecraft:
 
     def execute(self, plan: Recording) -> Recording:
         """Fly a plan and return its recording."""
-        step = FINE if self.seed is None else mission.TRUTH_STEP
-        truth = mission.fly(self.motion(plan), self.robot, step=step)
+        truth = mission.fly(self.motion(plan), self.robot)
         rng = None if self.seed is None else np.random.default_rng([self.seed, *plan.name.encode()])
         if self.seed is not None:
             bias = BIAS * np.random.default_rng([self.seed, 1]).standard_normal(3)
