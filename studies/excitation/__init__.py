@@ -56,7 +56,7 @@ def run(
     full: bool = False,
     seed: int = 1,
     search: Search | None = None,
-    repeats: int = 400,
+    repeats: int | None = None,
     flown: Sequence[str] = ("d-optimal",),
     random: int | None = None,
     points: int = mission.POINTS,
@@ -75,8 +75,8 @@ def run(
         Seed of all random numbers.
     search : Search, optional
         Effort of each design.
-    repeats : int
-        Number of flights of each design that is flown.
+    repeats : int, optional
+        Number of flights of each design that is flown; 400 in a full run, 100 in a quick one.
     flown : sequence of str
         Designs to fly in a quick run.
     random : int, optional
@@ -91,6 +91,7 @@ def run(
         Receives a line on what is being done.
     """
     search = search or (FULL if full else QUICK)
+    repeats = (400 if full else 100) if repeats is None else repeats
     random = (500 if full else 100) if random is None else random
     contest = compete(seed, search, full, points, store or Store.forgetful(), progress)
     own = contest.designs["d-optimal"].problem
@@ -116,7 +117,7 @@ COMMAND = Command(
     full="all criteria, the default effort of each search, every design flown",
     seed=1,
     extra={
-        "--repeats": {"type": int, "default": 400, "help": "number of flights of each design that is flown"},
+        "--repeats": {"type": int, "help": "number of flights of each design that is flown"},
         "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
         **TRIALS,
     },
