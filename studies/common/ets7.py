@@ -2,8 +2,8 @@
 
 Two versions of the flight's manoeuvre differ in their corners. The flight moved joints 2 to 4 out and back on linear
 ramps of 22.6 s. `studies.ets7_drift` starts from joints at zero and makes each ramp one quintic (``corner=None``), with
-a peak speed 1.875 times the flight's; `studies.ets7_limits` and `studies.separating` start from `START` and keep the
-flight's speed between corners of 4 s.
+a peak speed 1.875 times the flight's; `studies.common.mission` starts with the wrist extended and keeps the flight's
+speed between corners of 4 s.
 """
 
 from __future__ import annotations
