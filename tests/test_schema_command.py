@@ -29,13 +29,17 @@ def shipped() -> dict[str, Any]:
     return tomllib.loads(DEMONSTRATION.read_text(encoding="utf-8"))
 
 
-def readme() -> dict[str, Any]:
-    blocks = (ROOT / "README.md").read_text(encoding="utf-8").split("```toml\n")[1:]
+def printed(place: str) -> dict[str, Any]:
+    blocks = (ROOT / place).read_text(encoding="utf-8").split("```toml\n")[1:]
     text = next(block.partition("```")[0] for block in blocks if block.startswith("title"))
     return tomllib.loads(text)
 
 
-@pytest.mark.parametrize("study", [shipped(), readme()], ids=["demonstration", "README"])
+@pytest.mark.parametrize(
+    "study",
+    [shipped(), printed("README.md"), printed("studies/manual/manual.typ")],
+    ids=["demonstration", "README", "manual"],
+)
 def test_studies_that_the_package_accepts_are_valid(study):
     assert errors(study) == []
 
