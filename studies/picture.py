@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import tempfile
 from pathlib import Path
 
 import typst
@@ -26,7 +27,11 @@ def run(report: Path, output: Path) -> None:
         "#set page(width: 180mm, height: auto, margin: 0mm)\n"
         f"#box(clip: true, height: {SHOWN}, width: 180mm, place(top + left, dx: -15mm, dy: -16mm, {page}))"
     )
-    picture = typst.compile(source.encode(), root=report.parent, format="png", ppi=RESOLUTION)
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / report.name).write_bytes(report.read_bytes())
+        main = Path(folder) / "main.typ"
+        main.write_text(source, encoding="utf-8")
+        picture = typst.compile(main, root=Path(folder), format="png", ppi=RESOLUTION)
     with complete_file(output) as part:
         part.write_bytes(picture)
 
