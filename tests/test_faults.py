@@ -10,12 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, Phase, example, given, settings
 from test_cli import copy, run, scale
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import claimed_folder, complete_folder
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_model
+from studies.faults.fuzz import Spoilt, answer_to, spoilt
 from studies.truth.mujoco import Manoeuvres, write_study
 from studies.truth.urdf import SERVICER4
 
@@ -106,6 +108,35 @@ def test_a_faulty_effect_is_named_before_a_model_is_extended(study: Path, tmp_pa
         load_model(Study.load(study)).extend(Wrong())
 
 
+NARROW = settings(
+    max_examples=40,
+    derandomize=True,
+    deadline=None,
+    database=None,
+    phases=[Phase.explicit, Phase.generate],
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+"""The same changes in every run; the study makes more of them."""
+
+
+@NARROW
+@example(change=Spoilt(".urdf", "another byte", 0.4, ""))
+@example(change=Spoilt(".csv", "replace a value", 0.5, "1e300"))
+@given(change=spoilt())
+def test_spoilt_files_give_one_clear_error_or_are_accepted(change: Spoilt, study: Path, tmp_path: Path) -> None:
+    answer = answer_to(study, change, tmp_path / "spoilt")
+    assert not answer.fault, (answer.message, change)
+
+
+def test_what_the_robots_parser_prints_is_in_the_one_message(study: Path, tmp_path: Path, capfd) -> None:
+    file = copy(study, tmp_path)
+    robot = tmp_path / "robot.urdf"
+    robot.write_text(re.sub(r"<limit[^>]*/>", "", robot.read_text(), count=1))
+    with pytest.raises(InputError, match=r"robot.urdf: Pinocchio cannot read the robot: .*does not specify limits"):
+        load_model(Study.load(file))
+    assert capfd.readouterr().err == ""
+
+
 def call(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
     """A command in a process of its own, with all warnings shown."""
     command = [sys.executable, "-W", "default", "-m", "bayesid.app.command_line", *map(str, arguments)]
@@ -124,13 +155,14 @@ def test_degrees_are_refused_before_anything_is_computed(command: str, study: Pa
     assert len(done.stderr.strip().splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_a_motion_that_no_simulation_follows_is_refused_without_a_warning(study: Path, tmp_path: Path) -> None:
     """Without limits in the URDF nothing says that joint positions are in degrees but the simulation."""
     file = copy(study, tmp_path)
     robot = tmp_path / "robot.urdf"
     robot.write_text(re.sub(r"<limit[^>]*/>", "", robot.read_text()).replace('"revolute"', '"continuous"'))
     recording = next(tmp_path.glob("*.csv"))
-    recording.write_text(scale("position.", 1e150)(recording.read_text()))
+    recording.write_text(scale("position.", 1e8)(recording.read_text()))
     done = call("check", file, "--output", tmp_path / "out")
     assert done.returncode == 2, done.stderr
     assert "Warning" not in done.stderr, done.stderr

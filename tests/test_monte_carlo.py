@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gzip
 import json
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -14,6 +16,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from bayesid._io.errors import InputError
+from bayesid.app.scheduler import executor_at
 from studies.common.monte_carlo import read_store, run_trials
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -49,9 +53,37 @@ def test_serial_and_parallel_runs_give_the_same(tmp_path):
     serial = run_trials(draw, range(6), tmp_path / "serial.jsonl", seed=1)
     assert run_trials(draw, range(6), tmp_path / "parallel.jsonl", seed=1, workers=2) == serial
     with ThreadPoolExecutor(3) as threads:
-        assert run_trials(draw, range(6), seed=1, executor=threads) == serial
+        assert run_trials(draw, range(6), seed=1, workers=threads) == serial
     lines = [sorted(map(str, read_store(tmp_path / f"{name}.jsonl"))) for name in ("serial", "parallel")]
     assert lines[0] == lines[1]
+
+
+@pytest.mark.slow
+def test_a_scheduler_of_dask_that_loses_a_worker_gives_the_same(tmp_path):
+    """Two worker processes, of which one is killed while its trial runs."""
+    distributed = pytest.importorskip("distributed")
+    store, tasks = tmp_path / "trials.jsonl", range(12)
+    with distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            pids = list(client.run(os.getpid).values())
+
+        def kill_one(text: str) -> None:
+            if text.startswith("3 of"):
+                os.kill(pids[0], signal.SIGKILL)
+
+        with executor_at(cluster.scheduler_address) as executor:
+            spread = run_trials(slow, tasks, store, seed=2, workers=executor, progress=kill_one)
+            executor._client.close()  # else it waits for its scheduler to come back
+        assert spread == run_trials(slow, tasks, seed=2)
+    assert sorted(line["trial"] for line in read_store(store)) == list(tasks)
+    assert len(set(pids)) == 2
+
+
+def test_a_scheduler_that_does_not_answer_is_one_clear_error(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("bayesid.app.scheduler.SECONDS", 0.5)
+    with pytest.raises(InputError, match=r"--scheduler: no scheduler answers at tcp://127.0.0.1:9"):
+        executor_at("tcp://127.0.0.1:9")
 
 
 def test_a_killed_run_goes_on_where_it_was(tmp_path):

@@ -13,6 +13,7 @@ import typer
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress
 from bayesid.app.options import Output, Seed, StudyFile
+from bayesid.app.scheduler import Scheduler, executor_at
 
 __all__ = ["run"]
 
@@ -28,6 +29,7 @@ def run(
         tuple[str, str] | None,
         typer.Option(metavar="A B", help="Two effects of the catalogue that the manoeuvre is to tell apart."),
     ] = None,
+    scheduler: Scheduler = None,
 ) -> Iterator[str]:
     """Design manoeuvres by several criteria, within limits: design.json, a CSV file for each, and report.pdf."""
     from bayesid.app.schema import Study
@@ -60,7 +62,7 @@ def run(
     with claimed_folder(output):
         store = Store.open(output / "search.json", key)
         try:
-            with ThreadPoolExecutor(os.cpu_count()) as executor:
+            with executor_at(scheduler) if scheduler else ThreadPoolExecutor(os.cpu_count()) as executor:
                 designs = design(
                     problem, seed, noise, replace(effort, executor=executor), store=store, progress=progress
                 )

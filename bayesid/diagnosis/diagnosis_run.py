@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -143,6 +144,7 @@ def diagnose(
     bounds: Mapping[str, Sequence[PhysicalBound]] | None = None,
     prior: CausePrior | None = None,
     knows_latitude: bool = True,
+    executor: Executor | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
     """Show what a model gets wrong about recordings, and name the cause. Joint torques are not used.
@@ -161,6 +163,8 @@ def diagnose(
         Prior of the number of causes, and of something generic.
     knows_latitude : bool
         Whether the manoeuvres' arguments of latitude are known.
+    executor : concurrent.futures.Executor, optional
+        Executor of the refits without each of the recordings; by default they run one after the other.
     progress : Progress, optional
 
     Raises
@@ -170,7 +174,9 @@ def diagnose(
     """
     model = model.without_torque  # whose friction no catalogue of causes holds
     with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
-        return _diagnose(model, manoeuvres, seed, effects, bounds, prior or CausePrior(), knows_latitude, progress)
+        return _diagnose(
+            model, manoeuvres, seed, effects, bounds, prior or CausePrior(), knows_latitude, executor, progress
+        )
 
 
 def _diagnose(
@@ -181,6 +187,7 @@ def _diagnose(
     stated: Mapping[str, Sequence[PhysicalBound]] | None,
     prior: CausePrior,
     knows_latitude: bool,
+    executor: Executor | None,
     progress: Progress,
 ) -> Diagnosis:
     rng, clock = np.random.default_rng(seed), PhaseClock()
@@ -221,7 +228,7 @@ def _diagnose(
     if named:
         after = fitted.get(frozenset(named)) or fit_hypothesis(weighed.state(named), named, catalogue)
     progress(0.75, "measuring the gain")
-    gain = measure_gain(before, after)
+    gain = measure_gain(before, after, executor)
     progress(0.85, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
     lacking = Hypothesis(engine, without_torque(weighed.base.fit)) if present.held else before

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import jax
@@ -62,13 +63,13 @@ class Gain:
         return (self.after.bodies.mean - self.before.bodies.mean) / self.before.bodies.sd
 
 
-def measure_gain(before: Hypothesis, after: Hypothesis) -> Gain:
-    """Compare two hypotheses on the same recordings."""
-    first = _side(before)
-    return Gain(first, first if after is before else _side(after))
+def measure_gain(before: Hypothesis, after: Hypothesis, executor: Executor | None = None) -> Gain:
+    """Compare two hypotheses on the same recordings; an executor refits them without each of the recordings at once."""
+    first = _side(before, executor)
+    return Gain(first, first if after is before else _side(after, executor))
 
 
-def _side(hypothesis: Hypothesis) -> Side:
+def _side(hypothesis: Hypothesis, executor: Executor | None) -> Side:
     fit = hypothesis.fit
     posterior = fit.posterior
     whole = fit.residual.reshape(posterior.residual_shape)
@@ -83,29 +84,30 @@ def _side(hypothesis: Hypothesis) -> Side:
     }
     return Side(
         fit.chi2 / posterior.samples,
-        _held_out(hypothesis) if len(posterior.manoeuvres) > 1 else None,
+        _held_out(hypothesis, executor) if len(posterior.manoeuvres) > 1 else None,
         rms,
         float((np.abs(whole[there]) < 1.0).mean()),
         body_figures(hypothesis),
     )
 
 
-def _held_out(hypothesis: Hypothesis) -> Floats:
+def _held_out(hypothesis: Hypothesis, executor: Executor | None) -> Floats:
     """Log density of each recording given the others: the ratio of evidences with and without it (Laplace)."""
-    fit, engine = hypothesis.fit, hypothesis.engine
-    constant = fit.posterior.log_normalisation
-    scores = []
-    for r in range(len(fit.posterior.manoeuvres)):
-        outputs = [item.outputs for item in fit.posterior.whitenings]
-        masks = [own if i == r else np.zeros_like(own) for i, own in enumerate(outputs)]
-        without = engine.with_posterior(leaving_out(fit.posterior, masks))
-        rest = without.fit(fit.effects, fit.coordinates, z=fit.z, operating=fit.operating)
-        scores.append(_bare(hypothesis) - _bare_fit(rest.cost, rest.hessian[0]) + constant[r])
-    return np.array(scores)
+    fit = hypothesis.fit
+    numbers = range(len(fit.posterior.manoeuvres))
+    each = map if executor is None else executor.map
+    rest = np.array(list(each(_bare_without, [hypothesis] * len(numbers), numbers)))
+    return _bare_fit(fit.cost, fit.hessian[0]) - rest + fit.posterior.log_normalisation
 
 
-def _bare(hypothesis: Hypothesis) -> float:
-    return _bare_fit(hypothesis.fit.cost, hypothesis.fit.hessian[0])
+def _bare_without(hypothesis: Hypothesis, number: int) -> float:
+    """Log evidence, without constants, of all recordings but one."""
+    fit = hypothesis.fit
+    outputs = [item.outputs for item in fit.posterior.whitenings]
+    masks = [own if i == number else np.zeros_like(own) for i, own in enumerate(outputs)]
+    without = hypothesis.engine.with_posterior(leaving_out(fit.posterior, masks))
+    rest = without.fit(fit.effects, fit.coordinates, z=fit.z, operating=fit.operating)
+    return _bare_fit(rest.cost, rest.hessian[0])
 
 
 def _bare_fit(cost: float, factor: Floats) -> float:

@@ -30,6 +30,9 @@ Array = Floats
 MINIMUM_ROWS = 8
 """Number of rows below which a motion is not determined."""
 
+ABSURD = 1e9
+"""Size above which no sample can be a measurement in SI units."""
+
 NORM_TOLERANCE = 1e-3
 """Deviation of a quaternion's norm from one above which it is taken for an error."""
 
@@ -244,6 +247,11 @@ class Recording:
             if np.isinf(values).any():
                 row = int(np.argmax(np.isinf(values)))
                 raise self._error("the value is infinite", columns=[column], row=row, remedy=_NO_SAMPLE)
+            absurd = np.abs(values) > ABSURD
+            if absurd.any():
+                row = int(np.argmax(absurd))
+                problem = f"{values[row]:g} is implausibly large, over {ABSURD:g}"
+                raise self._error(problem, columns=[column], row=row, remedy=_NO_SAMPLE)
             if np.isnan(values).all():
                 raise self._error("the column has no samples", columns=[column], remedy="Remove the column or fill it")
             family, _, joint = column.partition(".")

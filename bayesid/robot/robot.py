@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -116,7 +119,10 @@ class Robot:
         path = Path(file)
         if not path.is_file():
             raise InputError("no such file", file=path, remedy="Correct the path of the URDF")
-        text = path.read_text(encoding="utf-8")
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise InputError(f"not a text file: {error}", file=path, remedy="Save it as UTF-8 text") from error
         root = _parsed(text, path)
         if root.tag == "sdf":
             raise InputError(
@@ -149,12 +155,7 @@ class Robot:
         root = _parsed(urdf, file)
         inertials = _inertials(root, file)
         _check_joints(root, file)
-        try:
-            model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
-        except Exception as error:
-            raise InputError(
-                f"Pinocchio cannot read the robot: {error}", file=file, remedy="Correct the URDF"
-            ) from error
+        model = _built(urdf, file)
         model.gravity.setZero()
         links = {}
         for frame in model.frames:
@@ -267,6 +268,24 @@ def _parsed(text: str, file: Path | None) -> ET.Element:
         return ET.fromstring(text)
     except ET.ParseError as error:
         raise InputError(f"not well-formed XML: {error}", file=file, remedy="Correct the URDF") from error
+
+
+def _built(urdf: str, file: Path | None) -> pin.Model:
+    """Return Pinocchio's model; its parser says on the error stream alone what is wrong, which the error repeats."""
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as said:
+        sys.stderr.flush()
+        stream = os.dup(2)
+        os.dup2(said.fileno(), 2)
+        try:
+            return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+        except Exception as error:
+            said.seek(0)
+            lines = [line.removeprefix("Error:").strip() for line in said if line.startswith("Error:")]
+            problem = f"Pinocchio cannot read the robot: {lines[0] if lines else error}"
+            raise InputError(problem, file=file, remedy="Correct the URDF") from error
+        finally:
+            os.dup2(stream, 2)
+            os.close(stream)
 
 
 def _numbers(text: str) -> list[float]:

@@ -19,7 +19,7 @@ from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from studies.blind_injections.goals import goals_of, share_text
 from studies.blind_injections.record import record_of
 from studies.blind_injections.trials import Trial, plan, read, run
-from studies.common.command import Command
+from studies.common.command import WORKERS, Command
 from studies.common.goals import add_goals
 
 __all__ = ["confusion", "main", "rates", "reliability", "scores", "statements", "write_report"]
@@ -44,7 +44,7 @@ COMMAND = Command(
         "--trials": {"type": Path, "default": Path("out/blind_injections.jsonl"), "help": "kept between runs"},
         "--made": {"action": "store_true", "help": "report the trials made so far, make no more"},
         "--record": {"type": Path, "help": "file for the counts that the package ships"},
-        "--workers": {"type": int, "default": 1, "help": "processes that make trials"},
+        **WORKERS,
     },
 )
 

@@ -27,7 +27,7 @@ from bayesid.diagnosis.scale_prior import AmplitudeGroup
 from bayesid.diagnosis.signature_bank import SignatureBank
 from bayesid.inference.perturbed_posterior import residual_of
 from bayesid.inference.posterior import Posterior
-from studies.common.monte_carlo import read_store, run_trials
+from studies.common.monte_carlo import Workers, read_store, run_trials
 from studies.truth import hidden_causes
 from studies.truth.mujoco import Study as Written
 
@@ -189,7 +189,7 @@ def _names(status: str) -> list[str]:
 
 
 def run(
-    plans: Sequence[Plan], kept: Path, progress: Callable[[str], None] = lambda text: None, workers: int = 1
+    plans: Sequence[Plan], kept: Path, progress: Callable[[str], None] = lambda text: None, workers: Workers = 1
 ) -> list[Trial]:
     """Make the trials that the store does not hold yet.
 
@@ -201,7 +201,7 @@ def run(
         Store of the trials, see `studies.common.monte_carlo`.
     progress : callable, optional
         Receives one line per finished trial.
-    workers : int
+    workers : int or Executor
         Number of processes.
 
     Raises

@@ -8,11 +8,24 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-__all__ = ["TRIALS", "Command"]
+from bayesid.app.scheduler import executor_at
+
+__all__ = ["TRIALS", "WORKERS", "Command"]
+
+WORKERS: Mapping[str, Mapping[str, Any]] = {
+    "--workers": {"type": int, "default": 1, "help": "number of processes that run the trials"},
+    "--scheduler": {
+        "metavar": "ADDRESS",
+        "dest": "workers",
+        "type": executor_at,
+        "help": "scheduler of dask.distributed whose workers run the trials, in place of processes of this machine",
+    },
+}
+"""Options of what runs the trials: ``workers`` of `studies.common.monte_carlo.run_trials`."""
 
 TRIALS: Mapping[str, Mapping[str, Any]] = {
     "--trials": {"type": Path, "help": "file that keeps the Monte Carlo trials, for an interrupted run"},
-    "--workers": {"type": int, "default": 1, "help": "number of processes that run the trials"},
+    **WORKERS,
 }
 """Options of a study with `studies.common.monte_carlo.run_trials`, for `Command.extra`."""
 

@@ -19,7 +19,10 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Outcomes", "read_store", "run_trials"]
+__all__ = ["Outcomes", "Workers", "read_store", "run_trials"]
+
+Workers = int | Executor
+"""Number of processes of this machine, one for this process itself; or an executor of any kind."""
 
 Trial = Callable[[Any, np.random.Generator], Any]
 """Task and source of random numbers -> result; task and result are made of what JSON has, or of arrays."""
@@ -61,8 +64,7 @@ def run_trials(
     store: str | Path | None = None,
     *,
     seed: int = 0,
-    workers: int = 1,
-    executor: Executor | None = None,
+    workers: Workers = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Outcomes:
     """Run a function on every task that the store does not hold yet.
@@ -79,10 +81,10 @@ def run_trials(
         File that keeps the results; they are kept in memory alone where left out.
     seed : int
         Seed of all trials.
-    workers : int
-        Number of processes; with one, trials run in this process.
-    executor : concurrent.futures.Executor, optional
-        Executor to use in place of processes of this machine.
+    workers : int or concurrent.futures.Executor
+        Number of processes, where trials run in this process if it is one; or an executor, such as that of
+        dask.distributed, whose workers must be able to import the function. A trial that such an executor repeats,
+        since the worker was lost, counts once.
     progress : callable, optional
         Receives one line per finished trial, with the rate and the time left.
 
@@ -100,7 +102,7 @@ def run_trials(
     began, done = time.monotonic(), len(held)
     try:
         left = [number for number in range(len(tasks)) if number not in held]
-        for count, (number, outcome) in enumerate(_outcomes(function, tasks, left, seed, workers, executor), start=1):
+        for count, (number, outcome) in enumerate(_outcomes(function, tasks, left, seed, workers), start=1):
             text = json.dumps({"trial": number, "task": tasks[number], **outcome}, default=_plain)
             if file is not None:
                 _append(file, text)
@@ -133,14 +135,15 @@ def read_store(store: str | Path) -> list[dict[str, Any]]:
 
 
 def _outcomes(
-    function: Trial, tasks: Sequence[Any], left: Sequence[int], seed: int, workers: int, executor: Executor | None
+    function: Trial, tasks: Sequence[Any], left: Sequence[int], seed: int, workers: Workers
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Each trial's number and outcome as it ends."""
-    if executor is None and workers == 1:
+    if workers == 1:
         for number in left:
             yield number, _attempt(function, tasks[number], seed, number)
         return
-    pool = executor or ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    own = isinstance(workers, int)
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn")) if isinstance(workers, int) else workers
     futures = {pool.submit(_attempt, function, tasks[number], seed, number): number for number in left}
     try:
         for future in as_completed(futures):
@@ -148,7 +151,7 @@ def _outcomes(
     finally:
         for future in futures:
             future.cancel()
-        if executor is None:
+        if own:
             pool.shutdown(wait=False, cancel_futures=True)
 
 

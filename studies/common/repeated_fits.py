@@ -29,7 +29,7 @@ from bayesid.simulation.model import Manoeuvre, Model
 from studies.common import mission
 from studies.common.ets7 import BASE, INTERVAL
 from studies.common.models import ARM_SPREAD
-from studies.common.monte_carlo import run_trials
+from studies.common.monte_carlo import Workers, run_trials
 
 __all__ = ["Realised", "Reference", "repeat"]
 
@@ -149,7 +149,7 @@ def repeat(
     seed: int,
     arm_spread: float = ARM_SPREAD,
     store: Path | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Realised:
     """Fly a manoeuvre many times in MuJoCo, each time with an arm, a bias and noise of its own, and fit the base.

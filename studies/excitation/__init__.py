@@ -18,6 +18,7 @@ from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import Search, Store
 from studies.common import mission
 from studies.common.command import TRIALS, Command
+from studies.common.monte_carlo import Workers
 from studies.common.repeated_fits import Realised, repeat
 from studies.excitation.cloud import Cloud, random_cloud
 from studies.excitation.contest import Contest, compete
@@ -62,7 +63,7 @@ def run(
     points: int = mission.POINTS,
     store: Store | None = None,
     trials: Path | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the study.

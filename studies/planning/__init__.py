@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from studies.common.command import Command
+from studies.common.command import WORKERS, Command
+from studies.common.monte_carlo import Workers
 from studies.planning.analysis import Case, analyse
 from studies.planning.calibration import calibrate
 from studies.planning.report import Result, write_report
@@ -33,7 +34,7 @@ def run(
     effective_samples: float = 1500.0,
     duration: float = DURATION,
     store: Path | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the study.
@@ -52,7 +53,7 @@ def run(
         Duration of the planned path [s].
     store : path, optional
         File that keeps the trials of the calibration, see `studies.common.monte_carlo`.
-    workers : int
+    workers : int or Executor
         Number of processes for these trials.
     progress : callable, optional
         Receives a line on what is being done.
@@ -82,7 +83,7 @@ COMMAND = Command(
     seed=1,
     extra={
         "--trials": {"type": Path, "help": "file that keeps the trials of the calibration between runs"},
-        "--workers": {"type": int, "default": 1, "help": "processes that make these trials"},
+        **WORKERS,
     },
 )
 

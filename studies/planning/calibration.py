@@ -13,7 +13,7 @@ from bayesid.design.base_prediction import BasePredictor
 from bayesid.robot.body_prior import BodyPrior, coordinates_of, draw_inertial
 from studies.common.ets7 import BASE, START, ets7
 from studies.common.guesses import guess_about
-from studies.common.monte_carlo import run_trials
+from studies.common.monte_carlo import Workers, run_trials
 from studies.planning.analysis import Flight, predictor_of
 from studies.planning.world import Flown, Guess, Swing, model_of
 
@@ -60,7 +60,7 @@ def calibrate(
     draws: int,
     seed: int,
     store: Path | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[Calibration, ...]:
     """Predict one path under many priors, of each of which the truth is a draw.

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from bayesid.app.compilation_cache import keep_compiled
 from studies.common.command import TRIALS, Command
+from studies.common.monte_carlo import Workers
 from studies.common.provenance import study_origin
 from studies.sensors.report import write_report
 from studies.sensors.result import REALISTIC, Effort, Result, compute
@@ -32,7 +33,7 @@ def run(
     seed: int = 1,
     effort: Effort | None = None,
     trials: Path | None = None,
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the study.

@@ -18,7 +18,7 @@ from bayesid.inference.body_quantities import linearise
 from bayesid.robot.joint_state import JointState
 from studies.base_body import paper
 from studies.common.ets7 import INTERVAL
-from studies.common.monte_carlo import run_trials
+from studies.common.monte_carlo import Workers, run_trials
 from studies.common.quantities import JUDGED
 from studies.sensors.draws import Draws
 from studies.sensors.linear import STEP, Estimator, Solved, linearised, raw_posterior, recording_of
@@ -76,7 +76,7 @@ def refit_all(
     counts: Mapping[str, int],
     seed: int,
     store: Path | None,
-    workers: int,
+    workers: Workers,
     progress: Callable[[str], None],
 ) -> dict[str, dict[str, Refits]]:
     """Fit fresh sets of noise by each procedure at each level of noise.

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.common.monte_carlo import Workers
 from studies.sensors import montecarlo
 from studies.sensors.draws import Draws
 from studies.sensors.integration import Falsified, Scalar, falsified, scalars
@@ -90,7 +91,9 @@ class Result:
     seconds: float
 
 
-def compute(effort: Effort, seed: int, trials: Path | None, workers: int, progress: Callable[[str], None]) -> Result:
+def compute(
+    effort: Effort, seed: int, trials: Path | None, workers: Workers, progress: Callable[[str], None]
+) -> Result:
     """Fly, treat and estimate; see `studies.sensors.run`."""
     began = time.perf_counter()
     progress("flights of the independent simulator, Jacobian")

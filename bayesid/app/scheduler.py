@@ -1,0 +1,49 @@
+"""Executors of work that is spread over processes or machines."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from typing import Annotated
+
+import typer
+
+from bayesid._io.errors import InputError
+
+__all__ = ["Scheduler", "executor_at"]
+
+SECONDS = 10
+"""Time in which a scheduler must answer [s]."""
+
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="Scheduler of dask.distributed, such as tcp://host:8786.")
+]
+
+
+def executor_at(scheduler: str) -> Executor:
+    """Return the executor of a scheduler of dask.distributed, whose workers must be able to import this package.
+
+    Parameters
+    ----------
+    scheduler : str
+        Address, such as ``tcp://host:8786``.
+
+    Raises
+    ------
+    InputError
+        If dask.distributed is not installed, or no scheduler answers at the address.
+    """
+    try:
+        from distributed import Client
+    except ImportError:
+        raise InputError(
+            "dask.distributed is not installed", place="--scheduler", remedy="pip install 'bayesid[dask]'"
+        ) from None
+    try:
+        executor: Executor = Client(scheduler, timeout=SECONDS).get_executor()
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no scheduler answers at {scheduler}: {error}",
+            place="--scheduler",
+            remedy="Start one with `dask scheduler`, and workers with `dask worker ADDRESS`",
+        ) from error
+    return executor

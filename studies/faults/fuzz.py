@@ -1,0 +1,148 @@
+"""Study files, robots and recordings spoilt at random, as a command reads them."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+from unittest.mock import patch
+
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+
+from bayesid._io.errors import InputError
+from bayesid.app import study_to_model
+from bayesid.app.command_line import app
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+
+__all__ = ["Answer", "Spoilt", "answer_to", "spoilt"]
+
+JUNK = (
+    *("nan", "inf", "-inf", "-1.0", "0", "0.0", "1e-300", "1e300", "1e400", "9" * 400, "-0.0", "1_000", "0x10", "1,5"),
+    *("true", "''", '""', '"x"', "'..'", "'/'", '"\\u0000"', "[]", "[1.0]", "[nan, nan, nan]", "[[]]", "{}", "{x = 1}"),
+    *("1979-05-27", "", " ", ",", '"', "'", "\x00", "\ufeff", "é", "\u202e", "<", ">", "&", "#", "=", "[", "]"),
+)
+"""Texts that take the place of a value."""
+
+ACCEPTED = "the files are accepted"
+"""Message of what ends a command after it has read its files."""
+
+
+@dataclass(frozen=True)
+class Spoilt:
+    """One change of one file.
+
+    Parameters
+    ----------
+    file : str
+        Ending of the name of the file.
+    kind : str
+        Name of the change, one of `KINDS`.
+    place : float
+        Where in the file, from 0 at its start to 1 at its end.
+    text : str
+        What is put there.
+    """
+
+    file: str
+    kind: str
+    place: float
+    text: str
+
+    def apply(self, folder: Path) -> None:
+        """Change the file in a folder."""
+        file = min(folder.glob(f"*{self.file}"))
+        content = file.read_bytes()
+        at = min(int(self.place * len(content)), len(content) - 1)
+        new = self.text.encode("utf-8", "surrogatepass")
+        start, end = _word(content, at)
+        line_start, line_end = content.rfind(b"\n", 0, at) + 1, (content.find(b"\n", at) + 1) or len(content)
+        line = content[line_start:line_end]
+        changed = {
+            "replace a value": content[:start] + new + content[end:],
+            "insert": content[:at] + new + content[at:],
+            "cut off": content[:at],
+            "drop a line": content[:line_start] + content[line_end:],
+            "repeat a line": content[:line_end] + line + content[line_end:],
+            "another byte": content[:at] + bytes([content[at] ^ 0x80]) + content[at + 1 :],
+        }
+        file.write_bytes(changed[self.kind])
+
+
+KINDS = ("replace a value", "insert", "cut off", "drop a line", "repeat a line", "another byte")
+
+
+def _word(content: bytes, at: int) -> tuple[int, int]:
+    """Return where the value about a place begins and ends: it holds no separator of any of the formats."""
+    separators = b' ,\n"=<>[]'
+    start = end = at
+    while start and content[start - 1] not in separators:
+        start -= 1
+    while end < len(content) and content[end] not in separators:
+        end += 1
+    return start, end
+
+
+def spoilt() -> st.SearchStrategy[Spoilt]:
+    """Return the strategy of changes."""
+    text = st.one_of(st.sampled_from(JUNK), st.floats().map(repr), st.text(max_size=8))
+    places = st.floats(0.0, 1.0)
+    return st.builds(Spoilt, st.sampled_from([".toml", ".csv", ".urdf"]), st.sampled_from(KINDS), places, text)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command answers to a study.
+
+    Attributes
+    ----------
+    status : int
+        Exit status.
+    message : str
+        What it says.
+    accepted : bool
+        Whether it accepts the files.
+    fault : str
+        What is wrong with the answer: a traceback, another status than 2, no message or several; empty if nothing is.
+    """
+
+    status: int
+    message: str
+    accepted: bool
+    fault: str
+
+
+def answer_to(study: Path, change: Spoilt, folder: Path) -> Answer:
+    """Copy the folder of a study, change it, and return what ``bayesid check`` answers once it has read the files."""
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(study.parent, folder)
+    change.apply(folder)
+    with _reading_alone():
+        done = CliRunner().invoke(app, ["check", str(folder / study.name), "--output", str(folder / "out")])
+    errors = done.output.count("Error: ")
+    fault = ""
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        fault = f"{type(done.exception).__name__}: {done.exception}"
+    elif done.exit_code != 2:
+        fault = f"exit status {done.exit_code}"
+    elif errors < 1 or not done.output.startswith("Error: "):
+        fault = "no message"
+    elif (folder / "out").exists():
+        fault = "something is written"
+    return Answer(done.exit_code, done.output, ACCEPTED in done.output, fault)
+
+
+@contextmanager
+def _reading_alone() -> Iterator[None]:
+    """End a command when it has read all files, before anything is compiled."""
+
+    def read(study: Study, window: int | None = None) -> NoReturn:
+        load_manoeuvres(study, load_model(study).robot)
+        raise InputError(ACCEPTED)
+
+    with patch.object(study_to_model, "load_posterior", read):
+        yield
