@@ -312,4 +312,4 @@ def test_no_manoeuvre_is_designed_for_causes_that_the_design_cannot_weigh(tmp_pa
     file = tmp_path / "study.toml"
     file.write_text(STUDY, encoding="utf-8")
     with pytest.raises(InputError, match="no unknown size"):
-        fly_next(Study.load(file), ("rate-bias", "gravity-gradient"), 1, silent)
+        fly_next(Study.load(file), ("rate-bias", "encoder-noise"), 1, silent)
