@@ -3,27 +3,71 @@
 from __future__ import annotations
 
 import json
-import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-__all__ = ["Killed", "content_of", "half_written", "kill_and_resume"]
+from bayesid.robot.robot import Robot
 
-RESULTS = (".json", ".pdf", ".nc", ".csv", ".urdf")
-"""Endings of the files that a command leaves; what it goes on from has other names."""
+__all__ = ["COMMANDS", "Killed", "content_of", "half_written", "kill_and_resume"]
 
-CLOCKS = ("seconds", "evaluations_per_second", "created")
-"""Keys of what a clock decides, which differs between two runs of the same command."""
+DECIDED_BY_CLOCKS = ("seconds", "sha256")
+"""Keys of what differs between two runs of one command: times, and keys of files that say when they were made."""
 
-RESUMED = ("search.json", "samples.h5")
-"""Files that an interrupted command goes on from, which it removes at its end."""
+STUDY = """
+[robot]
+urdf = "planar.urdf"
+[sensors.rate]
+sigma = 1e-5
+[sensors.encoder]
+sigma = 1e-6
+[unknowns]
+bodies = ["base_link"]
+spread = 0.05
+[model]
+initial_rate = "zero"
+[design]
+duration = 30.0
+functions = 2
+criteria = ["d-optimal"]
+[design.limits]
+tip_speed = 0.15
+"""
+"""Study of which manoeuvres are designed and flown."""
+
+SPACECRAFT = """
+from bayesid import Kind, Model, Robot, Sensor, White
+from bayesid.design import SimulatedSpacecraft
+
+execute = SimulatedSpacecraft(
+    Model(Robot.shipped("planar"), (Sensor(Kind.RATE, White(1e-5)),), (), rate_sigma=0.0), encoder_sigma=1e-6
+).execute
+"""
+
+TRIAL = """
+import time
+
+def draw(task, rng):
+    time.sleep(0.05)
+    return [task, *rng.random(3).tolist()]
+"""
+"""A trial of a campaign, which takes a while."""
+
+CAMPAIGN = """
+import sys
+
+sys.path.insert(0, sys.argv[1])
+from studies.common.monte_carlo import run_trials
+from trial import draw
+
+run_trials(draw, range(40), sys.argv[2] + "/trials.json", seed=5, workers=2)
+"""
 
 
 @dataclass(frozen=True)
@@ -39,7 +83,7 @@ class Killed:
     half_written : tuple of str
         Results that were there but not whole after a kill.
     same : bool
-        Whether the results in the end are those of the command left alone.
+        Whether the results in the end, and the names of all files, are those of the command left alone.
     message : str
         Last line of what the last call said.
     """
@@ -51,83 +95,106 @@ class Killed:
     message: str
 
 
-def kill_and_resume(
-    name: str,
-    arguments: Callable[[Path], Sequence[str]],
-    folder: Path,
-    rng: np.random.Generator,
-    kills: int,
-    prepare: Callable[[Path], None] = lambda output: None,
-) -> Killed:
+def _campaign(folder: Path, output: Path) -> list[str]:
+    return ["-c", CAMPAIGN, str(folder), str(output)]
+
+
+def _bayesid(name: str, *options: str) -> Callable[[Path, Path], list[str]]:
+    study = "design.toml" if name in ("design", "loop") else "study.toml"
+
+    def arguments(folder: Path, output: Path) -> list[str]:
+        where = [str(folder / item) if item.endswith(".py") else item for item in options]
+        return ["-m", "bayesid.app.command_line", name, str(folder / study), "--output", str(output), *where]
+
+    return arguments
+
+
+COMMANDS: Mapping[str, Callable[[Path, Path], list[str]]] = {
+    "campaign": _campaign,
+    "design": _bayesid("design", "--starts", "4", "--iterations", "10"),
+    "loop": _bayesid("loop", "--spacecraft", "craft.py", "--at-most", "2", "--samples", "300", "--no-diagnose"),
+    "identify": _bayesid("identify", "--samples", "300"),
+    "diagnose": _bayesid("diagnose", "--no-sample"),
+}
+"""Functions of the folder of the studies and of the output that return what follows ``python``."""
+
+
+def kill_and_resume(command: str, folder: Path, rng: np.random.Generator, kills: int) -> Killed:
     """Run a command alone, then again with kills at random moments, and compare.
 
     Parameters
     ----------
-    name : str
-        Name for the table.
-    arguments : callable
-        Function of the output folder that returns what follows ``python``.
+    command : str
+        One of `COMMANDS`.
     folder : Path
-        Empty folder for both runs.
+        Folder with the study ``study.toml``, in which both runs are made.
     rng : numpy.random.Generator
         Source of the moments, uniform over the time that the command takes alone.
     kills : int
-        Number of kills before the last call, which runs to its end.
-    prepare : callable
-        Function of the output folder that is called before the first run into it.
+        Number of calls that are killed before the last one, which runs to its end.
+
+    Raises
+    ------
+    RuntimeError
+        If the command fails where it is left alone.
     """
+    Robot.shipped("planar").write_urdf(folder / "planar.urdf")
+    (folder / "design.toml").write_text(STUDY)
+    (folder / "craft.py").write_text(SPACECRAFT)
+    (folder / "trial.py").write_text(TRIAL)
     alone, killed = folder / "alone", folder / "killed"
-    for output in (alone, killed):
-        prepare(output)
-    # the first run compiles, which a later one need not
-    for _ in range(2):
-        shutil.rmtree(alone, ignore_errors=True)
-        prepare(alone)
-        began = time.monotonic()
-        first = _run(arguments(alone))
-        taken = time.monotonic() - began
-        if first.returncode:
-            raise RuntimeError(f"{name} fails when it is left alone: {first.stderr}")
+    began = time.monotonic()
+    first = _run(COMMANDS[command](folder, alone))
+    taken = time.monotonic() - began
+    if first.returncode:
+        raise RuntimeError(f"{command} fails where it is left alone: {first.stderr}")
     found, broken = 0, []
     for moment in rng.uniform(0.0, taken, size=kills):
-        found += _run_and_kill(arguments(killed), float(moment))
+        found += _run_and_kill(COMMANDS[command](folder, killed), float(moment))
         broken += half_written(killed)
-    last = _run(arguments(killed))
+    last = _run(COMMANDS[command](folder, killed))
     same = last.returncode == 0 and content_of(killed) == content_of(alone)
-    text = (last.stderr + last.stdout).strip().splitlines()
-    return Killed(name, found, tuple(broken), same, text[-1] if text else "")
+    text = (last.stdout + last.stderr).strip().splitlines()
+    return Killed(command, found, tuple(broken), same, text[-1] if text else "")
 
 
 def content_of(folder: Path) -> dict[str, Any]:
     """Return the results of a command by the names of their files, without what a clock decides.
 
-    Reports and posterior files state when they were made; of them only the names count.
+    Reports and posterior files say when they were made; of them the names alone count.
     """
-    readers = {".json": lambda file: _without_clocks(json.loads(file.read_text())), ".csv": Path.read_text}
-    return {file.name: readers.get(file.suffix, lambda file: None)(file) for file in sorted(folder.iterdir())}
+    return {file.name: _content(file) for file in sorted(folder.iterdir())}
+
+
+def _content(file: Path) -> Any:
+    if file.suffix == ".csv":
+        return file.read_text()
+    if file.suffix != ".json":
+        return None
+    lines = file.read_text().splitlines()
+    if file.name == "trials.json":  # a store, whose lines are in the order in which the trials ended
+        return sorted(lines)
+    return _without_clocks(json.loads("\n".join(lines)))
 
 
 def half_written(folder: Path) -> list[str]:
-    """Return the names of results that are there but not whole."""
-    files = [file for file in folder.iterdir() if file.suffix in RESULTS] if folder.is_dir() else []
-    return [file.name for file in files if not _whole(file)]
+    """Return the names of reports and results in JSON that are there but not whole."""
+    files = sorted(folder.iterdir()) if folder.is_dir() else []
+    return [file.name for file in files if not file.name.startswith((".", "trials")) and not _whole(file)]
 
 
 def _whole(file: Path) -> bool:
-    content = file.read_bytes()
     if file.suffix == ".json":
         try:
-            json.loads(content)
+            json.loads(file.read_text())
         except ValueError:
             return False
-    if file.suffix == ".pdf":
-        return content.startswith(b"%PDF") and content.rstrip().endswith(b"%%EOF")
-    return bool(content)
+    return file.suffix != ".pdf" or file.read_bytes().rstrip().endswith(b"%%EOF")
 
 
 def _without_clocks(content: Any) -> Any:
     if isinstance(content, dict):
-        return {key: _without_clocks(value) for key, value in content.items() if key not in CLOCKS}
+        return {key: _without_clocks(value) for key, value in content.items() if key not in DECIDED_BY_CLOCKS}
     return [_without_clocks(item) for item in content] if isinstance(content, list) else content
 
 
@@ -137,11 +204,11 @@ def _run(arguments: Sequence[str]) -> subprocess.CompletedProcess[str]:
 
 def _run_and_kill(arguments: Sequence[str], moment: float) -> bool:
     """Start a command, kill it with SIGKILL after some time [s], and return whether it was still running."""
-    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    try:
-        process.wait(moment)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-        return True
-    return False
+    nothing = subprocess.DEVNULL
+    with subprocess.Popen([sys.executable, *arguments], stdout=nothing, stderr=nothing) as process:
+        try:
+            process.wait(moment)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return True
+        return False

@@ -1,0 +1,137 @@
+"""Report of the faults."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from bayesid.report import Document
+from studies.common.command import TRIALS, Command
+from studies.common.monte_carlo import run_trials
+from studies.common.tables import add_number_table
+from studies.faults.kills import COMMANDS
+from studies.faults.trials import attempt, tasks
+from studies.faults.units import SLIPS
+
+__all__ = ["main", "write_report"]
+
+Made = Mapping[str, Any]
+"""A task with its result."""
+
+COMMAND = Command(
+    "faults",
+    "What commands make of spoilt files, mistaken units and kills at random moments.",
+    full="1,000 spoilt files, ten mistaken units, and kills of every command that takes long",
+    seed=1,
+    extra=TRIALS,
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the study and write its report."""
+    options = COMMAND.parse(arguments)
+    planned = tasks(options.full)
+    outcomes = run_trials(
+        attempt,
+        planned,
+        options.trials,
+        seed=options.seed,
+        workers=options.workers,
+        progress=lambda text: print(text, file=sys.stderr),
+    )
+    made = [{**task, **result} for task, result in zip(planned, outcomes.results, strict=True) if result is not None]
+    write_report(made, list(outcomes.failures.values()), options.output)
+    print(f"Wrote {options.output}.")
+
+
+def write_report(made: Sequence[Made], failures: Sequence[str], file: Path) -> None:
+    """Write the report as PDF.
+
+    Parameters
+    ----------
+    made : sequence of mappings
+        Tasks with their results.
+    failures : sequence of str
+        Messages of trials that failed themselves.
+    file : Path
+    """
+    spoilt = [item for item in made if "spoil" in item]
+    units = {item["unit"]: item for item in made if "unit" in item}
+    killed = {item["kill"]: item for item in made if "kill" in item}
+    numbers = {key: sum(item["numbers"].get(key, 0) for item in spoilt) for key in ("refused", "accepted", "faulty")}
+    document = Document("Faults", "Spoilt files, mistaken units, kills at random moments")
+    document.section("Summary")
+    document.paragraph(
+        f"{sum(numbers.values())} spoilt files: {numbers['refused']} refused with one message, {numbers['accepted']} "
+        f"accepted, {numbers['faulty']} answered wrongly. {sum(item['refused'] for item in units.values())} of "
+        f"{len(units)} mistaken units refused. {sum(item['kills'] for item in killed.values())} kills of "
+        f"{len(killed)} commands: {sum(item['same'] for item in killed.values())} of these commands gave in the end "
+        "the answer of a run left alone."
+    )
+    document.table(["goal", "reached", ""], _goals(numbers, units, killed), "Goals.")
+    document.section("What went wrong")
+    wrong = [text for item in spoilt for text in item["faults"]]
+    wrong += [f"{unit}: {item['said'] or 'not refused'}" for unit, item in units.items() if not item["refused"]]
+    wrong += [f"{name} after kills: {item['message']}" for name, item in killed.items() if not item["same"]]
+    wrong += [f"A trial failed: {text}" for text in failures]
+    document.items([text[:400] for text in wrong])
+    if not wrong:
+        document.paragraph("Nothing in this run.")
+    document.section("Kills")
+    document.paragraph(
+        "A command is run alone, then killed with SIGKILL at moments drawn uniformly over the time that it took, and "
+        "called again until it ends. Compared are the names of all files, tables and JSON without times. Identify, "
+        "design, loop and campaigns go on from what they kept; diagnose keeps nothing and starts anew."
+    )
+    rows = [
+        [name, str(item["kills"]), str(len(item["half_written"])), "yes" if item["same"] else "no"]
+        for name, item in killed.items()
+    ]
+    if rows:
+        add_number_table(document, ["command", "kills while it ran", "files half written", "same answer"], rows)
+    if units:
+        document.section("Mistaken units")
+        said = [[unit, "yes" if item["refused"] else "no", item["said"][:160]] for unit, item in units.items()]
+        document.table(["unit", "refused", "what the command says"], said)
+    document.section("Conditions")
+    document.paragraph(
+        "Files are those of a robot with three joints and one recording of 40 s, made by MuJoCo. A spoilt file has one "
+        "value replaced, text inserted, the end cut off, a line dropped or repeated, or a byte changed, drawn by "
+        "Hypothesis from a fixed seed; the command stops when all files are read. A file counts as refused where the "
+        "exit status is 2, one message begins with Error, nothing is written, and no warning of Python is raised. "
+        "Accepted files are those that are still valid, such as another number in a cell. A full disk, a closed "
+        "folder, two runs into one folder, and effects of a user's own that fail are in tests/test_faults.py."
+    )
+    document.section("Provenance")
+    packages = ", ".join(f"{name} {version(name)}" for name in ("bayesid", "hypothesis", "jax", "numpy"))
+    document.paragraph(f"python -m studies.faults --full. {packages}.")
+    document.write(file)
+
+
+def _goals(numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mapping[str, Made]) -> list[list[str]]:
+    """Return each goal, what was reached, and PASS, FAIL or NOT TESTED."""
+    total, kills = sum(numbers.values()), sum(item["kills"] for item in killed.values())
+    broken = [name for item in killed.values() for name in item["half_written"]]
+    refused = sum(item["refused"] for item in units.values())
+    answers = {name: killed.get(name, {"kills": 0, "same": False}) for name in COMMANDS}
+    goals = [
+        ("No unclear answer to a spoilt file", f"{numbers['faulty']} of {total}", not numbers["faulty"], total > 0),
+        (
+            "No wrong unit in silence",
+            f"{refused} of {len(units)} refused",
+            refused == len(units),
+            units.keys() == SLIPS.keys(),
+        ),
+        ("Nothing half written after a kill", f"{len(broken)} files after {kills} kills", not broken, kills > 0),
+        *(
+            (f"{name}: same answer after kills", f"{item['kills']} kills", item["same"], item["kills"] > 0)
+            for name, item in answers.items()
+        ),
+    ]
+    return [
+        [goal, reached, ("PASS" if passed else "FAIL") if tested else "NOT TESTED"]
+        for goal, reached, passed, tested in goals
+    ]

@@ -1,0 +1,54 @@
+"""The study of faults: a campaign that is killed, units that are mistaken, and what the report says of both."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from studies.faults import attempt, tasks, write_report
+from studies.faults.kills import content_of, half_written, kill_and_resume
+from tests.pdf_text import PdfText
+
+
+def test_a_campaign_that_is_killed_ends_as_one_left_alone(tmp_path):
+    killed = kill_and_resume("campaign", tmp_path, np.random.default_rng(4), kills=3)
+    assert killed.kills > 0
+    assert killed.same, killed
+    lines = (tmp_path / "killed" / "trials.json").read_text().splitlines()
+    assert len(lines) == len(set(lines)) == 41
+
+
+def test_what_differs_and_what_is_half_written_is_seen(tmp_path):
+    (tmp_path / "a.json").write_text('{"mass": 1.0, "seconds": 2.0}')
+    (tmp_path / "report.pdf").write_bytes(b"%PDF-1.7 and then")
+    assert content_of(tmp_path) == {"a.json": {"mass": 1.0}, "report.pdf": None}
+    assert half_written(tmp_path) == ["report.pdf"]
+    (tmp_path / "a.json").write_text('{"mass": 1.')
+    assert half_written(tmp_path) == ["a.json", "report.pdf"]
+
+
+@pytest.mark.slow
+def test_spoilt_files_are_counted():
+    found = attempt({"spoil": 3, "changes": 20}, np.random.default_rng(0))
+    assert sum(found["numbers"].values()) == 20
+    assert found["faults"] == []
+
+
+def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
+    killed = {"kill": "design", "kills": 2, "half_written": ["a.json"], "same": False, "message": "other files"}
+    made = [
+        {"spoil": 1, "numbers": {"refused": 7, "faulty": 1}, "faults": ["Spoilt: KeyError"]},
+        {"unit": "acceleration in g", "refused": False, "said": ""},
+        killed,
+    ]
+    write_report(made, ["a trial broke"], tmp_path / "faults.pdf")
+    text = PdfText.read(tmp_path / "faults.pdf")
+    assert text.row("Nothing half written after a kill", "1 files after 2 kills", "FAIL")
+    assert text.row("design: same answer after kills", "2 kills", "FAIL")
+    assert text.row("loop: same answer after kills", "0 kills", "NOT TESTED")
+    for part in ("Spoilt: KeyError", "not refused", "other files", "a trial broke"):
+        assert part in text
+
+
+def test_the_small_study_is_a_part_of_the_full_one():
+    assert {next(iter(task)) for task in tasks(full=False)} < {next(iter(task)) for task in tasks(full=True)}
