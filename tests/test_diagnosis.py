@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import pickle
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -14,6 +16,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
 from bayesid.diagnosis.diagnosis_run import extended_start
+from bayesid.diagnosis.gain import measure_gain
 from bayesid.diagnosis.noise_faults import noise_fault
 from bayesid.diagnosis.noise_tests import chi2_log_sf
 from bayesid.diagnosis.perturbed_fit import Engine
@@ -53,6 +56,16 @@ def test_a_hidden_wheel_is_named_and_measured(wheel):
     gain = wheel.gain
     assert gain.after.chi2_per_sample < 1.1 < gain.before.chi2_per_sample
     assert gain.after.held_out.sum() > gain.before.held_out.sum()
+
+
+def test_refits_without_a_recording_run_on_any_executor(wheel):
+    """In threads, and after the way to another process."""
+    with ThreadPoolExecutor(2) as threads:
+        again = measure_gain(wheel.before, wheel.after, threads)
+    np.testing.assert_array_equal(again.after.held_out, wheel.gain.after.held_out)
+    sent = pickle.loads(pickle.dumps(wheel.after))
+    there = measure_gain(wheel.before, sent)
+    np.testing.assert_allclose(there.after.held_out, wheel.gain.after.held_out, rtol=1e-9)
 
 
 def test_the_extended_posterior_agrees_with_the_pushes(wheel):
