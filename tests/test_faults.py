@@ -17,6 +17,7 @@ from bayesid._io.errors import InputError
 from bayesid._io.files import claimed_folder, complete_folder
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_model
+from bayesid.simulation.own_effects import check_own_effect
 from studies.faults.fuzz import Spoilt, answer_to, spoilt
 from studies.truth.mujoco import Manoeuvres, write_study
 from studies.truth.urdf import SERVICER4
@@ -217,3 +218,12 @@ def test_a_second_run_into_one_folder_is_refused_and_a_killed_one_leaves_nothing
     with complete_folder(folder) as part:
         (part / "whole.json").write_text("{}")
     assert [item.name for item in folder.iterdir()] == ["whole.json"]
+
+
+@pytest.mark.slow
+def test_the_trial_of_effects_accepts_what_the_package_ships(monkeypatch: pytest.MonkeyPatch) -> None:
+    from test_effect_contract import EFFECTS, LINEAR, ROBOT, SENSORS
+
+    monkeypatch.setattr("bayesid.simulation.own_effects.PACKAGE", "none")
+    for effect in (*EFFECTS, *LINEAR):
+        check_own_effect(effect, ROBOT, SENSORS)

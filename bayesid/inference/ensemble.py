@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.metadata import version
 from pathlib import Path
 
 import emcee
@@ -17,7 +18,6 @@ from emcee.autocorr import auto_window
 from emcee.moves import DEMove, DESnookerMove
 from emcee.moves.red_blue import RedBlueMove
 
-import bayesid
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._io.store import content_key, refuse_other
@@ -165,7 +165,7 @@ def sample(
     sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
     # the mode stands for data and model in the key; it is rounded, so that rounding errors do not change the key
     mode = np.round(optimum.z, 6) + 0.0
-    key = content_key(bayesid.__version__, posterior.unknowns.names, sequence.entropy, sequence.spawn_key, mode)
+    key = content_key(version("bayesid"), posterior.unknowns.names, sequence.entropy, sequence.spawn_key, mode)
     samplers = []
     for number, child in enumerate(sequence.spawn(ENSEMBLES)):
         backend = _backend(file, number, key)

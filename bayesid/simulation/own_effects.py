@@ -1,6 +1,6 @@
 """Trial of an effect that does not belong to the package, so that a mistake in it is named before a simulation.
 
-Every hook that it overrides is called once, traced as in a simulation, at one instant of the robot at rest.
+Every hook that it overrides is called once, traced as in a simulation, at one instant of a moving robot.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ __all__ = ["check_own_effect"]
 
 PACKAGE = __name__.partition(".")[0]
 
-TIMES = np.array([0.0, 0.5])
+TIMES = np.linspace(0.0, 8.0, 17)
 """Times of the tables and readings of the trial [s]."""
 
 TYPICAL = 0.1
@@ -72,9 +72,9 @@ def _trials(effect: Effect, robot: Robot, sensors: Sequence[Sensor]) -> Iterator
     """Yield every physical hook with a call of it and the shapes that it must return, None where any will do."""
     values = jnp.array([parameter.value(jnp.asarray(TYPICAL)) for parameter in effect.parameters])
     zeros = np.zeros(len(robot.joints))
-    motion = Excitation(zeros, zeros, 1.0)
+    motion = Excitation(zeros, zeros + TYPICAL, 1.0)
     tables = time_tables(robot, (), (), motion, TIMES)
-    instant = _instant(tables.known[0], tables.environment)
+    instant = _instant(tables.known[-1], tables.environment)
     inner = jnp.full(effect.states, TYPICAL)
     count = effect.modes_count
     readings = _readings(robot, sensors)
@@ -106,11 +106,12 @@ def _table(effect: Effect, robot: Robot, motion: Excitation) -> Any:
 
 
 def _instant(row: Any, environment: Environment) -> Instant:
-    """Return an instant of the robot at rest, with directions in place of those of no orbit."""
-    now = jax.tree.map(lambda leaf: jnp.asarray(leaf[0]), environment)
+    """Return an instant at which nothing is zero or singular that need not be, with directions in place of an orbit."""
+    now = jax.tree.map(lambda leaf: jnp.asarray(leaf[-1]), environment)
     x, y, z = jnp.eye(3)
     now = now._replace(zenith=x, velocity=y, sun=x, north=z, gradient=jnp.asarray(1e-6))
-    return Instant(now, composite(jnp.asarray(row)), jnp.eye(3), *jnp.zeros((3, 3)))
+    moving = 1e-2 * jnp.array([1.0, -2.0, 1.5])
+    return Instant(now, composite(jnp.asarray(row)), jnp.eye(3), moving, moving, moving)
 
 
 def _readings(robot: Robot, sensors: Sequence[Sensor]) -> Readings:
