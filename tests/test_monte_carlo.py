@@ -104,6 +104,35 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path):
     assert resumed == run_trials(slow, tasks, seed=2)
 
 
+def number_of_process(task: int, rng: np.random.Generator) -> int:
+    time.sleep(0.05)
+    return os.getpid()
+
+
+def test_the_processes_of_a_killed_run_end_with_it(tmp_path):
+    store = tmp_path / "trials.jsonl"
+    code = f"from tests.test_monte_carlo import *; run_trials(number_of_process, range(999), {str(store)!r}, workers=2)"
+    process = subprocess.Popen([sys.executable, "-c", code], cwd=ROOT)
+    deadline = time.monotonic() + 60.0
+    while time.monotonic() < deadline and len(read_store(store)) < 2:
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    numbers = {line["result"] for line in read_store(store)}
+    assert numbers
+    while time.monotonic() < deadline and any(map(alive, numbers)):
+        time.sleep(0.05)
+    assert not any(map(alive, numbers))
+
+
+def alive(number: int) -> bool:
+    try:
+        os.kill(number, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
 def slow_of_that_process():
     """The function under the name that the other process knew it by."""
     from tests.test_monte_carlo import slow as function

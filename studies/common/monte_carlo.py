@@ -13,8 +13,9 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, is_dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -143,7 +144,7 @@ def _outcomes(
             yield number, _attempt(function, tasks[number], seed, number)
         return
     own = isinstance(workers, int)
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn")) if isinstance(workers, int) else workers
+    pool = _processes(workers) if isinstance(workers, int) else workers
     futures = {pool.submit(_attempt, function, tasks[number], seed, number): number for number in left}
     try:
         for future in as_completed(futures):
@@ -153,6 +154,23 @@ def _outcomes(
             future.cancel()
         if own:
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _processes(count: int) -> Executor:
+    """Return an executor of processes of this machine, which end with this one even where it is killed."""
+    return ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_end_with_parent)
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that started it has ended: a pool would wait for ever."""
+    parent = parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
 
 
 def _attempt(function: Trial, task: Any, seed: int, number: int) -> dict[str, Any]:
