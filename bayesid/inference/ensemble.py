@@ -226,7 +226,7 @@ def _backend(file: Path | None, number: int, key: str) -> emcee.backends.Backend
                 stored = opened[name].attrs.get("key", "") if name in opened else key
         except OSError as error:
             raise InputError(f"unreadable samples: {error}", file=file, remedy="Delete the file") from error
-        refuse_other(stored, key, file, "run", "data, model or seed")
+        refuse_other(stored, key, file, "run", "data, model, seed or version of bayesid")
     return _KeyedBackend(file, name, key)
 
 
