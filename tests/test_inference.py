@@ -236,14 +236,17 @@ def test_a_finished_run_is_read_not_repeated(tmp_path):
     np.testing.assert_array_equal(again.z, first.z)
 
 
-@pytest.mark.parametrize("change", ["seed", "data", "names"])
-def test_another_runs_file_is_refused(change, tmp_path):
+@pytest.mark.parametrize("change", ["seed", "data", "names", "version"])
+def test_another_runs_file_is_refused(change, tmp_path, monkeypatch):
     file = tmp_path / "chain.h5"
     drawn(LinearGaussian(), file=file)
     stub = LinearGaussian(seed=1 if change == "data" else 0)
     if change == "names":
         stub.unknowns = SimpleNamespace(names=("a", "b", "c", "d"))
-    with pytest.raises(InputError, match=r"chain\.h5: it belongs to another run: data, model or seed differ"):
+    if change == "version":
+        monkeypatch.setattr("bayesid.inference.ensemble.version", lambda package: "another")
+    words = r"chain\.h5: it belongs to another run: data, model, seed or version of bayesid differ"
+    with pytest.raises(InputError, match=words):
         drawn(stub, seed=4 if change == "seed" else 3, file=file)
 
 
