@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from enum import StrEnum
 from functools import cache
@@ -76,7 +75,7 @@ def model_of(case: Case) -> Model:
     return replace(model, priors=_whole(robot)) if case is Case.WHOLE else model
 
 
-def _whole(robot: Robot) -> Sequence[BodyPrior]:
+def _whole(robot: Robot) -> tuple[BodyPrior, ...]:
     """Return priors of all bodies with mass."""
     widths = {BASE: BASE_SPREAD, LOAD.name: LOAD_SPREAD}
     return tuple(

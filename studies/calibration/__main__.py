@@ -1,0 +1,5 @@
+"""``python -m studies.calibration``."""
+
+from studies.calibration import main
+
+main()

@@ -1,0 +1,99 @@
+"""The calibration study: its tests of uniformity, the errors of smoothed joints, and the report of its outcomes."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from arviz.stats.ecdf_utils import ecdf_confidence_band
+from scipy import stats
+
+from studies.calibration import make, plan, read, write_report
+from studies.calibration.cases import REPLICATES, Case
+from studies.calibration.encoders import _ratios, smooth_share
+from studies.calibration.replicate import Method, Plan
+from studies.calibration.report import goal_rows
+from studies.calibration.uniformity import POINTS, coverage, holm, uniform_p_value
+from studies.common.monte_carlo import run_trials
+from tests.pdf_text import PdfText
+
+REPORTS = Path(__file__).parents[1] / "reports"
+
+
+def ranks_with(counts):
+    """Ranks of which so many lie below each of the points."""
+    edges = [0.0, *POINTS, 1.0]
+    inside = np.diff([0, *counts, 120])
+    middles = [0.5 * (low + high) for low, high in pairwise(edges)]
+    return np.repeat(middles, inside)
+
+
+def test_the_test_of_uniformity_is_the_band_of_arviz():
+    low, high = (120 * side for side in ecdf_confidence_band(120, POINTS, POINTS, prob=0.95))
+    for edge in (low, high):
+        counts = np.maximum.accumulate(np.round(edge).astype(int))
+        sign = 1 if edge is high else -1
+        assert uniform_p_value(ranks_with(counts)) > 0.045
+        assert uniform_p_value(ranks_with(np.clip(counts + 2 * sign, 0, 120))) < 0.05
+
+
+def test_p_values_of_uniform_ranks_are_as_rare_as_they_say_and_wrong_widths_are_found():
+    rng = np.random.default_rng(1)
+    p = np.array([uniform_p_value(rng.uniform(size=30)) for _ in range(100)])
+    assert stats.binomtest(int((p <= 0.1).sum()), len(p), 0.1, alternative="greater").pvalue > 0.01
+    assert (p <= 0.5).mean() > 0.3  # few counts make few values of p
+    errors = rng.normal(size=300)
+    assert uniform_p_value(stats.norm.cdf(errors)) > 0.01
+    for wrong in (1.4 * errors, errors / 1.4, errors + 0.4):
+        assert uniform_p_value(stats.norm.cdf(wrong)) < 0.01
+
+
+def test_holm_and_coverage_by_hand():
+    assert holm({"a": 0.01, "b": 0.04, "c": 0.03}) == pytest.approx({"a": 0.03, "c": 0.06, "b": 0.06})
+    share, error = coverage(np.array([[0.3, 0.5], [0.9, 0.6], [0.01, 0.99]]), 0.5)
+    assert share == pytest.approx(0.5)
+    assert error == pytest.approx(0.5 / np.sqrt(3.0))
+
+
+def test_smoothed_motions_are_stated_too_loosely_by_the_share_that_theory_gives():
+    """By the transfer function of the smoothing, far from the ends of the ramps at 20 and 100 s."""
+    time = np.arange(0.0, 120.1, 0.5)
+    ratios = np.mean([_ratios(time, 1e-5, seed) for seed in range(30)], axis=0)
+    between = ratios[:, (time > 25.0) & (time < 95.0)].mean(axis=1)
+    assert between == pytest.approx([smooth_share(order) for order in range(3)], abs=0.06)
+    assert ratios[2, time == 20.0] > 10.0
+
+
+def test_the_plan_holds_every_replicate_once_and_its_beginning_some_of_every_case():
+    full = plan(True)
+    assert {case: sum(item.case is case for item in full) for case in Case} == REPLICATES
+    assert {item.case for item in full[:20]} == set(Case)
+    assert any(item.sampled for item in full)
+    assert not any(item.sampled for item in plan(False))
+
+
+def test_the_report_is_that_of_the_outcomes(tmp_path):
+    cases = read(REPORTS / "calibration.jsonl.gz")
+    write_report(cases, tmp_path / "calibration.pdf")
+    rebuilt, kept = PdfText.read(tmp_path / "calibration.pdf"), PdfText.read(REPORTS / "calibration.pdf")
+    for row in goal_rows(cases):
+        for text in row:
+            assert text in rebuilt
+            assert text in kept
+
+
+@pytest.mark.usefixtures("slow")
+def test_replicates_of_the_small_plan(tmp_path):
+    made = run_trials(make, [*plan(False), Plan(Case.BASE, sampled=True)], tmp_path / "trials.jsonl", seed=5).complete()
+    cases = {item.case: item for item in read(tmp_path / "trials.jsonl")}
+    assert set(cases) == {Case.EXACT, Case.BASE, Case.MUJOCO}
+    for result in made:
+        assert result["converged"]
+        for squares, samples in result["chi2"].values():
+            assert samples == 723
+            assert abs(squares - samples) < 5.0 * np.sqrt(2.0 * samples)
+    laplace, weighted, chains = (made[-1]["ranks"][method] for method in Method)
+    assert set(chains) == set(weighted) == set(laplace)
+    # 499 draws each, some of them alike
+    assert max(abs(chains[name] - weighted[name]) for name in chains) < 0.15
+    assert np.all((np.array(list(chains.values())) > 0.0) & (np.array(list(chains.values())) < 1.0))
