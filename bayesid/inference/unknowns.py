@@ -45,7 +45,9 @@ class Unknowns:
     recordings : int
         Number of recordings.
     rate_sigma : float
-        Prior standard deviation of the initial rate [rad/s]; 0 for a start at rest.
+        Prior standard deviation of the initial rate [rad/s]; 0 for a start at rest. The initial rate is the one that
+        belongs to the joints as smoothed: an error of a smoothed joint speed at time 0 moves it, and its posterior
+        leaves that out, unless such errors are unknowns themselves (``speed_sigma``).
     tilt_sigma : (R,) tuple
         Prior standard deviation of the initial attitude of each recording [rad]; 0 if it is exact.
     mixing : (10 B, 10 B) tuple of tuples, optional
