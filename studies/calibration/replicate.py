@@ -42,7 +42,7 @@ minutes."""
 ARMS = (Case.ARM, Case.WHOLE)
 """Cases with an unknown arm."""
 
-SMALL = (Case.EXACT, Case.BASE, Case.MUJOCO)
+SMALL = (Case.EXACT, Case.MUJOCO)
 """Cases of the small plan."""
 
 FIRST_SEED = 20_000

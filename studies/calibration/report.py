@@ -37,7 +37,7 @@ def goal_rows(cases: Sequence[Replicates]) -> list[list[str]]:
     for case, planned in REPLICATES.items():
         mine = next((item for item in cases if item.case is case), None)
         made = 0 if mine is None else len(mine.results)
-        goal = f"{case}: ranks uniform in {planned:,} replicates"
+        goal = f"{case}: {planned:,} replicates"
         if mine is None or made == 0:
             rows.append([goal, "none made", "NOT TESTED"])
             continue
@@ -73,7 +73,7 @@ def write_report(cases: Sequence[Replicates], file: Path) -> None:
             "A goal without a contradiction is not decided until all its replicates are made."
         )
     document.table(
-        ["goal", "reached", ""],
+        ["ranks uniform in", "reached", ""],
         goal_rows(cases),
         f"Goals, by importance sampling. P-values are exact and simultaneous over {len(POINTS)} points of the ranks' "
         f"distribution, and corrected by Holm's method over all {len(corrected)} ranks of all cases. FAIL at "
@@ -170,7 +170,7 @@ def _answer(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], float
             shares = [_pooled(ranks, level) for level in LEVELS]
             words = ", ".join(f"{100.0 * s:.1f} ± {100.0 * e:.1f}" for s, e in shares)
             sentences.append(
-                f"On {title}, {words} % of the bodies' true values lie within the "
+                f"On {title}, {words} % (with standard errors) of the bodies' true values lie within the "
                 f"{', '.join(f'{100.0 * level:g}' for level in LEVELS)} % intervals."
             )
     pooled = np.concatenate([item.ranks()[LOG_LIKELIHOOD] for item in cases if item.results])
@@ -180,9 +180,9 @@ def _answer(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], float
     )
     chi2 = [np.concatenate([item.chi2(sensor) for item in cases if item.results]) for sensor in ("rate", "accel")]
     sentences.append(
-        f"Chi-square per sample at the truth is {_mean(chi2[0])} for rates and {_mean(chi2[1])} for accelerations, but not "
-        "by merit alone: the noise carried from the encoders is overstated where joints move smoothly and understated "
-        "where their jerk jumps, which shows where it outweighs the sensors' own (section 4)."
+        f"Chi-square per sample at the truth is {_mean(chi2[0])} for rates and {_mean(chi2[1])} for accelerations, but "
+        "not by merit alone: the noise carried from the encoders is overstated where joints move smoothly and "
+        "understated where their jerk jumps, which shows where it outweighs the sensors' own (section 4)."
     )
     return sentences
 
