@@ -92,7 +92,7 @@ def write_report(cases: Sequence[Replicates], file: Path) -> None:
     add_number_table(
         document,
         ["case and method", "made", *(f"{100.0 * level:g} %" for level in LEVELS), "k-hat > 0.7"],
-        [row for item in cases for row in _coverage_rows(item)],
+        [row for item in cases for row in _coverage_rows(item)] + _pooled_rows(cases),
         "Percentage of the true mass, centre of mass and inertia of all identified bodies within the stated central "
         "intervals, with the standard error over replicates. Emcee samples one replicate of twenty, and none with an "
         "unknown arm, where it takes minutes; for the base alone it costs six times as much as all the rest.",
@@ -230,6 +230,18 @@ def _coverage_rows(item: Replicates) -> list[list[str]]:
         rows.append(
             [f"{item.case}: {method}", str(len(ranks)), *cells, str(bad) if method is Method.IMPORTANCE else "-"]
         )
+    return rows
+
+
+def _pooled_rows(cases: Sequence[Replicates]) -> list[list[str]]:
+    rows = []
+    for method in Method:
+        ranks = [made for item in cases if len(made := item.bodies(method))]
+        if ranks:
+            cells = [
+                f"{100.0 * share:.1f} ± {100.0 * error:.1f}" for share, error in (_pooled(ranks, v) for v in LEVELS)
+            ]
+            rows.append([f"all cases: {method}", str(sum(map(len, ranks))), *cells, "-"])
     return rows
 
 
