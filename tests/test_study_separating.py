@@ -7,8 +7,8 @@ import pytest
 
 from bayesid.robot.joint_state import JointState
 from studies.common import mission
-from studies.separating.analysis import flown
-from studies.separating.linear_evidence import Linearised, pairs
+from studies.separating.analysis import expectations, flown, realise, references
+from studies.separating.linear_evidence import Linearised
 from studies.separating.setting import TRUTHS
 
 DURATION = 40.0
@@ -67,16 +67,18 @@ def test_evidence_is_that_of_the_normal_distribution():
     assert difference == pytest.approx(evidence(first) - evidence(second))
 
 
-def test_the_most_alike_pair_comes_first():
-    signals = np.array([[1.0, 0.0, 0.0], [0.9, 0.1, 0.0], [0.0, 0.0, 1.0]])
-    own = Linearised(100.0 * signals @ signals.T, ("a.x", "b.x", "c.x"), np.zeros(3))
-    found = pairs(own, ("a", "b", "c"))
-    assert found[0].labels == ("a", "b")
-    assert found[0].left < 0.2
-    assert found[-1].left > 0.9
-
-
 def test_a_leak_pushes_steadily():
     leak, nothing = (flown(Still(), name, TRUTHS["thruster-leak"], duration=DURATION) for name in ("thruster-leak", ""))
     pushed = leak.rate - nothing.rate
     np.testing.assert_allclose(pushed[-1], 2.0 * pushed[len(pushed) // 2], rtol=0.02)
+
+
+@pytest.mark.usefixtures("slow")
+def test_realised_factors_are_those_that_linear_theory_expects():
+    motions = dict.fromkeys(("first", "d-optimal", "separation"), mission.flight_manoeuvre(4.0))
+    known = references(motions, arm_spread=0.0)
+    expected, _ = expectations(known, seed=0)
+    for item in realise(motions, known, noises=3, seed=5, arm_spread=0.0):
+        for stage, values in item.factors.items():
+            own = expected[item.truth, stage]
+            assert values.mean() == pytest.approx(own.log_factor, abs=4.0 * own.sd / np.sqrt(3.0) + 1.0), stage

@@ -17,8 +17,8 @@ from bayesid.design import Search, Store
 from bayesid.recording.joint_motion import Motion
 from studies.common import mission
 from studies.common.command import TRIALS, Command
-from studies.separating.analysis import Realised, expectations, realise, references, similar
-from studies.separating.linear_evidence import Expected, Pair
+from studies.separating.analysis import Realised, expectations, realise, references
+from studies.separating.linear_evidence import Expected
 from studies.separating.manoeuvres import Designed, design_both, separating_problem
 
 __all__ = ["Result", "main", "run"]
@@ -33,8 +33,6 @@ class Result:
 
     Attributes
     ----------
-    pairs : sequence of Pair
-        All pairs of candidates on the first manoeuvre.
     designs : mapping of str to Designed
         Designed manoeuvres by their criterion.
     motions : mapping of str to Motion
@@ -50,7 +48,6 @@ class Result:
     full : bool
     """
 
-    pairs: Sequence[Pair]
     designs: Mapping[str, Designed]
     motions: Mapping[str, Motion]
     expected: Mapping[tuple[str, str], Expected]
@@ -100,7 +97,7 @@ def run(
     known = references(motions)
     expected, directions = expectations(known, seed)
     realised = realise(motions, known, noises, seed, trials, progress)
-    return Result(similar(known), designs, motions, expected, directions, realised, search, full)
+    return Result(designs, motions, expected, directions, realised, search, full)
 
 
 COMMAND = Command(

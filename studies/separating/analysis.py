@@ -17,20 +17,14 @@ from studies.common.flight import light_wheel
 from studies.common.models import ARM_SPREAD
 from studies.common.monte_carlo import run_trials
 from studies.common.repeated_fits import Reference
-from studies.separating.linear_evidence import Expected, Linearised, Pair, pairs
-from studies.separating.setting import CANDIDATES, DRIFT, RIVALS, STAGES, TRUTHS, amplitude, drifting, rival_model
+from studies.separating.linear_evidence import Expected, Linearised
+from studies.separating.setting import DRIFT, RIVALS, STAGES, TRUTHS, amplitude, drifting, rival_model
 from studies.truth.mujoco import Truth, leak
 
-__all__ = ["Realised", "expectations", "flown", "realise", "references", "similar"]
+__all__ = ["Realised", "expectations", "flown", "realise", "references"]
 
 DIRECTIONS = 200
 """Number of random directions of an effect for which the separation is computed."""
-
-LABELS = tuple(effect.label for effect in CANDIDATES)
-"""Labels of all candidates."""
-
-OTHERS = tuple(label for label in LABELS if label not in RIVALS)
-"""Labels of the candidates that are no rivals, and in no model that is compared."""
 
 
 @dataclass(frozen=True)
@@ -52,16 +46,18 @@ class Realised:
     factors: Mapping[str, Floats]
 
 
-def references(motions: Mapping[str, Motion]) -> dict[str, Reference]:
-    """Return the manoeuvres linearised about the drifting base, with all candidates as unknowns."""
-    model = rival_model(LABELS)
+def references(motions: Mapping[str, Motion], arm_spread: float = ARM_SPREAD) -> dict[str, Reference]:
+    """Return the manoeuvres linearised about the drifting base, with both rivals as unknowns.
+
+    Parameters
+    ----------
+    motions : mapping of str to Motion
+    arm_spread : float
+        Relative width of the links' priors.
+    """
+    model = rival_model(RIVALS, arm_spread)
     z = drifting(mission.problem(model, mission.splines()).plan.unknowns)
     return {name: Reference.of(model, motion, z) for name, motion in motions.items()}
-
-
-def similar(known: Mapping[str, Reference]) -> Sequence[Pair]:
-    """Return all pairs of candidates on the first manoeuvre, the most alike first."""
-    return pairs(Linearised.of(known["first"]), LABELS)
 
 
 def joined(single: Mapping[str, Linearised], names: Sequence[str]) -> Linearised:
@@ -85,9 +81,9 @@ def expectations(
         total = joined(single, names)
         for truth in RIVALS:
             hidden = amplitude(truth)
-            expected[truth, stage] = total.expect(truth, hidden, OTHERS)
+            expected[truth, stage] = total.expect(truth, hidden)
             turned = np.pad(np.linalg.norm(hidden) * directions, ((0, 0), (len(hidden) - 3, 0)))
-            energies[truth, stage] = np.array([total.expect(truth, other, OTHERS).energy for other in turned])
+            energies[truth, stage] = np.array([total.expect(truth, other).energy for other in turned])
     return expected, energies
 
 
@@ -118,15 +114,29 @@ def realise(
     known: Mapping[str, Reference],
     noises: int,
     seed: int,
-    store: Path | None,
-    progress: Callable[[str], None],
+    store: Path | None = None,
+    progress: Callable[[str], None] = lambda text: None,
+    arm_spread: float = ARM_SPREAD,
 ) -> list[Realised]:
-    """Fly all manoeuvres with each rival hidden, and compare the models; each time with another arm, bias and noise."""
+    """Fly all manoeuvres with each rival hidden, and compare the models; each time with another arm, bias and noise.
+
+    Parameters
+    ----------
+    motions : mapping of str to Motion
+    known : mapping of str to Reference
+        The same manoeuvres linearised, with the links' priors of the same width.
+    noises : int
+        Number of sets of flights for each truth.
+    seed, store, progress
+        See `studies.common.monte_carlo.run_trials`.
+    arm_spread : float
+        Relative width of the distribution from which the true arm is drawn.
+    """
 
     def compared(task: tuple[str, int], rng: np.random.Generator) -> dict[str, Any]:
         """Return the log Bayes factors of one truth from one set of flights."""
         truth, _ = task
-        robot, bias = mission.true_arm(mission.ship(), rng, ARM_SPREAD), BIAS * rng.standard_normal(3)
+        robot, bias = mission.true_arm(mission.ship(), rng, arm_spread), BIAS * rng.standard_normal(3)
         single = {}
         for name, motion in motions.items():
             run = flown(motion, truth, TRUTHS[truth], robot=robot)
@@ -152,4 +162,4 @@ def realise(
 
 def _evidence(linearised: Linearised, label: str) -> float:
     """Return the log evidence of the model with one rival, or with neither where the label is empty."""
-    return linearised.log_evidence(linearised.without([other for other in LABELS if other != label]))
+    return linearised.log_evidence(linearised.without([other for other in RIVALS if other != label]))

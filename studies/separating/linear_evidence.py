@@ -1,10 +1,9 @@
-"""Evidence of the rivals in linear theory, before and after a flight, and how alike the candidates are."""
+"""Evidence of the rivals in linear theory, before and after a flight."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from bayesid._math.arrays import Floats
 from studies.common.repeated_fits import Reference
 from studies.separating.setting import rival_of
 
-__all__ = ["Expected", "Linearised", "Pair", "pairs", "unexplained_information"]
+__all__ = ["Expected", "Linearised", "unexplained_information"]
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ def unexplained_information(information: Floats, group: Sequence[int], rest: Seq
 
 @dataclass(frozen=True)
 class Linearised:
-    """Manoeuvres linearised about the drifting base, in the unknowns of a model with all candidates.
+    """Manoeuvres linearised about the drifting base, in the unknowns of a model with both rivals.
 
     Attributes
     ----------
@@ -107,13 +106,10 @@ class Linearised:
         gone = {index for label in labels for index in self.group(label)}
         return [index for index in range(len(self.names)) if index not in gone]
 
-    def expect(self, truth: str, amplitude: Floats, others: Sequence[str] = ()) -> Expected:
-        """Return the expectations where one of the rivals acts with an amplitude, in prior standard deviations.
-
-        Candidates among ``others`` are in no model.
-        """
+    def expect(self, truth: str, amplitude: Floats) -> Expected:
+        """Return the expectations where one of the rivals acts with an amplitude, in prior standard deviations."""
         hidden, rival = self.group(truth), self.group(rival_of(truth))
-        rest = self.without([truth, rival_of(truth), *others])
+        rest = self.without([truth, rival_of(truth)])
         signal = self.information[:, hidden] @ amplitude
         mean = [self._expected_evidence([*rest, *rows], signal) for rows in (hidden, rival)]
         alone, apart = (
@@ -133,51 +129,3 @@ class Linearised:
         total = within + np.eye(len(rows))
         fitted = signal[rows] @ np.linalg.solve(total, signal[rows]) + np.trace(np.linalg.solve(total, within))
         return float(0.5 * fitted - 0.5 * np.linalg.slogdet(total)[1])
-
-
-@dataclass(frozen=True)
-class Pair:
-    """Two effects on a manoeuvre.
-
-    Attributes
-    ----------
-    labels : (str, str)
-        Labels of the effects.
-    alone : (float, float)
-        Noncentrality of each at its prior's amplitude, in the direction that shows least, with base, arm, bias and
-        initial rate marginalised.
-    apart : (float, float)
-        Noncentrality of each with the rival, of any size within its prior, marginalised too.
-    """
-
-    labels: tuple[str, str]
-    alone: tuple[float, float]
-    apart: tuple[float, float]
-
-    @property
-    def left(self) -> float:
-        """Smaller of the two fractions of a signal that the rival cannot imitate."""
-        return min(part / whole for part, whole in zip(self.apart, self.alone, strict=True))
-
-
-def pairs(linearised: Linearised, labels: Sequence[str]) -> list[Pair]:
-    """Return all pairs of the candidates on a manoeuvre, the most alike first."""
-    rest = linearised.without(labels)
-
-    def least(label: str, known: Sequence[int]) -> float:
-        left = unexplained_information(linearised.information, linearised.group(label), known)
-        return float(np.linalg.eigvalsh(left)[0])
-
-    alone = {label: least(label, rest) for label in labels}
-    rows = [
-        Pair(
-            (first, second),
-            (alone[first], alone[second]),
-            (
-                least(first, [*rest, *linearised.group(second)]),
-                least(second, [*rest, *linearised.group(first)]),
-            ),
-        )
-        for first, second in combinations(labels, 2)
-    ]
-    return sorted(rows, key=lambda pair: pair.left)

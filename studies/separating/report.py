@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid.report import Document
-from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
 from studies.common import mission
 from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE
@@ -226,19 +226,11 @@ def _evidence(document: Document, result: Result) -> None:
         f"ln B above {RIVALRY}; directions: share of random directions with λ(1−ρ²)/2 above it.",
         columns("llrrrrrrrr"),
     )
-    document.table(
-        ["pair", "alone", "with the rival", "smaller remaining part"],
-        [
-            [
-                " / ".join(pair.labels),
-                *(" / ".join(format_number(value, 2) for value in both) for both in (pair.alone, pair.apart)),
-                format_percent(pair.left, 2),
-            ]
-            for pair in result.pairs
-        ],
-        "How alike the candidates are on the first manoeuvre: noncentrality in the direction that shows least, at the "
-        "width of the prior. Wheels and leak were chosen because a motion of the base decides between them.",
-        columns("lrrr"),
+    document.figure(
+        _direction_figure(result),
+        "Expected λ(1−ρ²)/2 of causes of the same size in random directions: share of the directions below "
+        "a value. The "
+        f"grey line is {RIVALRY}.",
     )
 
 
@@ -280,4 +272,19 @@ def factor_figure(result: Result) -> Figure:
         axes.grid(visible=False, axis="x")
         axes.legend(loc="upper left")
     figure.axes[0].set_ylabel("log Bayes factor")
+    return figure
+
+
+@styled
+def _direction_figure(result: Result) -> Figure:
+    figure = wide_figure(2.3)
+    for axes, truth in zip(figure.subplots(1, 2, sharey=True), RIVALS, strict=True):
+        for index, stage in enumerate(STAGES):
+            values = np.sort(result.directions[truth, stage])
+            share = np.arange(1, len(values) + 1) / len(values)
+            axes.plot(values, share, label=stage, **curve_style(index))
+        axes.axvline(RIVALRY, color="#888888", linewidth=0.8)
+        axes.set(xscale="log", xlabel="λ(1−ρ²)/2", title=f"hidden: {NAMES[truth]}")
+    figure.axes[0].set_ylabel("share of directions")
+    shared_legend(figure, figure.axes[0], len(STAGES))
     return figure
