@@ -135,9 +135,9 @@ def _calibration(document: Document, calibration: Sequence[Calibration]) -> None
     document.paragraph(
         f"The first path was predicted again for {count} guesses of the base, each such that the truth is a draw of "
         f"the prior about it, with {calibration[0].draws} draws of each. Of {count} regions {expected:.0f} ± "
-        f"{np.sqrt(expected * (1.0 - CONTENT)):.1f} should hold the truth. The regions are normal approximations. "
-        "Under the narrow prior final poses are nearly normal, which shows how much of a shortfall the approximation "
-        "explains."
+        f"{np.sqrt(expected * (1.0 - CONTENT)):.1f} should hold the truth. The regions have the "
+        "proportions of the draws' covariance and are as large as the draws want, since the tails of final poses are "
+        "heavier than normal under the wide prior."
     )
     document.table(
         ["width of the prior", "body", "position held", "rotation held"],
