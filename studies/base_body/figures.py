@@ -6,12 +6,16 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid.report.figures.figure_style import AFTER, BEFORE, COLOURS, TRUTH, shared_legend, styled, wide_figure
+from bayesid.report.numbers import format_number
 from studies.base_body import paper
 from studies.base_body.result import BaseBody
 from studies.common.ets7 import BASE
 from studies.common.quantities import LABELS
 
 __all__ = ["errors", "posterior", "precision"]
+
+REACH = 7.0
+"""Half-height of the panel of mass, centre of mass and moments [%]; points beyond are marked at its edge."""
 
 
 @styled
@@ -81,8 +85,14 @@ def posterior(result: BaseBody) -> Figure:
         for printed, marker, name in ((paper.RESULT_WELL, "x", "paper, well"), (paper.RESULT_POOR, "+", "paper, poor")):
             error = 100.0 * (printed / paper.TRUTH - 1.0)[pick]
             axes.plot(place, error, marker, color=BEFORE, label=name, markersize=5)
+            for x, value in zip(place, error, strict=True):
+                if axes is panels[0] and abs(value) > REACH:
+                    text = f"{format_number(float(value), 2)} %"
+                    edge = float(np.copysign(REACH, value))
+                    axes.plot(x, 0.97 * edge, "v" if value < 0.0 else "^", color=BEFORE, markersize=4)
+                    axes.annotate(text, (x, 0.97 * edge), (5, 0), textcoords="offset points", color=BEFORE, va="center")
         axes.axhline(0.0, color=TRUTH, linewidth=0.8)
         axes.set_xticks(place, LABELS[pick])
-    panels[0].set(ylabel="difference from the truth [%]", ylim=(-7.0, 7.0))
-    panels[0].legend(ncols=2, loc="lower left")
+    panels[0].set(ylabel="difference from the truth [%]", ylim=(-REACH, REACH))
+    panels[0].legend(ncols=2, loc="upper right")
     return figure

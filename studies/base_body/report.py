@@ -196,6 +196,10 @@ def _evidence(document: Document, result: BaseBody, output: Path) -> None:
         "digits.",
         columns("lrrrrr"),
     )
+    document.figure(
+        figures.errors(result),
+        "Relative errors without noise, of the paper's printed results and of those found here; the line is the goal.",
+    )
     header, widths = rows.precision_table(result)
     document.table(
         header,
@@ -209,7 +213,7 @@ def _evidence(document: Document, result: BaseBody, output: Path) -> None:
         document.figure(
             figures.posterior(result),
             "Sampled posterior (mean and standard deviation, faster manoeuvre) beside the results that the paper "
-            "printed.",
+            "printed; triangles mark what lies beyond the panel.",
         )
         document.items([rows.sampler_sentence(name, identified) for name, identified in result.sampled.items()])
     files = [
