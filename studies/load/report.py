@@ -156,8 +156,8 @@ def _failures(document: Document, result: Result) -> None:
     left = format_number(float(loop.bodies[-1].sd[MASS]), 2)
     document.paragraph(
         f"A precision of {format_percent(GOAL, 2)} is out of reach of any manoeuvre with this arm: link 6 and the load "
-        f"move as one body, and 5 % of the link's mass are {format_number(floor, 2)} kg, {share} of the load. After the "
-        f"last manoeuvre {left} kg are left."
+        f"move as one body, and 5 % of the link's mass are {format_number(floor, 2)} kg, {share} of the load. "
+        f"After the last manoeuvre {left} kg are left."
     )
     attempts = []
     for number, plan in enumerate(loop.plans, start=1):
