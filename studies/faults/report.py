@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
@@ -15,6 +16,7 @@ from studies.common.monte_carlo import read_store, run_trials
 from studies.common.tables import add_number_table
 from studies.faults.kills import COMMANDS
 from studies.faults.trials import attempt, tasks
+from studies.faults.units import SLIPS
 
 __all__ = ["main", "write_report"]
 
@@ -76,6 +78,9 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path) -> N
         f"{counted(len(killed), 'command')}: {sum(item['same'] for item in killed.values())} of them gave in "
         "the end the answer of a run left alone."
     )
+    planned = len(tasks(full=True))
+    if len(made) + len(failures) < planned:
+        document.paragraph(f"Incomplete: of the {planned} trials of the full study {len(made)} were made.")
     document.table(["goal", "reached", ""], _goals(numbers, units, killed), "Goals.")
     document.section("What went wrong")
     wrong = [text for item in spoilt for text in item["faults"]]
@@ -99,7 +104,7 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path) -> N
         add_number_table(document, ["command", "kills while it ran", "files half written", "same answer"], rows)
     if units:
         document.section("Mistaken units")
-        said = [[unit, "yes" if item["refused"] else "no", item["said"][:160]] for unit, item in units.items()]
+        said = [[unit, "yes" if item["refused"] else "no", _short(item["said"])] for unit, item in units.items()]
         document.table(["unit", "refused", "what the command says"], said)
     document.section("Conditions")
     document.paragraph(
@@ -116,6 +121,11 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path) -> N
     document.write(file)
 
 
+def _short(said: str) -> str:
+    """Return the beginning of a message, without the folders of files."""
+    return re.sub(r"/\S*/", "", said)[:200]
+
+
 def _goals(numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mapping[str, Made]) -> list[list[str]]:
     """Return each goal, what was reached, and PASS, FAIL or NOT TESTED."""
     total, kills = sum(numbers.values()), sum(item["kills"] for item in killed.values())
@@ -128,7 +138,7 @@ def _goals(numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mappin
             "No wrong unit in silence",
             f"{refused} of {len(units)} refused",
             refused == len(units),
-            len(units) > 0,
+            len(units) == len(SLIPS),
         ),
         ("Nothing half written after a kill", f"{len(broken)} files after {kills} kills", not broken, kills > 0),
         *(
