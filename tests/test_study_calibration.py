@@ -13,10 +13,11 @@ from studies.calibration import make, plan, read, write_report
 from studies.calibration.cases import REPLICATES, Case
 from studies.calibration.encoders import _ratios, smooth_share
 from studies.calibration.replicate import Method
-from studies.calibration.report import goal_rows
+from studies.calibration.report import goals_of
 from studies.calibration.uniformity import POINTS, coverage, holm, uniform_p_value
 from studies.common.monte_carlo import run_trials
 from tests.pdf_text import PdfText
+from tests.report_rules import broken_rules
 
 REPORTS = Path(__file__).parents[1] / "reports"
 
@@ -77,10 +78,11 @@ def test_the_report_is_that_of_the_outcomes(tmp_path):
     cases = read(REPORTS / "calibration.jsonl.gz")
     write_report(cases, tmp_path / "calibration.pdf")
     rebuilt, kept = PdfText.read(tmp_path / "calibration.pdf"), PdfText.read(REPORTS / "calibration.pdf")
-    for row in goal_rows(cases):
-        for text in row:
+    for goal in goals_of(cases):
+        for text in (goal.text, goal.reached, goal.verdict.value):
             assert text in rebuilt
             assert text in kept
+    assert broken_rules(tmp_path / "calibration.pdf") == []
 
 
 @pytest.mark.usefixtures("slow")

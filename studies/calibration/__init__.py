@@ -17,6 +17,7 @@ from studies.calibration.replicate import make, plan
 from studies.calibration.report import write_report
 from studies.common.command import TRIALS, Command
 from studies.common.monte_carlo import run_trials
+from studies.common.provenance import study_origin
 
 __all__ = ["Replicates", "main", "make", "plan", "read", "write_report"]
 
@@ -48,5 +49,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
             workers=options.workers,
             progress=lambda text: print(text, file=sys.stderr),
         )
-    write_report(read(options.trials), options.output)
+    write_report(read(options.trials), options.output, study_origin("calibration", options))
     print(f"Wrote {options.output}.")

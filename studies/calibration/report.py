@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +13,17 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.importance import TRUSTED
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
+from bayesid.report.numbers import format_number, format_p_value, format_percent
 from studies.calibration.cases import ARM_SPREAD, BASE_SPREAD, DRAWINGS_SPREAD, INDEPENDENT, REPLICATES, Case
 from studies.calibration.encoders import NEAR, Smoothed, smooth_share, smoothed_errors
 from studies.calibration.outcomes import Replicates
 from studies.calibration.replicate import LOG_LIKELIHOOD, Method
 from studies.calibration.uniformity import POINTS, coverage, holm, uniform_p_value
+from studies.common.goals import Goal, Verdict
 from studies.common.tables import add_number_table
+from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study
 
-__all__ = ["FAMILYWISE", "LEVELS", "goal_rows", "write_report"]
+__all__ = ["FAMILYWISE", "LEVELS", "goals_of", "write_report"]
 
 LEVELS = (0.5, 0.9, 0.95)
 """Levels of the intervals whose coverage is counted."""
@@ -30,22 +32,22 @@ FAMILYWISE = 0.01
 """Probability that any rank of any case is called not uniform where all are."""
 
 
-def goal_rows(cases: Sequence[Replicates]) -> list[list[str]]:
-    """Return each goal, what was reached, and PASS, FAIL, or NOT DECIDED where too few replicates were made."""
+def goals_of(cases: Sequence[Replicates]) -> list[Goal]:
+    """Return the goal of each case, not decided where fewer replicates than planned contradict nothing."""
     corrected = corrected_p_values(cases)
-    rows = []
+    goals = []
     for case, planned in REPLICATES.items():
         mine = next((item for item in cases if item.case is case), None)
         made = 0 if mine is None else len(mine.results)
-        goal = f"{case}: {planned:,} replicates"
+        text = f"ranks uniform, {planned:,} replicates: {case}"
         if mine is None or made == 0:
-            rows.append([goal, "none made", "NOT TESTED"])
+            goals.append(Goal(text, "none made", Verdict.NOT_TESTED))
             continue
         name = min(mine.p_values, key=lambda key: mine.p_values[key])
         p = corrected[case, name]
-        verdict = "FAIL" if p <= FAMILYWISE else "PASS" if made >= planned else "NOT DECIDED"
-        rows.append([goal, f"{made:,} made; smallest corrected p {_p(p)} ({name})", verdict])
-    return rows
+        verdict = Verdict.FAIL if p <= FAMILYWISE else Verdict.PASS if made >= planned else Verdict.OPEN
+        goals.append(Goal(text, f"{made:,} made; smallest corrected p {format_p_value(p)} ({name})", verdict))
+    return goals
 
 
 def corrected_p_values(cases: Sequence[Replicates]) -> dict[tuple[Case, str], float]:
@@ -53,57 +55,84 @@ def corrected_p_values(cases: Sequence[Replicates]) -> dict[tuple[Case, str], fl
     return holm({(item.case, name): p for item in cases for name, p in item.p_values.items()})
 
 
-def write_report(cases: Sequence[Replicates], file: Path) -> None:
-    """Write the report as PDF."""
-    made, planned = sum(len(item.results) for item in cases), sum(REPLICATES.values())
+def write_report(cases: Sequence[Replicates], file: Path, origin: str | None = None) -> None:
+    """Write the report as PDF, with its summary beside it."""
     corrected = corrected_p_values(cases)
     document = Document("Calibration", "Whether the truth lies where the posterior says")
-    document.section("Answer")
-    document.items(_answer(cases, corrected))
-    document.paragraph(
-        f"{made:,} of {planned:,} replicates were made. Each draws the unknowns from the prior, records a manoeuvre "
-        f"of 120 "
-        "s with noise of all sensors and encoders, smooths the joints, finds the mode, and ranks the truth among "
-        "draws of the posterior. Where the intervals are honest, every rank is uniform, and so is that of the log "
-        "likelihood, which sees all unknowns at once."
-    )
-    if made < planned:
-        document.paragraph(
-            "The study is incomplete. Replicates of a case are independent, and those made are the first of the plan. "
-            "A goal without a contradiction is not decided until all its replicates are made."
-        )
-    document.table(
-        ["ranks uniform in", "reached", ""],
-        goal_rows(cases),
-        f"Goals, by importance sampling. P-values are exact and simultaneous over {len(POINTS)} points of the ranks' "
-        f"distribution, and corrected by Holm's method over all {len(corrected)} ranks of all cases. FAIL at "
-        f"{100.0 * FAMILYWISE:g} % family-wise.",
-        ["left", "left", "left"],
-    )
-    document.section("What went wrong")
-    document.items(_failures(cases))
-    document.section("Ranks and coverage")
-    document.figure(
+    summary = _summary(cases)
+    add_first_page(
+        document,
+        summary,
         ecdf_figure(cases, len(corrected)),
         "Empirical distribution of the ranks less the uniform one, by importance sampling: every unknown (grey), the "
-        "log "
-        "likelihood (colour), and the band that all curves of all cases leave with a probability of at most 1 %.",
+        "log likelihood (colour), and the band that all curves of all cases leave with a probability of at most "
+        f"{format_percent(FAMILYWISE, 1)}.",
     )
+    document.paragraph(
+        f"P-values of ranks are exact and simultaneous over {len(POINTS)} points of their distribution, and corrected "
+        f"by Holm's method over all {len(corrected)} ranks of all cases. A goal fails at "
+        f"{format_percent(FAMILYWISE, 1)} family-wise, and is not decided until all its replicates are made."
+    )
+    add_setup(document, _setup(cases))
+    document.section("What went wrong")
+    document.items(_failures(cases))
+    document.section("What the ranks and intervals say")
+    document.items(_findings(cases, corrected))
     add_number_table(
         document,
-        ["case and method", "made", *(f"{100.0 * level:g} %" for level in LEVELS), "k-hat > 0.7"],
+        ["case and method", "made", *(format_percent(level) for level in LEVELS), "k-hat ≥ 0.7"],
         [row for item in cases for row in _coverage_rows(item)] + _pooled_rows(cases),
         "Percentage of the true mass, centre of mass and inertia of all identified bodies within the stated central "
         "intervals, with the standard error over replicates. Emcee samples one replicate of twenty, and none with an "
         "unknown arm, where it takes minutes; for the base alone it costs six times as much as all the rest.",
     )
+    _add_chi_square(document, cases)
+    write_study(document, summary, file, origin)
+
+
+def _summary(cases: Sequence[Replicates]) -> Summary:
+    made, planned = sum(len(item.results) for item in cases), sum(REPLICATES.values())
+    share, error = _pooled([item.bodies() for item in cases if item.results], LEVELS[-1])
+    wrong = [p for p in corrected_p_values(cases).values() if p <= FAMILYWISE]
+    said = f"{len(wrong)} ranks contradict uniformity" if wrong else "no rank contradicts uniformity"
+    return Summary(
+        question="Does the truth lie within the stated intervals as often as they say, through the whole chain?",
+        answer=f"Of the bodies' true values {100.0 * share:.1f} ± {100.0 * error:.1f} % lie within their "
+        f"{format_percent(LEVELS[-1])} intervals and {said}, over {made:,} replicates"
+        + (f" of the {planned:,} that would decide." if made < planned else "."),
+        goals=tuple(goals_of(cases)),
+        valid="noise is white and as declared, joints move smoothly, nothing acts that the model lacks, and the prior "
+        "is the one from which truths are drawn.",
+        full=made >= planned,
+    )
+
+
+def _setup(cases: Sequence[Replicates]) -> Setup:
+    seconds = np.median([result["seconds"] for item in cases for result in item.results])
+    return Setup(
+        robot="ETS-VII, alone or with a load, and a planar robot on a table.",
+        manoeuvre="Random motion of all joints for 120 s, from a random attitude and initial rate (10⁻³ rad/s).",
+        sensors="Every 0.5 s rates with 10⁻⁵ rad/s, accelerations with 10⁻⁵ m/s² and an unknown constant error of "
+        "10⁻⁴ m/s², joint positions with 10⁻⁶ rad.",
+        known="The orbit with its gravity gradient, the attitude at the start, the sensors' noise.",
+        unknown=f"Log-Cholesky coordinates of width {BASE_SPREAD:g} for base and load (mass uncertain by a factor of "
+        f"1.8), {ARM_SPREAD:g} for an arm known to 5 %, {DRAWINGS_SPREAD:g} for links where the whole system is "
+        "unknown; the initial rate, as it belongs to the joints as smoothed.",
+        replicates="Each draws the unknowns from the prior, records with all noise, smooths the joints, finds the "
+        "mode, and ranks the truth among draws of the posterior. Around one data set, truths are drawn from its "
+        "posterior and each replicate's posterior is that of both data sets. Data of cases named MuJoCo share no code "
+        f"with the package. Median processor time of a replicate {seconds:.1f} s. Method: Talts et al. 2018; Säilynoja, Bürkner "
+        "and Vehtari 2022 (bands, by ArviZ); Modrák et al. 2023.",
+    )
+
+
+def _add_chi_square(document: Document, cases: Sequence[Replicates]) -> None:
     document.section("Chi-square per sample")
     smoothed = smoothed_errors()
     sharp = np.sqrt([row.near[2] for row in smoothed])
     document.paragraph(
-        "Chi-square is that of the data at the truth, so that its mean is one where the stated covariance is right. "
-        "It is "
-        "below one where the noise carried from the encoders is overstated, above one where understated. The second "
+        "Chi-square is that of the data at the truth, so that its mean is one where the stated covariance is right. It "
+        "is below one where the noise carried from the encoders is overstated, above one where understated. The second "
         "table, of joint motions that are known exactly, says why it may be either. The smoothing takes a motion as a "
         "five-fold integral of white noise, the smoothest that its algebra allows. Robots move smoother than that: of "
         "the stated variance of position, speed and acceleration the shares "
@@ -111,8 +140,7 @@ def write_report(cases: Sequence[Replicates], file: Path) -> None:
         "have, whatever the sampling and the encoder, as long as the encoder's noise and not the interval limits the "
         f"smoothing. Ratios of {', '.join(f'{smooth_share(order):.1f}' for order in range(3))} follow, and a sensor "
         "whose errors are mostly carried accelerations shows a chi-square down to one half. Within a second of the "
-        "ends "
-        "of quintic ramps, where the jerk jumps, the stated acceleration is too sharp by a factor of "
+        "ends of quintic ramps, where the jerk jumps, the stated acceleration is too sharp by a factor of "
         f"{sharp.min():.1f} to {sharp.max():.1f}. A sensor with as much noise of its own, as here, shows little of "
         "either. The remedy would be a smoother process with jumps of the jerk as unknowns; it is not made."
     )
@@ -121,43 +149,20 @@ def write_report(cases: Sequence[Replicates], file: Path) -> None:
         ["case", "rate", "accelerometer"],
         [[item.case, *(_mean(item.chi2(sensor)) for sensor in ("rate", "accel"))] for item in cases if item.results],
         "Mean chi-square per sample at the truth, with its standard error over replicates. Around one data set, half "
-        "of "
-        "the samples are the same in all replicates, and their mean need not be one.",
+        "of the samples are the same in all replicates, and their mean need not be one.",
     )
+    parts = [f"{part}, {name}" for part in ("between", "near") for name in ("pos.", "speed", "accel.")]
     add_number_table(
         document,
-        [
-            "sampling, encoder",
-            *(f"{part}, {name}" for part in ("between", "near") for name in ("pos.", "speed", "accel.")),
-        ],
+        ["sampling, encoder", *parts],
         [_smoothed_row(row) for row in smoothed],
         "Mean square of the errors of smoothed joints over the stated variance, one where all is right: "
         f"near the ends of ramps (within {NEAR:g} s) and between.",
     )
-    document.section("Conditions")
-    document.paragraph(
-        f"Rates of 1e-5 rad/s and accelerations of 1e-5 m/s² per sample at 0.5 s, joint positions of 1e-6 rad, an "
-        f"unknown constant error of the accelerometer of 1e-4 m/s², gravity gradient, random attitude and initial rate "
-        f"(1e-3 rad/s), random motion of all joints. Priors in log-Cholesky coordinates: width {BASE_SPREAD:g} for "
-        f"base "
-        f"and load (mass uncertain by a factor of 1.8), {ARM_SPREAD:g} for an arm known to 5 %, {DRAWINGS_SPREAD:g} "
-        f"for "
-        f"links where the whole system is unknown. Around one data set, truths are drawn from its posterior and each "
-        f"replicate's posterior is that of both data sets. Data of cases named MuJoCo share no code with the package; "
-        f"those of the others are the package's own. The initial rate is that which belongs to the joints as smoothed. "
-        f"Median processor time of a replicate "
-        f"{np.median([result['seconds'] for item in cases for result in item.results]):.1f} s."
-    )
-    document.foot(
-        f"bayesid {version('bayesid')}; python -m studies.calibration --full; seed of the replicates 1. Method: "
-        f"Talts et "
-        "al. 2018; Säilynoja, Bürkner & Vehtari 2022 (bands, by ArviZ); Modrák et al. 2023; Säilynoja et al. 2025."
-    )
-    document.write(file)
 
 
-def _answer(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], float]) -> list[str]:
-    wrong = [f"{name} ({case}; p {_p(p)})" for (case, name), p in corrected.items() if p <= FAMILYWISE]
+def _findings(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], float]) -> list[str]:
+    wrong = [f"{name} ({case}; p {format_p_value(p)})" for (case, name), p in corrected.items() if p <= FAMILYWISE]
     sentences = [
         f"Not uniform at {100.0 * FAMILYWISE:g} % family-wise: " + "; ".join(wrong) + "."
         if wrong
@@ -175,8 +180,8 @@ def _answer(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], float
             )
     pooled = np.concatenate([item.ranks()[LOG_LIKELIHOOD] for item in cases if item.results])
     sentences.append(
-        f"The log likelihood of all {len(pooled)} replicates together: p = {_p(uniform_p_value(pooled))} of its ranks "
-        "being uniform."
+        f"The log likelihood of all {len(pooled)} replicates together: "
+        f"p = {format_p_value(uniform_p_value(pooled))} of its ranks being uniform."
     )
     chi2 = [np.concatenate([item.chi2(sensor) for item in cases if item.results]) for sensor in ("rate", "accel")]
     sentences.append(
@@ -203,18 +208,15 @@ def _failures(cases: Sequence[Replicates]) -> list[str]:
     sentences = [
         f"Replicates that raised an error: {len(errors)}." + "".join(f" {text}." for text in sorted(set(errors))),
         f"Searches for the mode that did not converge: {modes}. Runs of emcee that did not converge: {chains} of "
-        f"{sampled}. "
-        f"Replicates whose weights are not trusted (Pareto k-hat of {TRUSTED:g} and more): {untrusted}; they count "
-        f"like "
-        "all others.",
+        f"{sampled}. Replicates whose weights are not trusted (Pareto k-hat of {TRUSTED:g} and more): {untrusted}; "
+        "they count like all others.",
     ]
     if shifts:
         sentences.append(
             "The initial rate in a posterior is not the base's own, but the one that belongs to the joints as "
-            "smoothed: "
-            "an error of a smoothed joint speed at time 0 moves it, and its stated interval leaves that out. Root mean "
-            f"square of the difference in stated standard deviations: {shifts}. Ranks "
-            "and coverage here are of the rate as the posterior means it; the bodies are the same in both readings."
+            "smoothed: an error of a smoothed joint speed at time 0 moves it, and its stated interval leaves that out. "
+            f"Root mean square of the difference in stated standard deviations: {shifts}. Ranks and coverage here are "
+            "of the rate as the posterior means it; the bodies are the same in both readings."
         )
     return sentences
 
@@ -246,7 +248,10 @@ def _pooled_rows(cases: Sequence[Replicates]) -> list[list[str]]:
 
 
 def _smoothed_row(row: Smoothed) -> list[str]:
-    return [f"{row.interval:g} s, {row.encoder:g} rad", *(f"{value:.2f}" for value in (*row.between, *row.near))]
+    return [
+        f"{row.interval:g} s, {format_number(row.encoder)} rad",
+        *(f"{value:.2f}" for value in (*row.between, *row.near)),
+    ]
 
 
 def _mean(values: Floats) -> str:
@@ -255,16 +260,12 @@ def _mean(values: Floats) -> str:
     return f"{values.mean():.3f} ± {values.std(ddof=1) / np.sqrt(len(values)):.3f}"
 
 
-def _p(value: float) -> str:
-    return f"{value:.2g}" if value >= 1e-6 else "below 1e-6"
-
-
 @styled
 def ecdf_figure(cases: Sequence[Replicates], family: int) -> Figure:
     """Draw the differences of all ranks' distributions from the uniform one, a panel for each case."""
     shown = [item for item in cases if item.results]
     rows = int(np.ceil(len(shown) / 3))
-    figure = wide_figure(1.75 * rows)
+    figure = wide_figure(1.2 * rows)
     panels = figure.subplots(rows, 3, squeeze=False, sharex=True)
     for axes, item in zip(panels.ravel(), shown, strict=False):
         count = len(item.results)
