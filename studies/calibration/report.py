@@ -121,8 +121,8 @@ def _setup(cases: Sequence[Replicates]) -> Setup:
         replicates="Each draws the unknowns from the prior, records with all noise, smooths the joints, finds the "
         "mode, and ranks the truth among draws of the posterior. Around one data set, truths are drawn from its "
         "posterior and each replicate's posterior is that of both data sets. Data of cases named MuJoCo share no code "
-        f"with the package. Median processor time of a replicate {seconds:.1f} s. Method: Talts et al. 2018; Säilynoja, Bürkner "
-        "and Vehtari 2022 (bands, by ArviZ); Modrák et al. 2023.",
+        f"with the package. Median processor time of a replicate {seconds:.1f} s. Method: Talts et al. 2018; "
+        "Säilynoja, Bürkner and Vehtari 2022 (bands, by ArviZ); Modrák et al. 2023.",
     )
 
 
