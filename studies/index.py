@@ -58,7 +58,7 @@ def _entry(file: Path, summary: dict[str, Any]) -> Iterator[str]:
     yield ""
     yield f"**{summary['answer']}**"
     yield ""
-    run = "full run" if summary["full"] else "quick run"
+    run = "full run" if summary["full"] else "not run in full"
     yield f"Valid when {summary['valid']} {run.capitalize()}. Goals: {', '.join(_counts([summary]))}."
     yield ""
     yield "| goal | reached | verdict |"

@@ -43,7 +43,7 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     ]
     write_report(made, ["a trial broke"], tmp_path / "faults.pdf")
     text = PdfText.read(tmp_path / "faults.pdf")
-    assert text.row("Nothing half written after a kill", "1 files after 2 kills", "FAIL")
+    assert text.row("Nothing half written after a kill", "1 file after 2 kills", "FAIL")
     assert text.row("design: same answer after kills", "2 kills", "FAIL")
     assert text.row("loop: same answer after kills", "0 kills", "NOT TESTED")
     for part in ("Spoilt: KeyError", "not refused", "other files", "a trial broke"):

@@ -57,7 +57,7 @@ def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
         "It weighs 3.1 kg.",
         "How heavy is it?",
         "the arm is known.",
-        "quick run",
+        "not run in full",
         "python -m studies.weighing --full --seed 4",
         "ets7.urdf",
     ):

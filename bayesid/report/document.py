@@ -58,7 +58,8 @@ _TEMPLATE = """\
 #let decision(title, ..cells) = block(width: 100%, stroke: 1pt, radius: 3pt, inset: 9pt, breakable: false, {
   set text(size: 10pt)
   set par(justify: false, leading: 0.55em, spacing: 0.5em)
-  par(text(size: 12.5pt, weight: "bold", title))
+  par(leading: 0.5em, text(size: 12.5pt, weight: "bold", title))
+  v(0.35em)
   grid(columns: (auto, 1fr), column-gutter: 1em, row-gutter: 0.65em,
     ..cells.pos().chunks(2).map(pair => (text(fill: luma(35%), pair.at(0)), pair.at(1))).flatten())
 })

@@ -79,11 +79,12 @@ class Statement:
     reason: str
 
 
-def add_first_page(document: Document, summary: Summary, figure: Figure, caption: str) -> None:
-    """Add the answer in a box, the figure that decides, and the table of goals."""
-    run = "full run" if summary.full else "quick run: read it as an example, not as the result"
+def add_first_page(document: Document, summary: Summary, figure: Figure | None = None, caption: str = "") -> None:
+    """Add the answer in a box, the figure that decides if there is one, and the table of goals."""
+    run = "full run" if summary.full else "not run in full: read it as an example, not as the result"
     document.decision(summary.answer, [("Question", summary.question), ("Valid when", summary.valid), ("Effort", run)])
-    document.figure(figure, caption)
+    if figure is not None:
+        document.figure(figure, caption)
     add_goals(document, summary.goals)
 
 

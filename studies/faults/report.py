@@ -12,8 +12,11 @@ from typing import Any
 from bayesid._io.words import counted
 from bayesid.report import Document
 from studies.common.command import TRIALS, Command
+from studies.common.goals import Goal, Verdict
 from studies.common.monte_carlo import read_store, run_trials
+from studies.common.provenance import study_origin
 from studies.common.tables import add_number_table
+from studies.common.template import Summary, add_first_page, write_study
 from studies.faults.kills import COMMANDS
 from studies.faults.trials import attempt, tasks
 from studies.faults.units import SLIPS
@@ -38,7 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.made:
         lines = read_store(options.trials)
         made = [{**line["task"], **line["result"]} for line in lines if "result" in line]
-        write_report(made, [line["error"] for line in lines if "error" in line], options.output)
+        failures = [line["error"] for line in lines if "error" in line]
+        write_report(made, failures, options.output, study_origin("faults", options))
         return
     planned = tasks(options.full)
     outcomes = run_trials(
@@ -50,12 +54,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         progress=lambda text: print(text, file=sys.stderr),
     )
     made = [{**task, **result} for task, result in zip(planned, outcomes.results, strict=True) if result is not None]
-    write_report(made, list(outcomes.failures.values()), options.output)
+    write_report(made, list(outcomes.failures.values()), options.output, study_origin("faults", options))
     print(f"Wrote {options.output}.")
 
 
-def write_report(made: Sequence[Made], failures: Sequence[str], file: Path) -> None:
-    """Write the report as PDF.
+def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, origin: str | None = None) -> None:
+    """Write the report as PDF, with its summary beside it.
 
     Parameters
     ----------
@@ -64,24 +68,29 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path) -> N
     failures : sequence of str
         Messages of trials that failed themselves.
     file : Path
+    origin : str, optional
+        Where the report comes from.
     """
     spoilt = [item for item in made if "spoil" in item]
     units = {item["unit"]: item for item in made if "unit" in item}
     killed = {item["kill"]: item for item in made if "kill" in item}
     numbers = {key: sum(item["numbers"].get(key, 0) for item in spoilt) for key in ("refused", "accepted", "faulty")}
     document = Document("Faults", "Spoilt files, mistaken units, kills at random moments")
-    document.section("Summary")
-    document.paragraph(
-        f"{sum(numbers.values())} spoilt files: {numbers['refused']} refused with one message, {numbers['accepted']} "
-        f"accepted, {numbers['faulty']} answered wrongly. {sum(item['refused'] for item in units.values())} of "
-        f"{len(units)} mistaken units refused. {sum(item['kills'] for item in killed.values())} kills of "
-        f"{counted(len(killed), 'command')}: {sum(item['same'] for item in killed.values())} of them gave in "
-        "the end the answer of a run left alone."
+    planned, kills = len(tasks(full=True)), sum(item["kills"] for item in killed.values())
+    done = len(made) + len(failures)
+    summary = Summary(
+        question="What do commands make of spoilt files, mistaken units and kills at random moments?",
+        answer=f"Of {sum(numbers.values())} spoilt files {numbers['faulty']} got an unclear answer; "
+        f"{sum(item['refused'] for item in units.values())} of {counted(len(units), 'mistaken unit')} "
+        f"{'was' if len(units) == 1 else 'were'} refused; after {counted(kills, 'kill')} "
+        f"{sum(item['same'] for item in killed.values())} of {counted(len(killed), 'command')} gave the answer of a "
+        "run left alone.",
+        goals=tuple(_goals(numbers, units, killed)),
+        valid=f"files are those of a robot with three joints and one recording of 40 s; {done} of the {planned} trials "
+        "of the full study were made.",
+        full=done >= planned,
     )
-    planned = len(tasks(full=True))
-    if len(made) + len(failures) < planned:
-        document.paragraph(f"Incomplete: of the {planned} trials of the full study {len(made)} were made.")
-    document.table(["goal", "reached", ""], _goals(numbers, units, killed), "Goals.")
+    add_first_page(document, summary)
     document.section("What went wrong")
     wrong = [text for item in spoilt for text in item["faults"]]
     wrong += [f"{unit}: {item['said'] or 'not refused'}" for unit, item in units.items() if not item["refused"]]
@@ -115,10 +124,8 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path) -> N
         "Accepted files are those that are still valid, such as another number in a cell. A full disk, a closed "
         "folder, two runs into one folder, and effects of a user's own that fail are in tests/test_faults.py."
     )
-    document.section("Provenance")
-    packages = ", ".join(f"{name} {version(name)}" for name in ("bayesid", "hypothesis", "jax", "numpy"))
-    document.paragraph(f"python -m studies.faults --full. {packages}.")
-    document.write(file)
+    packages = ", ".join(f"{name} {version(name)}" for name in ("hypothesis", "jax", "numpy"))
+    write_study(document, summary, file, None if origin is None else f"{origin} With {packages}.")
 
 
 def _short(said: str) -> str:
@@ -126,8 +133,8 @@ def _short(said: str) -> str:
     return re.sub(r"/\S*/", "", said)[:200]
 
 
-def _goals(numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mapping[str, Made]) -> list[list[str]]:
-    """Return each goal, what was reached, and PASS, FAIL or NOT TESTED."""
+def _goals(numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mapping[str, Made]) -> list[Goal]:
+    """Return each goal, what was reached, and whether that passes."""
     total, kills = sum(numbers.values()), sum(item["kills"] for item in killed.values())
     broken = [name for item in killed.values() for name in item["half_written"]]
     refused = sum(item["refused"] for item in units.values())
@@ -140,13 +147,15 @@ def _goals(numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mappin
             refused == len(units),
             len(units) == len(SLIPS),
         ),
-        ("Nothing half written after a kill", f"{len(broken)} files after {kills} kills", not broken, kills > 0),
+        (
+            "Nothing half written after a kill",
+            f"{counted(len(broken), 'file')} after {counted(kills, 'kill')}",
+            not broken,
+            kills > 0,
+        ),
         *(
-            (f"{name}: same answer after kills", f"{item['kills']} kills", item["same"], item["kills"] > 0)
+            (f"{name}: same answer after kills", counted(item["kills"], "kill"), item["same"], item["kills"] > 0)
             for name, item in answers.items()
         ),
     ]
-    return [
-        [goal, reached, ("PASS" if passed else "FAIL") if tested else "NOT TESTED"]
-        for goal, reached, passed, tested in goals
-    ]
+    return [Goal(goal, reached, Verdict.of(passed if tested else None)) for goal, reached, passed, tested in goals]
