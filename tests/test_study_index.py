@@ -19,7 +19,8 @@ def test_summaries_are_those_of_their_reports():
     assert found
     for file in found:
         summary, text = json.loads(file.read_text()), PdfText.read(file.with_suffix(".pdf"))
-        assert summary["full"], file.name
+        effort = "full run" if summary["full"] else "read it as an example, not as the result"
+        assert effort in text, file.name
         assert summary["answer"] in text, file.name
         for goal in summary["goals"]:
             assert text.row(goal["text"], goal["reached"], goal["verdict"]), (file.name, goal["text"])
