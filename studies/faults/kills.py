@@ -60,9 +60,10 @@ def draw(task, rng):
 """A trial of a campaign, which takes a while."""
 
 CAMPAIGN = """
+import site
 import sys
 
-sys.path.insert(0, sys.argv[1])
+site.addsitedir(sys.argv[1])
 from studies.common.monte_carlo import run_trials
 from trial import draw
 

@@ -96,7 +96,7 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
     wrong += [f"{unit}: {item['said'] or 'not refused'}" for unit, item in units.items() if not item["refused"]]
     wrong += [f"{name} after kills: {item['message']}" for name, item in killed.items() if not item["same"]]
     wrong += [f"A trial failed: {text}" for text in failures]
-    document.items([text[:400] for text in wrong])
+    document.items([_short(text) for text in wrong])
     if not wrong:
         document.paragraph("Nothing in this run.")
     document.section("Kills")
@@ -130,7 +130,7 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
 
 def _short(said: str) -> str:
     """Return the beginning of a message, without the folders of files."""
-    return re.sub(r"/\S*/", "", said)[:200]
+    return re.sub(r"/\S*/", "", said)[:300]
 
 
 def _goals(numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mapping[str, Made]) -> list[Goal]:
