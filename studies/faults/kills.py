@@ -54,7 +54,7 @@ TRIAL = """
 import time
 
 def draw(task, rng):
-    time.sleep(0.05)
+    time.sleep(0.15)
     return [task, *rng.random(3).tolist()]
 """
 """A trial of a campaign, which takes a while."""
