@@ -40,8 +40,8 @@ class LinearGaussian:
         if self.calls > self.limit:
             raise KeyboardInterrupt
         z = np.atleast_2d(z)
-        likelihood = norm.logpdf(self.y, z @ self.matrix.T, self.sigma).sum(axis=1)
-        return likelihood + norm.logpdf(z).sum(axis=1)
+        squares = (((self.y - z @ self.matrix.T) / self.sigma) ** 2).sum(axis=1) + (z**2).sum(axis=1)
+        return -0.5 * (squares + (30 + self.size) * np.log(2.0 * np.pi)) - 30 * np.log(self.sigma)
 
     @property
     def optimum(self) -> Optimum:
