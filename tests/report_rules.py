@@ -41,9 +41,9 @@ HEXADECIMAL = re.compile(r"\b(?=[0-9a-f]*\d)[0-9a-f]{12}\b")
 """Hashes and commits, which may hold what looks like a power of ten."""
 
 
-def broken_rules(file: Path) -> list[str]:
-    """Return a sentence for every rule that a report breaks."""
-    return [*_written(file), *_captioned(file), *_filled(file)]
+def broken_rules(file: Path, *, full: bool = True) -> list[str]:
+    """Return a sentence for every rule that a report breaks; the last page of a run that is not full may be emptier."""
+    return [*_written(file), *_captioned(file), *_filled(file, full)]
 
 
 def badly_written(text: str) -> Iterator[str]:
@@ -68,10 +68,10 @@ def _captioned(file: Path) -> Iterator[str]:
                 yield f"page {number} ends with the caption of a table: {match[0]}"
 
 
-def _filled(file: Path) -> Iterator[str]:
+def _filled(file: Path, full: bool) -> Iterator[str]:
     """Every page is filled to one half at least."""
     count = len(PdfText.read(file).pages)
-    for number in range(1, count + 1):
+    for number in range(1, count + int(full)):
         end = _lowest_ink(file, number, FOOT if number == 1 else 0.0)
         share = (end - TOP) / (BOTTOM - TOP)
         if share < 0.5:

@@ -71,9 +71,9 @@ def test_a_scheduler_of_dask_that_loses_a_worker_gives_the_same(tmp_path):
             if text.startswith("3 of"):
                 os.kill(pids[0], signal.SIGKILL)
 
-        with executor_at(cluster.scheduler_address) as executor:
-            spread = run_trials(slow, tasks, store, seed=2, workers=executor, progress=kill_one)
-            executor._client.close()  # else it waits for its scheduler to come back
+        executor = executor_at(cluster.scheduler_address)
+        spread = run_trials(slow, tasks, store, seed=2, workers=executor, progress=kill_one)
+        executor._client.close()  # else it waits for its scheduler to come back
         assert spread == run_trials(slow, tasks, seed=2)
     assert sorted(line["trial"] for line in read_store(store)) == list(tasks)
     assert len(set(pids)) == 2

@@ -123,6 +123,6 @@ def test_the_arm_is_scaled_to_a_seventh():
 
 def test_the_report_is_written(result, tmp_path: Path):
     write_report(result, tmp_path / "base_body.pdf")
-    assert broken_rules(tmp_path / "base_body.pdf") == []
+    assert broken_rules(tmp_path / "base_body.pdf", full=False) == []
     verdicts = [goal.verdict for goal in goals_of(result)]
     assert verdicts == [Verdict.PASS, Verdict.PASS, Verdict.FAIL, Verdict.NOT_TESTED, Verdict.NOT_TESTED]

@@ -177,4 +177,4 @@ def test_the_study(tmp_path):
     assert 0.7 < honest.honesty.mean() < 1.3
     assert PIECES.title in result.rates[REALISTIC]
     write_report(result, tmp_path / "sensors.pdf")
-    assert broken_rules(tmp_path / "sensors.pdf") == []
+    assert broken_rules(tmp_path / "sensors.pdf", full=False) == []
