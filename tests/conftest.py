@@ -21,6 +21,7 @@ from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import GravityGradient
+from bayesid.simulation.effects.register import _REGISTER
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Kind, Sensor, White
@@ -81,6 +82,15 @@ def _forget_compiled() -> Iterator[None]:
     """Compiled functions of past files would fill the memory; those on disk stay."""
     yield
     forget_executables()
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _forget_effects() -> Iterator[None]:
+    """Effects that a file registered do not reach the next one."""
+    before = dict(_REGISTER)
+    yield
+    _REGISTER.clear()
+    _REGISTER.update(before)
 
 
 class FormulaMotion:
