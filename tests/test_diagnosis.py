@@ -15,7 +15,7 @@ import pytest
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
-from bayesid.diagnosis.diagnosis_run import extended_start
+from bayesid.diagnosis.extended_model import extended_start
 from bayesid.diagnosis.gain import measure_gain
 from bayesid.diagnosis.noise_faults import noise_fault
 from bayesid.diagnosis.noise_tests import chi2_log_sf

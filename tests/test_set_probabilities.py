@@ -107,6 +107,19 @@ def test_a_triple_beside_something_generic_is_found_among_many():
     assert len(found.sets) < 4000  # not all of 2,625 sets of causes beside each of five
 
 
+def test_a_triple_is_found_though_something_generic_takes_the_place_of_two_of_it():
+    rng = np.random.default_rng(5)
+    causes = [f"cause {k:02}" for k in range(40)]
+    problem = LinearProblem.random(rng, dict.fromkeys([*causes, "generic"], 1), samples=200)
+    two = np.concatenate([problem.columns["cause 04"], problem.columns["cause 21"]], axis=1)
+    problem.columns["generic"] = two + 0.2 * rng.standard_normal(two.shape) * two.std(axis=0)
+    problem = problem.observed(rng, {name: np.array([3.0]) for name in ("cause 00", "cause 04", "cause 21")})
+    found = enumerate_sets(SetEvidence(problem.gram(), [cause(name) for name in [*causes, "generic"]]))
+    best = {item.generic: item for item in reversed([item for item in found.sets if len(item.names) == 2])}
+    assert best["generic"].log_evidence > best[None].log_evidence + 100.0
+    assert found.sets[0].names == ("cause 00", "cause 04", "cause 21")
+
+
 def test_causes_drawn_from_the_prior_are_at_work_as_often_as_stated():
     rng = np.random.default_rng(4)
     causes, generics, trials = [*"abcd"], ["generic x"], 3000

@@ -72,7 +72,7 @@ def fit_in_amplitudes(point: Linearisation, effects: Sequence[Effect], released:
         z[frozen] = engine.posterior.starting_point()[frozen]
     expected = predicted_cost(point) - gain
     fit = engine.fit(scaled, start, z=z, operating=None if released else point.fit.operating)
-    if abs(fit.cost - expected) > FAR and not point.held:  # far from the data no fit finds them from the centre
+    if abs(fit.cost - expected) > FAR and not point.far:  # far from the data no fit finds them from the centre
         fresh = engine.fit(scaled, [np.zeros_like(own) for own in start])
         fit = fresh if fresh.cost < fit.cost else fit
     if not released:

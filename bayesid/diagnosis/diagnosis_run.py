@@ -20,6 +20,7 @@ from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.cause_weighing import WeighedCauses, weigh_causes
 from bayesid.diagnosis.diagnosis_file import diagnosis_dict
 from bayesid.diagnosis.disturbing_wrench import Unexplained, unexplained_wrench
+from bayesid.diagnosis.extended_model import extended_posterior, extended_start
 from bayesid.diagnosis.family_alarm import FamilyAlarm
 from bayesid.diagnosis.followed_motion import step_along_data, without_torque
 from bayesid.diagnosis.gain import Gain, measure_gain
@@ -42,7 +43,7 @@ from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model
 
-__all__ = ["Diagnosis", "diagnose", "extended_posterior", "identify_extended"]
+__all__ = ["Diagnosis", "diagnose", "identify_extended"]
 
 
 @dataclass(frozen=True)
@@ -253,25 +254,6 @@ def _diagnose(
     )
 
 
-def extended_posterior(hypothesis: Hypothesis) -> Posterior:
-    """Build the posterior of a hypothesis, its effects in the simulation itself."""
-    fit = hypothesis.fit
-    model = fit.posterior.model
-    for index, effect in enumerate(fit.effects):
-        model = model.extend(effect.tuned(fit.values(index)))
-    if hypothesis.engine.frozen.size:
-        model = replace(model, rate_sigma=0.0)
-    manoeuvres = [_without(manoeuvre, fit.posterior, index) for index, manoeuvre in enumerate(fit.posterior.manoeuvres)]
-    return Posterior.of(model, manoeuvres)
-
-
-def extended_start(hypothesis: Hypothesis, posterior: Posterior) -> Floats:
-    """Mode of a hypothesis in the coordinates of its own posterior."""
-    fit = hypothesis.fit
-    z = np.delete(fit.z, hypothesis.engine.frozen)
-    return np.concatenate([z, *fit.coordinates]) if posterior.size else np.zeros(0)
-
-
 def identify_extended(
     diagnosis: Diagnosis,
     seed: int,
@@ -283,18 +265,3 @@ def identify_extended(
     return identify(
         diagnosis.posterior, seed, start=diagnosis.start, effective_samples=effective_samples, progress=progress
     )
-
-
-def _without(manoeuvre: Manoeuvre, posterior: Posterior, index: int) -> Manoeuvre:
-    """Return a manoeuvre without the samples that a hypothesis counts as outliers."""
-    gone = posterior.data.left_out_times(index)
-    if not gone:
-        return manoeuvre
-    channels = dict(manoeuvre.recording.channels)
-    for kind, times in gone.items():
-        rows = np.isin(manoeuvre.recording.time, times)
-        for axis in ("x", "y", "z", "w"):
-            key = f"{kind.value}.{axis}"
-            if key in channels:
-                channels[key] = np.where(rows, np.nan, channels[key])
-    return replace(manoeuvre, recording=replace(manoeuvre.recording, channels=channels))

@@ -93,7 +93,7 @@ def linearise_along_data(
     (torque,) = fit.effects
     columns = fit.added[0] / fit.effects[0].parameters[0].sigma
     return linearise(
-        engine, fit, effects, bounds, held=True, beside=SignatureBank((Signatures(torque.label, columns),))
+        engine, fit, effects, bounds, held=True, far=True, beside=SignatureBank((Signatures(torque.label, columns),))
     )
 
 

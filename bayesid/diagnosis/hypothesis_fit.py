@@ -56,7 +56,7 @@ def fit_hypothesis(state: NoiseState, causes: Sequence[str], effects: Sequence[E
     if INITIAL_RATE in names:
         z[point.engine.frozen] = engine.posterior.starting_point()[point.engine.frozen]
     starts = [_starts(effect, point, names) for effect in wanted]
-    along = point.fit.operating if point.held else None
+    along = point.fit.operating if point.far else None
     best: Fit | None = None
     problem: InputError | None = None
     for start in list(product(*starts))[:MOST_STARTS]:

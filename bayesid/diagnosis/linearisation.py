@@ -40,6 +40,8 @@ class Linearisation:
         Logarithm of the evidence of the present model without any cause, by the linear model.
     held : bool
         Whether the bodies are held where the fit has them, since the present model's own fit diverged.
+    far : bool
+        Whether the present model's own fit diverged, so that fits find the data from the motion here alone.
     """
 
     engine: Engine
@@ -48,10 +50,11 @@ class Linearisation:
     evidence: SetEvidence
     log_nothing: float
     held: bool = False
+    far: bool = False
 
     def with_bank(self, bank: SignatureBank) -> Linearisation:
         """Return the linearisation with another bank about the same fit."""
-        return _assembled(self.engine, self.fit, bank, self.held)
+        return _assembled(self.engine, self.fit, bank, self.held, self.far)
 
 
 def linearise(
@@ -61,6 +64,7 @@ def linearise(
     bounds: Mapping[str, Sequence[PhysicalBound]],
     *,
     held: bool = False,
+    far: bool = False,
     beside: SignatureBank | None = None,
 ) -> Linearisation:
     """Linearise the model and all candidates about a fit.
@@ -80,6 +84,8 @@ def linearise(
     held : bool
         Whether the bodies stay where the fit has them. A body of another size would make up for the lack of a large
         cause in the linear model, and only there.
+    far : bool
+        Whether the present model's own fit diverged.
     beside : SignatureBank, optional
         Further signatures, such as those of what the fit holds beside the candidates.
     """
@@ -93,10 +99,10 @@ def linearise(
             beside or SignatureBank(),
         ]
     )
-    return _assembled(engine, with_bodies_held(fit) if held else fit, bank, held)
+    return _assembled(engine, with_bodies_held(fit) if held else fit, bank, held, far)
 
 
-def _assembled(engine: Engine, fit: Fit, bank: SignatureBank, held: bool) -> Linearisation:
+def _assembled(engine: Engine, fit: Fit, bank: SignatureBank, held: bool, far: bool) -> Linearisation:
     gram = bank.gram(fit)
     amplitudes = _amplitudes(fit, gram)
     own = fit.own
@@ -108,7 +114,7 @@ def _assembled(engine: Engine, fit: Fit, bank: SignatureBank, held: bool) -> Lin
     taken = gram.matrix @ amplitudes
     log_nothing = constant - cost + float(gram.score @ amplitudes - 0.5 * amplitudes @ taken)
     gram = replace(gram, score=gram.score - taken)
-    return Linearisation(engine, fit, bank, SetEvidence(gram, bank.causes), log_nothing, held)
+    return Linearisation(engine, fit, bank, SetEvidence(gram, bank.causes), log_nothing, held, far)
 
 
 def _amplitudes(fit: Fit, gram: Gram) -> Floats:

@@ -263,7 +263,7 @@ class Engine:
                 converged = True
                 break
             z, chosen, damping = new_z, new, damping * 0.1
-            operating = self.operating(z, self._pushes(effects, chosen, operating, vibrations=False))
+            operating = self.operating(z, self.pushes(effects, chosen, operating, vibrations=False))
             if abs(cost - there) < CLOSE and here.cost - there < CLOSE:
                 converged = True
                 break
@@ -293,7 +293,7 @@ class Engine:
         self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, operating: OperatingTrajectory
     ) -> _Point:
         """Residual and derivatives at one point."""
-        data = self._pushed(self._pushes(effects, coordinates, operating))
+        data = self._pushed(self.pushes(effects, coordinates, operating))
         residual = self.residual(z, data)
         sized = [(effect, c) for effect, c in zip(effects, coordinates, strict=True) if len(c)]
         columns = [self.own_columns(z, data), *self.columns(sized, operating, z, data)]
@@ -303,13 +303,27 @@ class Engine:
     def _cost(
         self, effects: Sequence[Effect], coordinates: Sequence[Floats], z: Floats, operating: OperatingTrajectory
     ) -> float:
-        r = self.residual(z, self._pushed(self._pushes(effects, coordinates, operating)))
+        r = self.residual(z, self._pushed(self.pushes(effects, coordinates, operating)))
         return 0.5 * float(r @ r + z @ z + sum(c @ c for c in coordinates))
 
     def operating(self, z: Floats, perturbations: Sequence[Perturbation]) -> OperatingTrajectory:
         """Return the motion with the given pushes."""
         traced = trace(self.posterior, z, self._pushed(perturbations))
         return operating_trajectory_of(self.posterior, traced.node, traced.sample, traced.readings)
+
+    def pushes(
+        self,
+        effects: Sequence[Effect],
+        coordinates: Sequence[Floats],
+        operating: OperatingTrajectory,
+        vibrations: bool = True,
+    ) -> list[Perturbation]:
+        """Return what each effect does along a motion, with or without the vibrations."""
+        return [
+            perturb(effect, c, operating, self._table(effect))
+            for effect, c in zip(effects, coordinates, strict=True)
+            if vibrations or not effect.modes_count
+        ]
 
     def residual(self, z: Floats, data: Arrays) -> Floats:
         """Return the whitened residual, (N,)."""
@@ -336,19 +350,6 @@ class Engine:
         """Return ``count`` pushes with the named parts, the others zero."""
         empty = Perturbation(*(np.zeros((count, *shape)) for shape in self._push_shapes()))
         return empty._replace(**parts)
-
-    def _pushes(
-        self,
-        effects: Sequence[Effect],
-        coordinates: Sequence[Floats],
-        operating: OperatingTrajectory,
-        vibrations: bool = True,
-    ) -> list[Perturbation]:
-        return [
-            perturb(effect, c, operating, self._table(effect))
-            for effect, c in zip(effects, coordinates, strict=True)
-            if vibrations or not effect.modes_count
-        ]
 
     def _pushed(self, perturbations: Sequence[Perturbation]) -> Arrays:
         data = self.posterior.data.arrays

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -41,15 +41,18 @@ FORMS_NEAR, MOST_FORMS = 4.0, 4
 
 
 def enumerate_sets(
-    evidence: SetEvidence, prior: CausePrior | None = None, largest: int = MOST_CAUSES + 1
+    evidence: SetEvidence,
+    prior: CausePrior | None = None,
+    largest: int = MOST_CAUSES + 1,
+    beside: Collection[str] = (),
 ) -> SetProbabilities:
     """Return the probabilities of nothing, of all single candidates, all pairs, and larger sets grown from the best.
 
     Sets grow by one candidate at a time, of which at most one is generic. All sets of up to two candidates are
     considered, a cause beside a generic candidate among them. Larger ones are the extensions of the best sets of one
-    fewer: of the most probable one, of up to 19 others that are not much less probable than the most probable set of
-    any size, and of all where their extensions are few. A large set is missed only if none of those within it is among
-    these.
+    fewer: of the most probable one, of the most probable one without anything generic, of up to 19 others that are not
+    much less probable than the most probable set of any size, and of all where their extensions are few. A large set is
+    missed only if none of those within it is among these.
 
     Where there are many, all are weighed first by what their last member adds to the others at the others' most
     probable scales (`evidence_beside`). Only those whose weight matters are then integrated over all scales.
@@ -61,11 +64,13 @@ def enumerate_sets(
         Prior of sets; by default `CausePrior` with its defaults.
     largest : int
         Most candidates in one set.
+    beside : collection of str, optional
+        Causes of the catalogue that are in every set; sets grow from these in place of nothing.
     """
     prior = CausePrior() if prior is None else prior
-    found = [CauseSet((), None, 0.0)]
+    found = [_whole((tuple(sorted(beside)), None), evidence) if beside else CauseSet((), None, 0.0)]
     last = found
-    for size in range(1, largest + 1):
+    for size in range(len(beside) + 1, largest + 1):
         keys = _extensions(last, evidence)
         many = size > 1 and sum(_cost(key, evidence) for key in keys) > FEW
         if many and size == 2:
@@ -134,11 +139,17 @@ def _screened(
 
 
 def _best(found: list[CauseSet], size: int, evidence: SetEvidence, prior: CausePrior) -> list[CauseSet]:
-    """Return the sets of one size that are worth extending."""
+    """Return the sets of one size that are worth extending.
+
+    Where several causes are at work, something generic beside one of them takes the place of the others. The most
+    probable set without it is therefore extended, too, however improbable it is.
+    """
     ranked = SetProbabilities.of(found, evidence.catalogue, evidence.generics, prior).sets
     least = PROMISING * ranked[0].probability
-    last = [item for item in ranked if len(item.names) == size][:BEST]
-    return [item for place, item in enumerate(last) if place == 0 or item.probability >= least]
+    last = [item for item in ranked if len(item.names) == size]
+    named = [item for item in last if item.generic is None]
+    always = (*last[:1], *named[:1])
+    return [item for place, item in enumerate(last) if item in always or (place < BEST and item.probability >= least)]
 
 
 def _strongest(found: list[CauseSet], evidence: SetEvidence, prior: CausePrior) -> list[CauseSet]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.linearisation import Linearisation, linearise
 from bayesid.diagnosis.perturbed_fit import Fit
 from bayesid.diagnosis.set_enumeration import enumerate_sets
-from bayesid.diagnosis.set_probabilities import SetProbabilities
+from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
 from bayesid.diagnosis.signature_bank import SignatureBank
 from bayesid.diagnosis.tone_tuning import with_tuned_tones
 from bayesid.diagnosis.vibration_fits import plausible_vibrations
@@ -58,26 +60,76 @@ def settled(
     """
     base = _with_bursts(base)
     point, found, best = base, enumerate_sets(base.evidence, prior), base.fit
-    along = best if base.held else None  # no explanation: a torque that follows the data
     if beside := plausible_vibrations(found, effects):
         point = with_tuned_tones(point, effects, bounds, beside)
         found = enumerate_sets(point.evidence, prior)
+    if base.held:
+        return _settled_far(point, found, effects, bounds, prior)
     for _ in range(ROUNDS):
         chosen, released = _best_known(found, effects)
         if not chosen and not released:
             return point, found, best
         fit, expected = fit_in_amplitudes(point, chosen, released)
-        if not np.isfinite(fit.cost) or (fit.cost > best.cost and best is not along):
+        if not np.isfinite(fit.cost) or fit.cost > best.cost:
             return point, found, best
         best = fit
         if abs(fit.cost - expected) < AGREES:
             return point, found, best
-        point = _with_bursts(linearise(point.engine, best, effects, bounds, held=point.held))
+        point = _with_bursts(linearise(point.engine, best, effects, bounds))
         found = enumerate_sets(point.evidence, prior)
         if beside := plausible_vibrations(found, effects):
             point = with_tuned_tones(point, effects, bounds, beside)
             found = enumerate_sets(point.evidence, prior)
     return point, found, best
+
+
+def _settled_far(
+    base: Linearisation,
+    found: SetProbabilities,
+    effects: Sequence[Effect],
+    bounds: Mapping[str, Sequence[PhysicalBound]],
+    prior: CausePrior,
+) -> tuple[Linearisation, SetProbabilities, Fit]:
+    """Weigh every set about the nearest motion, where the present model itself comes nowhere near the data.
+
+    A linear model about the fit of some causes cannot say what happens without one of them that is large: it lets
+    others make up for it that never would. Sets that hold all causes of a fit are therefore weighed about that fit,
+    with free bodies, and the others along the data, until the most probable set has a fit of its own.
+    """
+    fits: dict[frozenset[str], _Near] = {}
+    point, along = base, found
+    for _ in range(ROUNDS):
+        chosen, released = _best_known(found, effects)
+        names = frozenset([*(effect.label for effect in chosen), *([INITIAL_RATE] if released else [])])
+        if not names or names in fits:
+            break
+        fit, _ = fit_in_amplitudes(base, chosen, released)
+        if not np.isfinite(fit.cost):
+            break
+        point = _with_bursts(linearise(base.engine, fit, effects, bounds, far=True))
+        fits[names] = _Near(point, enumerate_sets(point.evidence, prior, beside=names))
+        found = _nearest(_Near(base, along), fits, point.log_nothing)
+    return point, found, point.fit
+
+
+class _Near(NamedTuple):
+    """A linearisation, and the sets that are weighed there."""
+
+    point: Linearisation
+    found: SetProbabilities
+
+
+def _nearest(along: _Near, fits: Mapping[frozenset[str], _Near], log_nothing: float) -> SetProbabilities:
+    """Return the probabilities of all sets, each from the fit of most of its causes, or else along the data."""
+    best: dict[tuple[tuple[str, ...], str | None], tuple[int, CauseSet]] = {}
+    for size, (point, found) in [(0, along), *((len(names), near) for names, near in fits.items())]:
+        for item in found.sets:
+            key = (item.causes, item.generic)
+            if key not in best or size > best[key][0]:
+                moved = replace(item, log_evidence=item.log_evidence + point.log_nothing - log_nothing)
+                best[key] = size, moved
+    own = along.found
+    return SetProbabilities.of((item for _, item in best.values()), own.causes, own.generics, own.prior)
 
 
 def _with_bursts(point: Linearisation) -> Linearisation:
