@@ -56,7 +56,11 @@ def exactly_fitted(hypothesis: Hypothesis) -> Hypothesis:
     for _ in range(ROUNDS):
         exact = engine.fit(found.effects, coordinates, z=z, operating=operating, iterations=0)
         operating = engine.operating(z, engine.pushes(found.effects, coordinates, operating))
-    return replace(hypothesis, fit=exact) if exact.cost < found.cost else hypothesis
+    if exact.cost >= found.cost:
+        return hypothesis
+    columns = posterior.jacobian(mode)[: exact.residual.size]
+    own, *added = np.split(columns, ends[:-1], axis=1)
+    return replace(hypothesis, fit=replace(exact, own=own, added=tuple(added)))
 
 
 def _without(manoeuvre: Manoeuvre, posterior: Posterior, index: int) -> Manoeuvre:

@@ -55,7 +55,8 @@ def fit_hypothesis(state: NoiseState, causes: Sequence[str], effects: Sequence[E
     z = point.fit.z.copy()
     if INITIAL_RATE in names:
         z[point.engine.frozen] = engine.posterior.starting_point()[point.engine.frozen]
-    starts = [_starts(effect, point, names) for effect in wanted]
+    nearby = point.holding_bodies() if point.far else point  # about large causes free bodies would take their place
+    starts = [_starts(effect, nearby, names) for effect in wanted]
     along = point.fit.operating if point.far else None
     best: Fit | None = None
     problem: InputError | None = None

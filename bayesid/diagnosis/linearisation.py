@@ -56,6 +56,10 @@ class Linearisation:
         """Return the linearisation with another bank about the same fit."""
         return _assembled(self.engine, self.fit, bank, self.held, self.far)
 
+    def holding_bodies(self) -> Linearisation:
+        """Return the linearisation about the same fit with the bodies held there."""
+        return _assembled(self.engine, with_bodies_held(self.fit), self.bank, True, self.far)
+
 
 def linearise(
     engine: Engine,

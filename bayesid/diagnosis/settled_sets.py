@@ -31,6 +31,10 @@ AGREES = 0.5
 ROUNDS = 3
 """Most linearisations about the best set."""
 
+LARGE = 50.0
+"""Log evidence of a cause beside the others of a fit from which no linear model can leave it out [nats]: that of ten
+standard deviations."""
+
 
 def settled(
     base: Linearisation,
@@ -93,23 +97,36 @@ def _settled_far(
     """Weigh every set about the nearest motion, where the present model itself comes nowhere near the data.
 
     A linear model about the fit of some causes cannot say what happens without one of them that is large: it lets
-    others make up for it that never would. Sets that hold all causes of a fit are therefore weighed about that fit,
-    with free bodies, and the others along the data, until the most probable set has a fit of its own.
+    others make up for it that never would. Sets that hold all large causes of a fit are therefore weighed about that
+    fit, with free bodies, and the others along the data, until the most probable set has a fit of its own.
     """
-    fits: dict[frozenset[str], _Near] = {}
+    near: dict[frozenset[str], _Near] = {}
+    fitted: set[frozenset[str]] = set()
     point, along = base, found
     for _ in range(ROUNDS):
         chosen, released = _best_known(found, effects)
         names = frozenset([*(effect.label for effect in chosen), *([INITIAL_RATE] if released else [])])
-        if not names or names in fits:
+        if not names or names in fitted:
             break
         fit, _ = fit_in_amplitudes(base, chosen, released)
         if not np.isfinite(fit.cost):
             break
+        fitted.add(names)
         point = _with_bursts(linearise(base.engine, fit, effects, bounds, far=True))
-        fits[names] = _Near(point, enumerate_sets(point.evidence, prior, beside=names))
-        found = _nearest(_Near(base, along), fits, point.log_nothing)
+        large = _large(point, names)
+        near[large] = _Near(point, enumerate_sets(point.evidence, prior, beside=large))
+        found = _nearest(_Near(base, along), near, point.log_nothing)
     return point, found, point.fit
+
+
+def _large(point: Linearisation, names: frozenset[str]) -> frozenset[str]:
+    """Return the causes of a fit without which its motion would be another: bodies do not make up for them."""
+    evidence = point.holding_bodies().evidence
+    rest = {name: names - {name} for name in names}
+    whole = evidence.log_evidence(names)
+    return frozenset(
+        name for name, others in rest.items() if whole - (evidence.log_evidence(others) if others else 0.0) > LARGE
+    )
 
 
 class _Near(NamedTuple):
@@ -119,17 +136,18 @@ class _Near(NamedTuple):
     found: SetProbabilities
 
 
-def _nearest(along: _Near, fits: Mapping[frozenset[str], _Near], log_nothing: float) -> SetProbabilities:
-    """Return the probabilities of all sets, each from the fit of most of its causes, or else along the data."""
+def _nearest(along: _Near, near: Mapping[frozenset[str], _Near], log_nothing: float) -> SetProbabilities:
+    """Return the probabilities of all sets, each from the fit with most of its large causes, or else along the data."""
     best: dict[tuple[tuple[str, ...], str | None], tuple[int, CauseSet]] = {}
-    for size, (point, found) in [(0, along), *((len(names), near) for names, near in fits.items())]:
+    for size, (point, found) in [(0, along), *((len(names), own) for names, own in near.items())]:
         for item in found.sets:
             key = (item.causes, item.generic)
-            if key not in best or size > best[key][0]:
+            if key not in best or size >= best[key][0]:
                 moved = replace(item, log_evidence=item.log_evidence + point.log_nothing - log_nothing)
                 best[key] = size, moved
-    own = along.found
-    return SetProbabilities.of((item for _, item in best.values()), own.causes, own.generics, own.prior)
+    catalogue = along.found
+    sets = (item for _, item in best.values())
+    return SetProbabilities.of(sets, catalogue.causes, catalogue.generics, catalogue.prior)
 
 
 def _with_bursts(point: Linearisation) -> Linearisation:
