@@ -392,9 +392,17 @@ def test_the_corner_plot_names_every_quantity_with_its_value(result):
     assert len(figure.axes) == 55
     texts = [axes.texts[0].get_text() for axes in figure.axes if axes.texts]
     assert texts == [
-        f"{key}\n{format_quantity(mean, sd)} {format_unit(unit)}"
+        f"{key}\n{format_quantity(mean, sd)}\n{format_unit(unit)}"
         for (key, unit), mean, sd in zip(BODY_QUANTITIES.items(), body.mean, body.sd, strict=True)
     ]
+
+
+@pytest.mark.parametrize("count", [10, 80])
+def test_names_beside_a_matrix_of_plots_can_be_read_in_print(result, count):
+    drawn = (figures.corner(result.bodies["base_link"]), figures.correlations(["a"] * count, np.eye(count)))
+    for axes in (axes for figure in drawn for axes in figure.axes):
+        ticks = (*axes.get_xticklabels(), *axes.get_yticklabels())
+        assert min(text.get_fontsize() for text in (axes.xaxis.label, axes.yaxis.label, *ticks)) >= 8.0
 
 
 def test_correlations_are_drawn_with_their_values():
