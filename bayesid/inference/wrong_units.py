@@ -199,10 +199,14 @@ def _refuse_milliseconds(posterior: Posterior, seen: Sequence[_Comparison]) -> N
 
 
 def _refuse_gravities(posterior: Posterior, compared: Sequence[Sequence[_Comparison]]) -> None:
-    felt = [comparison for seen in compared for comparison in seen if comparison.kind == Kind.ACCEL]
-    # nearer to 1/9.8 than to one; the fits, which take longer, are for these alone
+    felt, turning = (
+        [comparison for seen in compared for comparison in seen if comparison.kind == kind]
+        for kind in (Kind.ACCEL, Kind.RATE)
+    )
+    # nearer to 1/9.8 than to one, where rates are nearer to one; the fits, which take longer, are for these alone
     small = [comparison for comparison in felt if abs(comparison.factor) < GRAVITY**-0.5]
-    if not small:
+    right = [comparison for comparison in turning if GRAVITY**-0.5 < abs(comparison.factor) < GRAVITY**0.5]
+    if not small or not right or len(right) < len(turning):
         return
     given, other = (_misfit(posterior, compared, unit) for unit in (1.0, GRAVITY))
     if given > max(1.0, BETTER * other):
