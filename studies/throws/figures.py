@@ -45,7 +45,7 @@ def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
 @styled
 def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
     """Draw the spectrum of what is left on the accelerometer, and the raw accelerometer against the wheel's orders."""
-    figure = wide_figure(len(left))
+    figure = wide_figure(1.15 * len(left))
     panels = figure.subplots(len(left), 2, squeeze=False)
     for row, (body, own) in zip(panels, left.items(), strict=True):
         spectrum = np.array([own.spectrum[:, c] for c in range(3, 6)])
