@@ -390,11 +390,28 @@ def test_the_corner_plot_names_every_quantity_with_its_value(result):
     body = result.bodies["base_link"]
     figure = figures.corner(body)
     assert len(figure.axes) == 55
+    assert smallest_axis_text(figure) >= 8.0
     texts = [axes.texts[0].get_text() for axes in figure.axes if axes.texts]
     assert texts == [
-        f"{key}\n{format_quantity(mean, sd)} {format_unit(unit)}"
+        f"{key}\n{format_quantity(mean, sd)}\n{format_unit(unit)}"
         for (key, unit), mean, sd in zip(BODY_QUANTITIES.items(), body.mean, body.sd, strict=True)
     ]
+
+
+def smallest_axis_text(figure: Figure) -> float:
+    """Return the size of the smallest name or number beside an axis [pt]."""
+    texts = [
+        text
+        for axes in figure.axes
+        for text in (axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels(), *axes.get_yticklabels())
+    ]
+    return min(text.get_fontsize() for text in texts)
+
+
+def test_names_beside_many_correlations_can_be_read_in_print():
+    figure = figures.correlations([f"{number}" for number in range(80)], np.eye(80))
+    assert smallest_axis_text(figure) >= 8.0
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == [f"{3 * k}" for k in range(27)]
 
 
 def test_correlations_are_drawn_with_their_values():

@@ -15,8 +15,8 @@ from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.inference.recorded_samples import RecordedSamples
-from bayesid.inference.recording_check import refuse_wrong_units
 from bayesid.inference.simulated_recordings import simulate_recordings
+from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.inertial_parameters import InertialParameters

@@ -22,7 +22,8 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
 
     from bayesid._io.files import complete_folder, write_json
     from bayesid.app.study_to_model import load_posterior
-    from bayesid.inference.recording_check import check_recording, refuse_wrong_units
+    from bayesid.inference.recording_check import check_recording
+    from bayesid.inference.wrong_units import refuse_wrong_units
     from bayesid.report import check_report
 
     posterior = load_posterior(study, window=0)  # nothing is fitted: the samples' correlations do not matter

@@ -30,7 +30,7 @@ def run(
     from bayesid.inference import identify
     from bayesid.inference.identified_robot import write_identified
     from bayesid.inference.posterior_file import write_netcdf
-    from bayesid.inference.recording_check import refuse_wrong_units
+    from bayesid.inference.wrong_units import refuse_wrong_units
     from bayesid.report import identification_report
 
     posterior = load_posterior(study)

@@ -28,8 +28,8 @@ def run(
     from bayesid._io.files import complete_folder, write_json
     from bayesid.app.study_to_model import load_posterior
     from bayesid.inference.predicted_readings import integration_error_at
-    from bayesid.inference.recording_check import refuse_wrong_units
     from bayesid.inference.simulated_recordings import simulate_recordings
+    from bayesid.inference.wrong_units import refuse_wrong_units
     from bayesid.report import simulation_report
 
     posterior = load_posterior(study)

@@ -19,7 +19,7 @@ from bayesid.identifiability.practical_identifiability import Basis
 from bayesid.inference.mode import Optimum, fit, maximise
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.recording_check import refuse_wrong_units
+from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.simulation.model import Manoeuvre, Model

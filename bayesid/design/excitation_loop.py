@@ -40,7 +40,7 @@ from bayesid.design.step_review import Reviewer
 from bayesid.design.trajectory_search import Search
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
-from bayesid.inference.recording_check import refuse_wrong_units
+from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.recording.recording import Recording

@@ -37,7 +37,7 @@ from bayesid.diagnosis.verdict_sensitivity import VerdictSensitivity, verdict_se
 from bayesid.inference import Identification, identify
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.recording_check import refuse_wrong_units
+from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.simulation.effects import bounds_by_label
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound

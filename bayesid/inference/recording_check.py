@@ -7,29 +7,21 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, predicted_readings
 from bayesid.recording.channel_families import JOINT_FAMILIES
 from bayesid.recording.joint_motion import MeasuredMotion
-from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor
 
-__all__ = ["ChannelSampling", "JointCheck", "RecordingCheck", "SensorCheck", "check_recording", "refuse_wrong_units"]
+__all__ = ["ChannelSampling", "JointCheck", "RecordingCheck", "SensorCheck", "check_recording"]
 
 
 STILL = 1e-3
 """Range of a joint's motion below which it hardly excites the base [rad or m]."""
-
-DEGREES = 180.0 / np.pi
-"""Degrees per radian."""
-
-WRONG_UNIT = 15.0
-"""Ratio of measured to predicted readings that no plausible error of the robot explains."""
 
 
 @dataclass(frozen=True)
@@ -191,99 +183,6 @@ def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
         sensors=tuple(_sensor(sensor, manoeuvre, model, predicted) for sensor in model.sensors),
         rate_is_differenced=_is_differenced(manoeuvre, model),
     )
-
-
-def refuse_wrong_units(posterior: Posterior) -> None:
-    """Refuse recordings whose numbers cannot be in rad, rad/s, m/s2 or N m.
-
-    Raises
-    ------
-    InputError
-        If a joint leaves its limits, or the readings of a sensor are many times larger or smaller than predicted.
-    """
-    for manoeuvre in posterior.manoeuvres:
-        refuse_impossible_joints(manoeuvre.recording, posterior.model.robot)
-    predictions = predicted_readings(posterior, posterior.starting_point())
-    for index, (manoeuvre, predicted) in enumerate(zip(posterior.manoeuvres, predictions, strict=True)):
-        for seen in _comparisons(posterior, index, predicted):
-            _refuse_factor(manoeuvre.recording, seen)
-
-
-@dataclass(frozen=True)
-class _Comparison:
-    """Measured readings of one sensor and those that the model predicts at the same times.
-
-    Attributes
-    ----------
-    column, unit : str
-        Name and unit of the columns in error messages.
-    mistaken : str
-        Unit that users most often give instead.
-    time : (n,) array
-        Sample times [s].
-    measured, expected : (n, axes) arrays
-        Measured and predicted readings.
-    sigma : float
-        Standard deviation of the white noise.
-    """
-
-    column: str
-    unit: str
-    mistaken: str
-    time: Floats
-    measured: Floats
-    expected: Floats
-    sigma: float
-
-
-def _comparisons(posterior: Posterior, index: int, predicted: PredictedReadings) -> list[_Comparison]:
-    comparisons = []
-    for sensor in posterior.model.sensors:
-        if sensor.kind.mounted:
-            time, measured = posterior.data.measured(index, sensor.kind)
-            expected = predicted.channels[sensor.kind][np.searchsorted(predicted.time, time)]
-            sigma = float(sensor.noise.sigma(float(np.median(np.diff(time)))).max())
-            column = f"{sensor.kind.value}.x|y|z"
-            comparisons.append(_Comparison(column, sensor.kind.unit, sensor.kind.slip, time, measured, expected, sigma))
-    if (torque := posterior.model.torque) is not None:
-        time, measured = posterior.data.torques(index)
-        expected = predicted.torque[np.searchsorted(predicted.time, time)]
-        for k, (joint, sigma) in enumerate(zip(torque.joints, torque.sigma, strict=True)):
-            one = slice(k, k + 1)
-            mistaken = "mN m or at the motor before the gear"
-            comparisons.append(
-                _Comparison(f"torque.{joint}", "N m", mistaken, time, measured[:, one], expected[:, one], sigma)
-            )
-    return comparisons
-
-
-def _refuse_factor(recording: Recording, seen: _Comparison) -> None:
-    first, second = _detrend(seen.time, seen.measured), _detrend(seen.time, seen.expected)
-    energy, cross = float((second**2).sum()), float((first * second).sum())
-    correlation = cross / np.sqrt(energy * float((first**2).sum()) + 1e-300)
-    loud = float(np.sqrt((first**2).mean())) > 5.0 * seen.sigma
-    if not loud or abs(correlation) < 0.8:
-        return
-    factor = cross / energy
-    if abs(factor) > WRONG_UNIT:
-        raise InputError(
-            f"the readings follow the joints' motion but are {factor:.3g} times what it can cause with this robot",
-            file=recording.file or recording.name,
-            place=f"column {seen.column}",
-            remedy=f"Give them in {seen.unit}, not in {seen.mistaken}, or correct the robot",
-        )
-    if abs(factor) < 1.0 / WRONG_UNIT:
-        raise InputError(
-            f"the readings follow the joints' motion but are {1.0 / factor:.3g} times smaller than what it causes",
-            file=recording.file or recording.name,
-            place=f"column {seen.column}",
-            remedy=f"Give them in {seen.unit}, joint positions in radians, or correct the robot",
-        )
-
-
-def _detrend(time: Floats, values: Floats) -> Floats:
-    basis = np.vander((time - time.mean()) / (np.ptp(time) + 1e-300), 3)
-    return values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
 
 
 def _channels(recording: Recording, model: Model) -> tuple[ChannelSampling, ...]:

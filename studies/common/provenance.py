@@ -33,7 +33,8 @@ def study_origin(name: str, options: argparse.Namespace, inputs: Sequence[Path] 
         Files that the study reads, by default the robot ETS-VII.
     """
     seed = getattr(options, "seed", None)
-    words = ["python", "-m", f"studies.{name}", *(["--full"] if getattr(options, "full", False) else [])]
+    flags = [f"--{option}" for option, value in vars(options).items() if value is True]
+    words = ["python", "-m", f"studies.{name}", *flags]
     words += [] if seed is None else ["--seed", str(seed)]
     return f"{datetime.now(UTC):%Y-%m-%d}, commit {commit()}, {processor()}. {origin_text(inputs, words, seed)}"
 

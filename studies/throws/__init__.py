@@ -16,6 +16,7 @@ import numpy as np
 from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis import Diagnosis
 from studies.common.command import Command
+from studies.common.provenance import study_origin
 from studies.throws.analysis import Analysis, analyse, prepare
 from studies.throws.body_result import BodyResult
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws, read_truth
@@ -124,6 +125,7 @@ COMMAND = Command(
     "throws",
     "Identify and diagnose thrown rigid bodies from real measurements.",
     full="all throws, and the diagnosis of every body",
+    seed=1,
     extra={
         "--data": {"type": Path, "help": "folder of the measurements"},
         "--reverse": {"action": "store_true", "help": "drop the recorded wheel from a throw of every body and seek it"},
@@ -134,5 +136,7 @@ COMMAND = Command(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     options = COMMAND.parse(arguments)
-    result = run(options.data, full=options.full, reverse=options.reverse)
-    write_report(result, options.output)
+    folder = DEFAULT_FOLDER if options.data is None else options.data
+    result = run(folder, full=options.full, reverse=options.reverse, seed=options.seed)
+    inputs = [folder / "truth.json", folder / "index.csv"]
+    write_report(result, options.output, origin=study_origin(COMMAND.name, options, inputs))

@@ -17,7 +17,7 @@ __all__ = ["left_over_figure", "throws_figure"]
 @styled
 def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
     """Draw the errors of single throws, a row per body, a column per model."""
-    figure = wide_figure(2.0 * len(extended.bodies))
+    figure = wide_figure(1.6 * len(extended.bodies))
     panels = figure.subplots(len(extended.bodies), 2, sharey="row", squeeze=False)
     for row, body in zip(panels, extended.bodies, strict=True):
         for axes, analysis in zip(row, (plain, extended), strict=True):
@@ -45,7 +45,7 @@ def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
 @styled
 def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
     """Draw the spectrum of what is left on the accelerometer, and the raw accelerometer against the wheel's orders."""
-    figure = wide_figure(1.6 * len(left))
+    figure = wide_figure(1.15 * len(left))
     panels = figure.subplots(len(left), 2, squeeze=False)
     for row, (body, own) in zip(panels, left.items(), strict=True):
         spectrum = np.array([own.spectrum[:, c] for c in range(3, 6)])

@@ -12,7 +12,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from bayesid.app.compilation_cache import keep_compiled
 from studies.common.command import Command
+from studies.common.provenance import study_origin
 from studies.whole_system.contest import contest
 from studies.whole_system.coverage import covered
 from studies.whole_system.information import informed
@@ -88,4 +90,6 @@ COMMAND = Command(
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the study and write its report."""
     options = COMMAND.parse(arguments)
-    write_report(run(full=options.full, seed=options.seed, progress=print), options.output)
+    keep_compiled()
+    result = run(full=options.full, seed=options.seed, progress=print)
+    write_report(result, options.output, origin=study_origin(COMMAND.name, options))

@@ -21,7 +21,10 @@ from studies.whole_system.sampled import true_point
 from studies.whole_system.setting import bodies, groups, model_of, spreads
 from studies.whole_system.world import fly, record
 
-__all__ = ["SCORED", "Coverage", "covered"]
+__all__ = ["SCORED", "TAIL", "Coverage", "covered"]
+
+TAIL = 0.95
+"""Quantile of the distances beyond which their number is tested."""
 
 SCORED = ("base", "load", "whole system")
 """Groups of bodies whose masses are scored."""
@@ -49,6 +52,16 @@ class Coverage:
     def p_value(self) -> float:
         """P-value of the distances being chi-square (Kolmogorov-Smirnov)."""
         return float(stats.kstest(self.distances, stats.chi2(self.unknowns).cdf).pvalue)
+
+    @property
+    def far(self) -> int:
+        """Number of distances beyond the `TAIL` quantile, where too narrow a posterior shows first."""
+        return int((self.distances > stats.chi2(self.unknowns).ppf(TAIL)).sum())
+
+    @property
+    def tail_p_value(self) -> float:
+        """P-value of so many distances or more beyond the `TAIL` quantile."""
+        return float(stats.binom.sf(self.far - 1, len(self.distances), 1.0 - TAIL))
 
 
 def covered(

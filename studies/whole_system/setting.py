@@ -11,15 +11,16 @@ from bayesid.simulation.joint_torques import TorqueSensor
 from studies.common.ets7 import BASE, ets7
 from studies.common.ets7_model import orbiting_model
 from studies.common.guesses import guess_about
+from studies.common.models import ARM_SPREAD
 
 __all__ = ["LOAD", "bodies", "drawn", "groups", "model_of", "spreads", "true_robot"]
 
 LOAD, HAND = "load", "link6"
 """Name of the load, and link that carries it."""
 
-ARM, BASE_SPREAD, LOAD_SPREAD = 0.05, 0.3, 1.0
-"""Relative widths of the priors in log-Cholesky coordinates: links of the arm known from drawings, a base that has used
-some of its fuel, and a load."""
+ARM, BASE_SPREAD, LOAD_SPREAD = ARM_SPREAD, 0.3, 1.0
+"""Relative widths of the priors in log-Cholesky coordinates: links of the arm known from drawings, to 5 % of each mass
+as in all studies, a base that has used some of its fuel, and a load."""
 
 TORQUE = 0.1
 """Noise per sample of the joint torques [N m]."""

@@ -109,4 +109,4 @@ def _draw_mark(axes: Axes, mark: CauseMark, plane: tuple[int, int], reach: float
         end = (start[0] + reach * float(mark.direction[across]), start[1] + reach * float(mark.direction[up]))
         axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": COLOURS[0], "linewidth": 1.8}, zorder=5)
         axes.plot(*end, alpha=0.0)  # so that the axes hold the arrow
-    axes.annotate(mark.label, end, (4, 5), textcoords="offset points", color=COLOURS[0], fontsize=7, zorder=6)
+    axes.annotate(mark.label, end, (4, 5), textcoords="offset points", color=COLOURS[0], zorder=6)

@@ -158,4 +158,4 @@ def _draw_limits(axes: Axes, values: Floats, bounds: set[float], unit: str) -> N
     beyond = [bound for bound in finite if not low - span <= bound <= high + span]
     if beyond:
         names = ", ".join(format_number(bound) for bound in beyond)
-        axes.set_title(f"limits beyond the panel: {names} {unit}", fontsize=6, color="#B00020", loc="right")
+        axes.set_title(f"limits beyond the panel: {names} {unit}", color="#B00020", loc="right")

@@ -51,7 +51,7 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
         if chosen:
             axes.barh(place[chosen], strength[chosen], color=colour, height=0.7, label=kind)
     for y, value in zip(place, strength, strict=True):
-        axes.annotate(f"{value:.1f}", (value, y), (2, 0), textcoords="offset points", va="center", fontsize=6)
+        axes.annotate(f"{value:.1f}", (value, y), (2, 0), textcoords="offset points", va="center")
     axes.set_yticks(place, [row.name for row in rows])
     axes.set_ylim(-0.7, len(rows) - 0.3)
     axes.set_xlim(0.0, 1.08 * max(float(strength.max(initial=0.0)), 3.0))

@@ -68,9 +68,9 @@ def displacements(directions: Sequence[Direction], prior_sd: Floats) -> Figure:
     image = axes.imshow(
         moved[rows] / largest, vmin=-1.0, vmax=1.0, cmap="RdBu_r", interpolation="nearest", aspect="auto"
     )
-    axes.set_yticks(range(len(rows)), names, fontsize=6)
+    axes.set_yticks(range(len(rows)), names)
     labels = [f"{number}\n{size:.2g}" for number, size in enumerate(largest, start=1)]
-    axes.set_xticks(range(len(shown)), labels, fontsize=6)
+    axes.set_xticks(range(len(shown)), labels)
     axes.set_xlabel("direction, and its largest displacement in prior sd")
     for body in range(1, len(rows)):
         if names[body].split(".")[0] != names[body - 1].split(".")[0]:

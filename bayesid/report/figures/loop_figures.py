@@ -49,7 +49,7 @@ def loop_progress(steps: Sequence[dict[str, Any]]) -> Figure:
     for axes in (known, limits):
         axes.set_xticks(numbers)
         axes.set_xlim(numbers[0] - 0.5, numbers[-1] + 0.5)
-    known.legend(fontsize=6)
+    known.legend()
     if names:
         limits.legend(loc="lower right")
     return figure

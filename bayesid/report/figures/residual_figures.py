@@ -166,5 +166,4 @@ def _draw_distribution(axes: Axes, residual: Floats) -> None:
         transform=axes.transAxes,
         ha="right",
         va="top",
-        fontsize=6,
     )

@@ -26,6 +26,9 @@ REACH = 3.5
 CELLS = 35
 """Number of cells of a corner plot's histograms along one axis."""
 
+LABELS, VALUES = 36, 16
+"""Largest numbers of parameters of which a matrix of correlations has room for every name, and for every value."""
+
 PRIOR_DRAWS = 4000
 """Number of draws from the prior."""
 
@@ -40,7 +43,7 @@ def corner(body: BodyDraws) -> Figure:
     scaled = (body.values - mean) / np.where(sd > 0.0, sd, 1.0)
     count = scaled.shape[1]
     figure = Figure(figsize=(WIDTH, 6.2))
-    figure.subplots_adjust(left=0.075, right=0.92, bottom=0.06, top=0.945, wspace=0.08, hspace=0.08)
+    figure.subplots_adjust(left=0.075, right=0.88, bottom=0.08, top=0.935, wspace=0.08, hspace=0.08)
     panels = {(i, j): figure.add_subplot(count, count, i * count + j + 1) for i in range(count) for j in range(i + 1)}
     for (row, column), axes in panels.items():
         if column == row:
@@ -49,12 +52,13 @@ def corner(body: BodyDraws) -> Figure:
             _draw_pair(axes, scaled[:, column], scaled[:, row])
         _corner_ticks(axes, row, column, count)
     for index, (name, unit) in enumerate(BODY_QUANTITIES.items()):
-        text = f"{name}\n{format_quantity(mean[index], sd[index])} {format_unit(unit)}"
+        text = f"{name}\n{format_quantity(mean[index], sd[index])}\n{format_unit(unit)}"
         axes = panels[index, index]
-        axes.text(0.0, 1.06, text, transform=axes.transAxes, fontsize=6, va="bottom", linespacing=1.15)
-        panels[count - 1, index].set_xlabel(name, fontsize=6, labelpad=2)
+        axes.text(0.0, 1.06, text, transform=axes.transAxes, fontsize=7, va="bottom", linespacing=1.1)
+        label = name.replace(".", "\n")
+        panels[count - 1, index].set_xlabel(label, labelpad=2)
         if index:
-            panels[index, 0].set_ylabel(name, fontsize=6, labelpad=2)
+            panels[index, 0].set_ylabel(label, labelpad=2)
     return figure
 
 
@@ -83,7 +87,7 @@ def _corner_ticks(axes: Axes, row: int, column: int, count: int) -> None:
     axes.grid(False)
     axes.set_xlim(-REACH, REACH)
     axes.set_xticks([-2, 0, 2])
-    axes.tick_params(labelsize=5, length=1.5, pad=1.5, labelbottom=row == count - 1, labelleft=column == 0 and row > 0)
+    axes.tick_params(length=1.5, pad=1.5, labelbottom=row == count - 1, labelleft=column == 0 and row > 0)
     if column < row:
         axes.set_ylim(-REACH, REACH)
         axes.set_yticks([-2, 0, 2])
@@ -109,17 +113,16 @@ def correlations(names: Sequence[str], covariance: ArrayLike) -> Figure:
     axes = figure.subplots()
     axes.grid(False)
     image = axes.imshow(values, vmin=-1.0, vmax=1.0, cmap="RdBu_r", interpolation="nearest")
-    size = 6.5 if count <= 16 else 5.0
-    axes.set_xticks(range(count), names, rotation=45, ha="right", rotation_mode="anchor", fontsize=size)
-    axes.set_yticks(range(count), names, fontsize=size)
-    if count <= 24:
+    labelled = range(0, count, -(-count // LABELS))
+    shown = [names[place] for place in labelled]
+    axes.set_xticks(labelled, shown, rotation=45, ha="right", rotation_mode="anchor")
+    axes.set_yticks(labelled, shown)
+    if count <= VALUES:
         for row in range(count):
             for column in range(count):
                 value = float(values[row, column])
                 colour = "white" if abs(round(value, 2)) > 0.6 else "black"
-                axes.text(
-                    column, row, format_fixed(value, 2), ha="center", va="center", color=colour, fontsize=size - 1.0
-                )
+                axes.text(column, row, format_fixed(value, 2), ha="center", va="center", color=colour, fontsize=6)
     figure.colorbar(image, ax=axes, label="correlation", shrink=0.8, aspect=30)
     return figure
 
@@ -145,7 +148,7 @@ def prior_to_posterior(result: Identification, seed: int = 0) -> Figure:
     axes.set_xticks(exponents - np.log10(low), [f"$10^{{{exponent}}}$" for exponent in exponents])
     axes.axvline(-np.log10(low), color="black", linewidth=0.8)
     for row, value in zip(rows, ratio, strict=True):
-        axes.text(float(np.log10(value / low)), float(row), f" {format_number(value, 2)}", va="center", fontsize=6)
+        axes.text(float(np.log10(value / low)), float(row), f" {format_number(value, 2)}", va="center")
     axes.set_xlim(0.0, max(-np.log10(low), float(np.log10(ratio.max() / low))) + 0.35)
     axes.set_yticks(rows, names)
     axes.set_ylim(len(names) - 0.4, -0.6)

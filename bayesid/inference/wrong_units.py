@@ -1,0 +1,251 @@
+"""Refusal of recordings whose numbers cannot be in SI units, before anything is fitted.
+
+Readings are compared with those that the joints' motion should cause with the robot as it is given. A factor that no
+plausible error of the robot explains is refused. Two units are too near for that, and are refused where the data
+contradict seconds or m/s2 and agree with the other unit:
+
+- Times in milliseconds make all motion a thousand times slower, and what acts on the base meanwhile hides the joints'
+  share. No reading then follows the prediction, and all do once times are divided by a thousand.
+- Accelerations in g are 9.8 times too small, as those of a heavier base would be. But the acceleration that the base's
+  turning adds at the accelerometer is known from the rates whatever the base weighs. Both units are fitted with
+  noise that is a share of the readings, so that neither the declared noise nor a small cause that the model lacks
+  decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
+from bayesid.inference.mode import fit
+from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import PredictedReadings, predicted_readings
+from bayesid.recording.joint_motion import Motion
+from bayesid.recording.plausibility import refuse_impossible_joints
+from bayesid.recording.recording import Recording
+from bayesid.robot.joint_state import JointState
+from bayesid.simulation.model import Manoeuvre
+from bayesid.simulation.sensors import Kind, White
+
+__all__ = ["refuse_wrong_units"]
+
+WRONG_UNIT = 15.0
+"""Ratio of measured to predicted readings that no plausible error of the robot explains."""
+
+FOLLOWING = 0.8
+"""Correlation of measured with predicted readings from which on they follow the joints' motion."""
+
+LOUD = 5.0
+"""Root mean square of readings over their noise from which on they can be judged."""
+
+MILLISECOND = 1e-3
+"""Milliseconds in seconds."""
+
+GRAVITY = 9.80665
+"""Standard gravity [m/s2]."""
+
+ROUGH = 0.05
+"""Noise over the root mean square of the readings in the fits of accelerations in m/s2 and in g."""
+
+BETTER = 4.0
+"""Chi-square of accelerations in m/s2 over that in g from which on they are in g; one would be no difference, and
+MuJoCo's recordings give 20 to 24 in g, and 1/270 in m/s2."""
+
+
+def refuse_wrong_units(posterior: Posterior) -> None:
+    """Refuse recordings whose numbers cannot be in s, rad, rad/s, m/s2 or N m.
+
+    Raises
+    ------
+    InputError
+        If a joint leaves its limits, or the readings of a sensor are many times larger or smaller than predicted, or
+        times are in milliseconds, or accelerations are in g.
+    """
+    for manoeuvre in posterior.manoeuvres:
+        refuse_impossible_joints(manoeuvre.recording, posterior.model.robot)
+    compared = _compared(posterior)
+    for seen in compared:
+        _refuse_milliseconds(posterior, seen)
+    _refuse_gravities(posterior, compared)
+    for manoeuvre, seen in zip(posterior.manoeuvres, compared, strict=True):
+        for comparison in seen:
+            _refuse_factor(manoeuvre.recording, comparison)
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """Measured readings of one sensor and those that the model predicts at the same times.
+
+    Attributes
+    ----------
+    index : int
+        Number of the recording.
+    kind : Kind or None
+        Sensor of the base, None for a joint torque.
+    column, unit : str
+        Name and unit of the columns in error messages.
+    mistaken : str
+        Unit that users most often give instead.
+    time : (n,) array
+        Sample times [s].
+    measured, expected : (n, axes) arrays
+        Measured and predicted readings, without their parabola in time.
+    sigma : float
+        Standard deviation of the white noise.
+    """
+
+    index: int
+    kind: Kind | None
+    column: str
+    unit: str
+    mistaken: str
+    time: Floats
+    measured: Floats
+    expected: Floats
+    sigma: float
+
+    @property
+    def loud(self) -> bool:
+        """Whether the readings stand out of the noise."""
+        return float(np.sqrt((self.measured**2).mean())) > LOUD * self.sigma
+
+    @property
+    def factor(self) -> float:
+        """Measured over predicted readings where they follow the prediction, else not a number."""
+        energy, cross = float((self.expected**2).sum()), float((self.measured * self.expected).sum())
+        size = float(np.sqrt(energy * (self.measured**2).sum()))
+        return cross / energy if abs(cross) > FOLLOWING * size > 0.0 else np.nan
+
+
+def _compared(posterior: Posterior) -> list[list[_Comparison]]:
+    """Return the comparisons of every recording with what is predicted at the starting point."""
+    predictions = predicted_readings(posterior, posterior.starting_point())
+    return [_comparisons(posterior, index, predicted) for index, predicted in enumerate(predictions)]
+
+
+def _comparisons(posterior: Posterior, index: int, predicted: PredictedReadings) -> list[_Comparison]:
+    comparisons = []
+    for sensor in posterior.model.sensors:
+        if sensor.kind.mounted:
+            kind = sensor.kind
+            time, measured = posterior.data.measured(index, kind)
+            expected = predicted.channels[kind][np.searchsorted(predicted.time, time)]
+            sigma = float(sensor.noise.sigma(float(np.median(np.diff(time)))).max())
+            readings = (time, _detrend(time, measured), _detrend(time, expected), sigma)
+            comparisons.append(_Comparison(index, kind, f"{kind.value}.x|y|z", kind.unit, kind.slip, *readings))
+    if (torque := posterior.model.torque) is not None:
+        time, measured = posterior.data.torques(index)
+        expected = predicted.torque[np.searchsorted(predicted.time, time)]
+        for k, (joint, sigma) in enumerate(zip(torque.joints, torque.sigma, strict=True)):
+            one = slice(k, k + 1)
+            readings = (time, _detrend(time, measured[:, one]), _detrend(time, expected[:, one]), sigma)
+            mistaken = "mN m or at the motor before the gear"
+            comparisons.append(_Comparison(index, None, f"torque.{joint}", "N m", mistaken, *readings))
+    return comparisons
+
+
+def _refuse_factor(recording: Recording, seen: _Comparison) -> None:
+    if not seen.loud or np.isnan(seen.factor):
+        return
+    if abs(seen.factor) > WRONG_UNIT:
+        raise InputError(
+            f"the readings follow the joints' motion but are {seen.factor:.3g} times what it can cause with this robot",
+            file=recording.file or recording.name,
+            place=f"column {seen.column}",
+            remedy=f"Give them in {seen.unit}, not in {seen.mistaken}, or correct the robot",
+        )
+    if abs(seen.factor) < 1.0 / WRONG_UNIT:
+        raise InputError(
+            f"the readings follow the joints' motion but are {1.0 / seen.factor:.3g} times smaller than what it causes",
+            file=recording.file or recording.name,
+            place=f"column {seen.column}",
+            remedy=f"Give them in {seen.unit}, joint positions in radians, or correct the robot",
+        )
+
+
+@dataclass(frozen=True)
+class _Hastened:
+    """Motion of joints with times divided by a thousand."""
+
+    motion: Motion
+
+    def evaluate(self, time: Floats) -> JointState:
+        """Return the joint state at the times, shape (T,)."""
+        slow = self.motion.evaluate(np.asarray(time) / MILLISECOND)
+        return JointState(slow.position, slow.velocity / MILLISECOND, slow.acceleration / MILLISECOND**2)
+
+
+def _refuse_milliseconds(posterior: Posterior, seen: Sequence[_Comparison]) -> None:
+    loud = [comparison for comparison in seen if comparison.kind is not None and comparison.loud]
+    if not loud or not all(np.isnan(comparison.factor) for comparison in loud):
+        return
+    manoeuvre = posterior.manoeuvres[loud[0].index]
+    recording = manoeuvre.recording
+    shorter = Recording(recording.name, recording.file, MILLISECOND * recording.time, recording.channels)
+    hastened = replace(manoeuvre, recording=shorter, motion=_Hastened(manoeuvre.motion))
+    other = Posterior.of(posterior.model, [hastened], step=MILLISECOND * posterior.step, window=0)
+    again = {comparison.column: comparison.factor for comparison in _compared(other)[0]}
+    if all(1.0 / WRONG_UNIT < again[comparison.column] < WRONG_UNIT for comparison in loud):
+        raise InputError(
+            "the readings follow the joints' motion only if times are milliseconds",
+            file=recording.file or recording.name,
+            place="column time",
+            remedy="Give times in seconds",
+        )
+
+
+def _refuse_gravities(posterior: Posterior, compared: Sequence[Sequence[_Comparison]]) -> None:
+    felt, turning = (
+        [comparison for seen in compared for comparison in seen if comparison.kind == kind]
+        for kind in (Kind.ACCEL, Kind.RATE)
+    )
+    # nearer to 1/9.8 than to one, where rates are nearer to one; the fits, which take longer, are for these alone
+    small = [comparison for comparison in felt if abs(comparison.factor) < GRAVITY**-0.5]
+    right = [comparison for comparison in turning if GRAVITY**-0.5 < abs(comparison.factor) < GRAVITY**0.5]
+    if not small or not right or len(right) < len(turning):
+        return
+    given, other = (_misfit(posterior, compared, unit) for unit in (1.0, GRAVITY))
+    if given > max(1.0, BETTER * other):
+        recording = posterior.manoeuvres[small[0].index].recording
+        raise InputError(
+            "the accelerations agree with the turning of the base only if they are in g",
+            file=recording.file or recording.name,
+            place=f"column {small[0].column}",
+            remedy="Give them in m/s2, or correct the accelerometer's position, which then is ten times too far",
+        )
+
+
+def _misfit(posterior: Posterior, compared: Sequence[Sequence[_Comparison]], unit: float) -> float:
+    """Return chi-square per sample of a fit to rough readings, with accelerations in a unit [m/s2]."""
+    model = posterior.model
+    loudness: dict[Kind, float] = {}
+    for item in (item for seen in compared for item in seen):
+        if item.kind is not None:
+            size = float(np.sqrt((item.measured**2).mean()))
+            loudness[item.kind] = max(loudness.get(item.kind, 0.0), size)
+    sensors = tuple(
+        replace(sensor, noise=White(ROUGH * (unit if sensor.kind == Kind.ACCEL else 1.0) * loudness[sensor.kind]))
+        if sensor.kind in loudness
+        else sensor
+        for sensor in model.sensors
+    )
+    manoeuvres = [_in_unit(manoeuvre, unit) for manoeuvre in posterior.manoeuvres]
+    rough = Posterior.of(replace(model, sensors=sensors), manoeuvres, step=posterior.step, window=0)
+    return fit(rough, rough.starting_point()).chi2 / rough.samples
+
+
+def _in_unit(manoeuvre: Manoeuvre, unit: float) -> Manoeuvre:
+    recording = manoeuvre.recording
+    channels = {
+        name: values * unit if name in Kind.ACCEL.columns else values for name, values in recording.channels.items()
+    }
+    return replace(manoeuvre, recording=Recording(recording.name, recording.file, recording.time, channels))
+
+
+def _detrend(time: Floats, values: Floats) -> Floats:
+    basis = np.vander((time - time.mean()) / (np.ptp(time) + 1e-300), 3)
+    return values - basis @ np.linalg.lstsq(basis, values, rcond=None)[0]

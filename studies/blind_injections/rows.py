@@ -1,0 +1,149 @@
+"""Rows of the tables: outcomes by signal-to-noise ratio, stated probabilities, scores, errors and answers."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+import numpy as np
+from scipy import stats
+
+from bayesid._math.arrays import Floats
+from bayesid.report.numbers import format_signed
+from studies.blind_injections.trials import Trial
+
+__all__ = ["LEAST", "confusion", "errors", "rates", "reliability", "scores", "statements"]
+
+BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, np.inf)
+"""Limits of the ranges of signal-to-noise ratio in the table."""
+
+STATED = (0.0, 0.5, 0.7, 0.9, 0.95, 0.99, 0.999, 1.0)
+"""Limits of the ranges of stated probability in the table."""
+
+LEAST = 1e-6
+"""Probability below which a statement that comes true is not counted as worse."""
+
+
+def rates(trials: Sequence[Trial]) -> list[list[str]]:
+    """Return the numbers of trials by signal-to-noise ratio and outcome, beside the limits of theory."""
+    rows = []
+    injected = [trial for trial in trials if trial.kind == "effect"]
+    for low, high in pairwise(BINS):
+        within = [t for t in injected if t.signal_to_noise is not None and low <= t.signal_to_noise < high]
+        if within:
+            rows.append([f"{low:g} to {high:g}" if np.isfinite(high) else f"above {low:g}", *_row(within)])
+    spoilt = [trial for trial in injected if trial.signal_to_noise is None]
+    return [*rows, ["faults of the noise", *_row(spoilt)]] if spoilt else rows
+
+
+def _row(trials: Sequence[Trial]) -> list[str]:
+    count = {
+        key: str(sum(getattr(trial, key) for trial in trials))
+        for key in ("alarmed", "in_set", "named_rightly", "misnamed")
+    }
+    limits = [(t.detection, t.detection * t.naming) for t in trials if t.detection is not None and t.naming is not None]
+    detection, naming = (f"{sum(column):.1f}" for column in zip(*limits, strict=True)) if limits else ("–", "–")
+    return [
+        str(len(trials)),
+        count["alarmed"],
+        detection,
+        count["in_set"],
+        count["named_rightly"],
+        naming,
+        count["misnamed"],
+    ]
+
+
+def reliability(trials: Iterable[Trial]) -> list[list[str]]:
+    """Return how often the named causes were hidden, by their stated probability, with 95 % Wilson intervals."""
+    named = [(trial.probability, trial.holds) for trial in trials if trial.probability is not None]
+    rows = []
+    for low, high in pairwise(STATED):
+        within = [pair for pair in named if low <= pair[0] < high or pair[0] == high == STATED[-1]]
+        if within:
+            rows.append([f"{low:g} to {high:g}", *_reliable(within)])
+    return [*rows, ["all", *_reliable(named)]] if named else rows
+
+
+def statements(trials: Iterable[Trial]) -> dict[str, list[tuple[float, bool]]]:
+    """Return the stated probabilities with whether they came true: of causes, of the unknown, and of nothing.
+
+    A cause counts where it is stated with more than one per cent, under any name that is accepted for what is hidden;
+    the names of one class of equivalents count each by itself.
+    """
+    found: dict[str, list[tuple[float, bool]]] = {"causes": [], "unknown": [], "nothing": []}
+    for trial in trials:
+        true = set(trial.hidden) | set(trial.accept)
+        found["causes"] += [(value, name in true) for name, value in trial.probabilities.items()]
+        found["unknown"].append((trial.unknown, trial.kind == "unknown"))
+        found["nothing"].append((trial.nothing, trial.kind == "adequate"))
+    return found
+
+
+def scores(trials: Iterable[Trial]) -> list[list[str]]:
+    """Return number, Brier score and mean logarithmic score of the stated probabilities, with standard errors."""
+    rows = []
+    for name, pairs in statements(trials).items():
+        if pairs:
+            p, true = np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])
+            brier = (p - true) ** 2
+            logs = np.log(np.clip(np.where(true, p, 1.0 - p), LEAST, None))
+            error = np.sqrt(len(p))
+            rows.append(
+                [
+                    name,
+                    str(len(p)),
+                    f"{brier.mean():.4f} ± {brier.std() / error:.4f}",
+                    f"{logs.mean():.3f} ± {logs.std() / error:.3f}",
+                    f"{p.mean():.3f}",
+                    f"{true.mean():.3f}",
+                ]
+            )
+    return rows
+
+
+def _reliable(named: Sequence[tuple[float, bool]]) -> list[str]:
+    right, total = sum(held for _, held in named), len(named)
+    interval = stats.binomtest(right, total).proportion_ci(method="wilson")
+    stated = float(np.mean([probability for probability, _ in named]))
+    return [
+        str(total),
+        f"{stated:.3f}",
+        str(right),
+        f"{right / total:.3f}",
+        f"{interval.low:.3f} to {interval.high:.3f}",
+    ]
+
+
+def confusion(trials: Iterable[Trial]) -> list[list[str]]:
+    """Return each hidden case with its answers and their numbers, all strengths and seeds together."""
+    said: dict[str, Counter[str]] = {}
+    for trial in trials:
+        answer = " + ".join(sorted(trial.causes)) or trial.status
+        if trial.status == "ambiguous":
+            answer += f" or {max(len(trial.sets) - 1, 1)} more"
+        said.setdefault(trial.case, Counter())[answer] += 1
+    return [
+        [case, ", ".join(f"{answer} ({count})" if count > 1 else answer for answer, count in answers.most_common())]
+        for case, answers in said.items()
+    ]
+
+
+def errors(trials: Sequence[Trial]) -> list[list[str]]:
+    """Return number, mean, root mean square and shares of the errors of what is reported, in stated deviations."""
+    right = [trial for trial in trials if trial.kind == "effect" and trial.named_rightly]
+    quiet = [trial for trial in trials if trial.kind == "adequate"]
+    return [
+        _scattered("amplitudes of causes named rightly", [error for t in right for error in t.amplitude_errors]),
+        _scattered("base, after the extension", [error for t in right for error in t.body_errors]),
+        _scattered("base, nothing hidden", [error for t in quiet for error in t.body_errors]),
+    ]
+
+
+def _scattered(label: str, values: Sequence[float]) -> list[str]:
+    found: Floats = np.asarray(values, dtype=float)
+    if len(found) == 0:
+        return [label, "0", "–", "–", "–", "–"]
+    inside = [f"{100.0 * (np.abs(found) < limit).mean():.0f} %" for limit in (1.0, 2.0)]
+    return [label, str(len(found)), format_signed(found.mean(), 2), f"{np.sqrt((found**2).mean()):.2f}", *inside]

@@ -1,0 +1,73 @@
+"""Units that users mistake, in recordings of MuJoCo: refused where the data contradict them, and nowhere else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bayesid import BodyPrior, InertialParameters, InputError, Model, Posterior, Recording
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.inference.wrong_units import refuse_wrong_units
+from bayesid.simulation.model import Manoeuvre
+from studies.faults.units import SLIPS
+from studies.truth.mujoco import Manoeuvres, write_study
+from studies.truth.urdf import SERVICER3
+
+STANDARD_GRAVITY = 9.80665
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("study")
+    manoeuvres = Manoeuvres(count=1, duration=40.0)
+    return write_study(folder, SERVICER3, np.random.default_rng(3), manoeuvres=manoeuvres).file
+
+
+def posterior_of(file: Path, *, mass: float = 1.0, unit: float = 1.0) -> Posterior:
+    """Return the posterior with the stated mass and inertia of the base and the accelerations multiplied."""
+    loaded = Study.load(file)
+    model = load_model(loaded)
+    manoeuvres = [_scaled(manoeuvre, unit) for manoeuvre in load_manoeuvres(loaded, model.robot)]
+    return Posterior.of(_heavier(model, mass), manoeuvres, step=2.0, window=0)
+
+
+def _heavier(model: Model, factor: float) -> Model:
+    (prior,) = model.priors
+    stated = prior.centre
+    body = InertialParameters(factor * stated.mass, stated.com, factor * stated.inertia)
+    robot = model.robot.with_inertial(prior.name, body)
+    return replace(model, robot=robot, priors=(BodyPrior(prior.name, body, prior.spread),))
+
+
+def _scaled(manoeuvre: Manoeuvre, factor: float) -> Manoeuvre:
+    recording = manoeuvre.recording
+    channels = {
+        name: values * factor if name.startswith("accel.") else values for name, values in recording.channels.items()
+    }
+    return replace(manoeuvre, recording=Recording(recording.name, recording.file, recording.time, channels))
+
+
+@pytest.mark.parametrize("mass", [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0])
+def test_a_base_that_is_stated_ten_times_too_heavy_or_light_is_no_wrong_unit(study: Path, mass: float) -> None:
+    refuse_wrong_units(posterior_of(study, mass=mass))
+
+
+@pytest.mark.parametrize("mass", [0.5, 1.0, 2.0])
+def test_accelerations_in_g_are_refused_whatever_the_base_weighs(study: Path, mass: float) -> None:
+    with pytest.raises(InputError, match=r"column accel\.x\|y\|z: .* only if they are in g\. Give them in m/s2"):
+        refuse_wrong_units(posterior_of(study, mass=mass, unit=1.0 / STANDARD_GRAVITY))
+
+
+def test_times_in_milliseconds_are_refused(study: Path) -> None:
+    SLIPS["time in milliseconds"](study.parent)
+    loaded = Study.load(study)
+    model = load_model(loaded)
+    posterior = Posterior.of(model, load_manoeuvres(loaded, model.robot), window=0)
+    with pytest.raises(InputError, match=r"column time: .* only if times are milliseconds\. Give times in seconds"):
+        refuse_wrong_units(posterior)
