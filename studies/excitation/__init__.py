@@ -9,7 +9,7 @@ errors realised over repeated flights of an independent simulator. ``python -m s
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -119,6 +119,7 @@ COMMAND = Command(
     seed=1,
     extra={
         "--repeats": {"type": int, "help": "number of flights of each design that is flown"},
+        "--starts": {"type": int, "help": "number of random starts of each search"},
         "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
         **TRIALS,
     },
@@ -133,10 +134,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = COMMAND.parse(arguments)
     keep_compiled()
     effort = FULL if options.full else QUICK
+    effort = effort if options.starts is None else replace(effort, starts=options.starts)
     store = None if options.store is None else Store.open(options.store, f"excitation {options.seed} {effort}")
     result = run(
         full=options.full,
         seed=options.seed,
+        search=effort,
         repeats=options.repeats,
         store=store,
         trials=options.trials,
