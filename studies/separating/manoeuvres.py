@@ -11,6 +11,7 @@ import numpy as np
 from bayesid.design import DOptimal, Problem, Search, Separation, Store, optimise
 from bayesid.design.design_problem import Known
 from bayesid.design.trajectories import ParameterisedMotion
+from bayesid.design.visible_directions import with_visible_directions
 from studies.common import mission
 from studies.separating.setting import RIVALS, drifting, rival_model
 
@@ -50,6 +51,7 @@ def design_both(
     problem: Problem, seed: int, search: Search, store: Store, progress: Callable[[str], None]
 ) -> dict[str, Designed]:
     """Design by both criteria from the same random starts, the second also from the first's best."""
+    problem = with_visible_directions(problem, np.random.default_rng(seed))
     found: list[np.ndarray] = []
     for criterion in problem.criteria:
         kept = store.of(criterion.name)
