@@ -122,7 +122,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     keep_compiled()
     table = options.tables / "excitation-manoeuvres.csv"
     result = run(
-        designed_motion(table).parameters,
+        np.asarray(designed_motion(table).parameters),
         full=options.full,
         seed=options.seed,
         ships=options.ships,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesid import Robot
 from bayesid._math.arrays import Floats
@@ -92,7 +93,7 @@ class Row:
     """
 
     miss: Floats
-    held: Floats
+    held: NDArray[np.bool_]
     size: Floats
     distance: Floats
 
