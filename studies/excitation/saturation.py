@@ -66,7 +66,7 @@ def crowd_of(
 
     The starts are those of `bayesid.design.design` with the same seed, and more.
     """
-    kept = store.of(f"crowd.{criterion.name}")
+    kept = store.of(f"{search.starts} starts.{criterion.name}")  # which descents are followed depends on their number
     index = problem.criteria.index(criterion)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(index + 1)[index])
 
