@@ -16,6 +16,9 @@ __all__ = ["MODELS", "processor", "study_origin"]
 ROOT = Path(__file__).resolve().parents[2]
 """Folder of the checkout."""
 
+COUNTS = ("starts", "repeats", "flights", "ships")
+"""Options of single studies that say how much is repeated."""
+
 MODELS = ROOT / "bayesid" / "robot" / "models"
 """Folder of the robots that are shipped."""
 
@@ -35,6 +38,8 @@ def study_origin(name: str, options: argparse.Namespace, inputs: Sequence[Path] 
     seed = getattr(options, "seed", None)
     words = ["python", "-m", f"studies.{name}", *(["--full"] if getattr(options, "full", False) else [])]
     words += [] if seed is None else ["--seed", str(seed)]
+    counts = {key: getattr(options, key, None) for key in COUNTS}
+    words += [word for key, count in counts.items() if count is not None for word in (f"--{key}", str(count))]
     return f"{datetime.now(UTC):%Y-%m-%d}, commit {commit()}, {processor()}. {origin_text(inputs, words, seed)}"
 
 
