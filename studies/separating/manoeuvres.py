@@ -30,11 +30,14 @@ class Designed:
         Largest values of the limited quantities by name.
     motion : ParameterisedMotion
         Motion of the joints.
+    left_out : dict of str to int
+        Number of directions in which no manoeuvre shows a rival and which the criterion leaves out, by its label.
     """
 
     costs: dict[str, float]
     largest: dict[str, float]
     motion: ParameterisedMotion
+    left_out: dict[str, int]
 
 
 def separating_problem(points: int = mission.POINTS) -> Problem:
@@ -71,6 +74,7 @@ def design_both(
             costs=problem.costs(best),
             largest={item.name: item.largest for item in problem.reached(best)},
             motion=problem.plan.family.motion(best),
+            left_out=criterion.left_out if isinstance(criterion, Separation) else {},
         )
         for criterion, best in zip(problem.criteria, found, strict=True)
     }
