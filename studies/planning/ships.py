@@ -173,14 +173,26 @@ def fitted(posterior: Posterior) -> tuple[Floats, Floats]:
         If they do not end.
     """
     z = np.zeros(posterior.size)
+    residual = posterior.least_squares(z)
     for _ in range(STEPS):
         jacobian = posterior.jacobian(z)
         covariance = np.linalg.inv(jacobian.T @ jacobian)
-        step = covariance @ (jacobian.T @ posterior.least_squares(z))
-        z = z - step
+        step = covariance @ (jacobian.T @ residual)
         if np.abs(step).max() < SMALL:
-            return z, covariance
+            return z - step, covariance
+        z, residual = _descended(posterior, z, step, residual)
     raise RuntimeError(f"the fit still moves by {np.abs(step).max():.2g} prior deviations after {STEPS} steps")
+
+
+def _descended(posterior: Posterior, z: Floats, step: Floats, residual: Floats) -> tuple[Floats, Floats]:
+    """Return the point after a step, made smaller until the sum of squares falls, and the residuals there."""
+    size, before = 1.0, residual @ residual
+    while size > SMALL:
+        after = posterior.least_squares(z - size * step)
+        if after @ after < before:  # false where it is not a number
+            return z - size * step, after
+        size *= 0.5
+    raise RuntimeError("the fit ends where no step leads to a smaller sum of squares")
 
 
 def _coordinates(planner: Planner, robot: Robot) -> Floats:
