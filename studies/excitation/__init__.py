@@ -21,7 +21,7 @@ from studies.common.command import TRIALS, Command
 from studies.common.monte_carlo import Workers
 from studies.common.repeated_fits import Realised, repeat
 from studies.excitation.cloud import Cloud, random_cloud
-from studies.excitation.contest import Contest, compete, contest_problem
+from studies.excitation.contest import Contest, compete, contest_problem, sparse
 from studies.excitation.saturation import CROWDED, Crowd, crowd_of
 
 __all__ = ["Result", "main", "run"]
@@ -105,7 +105,7 @@ def run(
     problem, crowds = contest_problem(full, points), {}
     if starts is not None:
         effort = replace(QUICK, starts=starts)
-        crowds = {item.name: crowd_of(problem, item, seed, effort, store, progress) for item in CROWDED}
+        crowds = {item.name: crowd_of(problem, item, seed, effort, store, sparse(progress)) for item in CROWDED}
     contest = compete(problem, seed, search, [crowd.best for crowd in crowds.values()], store, progress)
     own = contest.designs["d-optimal"].problem
     cloud = random_cloud(own, random, np.random.default_rng(seed))

@@ -38,7 +38,7 @@ from studies.common import mission
 from studies.common.ets7 import INTERVAL
 from studies.common.quantities import JUDGED
 
-__all__ = ["Contest", "compete", "contest_problem", "paper_problem", "shrunk"]
+__all__ = ["Contest", "compete", "contest_problem", "paper_problem", "shrunk", "sparse"]
 
 FEW: tuple[Criterion, ...] = (Paper26(), Paper26Intended(), ConditionNumber(), DOptimal())
 """Criteria of a quick run: the paper's, the one usual for arms on the ground, and the posterior's volume."""
@@ -103,7 +103,7 @@ def compete(
     progress: Callable[[str], None],
 ) -> Contest:
     """Design by every criterion of the problem; ``first`` are manoeuvres from which every search begins, too."""
-    found = design(problem, seed, mission.ENCODERS, search, first=first, store=store, progress=_sparse(progress))
+    found = design(problem, seed, mission.ENCODERS, search, first=first, store=store, progress=sparse(progress))
     designs = {item.name: item for item in found}
     motions: dict[str, Motion] = {}
     shrink: dict[str, float] = {}
@@ -131,7 +131,7 @@ def _predicted(model: Model, motion: Motion) -> Predicted:
     return predict(planned_posterior(model, [planned_manoeuvre(model, motion, times, "plan", mission.ENCODERS)]))
 
 
-def _sparse(progress: Callable[[str], None]) -> Callable[[float, str], None]:
+def sparse(progress: Callable[[str], None]) -> Callable[[float, str], None]:
     """Return a progress that passes on a line every five percent."""
     told = [-1]
 

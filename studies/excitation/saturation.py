@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import hypergeom
 
+from bayesid._io.progress import Progress
 from bayesid._math.arrays import Floats
 from bayesid.design import Criterion, DOptimal, Paper26, Problem, Search, Store, optimise
 
@@ -60,7 +61,7 @@ class Crowd:
 
 
 def crowd_of(
-    problem: Problem, criterion: Criterion, seed: int, search: Search, store: Store, progress: Callable[[str], None]
+    problem: Problem, criterion: Criterion, seed: int, search: Search, store: Store, progress: Progress
 ) -> Crowd:
     """Search by a criterion of the problem from many starts; an interrupted search goes on from the store.
 
@@ -69,10 +70,6 @@ def crowd_of(
     kept = store.of(f"{search.starts} starts.{criterion.name}")  # which descents are followed depends on their number
     index = problem.criteria.index(criterion)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(index + 1)[index])
-
-    def tell(fraction: float, text: str) -> None:
-        progress(f"{search.starts} starts, {100.0 * fraction:.0f} %, {text}")
-
-    found = optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=tell)
+    found = optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=progress)
     descents: Sequence[tuple[Floats, float, int] | None] = [kept.known(f"0.{k}") for k in range(search.starts)]
     return Crowd(found.parameters, found.cost, np.array([item[1] for item in descents if item is not None]))

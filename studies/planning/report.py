@@ -154,7 +154,7 @@ def _failures(document: Document, result: Result) -> None:
             f"{row.capitalize()}: the squared distance of the true base from the identified one is "
             f"{format_fixed(float(mean), 1)} ± {format_fixed(float(error), 1)} where 10 are expected; after "
             f"identification {outside} of {len(own.held)} regions of the end-effector's position do not hold the "
-            f"flown one, {format_fixed((1.0 - CONTENT) * len(own.held), 0)} of which are due."
+            f"flown one, where {format_fixed((1.0 - CONTENT) * len(own.held), 1)} are due."
         )
     texts.append(
         "The regions have the proportions of the draws' covariance and are as large as the draws want. The truth is a "
@@ -175,7 +175,7 @@ def _evidence(document: Document, result: Result) -> None:
             ]
             sizes = [format_number(float(np.median(own.size[:, stage, 1, kind])), 2) for kind in range(len(KINDS))]
             counts = [f"{own.held[:, stage, body, kind].sum()} of {len(own.held)}" for body, kind in REGIONS]
-            cells.append([row, title, *misses, *sizes, *counts])
+            cells.append([row.removeprefix("arm "), title, *misses, *sizes, *counts])
     add_number_table(
         document,
         [

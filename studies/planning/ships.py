@@ -172,7 +172,7 @@ def fitted(posterior: Posterior) -> tuple[Floats, Floats]:
     RuntimeError
         If they do not end.
     """
-    z = np.zeros(posterior.size)
+    z: Floats = np.zeros(posterior.size)
     residual = posterior.least_squares(z)
     for _ in range(STEPS):
         jacobian = posterior.jacobian(z)
