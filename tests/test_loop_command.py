@@ -225,3 +225,55 @@ def test_an_unknown_joint_is_an_error(study: Path, tmp_path: Path):
     assert status == 2
     assert "no moving joint 'elbow'" in text
     assert "joint1, joint2" in text
+
+
+FLIES = """
+from pathlib import Path
+
+from bayesid.app.schema import Study
+from bayesid.app.study_to_design import load_loop_problem
+from bayesid.design import SimulatedSpacecraft
+
+
+class Spacecraft:
+    def __init__(self):
+        self.truth = SimulatedSpacecraft(load_loop_problem(Study.load({study!r})).plan.model, 1e-5, seed=3)
+
+    def execute(self, plan):
+        if plan.name == "step-2" and Path({tired!r}).exists():
+            raise RuntimeError("killed")
+        return self.truth.execute(plan)
+"""
+
+
+@pytest.mark.slow  # two minutes of a processor
+def test_the_command_plans_flies_identifies_and_goes_on_with_the_same_numbers(tmp_path: Path):
+    file, tired = tmp_path / "study.toml", tmp_path / "tired"
+    # what moves in a plane shows little of the base: a narrow prior and a criterion that compiles fast do here
+    file.write_text(
+        STUDY.replace("spread = 0.05", "spread = 0.01").replace(
+            "[design]", "[design]\ncriteria = ['paper-26-intended']"
+        )
+    )
+    spacecraft = tmp_path / "mine.py"
+    spacecraft.write_text(FLIES.format(study=str(file), tired=str(tired)))
+    options = ("--spacecraft", spacecraft, "--at-most", 2, "--samples", 100, "--no-diagnose", "--wanted", 1e-6)
+    outputs = [tmp_path / name for name in ("whole", "parts")]
+    status, text = run("loop", file, "--output", outputs[0], *options)
+    assert status == 0, text
+    tired.touch()
+    status, text = run("loop", file, "--output", outputs[1], *options)
+    assert status == 2
+    assert "killed" in text
+    assert len(json.loads((outputs[1] / "loop.json").read_text())["steps"]) == 2
+    tired.unlink()
+    status, text = run("loop", file, "--output", outputs[1], *options)
+    assert status == 0, text
+    whole, parts = (json.loads((output / "loop.json").read_text()) for output in outputs)
+    assert whole["status"] == parts["status"] == "at-most"
+    for first, second in zip(whole["steps"], parts["steps"], strict=True):
+        assert first["plan"]["parameters"] == second["plan"]["parameters"]
+        assert first["identification"]["bodies"] == second["identification"]["bodies"]
+        assert first["goals"] == second["goals"]
+    assert "mass" in whole["steps"][1]["identification"]["bodies"]["base_link"]
+    assert (outputs[1] / "report.pdf").read_bytes().startswith(b"%PDF")

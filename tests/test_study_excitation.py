@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from studies.excitation import run
 from studies.excitation.cloud import Cloud
 from studies.excitation.contest import paper_problem, shrunk
 from studies.excitation.report import goals, write_report
+from studies.excitation.saturation import Crowd
 from tests.report_rules import broken_rules
 
 
@@ -45,6 +47,15 @@ def test_rank_correlation_of_a_cloud():
     assert cloud.correlation(cloud.intended)[0] == pytest.approx(-1.0)
 
 
+def test_the_best_of_some_descents_is_that_of_all_their_choices():
+    costs = np.array([0.3, -1.0, 0.1, 2.0, 0.1])
+    crowd = Crowd(np.zeros(2), -1.1, costs)
+    for count in (1, 2, 4, 5):
+        best = [min(choice) for choice in combinations(costs, count)]
+        assert crowd.expected(count) == pytest.approx(np.mean(best))
+        assert crowd.chance(count, 1.15) == pytest.approx(np.mean(np.array(best) <= 0.15))
+
+
 def test_the_flight_s_manoeuvre_lies_in_the_middle_of_the_mission():
     state = mission.flight_manoeuvre().evaluate(np.array([0.0, 0.5 * mission.DURATION, mission.DURATION]))
     np.testing.assert_allclose(state.position[[0, 2]], np.tile(mission.start(), (2, 1)), atol=1e-9)
@@ -63,7 +74,7 @@ def test_a_recording_without_noise_is_fitted_at_the_truth():
 
 @pytest.mark.usefixtures("slow")
 def test_the_whole_study_small(tmp_path):
-    result = run(seed=2, search=Search(starts=1, iterations=4), repeats=6, random=12, points=2)
+    result = run(seed=2, search=Search(starts=1, iterations=4), starts=4, repeats=6, random=12, points=2)
     for name, item in result.contest.designs.items():
         assert all(reached.kept for reached in item.reached), name
     for row in mission.ROWS:

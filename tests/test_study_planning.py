@@ -1,44 +1,71 @@
-"""The planning study: a plan with the true base hits its target in the independent simulator, a wrong one misses."""
+"""The planning study: a plan with the true ship hits in MuJoCo, and how its regions are judged."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from bayesid.robot.robot import Robot
-from studies.common.ets7 import BASE, START
-from studies.planning.analysis import flight_of, plan, predictor_of
-from studies.planning.calibration import calibrate
-from studies.planning.world import Guess, Swing, fly, model_of
+from bayesid.report.verdict_record import Share
+from bayesid.robot.body_prior import coordinates_of
+from studies.common import mission
+from studies.common.goals import Verdict
+from studies.planning import run
+from studies.planning.planner import Planner, miss_of
+from studies.planning.report import _verdict, goals, write_report
+from studies.planning.ships import fitted
+from studies.planning.world import Swing, fly, planners_model, true_ship
+from tests.report_rules import broken_rules
 
-DURATION = 20.0
-REACHED = START + np.array([0.4, -0.3, 0.2, 0.1, -0.2, 0.2])
+
+def test_a_path_ends_where_its_quintics_do():
+    swing = Swing(mission.start(), mission.start() + 0.5)
+    state = swing.evaluate(np.array([0.0, 0.5 * swing.duration, swing.duration]))
+    np.testing.assert_allclose(state.position - mission.start(), np.outer([0.0, 0.25, 0.5], np.ones(6)), atol=1e-12)
+    np.testing.assert_allclose(state.velocity[[0, 2]], 0.0, atol=1e-12)
+    np.testing.assert_allclose(state.velocity[1], 1.875 * 0.5 / swing.duration)
 
 
-@pytest.mark.slow
-def test_a_plan_hits_with_the_true_base_and_misses_with_a_wrong_one():
-    target = fly(Swing(START, REACHED, DURATION)).tip
-    truth = Robot.shipped("ets7").link(BASE).inertial
-    model = model_of(Guess("truth", truth, 0.01))
-    predictor = predictor_of(model, Swing(START, START, DURATION))
-    goal = plan(predictor, model, target, DURATION)
-    np.testing.assert_allclose(goal, REACHED, atol=1e-6)
-    flight = flight_of(goal, target, DURATION)
-    assert flight.miss < 1e-6
-    # the same path under another base: along the first coordinate, mass and inertia grow by e^0.4
-    wrong = predictor.centre.copy()
-    wrong[0] = 20.0
-    _, tip = predictor_of(model, Swing(START, goal, DURATION), predictor).courses(wrong[None])
-    assert np.linalg.norm(tip.position[0, -1] - target[0]) > 0.005
-    assert predictor.posterior.unknowns.values_at(wrong).inertial[0] == pytest.approx(truth.mass * np.exp(0.4))
+def test_counts_are_judged_together_and_few_decide_nothing():
+    right, wrong, few = Share(190, 200), Share(170, 200), Share(19, 20)
+    assert _verdict([right] * 3) is Verdict.PASS
+    assert _verdict([right, wrong, right]) is Verdict.FAIL
+    assert _verdict([few] * 3) is Verdict.OPEN
+    # one of three may lie beyond its own 95 % interval
+    assert _verdict([Share(183, 200), right, right]) is Verdict.PASS
+
+
+def test_a_linear_posterior_is_fitted_as_by_hand():
+    rng = np.random.default_rng(0)
+    jacobian, data = rng.normal(size=(8, 3)), rng.normal(size=8)
+    posterior = SimpleNamespace(size=3, jacobian=lambda z: jacobian, least_squares=lambda z: jacobian @ z - data)
+    z, covariance = fitted(posterior)
+    np.testing.assert_allclose(z, np.linalg.lstsq(jacobian, data, rcond=None)[0], atol=1e-10)
+    np.testing.assert_allclose(covariance, np.linalg.inv(jacobian.T @ jacobian), atol=1e-10)
 
 
 @pytest.mark.usefixtures("slow")
-def test_regions_about_guesses_hold_the_truth_and_a_store_keeps_them(tmp_path):
-    flight = flight_of(REACHED, fly(Swing(START, REACHED, DURATION)).tip, DURATION)
-    options = {"guesses": 4, "draws": 40, "seed": 2, "store": tmp_path / "trials.jsonl"}
-    (narrow,) = calibrate(flight, DURATION, [0.02], **options)
-    assert all(held >= 2 for held in (*narrow.held["base"], *narrow.held["tip"]))
-    lines = []
-    assert calibrate(flight, DURATION, [0.02], **options, progress=lines.append) == (narrow,)
-    assert lines == []
+def test_a_plan_hits_with_the_true_ship_and_misses_with_the_published_one():
+    planner = Planner(planners_model(0.0))
+    robot = true_ship(np.random.default_rng(1), 0.0)
+    (prior,) = planner.model.priors
+    right = planner.plan(coordinates_of(prior, robot.link(prior.name).inertial))
+    assert miss_of(fly(robot, right)["tip"], planner.target)[0] < 1e-3
+    assert miss_of(fly(robot, planner.first)["tip"], planner.target)[0] > 1.0
+    assert miss_of(fly(mission.ship(), planner.first)["tip"], planner.target)[0] < 1e-3
+
+
+@pytest.mark.usefixtures("slow")
+def test_the_whole_study_small(tmp_path):
+    parameters = mission.splines(2).centre + 0.3 * np.random.default_rng(3).normal(size=12)
+    result = run(parameters, seed=2, ships=4)
+    for own in result.rows.values():
+        assert np.all(own.miss[:, 1, 0] < own.miss[:, 0, 0])
+    write_report(result, tmp_path / "report.pdf")
+    assert broken_rules(tmp_path / "report.pdf", full=False) == []
+    assert {goal.verdict for goal in goals(result)[:4]} == {Verdict.OPEN}  # four ships decide nothing
+    (row, own), *_ = result.rows.items()
+    wrong = replace(result, rows={row: replace(own, held=np.repeat(np.zeros_like(own.held), 10, axis=0))})
+    assert goals(wrong)[0].verdict is Verdict.FAIL

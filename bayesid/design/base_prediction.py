@@ -98,7 +98,7 @@ class BasePredictor:
         self.name, self.tip_frame = manoeuvre.recording.name, tip_frame or last_link(model.robot)
         planned = replace(manoeuvre, recording=_planned(manoeuvre.recording), motion=_Exact(manoeuvre.motion))
         if like is None:
-            self.posterior = Posterior.of(replace(model.without_torque, sensors=(ATTITUDE,)), [planned])
+            self.posterior = Posterior.of(_moved_alone(model), [planned])
         else:
             self.posterior = with_manoeuvres(like.posterior, [planned])
         self.rate = _first_rate(model, manoeuvre.recording)
@@ -173,6 +173,16 @@ class _Exact:
 
     def __init__(self, motion: Any) -> None:
         self.evaluate = motion.evaluate
+
+
+def _moved_alone(model: Model) -> Model:
+    """Return the model with the sensor of a prediction, without effects on the readings of others alone."""
+    moving = [
+        effect
+        for effect in model.without_torque.effects
+        if not effect.uses("read") or effect.uses("wrench") or effect.uses("momentum")
+    ]
+    return replace(model.without_torque, sensors=(ATTITUDE,), effects=tuple(moving))
 
 
 def _planned(recording: Recording) -> Recording:

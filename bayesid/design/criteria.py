@@ -7,14 +7,17 @@ marginalised.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import ClassVar, Protocol
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
 from bayesid.design.plan import Outcome, Plan
 
 __all__ = [
@@ -202,9 +205,14 @@ class Separation:
     ----------
     rivals : tuple of str
         Labels of the effects to distinguish, at least two.
+    visible : tuple of tuple of tuple of float, optional
+        Orthonormal directions (k, n) of each rival's n amplitudes among which the worst is sought, by default all.
+        `bayesid.design.visible_directions` finds those that a family of manoeuvres can show at all; the others are as
+        small in every manoeuvre, so that a search for the best of them would decide nothing.
     """
 
     rivals: tuple[str, ...]
+    visible: tuple[tuple[tuple[float, ...], ...], ...] | None = None
     name: ClassVar[str] = "separation"
     informed: ClassVar[bool] = True
     draws: int = 0
@@ -215,19 +223,54 @@ class Separation:
                 f"{len(self.rivals)} effects to tell apart", place="design.rivals", remedy="Name at least two"
             )
 
-    def noncentrality(self, plan: Plan, outcome: Outcome) -> Array:
-        """Return lambda (1 - rho^2) of each rival in its worst direction, at the size of its prior, shape (rivals,)."""
+    @property
+    def left_out(self) -> dict[str, int]:
+        """Number of directions of its amplitudes in which no manoeuvre shows a rival, by its label, where any."""
+        pairs = zip(self.rivals, self.visible or (), strict=False)
+        counts = {label: len(directions[0]) - len(directions) for label, directions in pairs}
+        return {label: count for label, count in counts.items() if count}
+
+    def seeing(self, shown: Sequence[Floats], least: float) -> Separation:
+        """Return the criterion restricted to directions in which the rivals are shown.
+
+        Parameters
+        ----------
+        shown : sequence of (n, n) arrays
+            Sum of `unexplained` over some manoeuvres, for each rival.
+        least : float
+            Smallest noncentrality that counts; the direction that is shown best always does.
+        """
+        visible = []
+        for matrix in shown:
+            values, directions = np.linalg.eigh(matrix)
+            kept = directions.T[values >= min(least, values[-1])]
+            visible.append(tuple(tuple(map(float, direction)) for direction in kept))
+        return replace(self, visible=tuple(visible))
+
+    def unexplained(self, plan: Plan, outcome: Outcome) -> list[Array]:
+        """Return for each rival the quadratic form of its amplitudes that is lambda (1 - rho^2), shape (n, n).
+
+        Amplitudes are in standard deviations of their prior.
+        """
         groups = [jnp.asarray(self._coordinates(plan, label), dtype=int) for label in self.rivals]
         # no prior on the rivals' amplitudes, because a rival may have any size
         free = jnp.ones(plan.unknowns.size).at[jnp.concatenate(groups)].set(0.0)
         total = outcome.information + _prior(plan, outcome) * jnp.outer(free, free) + 1e-9 * jnp.diag(1.0 - free)
-        values = []
+        forms = []
         for group in groups:
             rest = jnp.setdiff1d(jnp.arange(plan.unknowns.size), group, size=plan.unknowns.size - len(group))
             direct = outcome.information[jnp.ix_(group, group)]
             cross = outcome.information[jnp.ix_(group, rest)]
-            values.append(jnp.linalg.eigvalsh(direct - cross @ _inverse(total[jnp.ix_(rest, rest)]) @ cross.T)[0])
-        return jnp.stack(values)
+            forms.append(direct - cross @ _inverse(total[jnp.ix_(rest, rest)]) @ cross.T)
+        return forms
+
+    def noncentrality(self, plan: Plan, outcome: Outcome) -> Array:
+        """Return lambda (1 - rho^2) of each rival in its worst direction, at the size of its prior, shape (rivals,)."""
+        forms = self.unexplained(plan, outcome)
+        if self.visible is not None:
+            bases = [jnp.asarray(directions) for directions in self.visible]
+            forms = [basis @ form @ basis.T for basis, form in zip(bases, forms, strict=True)]
+        return jnp.stack([jnp.linalg.eigvalsh(form)[0] for form in forms])
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus the logarithm of the smallest square root of a noncentrality."""

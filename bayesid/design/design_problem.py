@@ -168,6 +168,12 @@ class Problem:
         """Return the problem with the knowledge from earlier manoeuvres, without a new compilation."""
         return self._sharing(replace(self, known=known))
 
+    def judged_by(self, criteria: Sequence[Criterion]) -> Problem:
+        """Return the problem with other criteria, whose costs alone are compiled anew."""
+        new = replace(self, criteria=tuple(criteria))
+        new.__dict__.update({key: getattr(self, key) for key in _SHARED if not key.endswith("cost")})
+        return new
+
     def with_encoder(self, encoder: Encoder) -> Problem:
         """Return the problem with the noise of the encoders, without a new compilation."""
         joints = tuple(joint.name for joint in self.plan.model.robot.joints)

@@ -19,6 +19,7 @@ from bayesid.design.predicted_posterior import Encoder, Predicted, planned_manoe
 from bayesid.design.search_store import Store
 from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.design.trajectory_search import Found, Search, optimise
+from bayesid.design.visible_directions import with_visible_directions
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.model import Manoeuvre
 
@@ -192,7 +193,8 @@ def design(
     """Design a manoeuvre by every criterion of a problem.
 
     Each criterion is minimised from many starts, and again from any other manoeuvre that is better by it, until the
-    manoeuvre designed by each criterion is the best by it.
+    manoeuvre designed by each criterion is the best by it. Effects are told apart in the directions that the family's
+    manoeuvres can show (`bayesid.design.visible_directions`).
 
     Parameters
     ----------
@@ -217,12 +219,12 @@ def design(
         If no manoeuvre keeps the limits.
     """
     store = Store.forgetful() if store is None else store
-    problem = problem.with_encoder(encoder)
     count = len(problem.criteria)
-    seeds = np.random.SeedSequence(seed).spawn(2 * count + 1)
+    *seeds, last, visible = np.random.SeedSequence(seed).spawn(2 * count + 2)
+    problem = with_visible_directions(problem.with_encoder(encoder), np.random.default_rng(visible))
     points = {
         criterion.name: problem.points(criterion, np.random.default_rng(own))
-        for criterion, own in zip(problem.criteria, seeds[count:], strict=False)
+        for criterion, own in zip(problem.criteria, seeds[count:], strict=True)
     }
     shares = Shares(part_of(progress, 0.0, SEARCHING), count)
 
@@ -244,7 +246,7 @@ def design(
     problem.compile()
     found = each(search_by, count, search.executor)
     found = _consistent(problem, points, found, search, store, part_of(progress, SEARCHING, EVALUATING))
-    streams = seeds[-1].spawn(count)
+    streams = last.spawn(count)
 
     def evaluate_by(index: int) -> Design:
         name, rng = problem.criteria[index].name, np.random.default_rng(streams[index])

@@ -38,6 +38,7 @@ from bayesid.design.search_store import Store
 from bayesid.design.simulated_spacecraft import Spacecraft, plan_recording
 from bayesid.design.step_review import Reviewer
 from bayesid.design.trajectory_search import Search
+from bayesid.design.visible_directions import with_visible_directions
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
 from bayesid.inference.wrong_units import refuse_wrong_units
@@ -122,7 +123,8 @@ class Loop:
             If a plan is impossible or a recording does not fit.
         """
         history = History.open(folder, self._key(), reviewed=self.reviewer is not None)
-        problem, model = self.problem, self.problem.plan.model
+        first = with_visible_directions(self.problem, np.random.default_rng([self.seed, 0]))
+        problem, model = first, first.plan.model
         for number in range(1, self.at_most + 1):
             progress((number - 1) / self.at_most, f"step {number}: planning")
             if not self._plan(history, number, problem, progress):
@@ -147,7 +149,7 @@ class Loop:
             if number == len(history.steps) and reached:
                 history.close("reached")
                 return history
-            problem = self.problem.knowing(known_of(self.problem.plan.unknowns, draws))
+            problem = first.knowing(known_of(self.problem.plan.unknowns, draws))
         history.close("at-most")
         return history
 

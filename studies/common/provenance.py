@@ -16,6 +16,9 @@ __all__ = ["MODELS", "processor", "study_origin"]
 ROOT = Path(__file__).resolve().parents[2]
 """Folder of the checkout."""
 
+COUNTS = ("starts", "repeats", "flights", "ships")
+"""Options of single studies that say how much is repeated."""
+
 MODELS = ROOT / "bayesid" / "robot" / "models"
 """Folder of the robots that are shipped."""
 
@@ -36,6 +39,8 @@ def study_origin(name: str, options: argparse.Namespace, inputs: Sequence[Path] 
     flags = [f"--{option}" for option, value in vars(options).items() if value is True]
     words = ["python", "-m", f"studies.{name}", *flags]
     words += [] if seed is None else ["--seed", str(seed)]
+    counts = {key: getattr(options, key, None) for key in COUNTS}
+    words += [word for key, count in counts.items() if count is not None for word in (f"--{key}", str(count))]
     return f"{datetime.now(UTC):%Y-%m-%d}, commit {commit()}, {processor()}. {origin_text(inputs, words, seed)}"
 
 

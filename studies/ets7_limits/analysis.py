@@ -12,6 +12,7 @@ import numpy as np
 from bayesid import White
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.sensors import Noise, StarTracker
 from studies.common import mission
@@ -99,7 +100,7 @@ def read_rows(file: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(stream))
 
 
-def designed_motion(file: Path) -> Motion:
+def designed_motion(file: Path) -> ParameterisedMotion:
     """Return the d-optimal manoeuvre that `studies.excitation` has found, from the table that it wrote."""
     row = next(row for row in read_rows(file) if row["manoeuvre"] == DESIGN)
     names = [name for name in row if name != "manoeuvre"]

@@ -9,7 +9,7 @@ errors realised over repeated flights of an independent simulator. ``python -m s
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,8 @@ from studies.common.command import TRIALS, Command
 from studies.common.monte_carlo import Workers
 from studies.common.repeated_fits import Realised, repeat
 from studies.excitation.cloud import Cloud, random_cloud
-from studies.excitation.contest import Contest, compete
+from studies.excitation.contest import Contest, compete, contest_problem, sparse
+from studies.excitation.saturation import CROWDED, Crowd, crowd_of
 
 __all__ = ["Result", "main", "run"]
 
@@ -40,14 +41,17 @@ class Result:
         Designs that were flown, by name.
     cloud : Cloud
         Random manoeuvres, splines of all joints.
+    crowds : mapping of str to Crowd
+        Searches from many starts by criterion, if there were any.
     search : Search
-        Effort of each search.
+        Effort of each other search.
     full : bool
     """
 
     contest: Contest
     realised: Mapping[str, Realised]
     cloud: Cloud
+    crowds: Mapping[str, Crowd]
     search: Search
     full: bool
 
@@ -57,6 +61,7 @@ def run(
     full: bool = False,
     seed: int = 1,
     search: Search | None = None,
+    starts: int | None = None,
     repeats: int | None = None,
     flown: Sequence[str] = ("d-optimal",),
     random: int | None = None,
@@ -76,6 +81,8 @@ def run(
         Seed of all random numbers.
     search : Search, optional
         Effort of each design.
+    starts : int, optional
+        Number of cheap descents by each of `CROWDED` from which the contest begins, too; none where left out.
     repeats : int, optional
         Number of flights of each design that is flown; 400 in a full run, 100 in a quick one.
     flown : sequence of str
@@ -94,7 +101,12 @@ def run(
     search = search or (FULL if full else QUICK)
     repeats = (400 if full else 100) if repeats is None else repeats
     random = (500 if full else 100) if random is None else random
-    contest = compete(seed, search, full, points, store or Store.forgetful(), progress)
+    store = store or Store.forgetful()
+    problem, crowds = contest_problem(full, points), {}
+    if starts is not None:
+        effort = replace(QUICK, starts=starts)
+        crowds = {item.name: crowd_of(problem, item, seed, effort, store, sparse(progress)) for item in CROWDED}
+    contest = compete(problem, seed, search, [crowd.best for crowd in crowds.values()], store, progress)
     own = contest.designs["d-optimal"].problem
     cloud = random_cloud(own, random, np.random.default_rng(seed))
     realised = {}
@@ -109,7 +121,7 @@ def run(
                 workers=workers,
                 progress=lambda text, name=name: progress(f"{name}: {text}"),  # type: ignore[misc]
             )
-    return Result(contest, realised, cloud, search, full)
+    return Result(contest, realised, cloud, crowds, search, full)
 
 
 COMMAND = Command(
@@ -119,6 +131,7 @@ COMMAND = Command(
     seed=1,
     extra={
         "--repeats": {"type": int, "help": "number of flights of each design that is flown"},
+        "--starts": {"type": int, "help": "number of further descents by (26) and d-optimality"},
         "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
         **TRIALS,
     },
@@ -137,6 +150,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     result = run(
         full=options.full,
         seed=options.seed,
+        starts=options.starts,
         repeats=options.repeats,
         store=store,
         trials=options.trials,

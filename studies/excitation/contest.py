@@ -38,7 +38,7 @@ from studies.common import mission
 from studies.common.ets7 import INTERVAL
 from studies.common.quantities import JUDGED
 
-__all__ = ["Contest", "compete", "paper_problem", "shrunk"]
+__all__ = ["Contest", "compete", "contest_problem", "paper_problem", "shrunk", "sparse"]
 
 FEW: tuple[Criterion, ...] = (Paper26(), Paper26Intended(), ConditionNumber(), DOptimal())
 """Criteria of a quick run: the paper's, the one usual for arms on the ground, and the posterior's volume."""
@@ -89,13 +89,21 @@ class Contest:
         )
 
 
+def contest_problem(full: bool, points: int) -> Problem:
+    """Return the problem in which the criteria compete, with all of them or few and so many free control points."""
+    return mission.problem(mission.base_unknown(), mission.splines(points), *(ALL if full else FEW))
+
+
 def compete(
-    seed: int, search: Search, full: bool, points: int, store: Store, progress: Callable[[str], None]
+    problem: Problem,
+    seed: int,
+    search: Search,
+    first: Sequence[Floats],
+    store: Store,
+    progress: Callable[[str], None],
 ) -> Contest:
-    """Design by every criterion; parameters as in `studies.excitation.run`."""
-    known = mission.base_unknown()
-    own = mission.problem(known, mission.splines(points), *(ALL if full else FEW))
-    found = design(own, seed, mission.ENCODERS, search, store=store, progress=_sparse(progress))
+    """Design by every criterion of the problem; ``first`` are manoeuvres from which every search begins, too."""
+    found = design(problem, seed, mission.ENCODERS, search, first=first, store=store, progress=sparse(progress))
     designs = {item.name: item for item in found}
     motions: dict[str, Motion] = {}
     shrink: dict[str, float] = {}
@@ -123,7 +131,7 @@ def _predicted(model: Model, motion: Motion) -> Predicted:
     return predict(planned_posterior(model, [planned_manoeuvre(model, motion, times, "plan", mission.ENCODERS)]))
 
 
-def _sparse(progress: Callable[[str], None]) -> Callable[[float, str], None]:
+def sparse(progress: Callable[[str], None]) -> Callable[[float, str], None]:
     """Return a progress that passes on a line every five percent."""
     told = [-1]
 

@@ -2,193 +2,251 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from scipy.stats import binomtest
 
 from bayesid.design.pose_region import CONTENT
-from bayesid.report import Document, figures, format_quantity
-from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
-from bayesid.report.numbers import format_number, format_vector
-from bayesid.robot.inertial_parameters import mass_com_inertia
-from studies.common.ets7 import ACCEL, BASE, ENCODER, RATE
-from studies.common.report_parts import QUANTITY_TITLES, columns, not_evaluated
-from studies.planning.analysis import Case
-from studies.planning.calibration import Calibration
-from studies.planning.world import EXCITATION, INITIAL_RATE, INTERVAL
+from bayesid.report import Document, figures
+from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
+from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
+from bayesid.report.verdict_record import Share
+from studies.common import mission
+from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, TIP_RATE, TIP_SPEED
+from studies.common.goals import Goal, Verdict
+from studies.common.tables import add_number_table
+from studies.common.template import (
+    Finding,
+    Setup,
+    Statement,
+    Summary,
+    add_first_page,
+    add_setup,
+    add_statements,
+    write_study,
+    write_table,
+)
+from studies.planning import Result
+from studies.planning.ships import BODIES, DRAWS, KINDS, STAGES, Row
+from studies.planning.world import EXCURSION, SPREAD
 
-__all__ = ["Result", "miss_figure", "write_report"]
+__all__ = ["goals", "write_report"]
 
-BODIES = {"base": "base", "tip": "end-effector"}
-"""Bodies whose poses are predicted, with their titles."""
+HEADLINE = next(iter(mission.ROWS))
+"""What is known of the arm in the headline."""
 
+REGIONS = {(0, 0): "base's position", (1, 0): "end-effector's position", (1, 1): "rotation"}
+"""Regions that are counted, by indices of body and kind; base and end-effector turn alike."""
 
-@dataclass(frozen=True)
-class Result:
-    """Outcome of the study.
+RISK = 0.05
+"""Probability with which the counts of one stage are called wrong although all of its regions are right."""
 
-    Attributes
-    ----------
-    cases : mapping of str to Case
-        Cases ``drawn`` and, in a full run, ``paper``.
-    calibration : tuple of Calibration
-        Numbers of regions that hold the truth, for each width of the prior.
-    """
-
-    cases: Mapping[str, Case]
-    calibration: tuple[Calibration, ...]
-
-
-def write_report(result: Result, output: Path) -> None:
-    """Write the report as PDF."""
-    document = Document("What a planner gains by identification", "Section 1.1.1 of Lampariello and Hirzinger (2005)")
-    document.section("Question and answer")
-    document.paragraph(
-        "Joint angles lead to a place in space only through the base, which moves as the arm does. A path planned in "
-        "joint space with wrong inertial parameters therefore ends elsewhere. Here a path of ETS-VII is planned that "
-        "is to bring the end-effector to a pose in orbit axes; an independent simulator (MuJoCo) flies it. Before the "
-        "flight, the prediction says where base and end-effector will end, with 95 % regions. Then the base is "
-        "identified from one recorded manoeuvre, its posterior becomes the prior of the next prediction, and the path "
-        "is planned again."
-    )
-    document.table(
-        ["case", "base", "miss [mm]", "miss [degrees]"],
-        [
-            [case.guess.title, base, format_number(1e3 * flight.miss, 2), format_number(flight.turned, 2)]
-            for case in result.cases.values()
-            for base, flight in (("guessed", case.first), ("identified", case.again))
-        ],
-        "Distance and angle from its target at which the end-effector truly ended, for paths planned with the guessed "
-        "base and with the identified one.",
-        columns("llrr"),
-    )
-    document.figure(miss_figure(result), "The same distances and angles on a logarithmic scale.")
-    for case in result.cases.values():
-        _case(document, case)
-    if len(result.cases) == 1:
-        not_evaluated(document, "The paper's initial guess")
-    _calibration(document, result.calibration)
-    _assumed(document, result)
-    document.write(output)
+NARROW = 0.05
+"""Half width of an interval above which a count decides nothing."""
 
 
-def _case(document: Document, case: Case) -> None:
-    document.section(case.guess.title)
-    document.table(
-        ["path and prior", "body", "error [mm]", "95 % region [mm]", "inside", "error [deg]", "95 % [deg]", "inside"],
-        _pose_rows(case),
-        "Predicted and flown final poses: distance of the predicted mean from the truth, semi-axes of the 95 % "
-        "ellipsoid (of the rotation, the longest), and whether the region holds the truth.",
-        columns("llrrlrrl"),
-    )
-    before, after, _ = (trial.compared("tip")[0] for trial in case.trials)
-    document.figure(
-        figures.final_positions({"guessed base": before}, case.first.flown.tip[0]),
-        "Final position of the end-effector on the first path as predicted before identification: draws and the "
-        "outline of the 95 % ellipsoid, in orbit axes, counted from where it truly ended.",
-    )
-    document.figure(
-        figures.final_positions({"identified base": after}, case.first.flown.tip[0]),
-        "Final position on the same path as predicted with the identified base; the scale differs.",
-    )
-    body, truth, guess = case.identification.bodies[BASE], case.truth.vector, case.guess.body.vector
-    values = zip(
-        QUANTITY_TITLES[:7], mass_com_inertia(truth), mass_com_inertia(guess), body.mean, body.sd, strict=False
-    )
-    document.table(
-        ["base", "true", "guessed", "identified ± standard deviation"],
-        [
-            [title, format_number(float(t), 5), format_number(float(g), 5), format_quantity(float(m), float(s))]
-            for title, t, g, m, s in values
-        ],
-        "The true, the guessed and the identified base; inertias are about the centre of mass.",
-        columns("lrrr"),
-    )
-    for sentence in case.identification.disagreements:
-        document.paragraph(sentence)
-    document.paragraph(
-        "The joint goals of the second path differ from those of the first by up to "
-        f"{np.degrees(np.abs(case.again.goal - case.first.goal).max()):.2g} degrees."
-    )
+def _verdict(shares: list[Share]) -> Verdict:
+    """Judge the counts of one stage together: each is tested with its part of `RISK`."""
+    values = [binomtest(share.count, share.total, CONTENT).pvalue for share in shares]
+    if min(values) < RISK / len(values):
+        return Verdict.FAIL
+    widths = [high - low for low, high in (share.interval for share in shares)]
+    return Verdict.PASS if max(widths) <= 2.0 * NARROW else Verdict.OPEN
 
 
-def _pose_rows(case: Case) -> list[list[str]]:
+def goals(result: Result) -> tuple[Goal, ...]:
+    """Return the goals of the study with what was reached."""
     rows = []
-    for trial in case.trials:
-        for body, title in BODIES.items():
-            pose, flown = trial.compared(body)
-            distance, angle = trial.errors(body)
-            place, turn = ("yes" if inside else "no" for inside in pose.holds(*flown))
-            axes = " / ".join(format_number(float(value), 2) for value in pose.millimetres.semi_axes)
-            longest = format_number(float(pose.degrees.semi_axes[0]), 2)
-            cells = [format_number(distance, 2), axes, place, format_number(angle, 2), longest, turn]
-            rows.append([trial.title, title, *cells])
-    return rows
+    for row, own in result.rows.items():
+        for stage, title in enumerate(STAGES):
+            shares = {text: own.share(stage, *index) for index, text in REGIONS.items()}
+            reached = "; ".join(f"{text} {share}" for text, share in shares.items())
+            text = f"Regions of the {title} hold what they state, {format_percent(CONTENT)}, {row}"
+            rows.append(Goal(text, reached, _verdict(list(shares.values()))))
+    for row, own in result.rows.items():
+        smaller = Share(int((own.miss[:, 1] < own.miss[:, 0]).all(axis=1).sum()), len(own.miss))
+        text = f"The plan with the identified ship misses less, position and rotation, {row}"
+        rows.append(Goal(text, str(smaller), Verdict.of(smaller.interval[0] > 0.5)))
+    speed, rate = result.course.largest("tip_speed"), result.course.largest("tip_rate")
+    reached = f"{format_number(1e3 * speed)} mm/s and {format_number(float(np.degrees(rate)), 2)} degrees per second"
+    kept = Verdict.of(speed <= TIP_SPEED and rate <= TIP_RATE)
+    rows.append(Goal("The planned path keeps the flight's rule in MuJoCo", reached, kept))
+    return tuple(rows)
 
 
-def _calibration(document: Document, calibration: Sequence[Calibration]) -> None:
-    document.section("Do the regions hold the truth?")
-    count, expected = calibration[0].guesses, CONTENT * calibration[0].guesses
-    document.paragraph(
-        f"The first path was predicted again for {count} guesses of the base, each such that the truth is a draw of "
-        f"the prior about it, with {calibration[0].draws} draws of each. Of {count} regions {expected:.0f} ± "
-        f"{np.sqrt(expected * (1.0 - CONTENT)):.1f} should hold the truth. The regions have the "
-        "proportions of the draws' covariance and are as large as the draws want, since the tails of final poses are "
-        "heavier than normal under the wide prior."
+def _median(row: Row, stage: int, kind: int) -> str:
+    return format_number(float(np.median(row.miss[:, stage, kind])), 2)
+
+
+def write_report(result: Result, output: Path, origin: str | None = None) -> None:
+    """Write the report as PDF, and its tables beside it."""
+    document = Document("What a planner gains by identification", "ETS-VII in MuJoCo; section 1.1.1 of the paper")
+    own = result.rows[HEADLINE]
+    held = [own.share(stage, 1, 0) for stage in range(len(STAGES))]
+    summary = Summary(
+        question="How far from its target does a path planned in joint space end, before and after identification?",
+        answer=(
+            f"With the {HEADLINE} the end-effector misses its target by {_median(own, 0, 0)} mm and "
+            f"{_median(own, 0, 1)} degrees in the median before identification and by {_median(own, 1, 0)} mm and "
+            f"{_median(own, 1, 1)} degrees after one manoeuvre; the predicted 95 % region of its position holds it in "
+            f"{held[0]} and {held[1]} of the flights."
+        ),
+        goals=goals(result),
+        valid=(
+            "the joints follow the plan exactly, nothing but the gravity gradient acts, and every path starts at rest."
+        ),
+        full=result.full,
     )
-    document.table(
-        ["width of the prior", "body", "position held", "rotation held"],
+    add_first_page(
+        document,
+        summary,
+        _miss_figure(result),
+        "Miss of the end-effector, distance from its target and angle, over the drawn ships: share of the ships below "
+        "a value. Solid: arm known to 5 %; dashed: arm known exactly.",
+    )
+    add_setup(document, _setup(result))
+    _failures(document, result)
+    _evidence(document, result)
+    add_statements(document, _statements(result))
+    tables = _write_tables(result, output)
+    document.paragraph(f"Tables beside this report: {', '.join(tables)}.")
+    write_study(document, summary, output, origin)
+
+
+def _setup(result: Result) -> Setup:
+    counts = ", ".join(f"{len(own.miss)} with the {row}" for row, own in result.rows.items())
+    return Setup(
+        robot=(
+            f"ETS-VII, its base drawn within {format_percent(2.0 * SPREAD)} of its mass and its links within 5 %; "
+            f"joints within ±{mission.REACH:g} rad, wrist extended at the start."
+        ),
+        manoeuvre=(
+            f"Identifying: the d-optimal manoeuvre of the study of excitation, {mission.DURATION:g} s within 50 mm/s "
+            "and 5 degrees per second. Planned: quintics from rest to rest in the same time, with joint excursions of "
+            f"{format_vector(EXCURSION, 2)} rad at first, at {format_number(1e3 * result.course.largest('tip_speed'))} "
+            "mm/s at most."
+        ),
+        sensors=(
+            f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with {format_number(ACCEL)} "
+            f"m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant bias of the accelerometer."
+        ),
+        known="The orbit and its gravity gradient, the attitude at the start, and the ship as it was published.",
+        unknown=(
+            f"The base and the links within these widths, the rate at the start, the bias within {format_number(BIAS)} "
+            "m/s²."
+        ),
+        replicates=(
+            f"Drawn ships: {counts}, each with noise and bias of its own. Each prediction has {DRAWS} draws; "
+            "posteriors are normal in log-Cholesky coordinates about the mode."
+        ),
+    )
+
+
+def _failures(document: Document, result: Result) -> None:
+    document.section("Calibration and failures")
+    texts = []
+    for row, own in result.rows.items():
+        mean, error = own.distance.mean(), own.distance.std(ddof=1) / np.sqrt(len(own.distance))
+        outside = int((~own.held[:, 1, 1, 0]).sum())
+        texts.append(
+            f"{row.capitalize()}: the squared distance of the true base from the identified one is "
+            f"{format_fixed(float(mean), 1)} ± {format_fixed(float(error), 1)} where 10 are expected; after "
+            f"identification {outside} of {len(own.held)} regions of the end-effector's position do not hold the "
+            f"flown one, where {format_fixed((1.0 - CONTENT) * len(own.held), 1)} are due."
+        )
+    texts.append(
+        "The regions have the proportions of the draws' covariance and are as large as the draws want. The truth is a "
+        "draw of what the planner holds possible; a prior that is too narrow was not tried."
+    )
+    document.items(texts)
+
+
+def _evidence(document: Document, result: Result) -> None:
+    document.section("Evidence")
+    cells = []
+    for row, own in result.rows.items():
+        for stage, title in enumerate(STAGES):
+            misses = [
+                format_number(float(np.quantile(own.miss[:, stage, kind], part)), 2)
+                for kind in range(len(KINDS))
+                for part in (0.5, 0.95)
+            ]
+            sizes = [format_number(float(np.median(own.size[:, stage, 1, kind])), 2) for kind in range(len(KINDS))]
+            counts = [f"{own.held[:, stage, body, kind].sum()} of {len(own.held)}" for body, kind in REGIONS]
+            cells.append([row.removeprefix("arm "), title, *misses, *sizes, *counts])
+    add_number_table(
+        document,
         [
-            [f"{100.0 * item.spread:g} %", title, *(f"{number} of {count}" for number in item.held[body])]
-            for item in calibration
-            for body, title in BODIES.items()
+            "arm",
+            "planned with",
+            "miss [mm]",
+            "95 %",
+            "[degrees]",
+            "95 %",
+            "region [mm]",
+            "[degrees]",
+            *(f"held, {text}" for text in ("base", "end-effector", "rotation")),
         ],
-        "Number of the 95 % regions before identification that hold the pose that was flown.",
-        columns("llrr"),
+        cells,
+        "Miss of the end-effector, median and 95 % quantile over the ships; longest semi-axis of the predicted 95 % "
+        "regions of its pose, median; number of regions that held the flown pose: position of the base, position of "
+        "the end-effector, rotation.",
+        words=2,
     )
+    first, again = result.example
+    for trip, title in ((first, STAGES[0]), (again, STAGES[1])):
+        document.figure(
+            figures.final_positions({title: trip.predicted["tip"]}, trip.flown["tip"][0]),
+            f"One ship, planned with the {title}: draws of the end-effector's final position and the outline of their "
+            "95 % ellipsoid, counted from where it truly ended.",
+        )
+
+
+def _statements(result: Result) -> list[Statement]:
+    own = result.rows[HEADLINE]
+    gain = float(np.median(own.miss[:, 0, 0] / own.miss[:, 1, 0]))
+    return [
+        Statement(
+            "A path planned in joint space for a final state in inertial space ends wrong if the parameters are "
+            "(1.1.1).",
+            Finding.CONFIRMED if np.median(own.miss[:, 0, 0]) > 1.0 else Finding.REFUTED,
+            f"With the base known to {format_percent(2.0 * SPREAD)} the median miss is {_median(own, 0, 0)} mm.",
+        ),
+        Statement(
+            "Identification has to be performed before any operational phase (1.1.1).",
+            Finding.CONFIRMED if gain > 2.0 else Finding.REFUTED,
+            f"One manoeuvre makes the miss {format_number(gain, 2)} times smaller in the median. What miss an "
+            "operation allows is not stated.",
+        ),
+    ]
+
+
+def _write_tables(result: Result, output: Path) -> list[str]:
+    header = ["arm", "ship", "planned with", "miss [mm]", "miss [degrees]"]
+    header += [f"{body} {kind} held" for body in BODIES for kind in KINDS]
+    lines = [
+        [row, ship, title, *map(float, own.miss[ship, stage]), *map(int, own.held[ship, stage].ravel())]
+        for row, own in result.rows.items()
+        for ship in range(len(own.miss))
+        for stage, title in enumerate(STAGES)
+    ]
+    return [write_table(output, "ships", header, lines)]
 
 
 @styled
-def miss_figure(result: Result) -> Figure:
-    """Draw the true miss of the end-effector before and after identification."""
-    figure = wide_figure(2.2)
-    panels = figure.subplots(1, 2)
-    cases = list(result.cases.values())
-    place = np.arange(len(cases))
-    for axes, unit, scale, key in ((panels[0], "mm", 1e3, "miss"), (panels[1], "degrees", 1.0, "turned")):
-        for shift, (label, attribute) in enumerate((("guessed", "first"), ("identified", "again"))):
-            values = [scale * float(getattr(getattr(case, attribute), key)) for case in cases]
-            axes.bar(place + 0.36 * (shift - 0.5), values, 0.32, color=COLOURS[shift], label=label)
-        axes.set_yscale("log")
-        axes.set_xticks(place, [case.guess.title.replace("initial ", "initial\n") for case in cases])
-        axes.set_ylabel(f"miss [{unit}]")
-        axes.grid(visible=False, axis="x")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, [f"planned with the {label} base" for label in labels], loc="outside upper center", ncols=2)
+def _miss_figure(result: Result) -> Figure:
+    figure = wide_figure(2.3)
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, kind, unit in zip(panels, range(2), ("mm", "degrees"), strict=True):
+        for (row, own), line in zip(result.rows.items(), ("-", "--"), strict=True):
+            for stage, title in enumerate(STAGES):
+                values = np.sort(own.miss[:, stage, kind])
+                share = np.arange(1, len(values) + 1) / len(values)
+                label = title if row == HEADLINE else None
+                axes.plot(values, share, line, color=COLOURS[stage], label=label)
+        axes.set(xscale="log", xlabel=f"miss [{unit}]")
+    panels[0].set_ylabel("share of ships")
+    shared_legend(figure, panels[0], len(STAGES))
     return figure
-
-
-def _assumed(document: Document, result: Result) -> None:
-    document.section("Assumptions")
-    case = next(iter(result.cases.values()))
-    document.items(
-        [
-            "The real robot is ETS-VII with the base of the paper and a nominal arm, in MuJoCo, with gravity gradient "
-            "on every body. The planner knows the arm exactly, but not the base.",
-            "A guess is drawn such that the truth is a draw of the planner's prior about it, normal in log-Cholesky "
-            "coordinates. The paper's initial guess has a prior of relative width one, under which final positions "
-            "are far from normal: its ellipsoid before identification is only a rough picture.",
-            f"The target of the end-effector is {format_vector(case.target[0])} m from where the base started, in "
-            "orbit axes, with an attitude; it is where one true flight ended, so that it can be reached. Joints move "
-            f"from rest to rest on quintics within {case.trials[0].prediction.base.time[-1]:g} s; the planner "
-            "determines their goals by least squares.",
-            f"Identification is by emcee from {EXCITATION.duration:.0f} s of joints 1 to 3, with sensors read every "
-            f"{INTERVAL:g} s with {format_number(RATE)} rad/s, {format_number(ACCEL)} m/s² and "
-            f"{format_number(ENCODER)} rad of white noise. The true initial rate of about "
-            f"{format_number(INITIAL_RATE)} rad/s is unknown. Predicted paths start at rest.",
-            "No external force acts, so that the centre of mass rests.",
-        ]
-    )

@@ -1,4 +1,4 @@
-"""What is real, flown by an independent simulator, and what the planner takes for granted."""
+"""The path that is planned, what the planner takes for granted, and how MuJoCo flies the true ship."""
 
 from __future__ import annotations
 
@@ -7,63 +7,25 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bayesid import BodyPrior, Excitation, InertialParameters, Manoeuvre, Model
+from bayesid import Model, Robot
 from bayesid._math.arrays import Floats
+from bayesid.robot.body_prior import draw_inertial
 from bayesid.robot.joint_state import JointState
-from studies.base_body import paper
-from studies.common import flight
-from studies.common.ets7 import BASE, TIP, ets7
-from studies.common.ets7_model import NOISE, orbiting_model
+from studies.common import mission
+from studies.common.ets7 import BASE, TIP
 from studies.common.flight import prescribed, true_robot
-from studies.common.guesses import guess_about
 from studies.truth.numerics import quintic_step
 
-__all__ = ["Flown", "FlownPose", "Guess", "Swing", "drawn_guess", "fly", "measure", "model_of", "paper_guess"]
+__all__ = ["EXCURSION", "SPREAD", "FlownPose", "Swing", "fly", "planners_model", "true_ship"]
 
 FlownPose = tuple[Floats, Floats]
 """Position (3,) [m] and quaternion x, y, z, w to orbit axes, counted in orbit axes from where the base started."""
 
-INTERVAL = 0.5
-"""Time between samples of all sensors [s]."""
+EXCURSION = np.array([1.3, -1.5, 0.6, 0.5, -0.7, 0.6])
+"""Excursion of the joints in the first plan [rad], whose end is the target if the ship is as it was published."""
 
-EXCITATION = Excitation(
-    offset=np.array([0.6, -2.2, 0.1, 0.0, 0.0, 0.0]),
-    amplitude=np.array([-0.9, -0.2, -0.6, 0.0, 0.0, 0.0]),
-    frequency=0.2,
-)
-"""Manoeuvre that is flown to identify the base."""
-
-INITIAL_RATE = 1e-4
-"""Standard deviation of the true initial rate of that manoeuvre about each axis [rad/s]."""
-
-ATTITUDE = Rotation.from_euler("xyz", [0.4, -0.3, 0.8]).as_quat()
-"""Attitude of the base when the planned path starts, a quaternion from base to orbit axes."""
-
-DURATION = 60.0
-"""Duration of the planned path [s]."""
-
-SPREAD, FAR = 0.15, 1.0
-"""Relative widths of the priors about a drawn guess and about the paper's, in log-Cholesky coordinates."""
-
-STEP = 0.1
-"""Integration step of MuJoCo [s]."""
-
-
-@dataclass(frozen=True)
-class Guess:
-    """Base as the planner takes it, with the relative width of its prior."""
-
-    title: str
-    body: InertialParameters
-    spread: float
-
-
-@dataclass(frozen=True)
-class Flown:
-    """Final poses of base and end-effector."""
-
-    base: FlownPose
-    tip: FlownPose
+SPREAD = 0.15
+"""Relative width of the planner's prior of the base: its mass is then known to 30 %."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +42,7 @@ class Swing:
 
     start: Floats
     goal: Floats
-    duration: float
+    duration: float = mission.DURATION
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,)."""
@@ -89,34 +51,21 @@ class Swing:
         return JointState(self.start + value, slope / self.duration, bend / self.duration**2)
 
 
-def drawn_guess(seed: int) -> Guess:
-    """Draw a guess of the base such that the truth is a draw of the prior about it."""
-    body = guess_about(ets7().link(BASE).inertial, SPREAD, np.random.default_rng(seed))
-    return Guess(f"Base guessed to {100.0 * SPREAD:g} %", body, SPREAD)
+def planners_model(arm_spread: float) -> Model:
+    """Return what the planner holds possible: the ship as published, its base to `SPREAD`, the arm to a width."""
+    return mission.base_unknown(arm_spread, base_spread=SPREAD)
 
 
-def paper_guess() -> Guess:
-    """Return the paper's initial guess, section 4.1."""
-    return Guess("The paper's initial guess", paper.body(paper.GUESS), FAR)
+def true_ship(rng: np.random.Generator, arm_spread: float) -> Robot:
+    """Draw the true ship from what the planner holds possible."""
+    robot = mission.true_arm(mission.ship(), rng, arm_spread)
+    return robot.with_inertial(BASE, draw_inertial(robot.link(BASE).inertial, SPREAD, rng))
 
 
-def model_of(guess: Guess) -> Model:
-    """Return the model of the planner: the arm is known, the base is not."""
-    return orbiting_model(ets7().with_inertial(BASE, guess.body), [BodyPrior(BASE, guess.body, guess.spread)])
-
-
-def fly(swing: Swing) -> Flown:
-    """Fly a planned path from rest and return the final poses."""
-    model, end = true_robot(ets7()), [swing.duration]
-    truth = model.run(prescribed(swing, end, STEP), end, attitude0=ATTITUDE, step=STEP)
+def fly(robot: Robot, swing: Swing) -> dict[str, FlownPose]:
+    """Fly a path from rest and return the final poses of ``base`` and ``tip``."""
+    model, end = true_robot(robot), [swing.duration]
+    truth = model.run(prescribed(swing, end, mission.TRUTH_STEP), end, step=mission.TRUTH_STEP)
     body = model.data.body(TIP)
     tip = Rotation.from_matrix(np.array(body.xmat).reshape(3, 3)).as_quat()
-    return Flown((np.array(model.data.qpos[:3]), truth.attitude[-1]), (np.array(body.xpos), tip))
-
-
-def measure(seed: int) -> Manoeuvre:
-    """Fly the identifying manoeuvre and record it with noise."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, EXCITATION.duration, INTERVAL)
-    truth = flight.fly(ets7(), EXCITATION, time, rate=INITIAL_RATE * rng.standard_normal(3), step=STEP)
-    return flight.record(truth, "identification", ets7(), NOISE, rng)
+    return {"base": (np.array(model.data.qpos[:3]), truth.attitude[-1]), "tip": (np.array(body.xpos), tip)}

@@ -23,6 +23,9 @@ from studies.separating.manoeuvres import Designed, design_both, separating_prob
 
 __all__ = ["Result", "main", "run"]
 
+FLIGHTS = 400
+"""Number of sets of flights for each cause in a full run."""
+
 FULL, QUICK = Search(), Search(starts=3, iterations=60)
 """Effort of each search of a full and of a quick run."""
 
@@ -73,7 +76,7 @@ def run(
     Parameters
     ----------
     full : bool
-        True for the default effort of each search and 400 flights for each truth.
+        True for the default effort of each search and `FLIGHTS` sets of flights for each truth.
     seed : int
         Seed of all random numbers.
     points : int
@@ -90,23 +93,24 @@ def run(
         Receives a line on what is being done.
     """
     search = search or (FULL if full else QUICK)
-    noises = (400 if full else 40) if noises is None else noises
+    noises = (FLIGHTS if full else 40) if noises is None else noises
     designs = design_both(separating_problem(points), seed, search, store or Store.forgetful(), progress)
     motions: dict[str, Motion] = {"first": mission.flight_manoeuvre()}
     motions |= {name: item.motion for name, item in designs.items()}
     known = references(motions)
     expected, directions = expectations(known, seed)
     realised = realise(motions, known, noises, seed, trials, progress)
-    return Result(designs, motions, expected, directions, realised, search, full)
+    return Result(designs, motions, expected, directions, realised, search, full and noises >= FLIGHTS)
 
 
 COMMAND = Command(
     "separating",
     "Tell apart what a first manoeuvre confuses.",
-    full="the default effort of each search, 400 sets of flights for each cause",
+    full=f"the default effort of each search, {FLIGHTS} sets of flights for each cause",
     seed=1,
     extra={
         "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
+        "--flights": {"type": int, "help": "number of sets of flights for each cause"},
         "--trials": TRIALS["--trials"],
     },
 )
@@ -124,6 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     result = run(
         full=options.full,
         seed=options.seed,
+        noises=options.flights,
         store=store,
         trials=options.trials,
         progress=lambda text: print(text, flush=True),

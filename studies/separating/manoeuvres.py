@@ -11,6 +11,7 @@ import numpy as np
 from bayesid.design import DOptimal, Problem, Search, Separation, Store, optimise
 from bayesid.design.design_problem import Known
 from bayesid.design.trajectories import ParameterisedMotion
+from bayesid.design.visible_directions import with_visible_directions
 from studies.common import mission
 from studies.separating.setting import RIVALS, drifting, rival_model
 
@@ -29,11 +30,14 @@ class Designed:
         Largest values of the limited quantities by name.
     motion : ParameterisedMotion
         Motion of the joints.
+    left_out : dict of str to int
+        Number of directions in which no manoeuvre shows a rival and which the criterion leaves out, by its label.
     """
 
     costs: dict[str, float]
     largest: dict[str, float]
     motion: ParameterisedMotion
+    left_out: dict[str, int]
 
 
 def separating_problem(points: int = mission.POINTS) -> Problem:
@@ -50,6 +54,7 @@ def design_both(
     problem: Problem, seed: int, search: Search, store: Store, progress: Callable[[str], None]
 ) -> dict[str, Designed]:
     """Design by both criteria from the same random starts, the second also from the first's best."""
+    problem = with_visible_directions(problem, np.random.default_rng(seed))
     found: list[np.ndarray] = []
     for criterion in problem.criteria:
         kept = store.of(criterion.name)
@@ -69,6 +74,7 @@ def design_both(
             costs=problem.costs(best),
             largest={item.name: item.largest for item in problem.reached(best)},
             motion=problem.plan.family.motion(best),
+            left_out=criterion.left_out if isinstance(criterion, Separation) else {},
         )
         for criterion, best in zip(problem.criteria, found, strict=True)
     }

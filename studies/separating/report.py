@@ -161,6 +161,7 @@ def _setup(result: Result) -> Setup:
         manoeuvre=(
             f"{mission.DURATION:g} s each: first the flight's own, then quintic splines of all joints, at the 50 mm/s "
             "and 5 degrees per second of the flight's rule."
+            f"{_left_out(result)}"
         ),
         sensors=(
             f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with {format_number(ACCEL)} "
@@ -179,6 +180,13 @@ def _setup(result: Result) -> Setup:
             "plan."
         ),
     )
+
+
+def _left_out(result: Result) -> str:
+    """Return which directions the separating manoeuvre was not designed for, for a sentence."""
+    left_out = result.designs["separation"].left_out
+    parts = [f"{count} of the {NAMES[label]}" for label, count in left_out.items()]
+    return f" Directions that no manoeuvre shows do not count in its design: {', '.join(parts)}." if parts else ""
 
 
 def _failures(document: Document, result: Result) -> None:

@@ -40,7 +40,7 @@ MEANING: Mapping[str, str] = {
     "information-gain": "The largest expected gain of information on the bodies, averaged over draws of their prior "
     "instead of taken at its centre.",
     "separation": "The largest expected log Bayes factor between the rival effects, each in the direction of its "
-    "amplitudes that shows least, with everything else unknown.",
+    "amplitudes that shows least, with everything else unknown. Directions that no manoeuvre shows are left out.",
 }
 """Meaning of each criterion, by its name."""
 
@@ -98,12 +98,14 @@ def separation_sentence(design: Design) -> str:
         raise ValueError(f"{design.name} was not designed to tell effects apart")
     noncentrality = float(np.exp(-2.0 * design.costs[criterion.name]))
     share = float(np.sqrt(noncentrality_for(SURE) / noncentrality))
+    unseen = [f"{count} of {label}" for label, count in criterion.left_out.items()]
+    rest = f" Directions of the amplitudes that no manoeuvre shows are left out: {joined(unseen)}." if unseen else ""
     return (
         f"{design.name} tells {joined(criterion.rivals)} apart: of the size of their priors, the least distinct has a "
         f"signal-to-noise ratio of {format_number(float(np.sqrt(noncentrality)))} that no other can imitate. Of two "
         f"causes that are equally probable before, the right one is expected to have a probability of "
         f"{format_number(SURE)} afterwards if its size is {format_percent(share, 2)} of its prior's, and "
-        f"{format_number(expected_probability(0.25 * noncentrality_for(SURE)))} if half of that."
+        f"{format_number(expected_probability(0.25 * noncentrality_for(SURE)))} if half of that.{rest}"
     )
 
 

@@ -1,0 +1,75 @@
+"""What more starts of a search are worth: the best of n among N descents from random starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import hypergeom
+
+from bayesid._io.progress import Progress
+from bayesid._math.arrays import Floats
+from bayesid.design import Criterion, DOptimal, Paper26, Problem, Search, Store, optimise
+
+__all__ = ["CROWDED", "Crowd", "crowd_of"]
+
+CROWDED: tuple[Criterion, ...] = (Paper26(), DOptimal())
+"""Criteria whose searches begin at many starts: the two whose ratio is a goal."""
+
+
+@dataclass(frozen=True)
+class Crowd:
+    """Descents by one criterion from N random starts.
+
+    Attributes
+    ----------
+    best : (n,) array
+        Parameters of the best manoeuvre, once the best descents were followed to the end.
+    cost : float
+        Its cost.
+    costs : (N,) array
+        Costs at which the first descents ended, in the order of their starts.
+    """
+
+    best: Floats
+    cost: float
+    costs: Floats
+
+    def share_of_best(self, count: int) -> Floats:
+        """Return for each descent, the best first, the probability that it is the best of ``count`` drawn of all."""
+        total = len(self.costs)
+        beyond = hypergeom.sf(0, total, np.arange(total + 1), count)  # that one of the k best is among them
+        return np.diff(beyond)
+
+    def expected(self, count: int) -> float:
+        """Return the mean cost of the best of ``count`` descents drawn of all."""
+        return float(self.share_of_best(count) @ np.sort(self.costs))
+
+    def chance(self, count: int, within: float) -> float:
+        """Return the probability that the best of ``count`` of the descents costs at most so much more than the best.
+
+        Parameters
+        ----------
+        count : int
+            Number of descents drawn of all.
+        within : float
+            Difference of the cost.
+        """
+        good = int((self.costs <= self.costs.min() + within).sum())
+        return float(hypergeom.sf(0, len(self.costs), good, count))
+
+
+def crowd_of(
+    problem: Problem, criterion: Criterion, seed: int, search: Search, store: Store, progress: Progress
+) -> Crowd:
+    """Search by a criterion of the problem from many starts; an interrupted search goes on from the store.
+
+    The starts are those of `bayesid.design.design` with the same seed, and more.
+    """
+    kept = store.of(f"{search.starts} starts.{criterion.name}")  # which descents are followed depends on their number
+    index = problem.criteria.index(criterion)
+    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(index + 1)[index])
+    found = optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=progress)
+    descents: Sequence[tuple[Floats, float, int] | None] = [kept.known(f"0.{k}") for k in range(search.starts)]
+    return Crowd(found.parameters, found.cost, np.array([item[1] for item in descents if item is not None]))
