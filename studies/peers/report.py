@@ -1,0 +1,398 @@
+"""Report of the contests with peers."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bayesid._math.arrays import Floats
+from bayesid.report import Document
+from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
+from bayesid.report.numbers import format_signed
+from studies.common.command import TRIALS, Command
+from studies.common.goals import Goal, Verdict
+from studies.common.monte_carlo import read_store, run_trials
+from studies.common.provenance import study_origin
+from studies.common.tables import add_number_table
+from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
+from studies.peers.contest import EFFECTIVE, LIMIT, NESTED, REFERENCE, attempt, tasks
+from studies.peers.density import CASES
+from studies.peers.samplers import ADAPTATION, BROAD, CHAINS, LIVE, Sampler
+from studies.peers.task import Recipe, lines
+
+__all__ = ["Made", "goals_of", "main", "read", "write_report"]
+
+FASTER = 5.0
+"""Smallest wanted ratio of the best peer's time to the package's."""
+
+EVIDENCE = 0.1
+"""Largest wanted error of the log evidence."""
+
+LEAST = 0.25
+"""Share of the wanted samples from which on the time to all of them is extrapolated; adaptation outweighs fewer."""
+
+SIGMAS = 1.96
+"""Half width of a 95 % interval in standard deviations."""
+
+PACKAGES = ("emcee", "numpyro", "dynesty", "nautilus-sampler", "jax", "scipy", "pin", "mujoco")
+"""Packages whose versions are stated."""
+
+TITLES = {Recipe.BAYESID: "bayesid: diagnose, identify", Recipe.SCIPY: "SciPy around Pinocchio"}
+"""Recipes in words."""
+
+Made = Sequence[Mapping[str, Any]]
+"""Trials that were made: ``task`` and ``result``."""
+
+COMMAND = Command(
+    "peers",
+    "Compare the package with what its users would use instead.",
+    full="every case, every sampler and every recipe",
+    seed=1,
+    extra={**TRIALS, "--made": {"action": "store_true", "help": "report the trials made so far, make no more"}},
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the study and write its report."""
+    options = COMMAND.parse(arguments)
+    if options.made:
+        made = read(options.trials)
+    else:
+        planned = tasks(options.full)
+        outcomes = run_trials(
+            attempt,
+            planned,
+            options.trials,
+            seed=options.seed,
+            workers=options.workers,
+            progress=lambda text: print(text, file=sys.stderr),
+        )
+        made = [{"task": task, "result": result} for task, result in zip(planned, outcomes.complete(), strict=True)]
+    write_report(made, options.output, study_origin("peers", options))
+    print(f"Wrote {options.output}.")
+
+
+def read(store: Path) -> Made:
+    """Return the trials of a store."""
+    return [line for line in read_store(store) if "result" in line]
+
+
+def write_report(made: Made, file: Path, origin: str | None = None) -> None:
+    """Write the report as PDF, with its summary and the table of all trials on the density beside it."""
+    planned = len(tasks(full=True))
+    document = Document("Peers", "The package beside what its users would use instead")
+    summary = Summary(
+        question="Is the package ahead of what its users would use instead, on the same density and on the same task?",
+        answer=_answer(made),
+        goals=tuple(goals_of(made)),
+        valid="the density is that of ETS-VII's base from three recordings of 120 s, smooth and with one mode, and its "
+        f"mode is known; {len(made)} of the {planned} trials of the full study were made.",
+        full=len(made) >= planned,
+    )
+    add_first_page(
+        document,
+        summary,
+        time_figure(made),
+        f"Processor time to {EFFECTIVE:,.0f} effective samples against the number of unknowns. Filled: reached; "
+        f"hollow: extrapolated from what was reached in {LIMIT:g} s; triangle: at least, as less than a quarter was "
+        "reached.",
+    )
+    add_setup(document, _setup())
+    document.section("What went wrong")
+    document.items(_failures(made))
+    document.section("On the same density")
+    add_number_table(
+        document,
+        ["unknowns, sampler", "time [s]", "evaluations", "effective", f"time to {EFFECTIVE:,.0f}", "ratio", "evidence"],
+        [row for unknowns in sorted(CASES) for row in _rows(made, unknowns)],
+        f"Processor time and evaluations until the sampler stopped, effective samples, time to {EFFECTIVE:,.0f} of "
+        "them (extrapolated where a quarter or more was reached, else a bound) and its ratio to the package's whole "
+        "time, and the error of the log evidence with the sampler's own standard error. A dash: none given. The "
+        "package's time includes the evidence.",
+    )
+    recipes = _recipe_rows(made)
+    if recipes:
+        document.section("On the same task")
+        add_number_table(
+            document,
+            ["recipe", "studies", "lines", "time [s]", "mass [%]", "moments [%]", "in 95 %", "χ of errors"],
+            recipes,
+            "The base of a robot with three joints from two recordings of 80 s made by MuJoCo: lines that a user "
+            "writes, processor time, mean absolute errors of the mass and of the moments of inertia, true values "
+            "within the stated 95 % intervals (of ten a study), and the root mean square of errors in stated standard "
+            "deviations, 1 where the intervals are right.",
+        )
+    packages = ", ".join(f"{name} {_version(name)}" for name in PACKAGES)
+    write_table(
+        file,
+        "density",
+        ["unknowns", "sampler", "seconds", "evaluations", "gradients", "effective samples", "log evidence", "error"],
+        [
+            [item["task"]["unknowns"], item["task"]["sampler"]]
+            + [item["result"][key] for key in ("seconds", "evaluations", "gradients", "effective_samples")]
+            + [item["result"]["log_evidence"], item["result"]["log_evidence_error"]]
+            for item in made
+            if "unknowns" in item["task"]
+        ],
+    )
+    write_study(document, summary, file, None if origin is None else f"{origin} With {packages}.")
+
+
+def goals_of(made: Made) -> list[Goal]:
+    """Return the goals: speed and evidence by number of unknowns, then those of the task."""
+    goals = []
+    for unknowns in sorted(CASES):
+        own, peers = _found(made, unknowns, Sampler.OURS), _peers(made, unknowns)
+        text = f"{FASTER:g} times less time than the best peer, {unknowns} unknowns"
+        if own is None or not peers:
+            goals.append(Goal(text, "not run", Verdict.NOT_TESTED))
+            continue
+        ratios = {name: _needed(result) / own["seconds"] for name, result in peers.items()}
+        best = min(ratios, key=lambda name: ratios[name])
+        wanted = [name for name in list(Sampler)[1:] if unknowns <= NESTED or name not in _NESTED]
+        missing = [name for name in wanted if name not in peers]
+        reached = f"{'more than ' if _is_bound(peers[best]) else ''}{ratios[best]:.1f} ({best})"
+        if missing:
+            reached += f"; not run: {' / '.join(missing)}"
+        below = [name for name, ratio in ratios.items() if ratio < FASTER]
+        failed = any(not _is_bound(peers[name]) for name in below)
+        verdict = Verdict.FAIL if failed else Verdict.OPEN if below or missing else Verdict.PASS
+        goals.append(Goal(text, reached, verdict))
+    for unknowns in sorted(CASES):
+        error = _evidence_error(made, unknowns, Sampler.OURS)
+        text = f"log evidence within {EVIDENCE:g} of a long reference, {unknowns} unknowns"
+        if error is None:
+            goals.append(Goal(text, "not run", Verdict.NOT_TESTED))
+        else:
+            goals.append(Goal(text, f"{abs(error[0]):.3f} ± {error[1]:.3f}", Verdict.of(abs(error[0]) <= EVIDENCE)))
+    return [*goals, *_task_goals(made)]
+
+
+_NESTED = (Sampler.DYNESTY, Sampler.NAUTILUS)
+
+
+def _task_goals(made: Made) -> list[Goal]:
+    goals = []
+    for hidden, words in ((False, "nothing hidden"), (True, "wheels hidden")):
+        text = f"stated 95 % intervals hold the truth, {words}"
+        errors = _errors(made, Recipe.BAYESID, hidden)
+        if not len(errors):
+            goals.append(Goal(text, "not run", Verdict.NOT_TESTED))
+            continue
+        inside, total = int((np.abs(errors) < SIGMAS).sum()), errors.size
+        peer = _errors(made, Recipe.SCIPY, hidden)
+        other = f"; SciPy {int((np.abs(peer) < SIGMAS).sum())} of {peer.size}" if len(peer) else ""
+        # errors of one study depend on each other: a share is decided by studies, and few cannot decide
+        verdict = Verdict.FAIL if inside < 0.5 * total else Verdict.OPEN
+        goals.append(Goal(text, f"{inside} of {total} in {len(errors)} studies{other}", verdict))
+    return goals
+
+
+def _answer(made: Made) -> str:
+    parts = []
+    ratios = {}
+    for unknowns in sorted(CASES):
+        own, peers = _found(made, unknowns, Sampler.OURS), _peers(made, unknowns)
+        if own is not None and peers:
+            best = min(peers.values(), key=_needed)
+            ratios[unknowns] = f"{'more than ' if _is_bound(best) else ''}{_needed(best) / own['seconds']:.1f}"
+    if ratios:
+        parts.append(
+            f"On the same density the best peer run takes {', '.join(ratios.values())} times the package's time with "
+            f"{', '.join(map(str, ratios))} unknowns"
+        )
+    errors = [_evidence_error(made, unknowns, Sampler.OURS) for unknowns in CASES]
+    known = [abs(error[0]) for error in errors if error is not None]
+    if known:
+        parts.append(f"its log evidence is within {max(known):.3f} of a long reference")
+    for hidden, words in ((True, "with wheels hidden"),):
+        own_errors, peer = _errors(made, Recipe.BAYESID, hidden), _errors(made, Recipe.SCIPY, hidden)
+        if len(own_errors) and len(peer):
+            counts = [int((np.abs(item) < SIGMAS).sum()) for item in (own_errors, peer)]
+            parts.append(
+                f"{words} {counts[0]} of its {own_errors.size} stated 95 % intervals hold the truth, of SciPy's around "
+                f"Pinocchio {counts[1]} of {peer.size}"
+            )
+    return "; ".join(parts) + "." if parts else "Nothing was run."
+
+
+def _setup() -> Setup:
+    return Setup(
+        robot="ETS-VII for the density; a robot with three joints and a base of 547 kg for the task.",
+        manoeuvre="Three random motions of all joints of 120 s; for the task two of 80 s, made by MuJoCo.",
+        sensors="Every 0.5 s rates with 10⁻⁵ rad/s, accelerations with 10⁻⁵ m/s², joint positions with 10⁻⁶ rad.",
+        known="Density: the mode, and the Laplace approximation, which whitens the coordinates for all samplers. They "
+        "are those that the package chose for its own walkers. Task: deep space, all links but the base.",
+        unknown="Density: "
+        + ", ".join(f"{size} ({CASES[size].title})" for size in sorted(CASES))
+        + "; links are known to 5 % of their mass. Task: base and initial rates.",
+        replicates=f"Each sampler runs alone in a process with one core, to {EFFECTIVE:,.0f} effective samples or "
+        f"{LIMIT:g} s of processor time, compiled before. NUTS: {CHAINS} chains in batches with the unit mass matrix, "
+        f"{ADAPTATION} steps to adapt the step size. Nested samplers start from a normal prior of {BROAD:g} standard "
+        f"deviations about the mode, with which the evidence is the posterior's; dynesty takes single points, {LIVE} "
+        f"live; both are tried up to {NESTED} unknowns. FIGAROH needs measured joint torques and so does not apply.",
+    )
+
+
+def _failures(made: Made) -> list[str]:
+    sentences = []
+    late = [
+        f"{item['task']['sampler']} ({item['task']['unknowns']})"
+        for item in made
+        if "unknowns" in item["task"] and not item["result"]["finished"]
+    ]
+    sentences.append(
+        f"Stopped at the limit of time: {', '.join(late)}." if late else "No sampler was stopped at the limit of time."
+    )
+    shifts = [
+        (float(np.abs(np.subtract(result["mean"], reference["mean"])).max()), f"{name} ({unknowns})")
+        for unknowns in CASES
+        for name, result in {Sampler.OURS: _found(made, unknowns, Sampler.OURS), **_peers(made, unknowns)}.items()
+        if (reference := _found(made, unknowns, REFERENCE)) is not None and result is not None and result["mean"]
+    ]
+    if shifts:
+        worst, where = max(shifts)
+        sentences.append(
+            f"Means of the samples differ from the reference's by at most {worst:.2f} standard deviations ({where})."
+        )
+    missing = [task for task in tasks(full=True) if not any(item["task"] == task for item in made)]
+    if missing:
+        kinds = sorted({task.get("sampler") or TITLES[Recipe(task["recipe"])] for task in missing})
+        sentences.append(f"Trials of the full study that were not made: {len(missing)} ({', '.join(kinds)}).")
+    sentences.append(
+        "mujoco.sysid of MuJoCo 4.0.0 is not compared: it drives joints by forces and cannot be given their motion. "
+        "Servos that follow the recorded motion need steps of milliseconds, and no recipe with them has converged yet."
+    )
+    return sentences
+
+
+def _rows(made: Made, unknowns: int) -> list[list[str]]:
+    own = _found(made, unknowns, Sampler.OURS)
+    rows = []
+    for name in (*Sampler, REFERENCE):
+        result = _found(made, unknowns, name)
+        if result is None:
+            continue
+        sampled = result["effective_samples"] > 0.0
+        compared = name != REFERENCE and own is not None
+        ratio = f"{_needed(result) / own['seconds']:.1f}" if compared and own is not None else "-"
+        error = _evidence_error(made, unknowns, name)
+        least = "> " if _is_bound(result) else ""
+        rows.append(
+            [
+                f"{unknowns}, {name}",
+                f"{result['seconds']:.0f}",
+                f"{result['evaluations']:,}",
+                f"{result['effective_samples']:,.0f}" if sampled else "-",
+                f"{least}{_needed(result):,.0f}" if compared else "-",
+                f"{least}{ratio}" if compared else "-",
+                "-" if error is None else f"{format_signed(error[0], 3)} ± {error[2]:.3f}",
+            ]
+        )
+    return rows
+
+
+def _recipe_rows(made: Made) -> list[list[str]]:
+    rows = []
+    for hidden, words in ((False, "nothing hidden"), (True, "wheels hidden")):
+        for recipe in Recipe:
+            found = _recipes(made, recipe, hidden)
+            if not found:
+                continue
+            errors = _errors(made, recipe, hidden)
+            relative = np.abs([np.subtract(item["mean"], item["truth"]) / np.array(item["truth"]) for item in found])
+            rows.append(
+                [
+                    f"{TITLES[recipe]}, {words}",
+                    str(len(found)),
+                    str(lines(recipe)),
+                    f"{np.median([item['seconds'] for item in found]):.0f}",
+                    f"{100.0 * relative[:, 0].mean():.3f}",
+                    f"{100.0 * relative[:, 4:7].mean():.3f}",
+                    f"{int((np.abs(errors) < SIGMAS).sum())} of {errors.size}",
+                    f"{np.sqrt((errors**2).mean()):.1f}",
+                ]
+            )
+    return rows
+
+
+def _found(made: Made, unknowns: int, sampler: str) -> Mapping[str, Any] | None:
+    for item in made:
+        if item["task"].get("unknowns") == unknowns and item["task"]["sampler"] == sampler:
+            result: Mapping[str, Any] = item["result"]
+            return result
+    return None
+
+
+def _peers(made: Made, unknowns: int) -> dict[Sampler, Mapping[str, Any]]:
+    """Return what the peers reached."""
+    found = {name: _found(made, unknowns, name) for name in list(Sampler)[1:]}
+    return {name: result for name, result in found.items() if result is not None}
+
+
+def _needed(result: Mapping[str, Any]) -> float:
+    """Return the time to the wanted samples [s], extrapolated where fewer were reached, or a lower bound of it."""
+    share = 1.0 if _is_bound(result) else min(result["effective_samples"] / EFFECTIVE, 1.0)
+    return float(result["seconds"] / share)
+
+
+def _is_bound(result: Mapping[str, Any]) -> bool:
+    """Whether so few samples were reached that the time is a bound."""
+    return bool(result["effective_samples"] < LEAST * EFFECTIVE)
+
+
+def _evidence_error(made: Made, unknowns: int, sampler: str) -> tuple[float, float, float] | None:
+    """Return the error of a log evidence, its standard error, and the part that the sampler states."""
+    result, reference = _found(made, unknowns, sampler), _found(made, unknowns, REFERENCE)
+    if result is None or reference is None or result["log_evidence"] is None or sampler == REFERENCE:
+        return None
+    own = result["log_evidence_error"]
+    both = float(np.hypot(own, reference["log_evidence_error"]))
+    return float(result["log_evidence"] - reference["log_evidence"]), both, own
+
+
+def _recipes(made: Made, recipe: Recipe, hidden: bool) -> list[Mapping[str, Any]]:
+    return [
+        item["result"] for item in made if item["task"].get("recipe") == recipe and item["task"]["hidden"] is hidden
+    ]
+
+
+def _errors(made: Made, recipe: Recipe, hidden: bool) -> Floats:
+    """Return the errors in stated standard deviations, shape (studies, 10)."""
+    found = _recipes(made, recipe, hidden)
+    return np.array([np.subtract(item["mean"], item["truth"]) / np.array(item["sd"]) for item in found])
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "(not installed)"
+
+
+@styled
+def time_figure(made: Made) -> Figure:
+    """Draw the time to the wanted samples against the number of unknowns."""
+    figure = wide_figure(2.6)
+    axes = figure.subplots()
+    for colour, name in zip(COLOURS, Sampler, strict=False):
+        points = [(size, result) for size in sorted(CASES) if (result := _found(made, size, name)) is not None]
+        if not points:
+            continue
+        x, y = [size for size, _ in points], [_needed(result) for _, result in points]
+        axes.plot(x, y, color=colour, linewidth=1.0, label=str(name))
+        for size, result in points:
+            reached = result["effective_samples"] >= EFFECTIVE
+            marker = "^" if _is_bound(result) else "o"
+            axes.plot(size, _needed(result), marker, color=colour, markersize=5, mfc=colour if reached else "white")
+    axes.set(xscale="log", yscale="log", xlabel="unknowns", ylabel="processor time [s]")
+    axes.set_xticks(sorted(CASES), [str(size) for size in sorted(CASES)])
+    axes.minorticks_off()
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    return figure
