@@ -157,6 +157,14 @@ def test_the_autocorrelation_time_of_short_chains():
     assert autocorrelation_time(chain) == pytest.approx((1.0 + correlation) / (1.0 - correlation), rel=0.07)
 
 
+def test_a_chain_that_ends_before_the_window_is_not_called_short():
+    slow = np.cumsum(np.random.default_rng(4).normal(size=(100, 10, 2)), axis=0)
+    assert autocorrelation_time(slow) >= 20.0
+    still = np.linspace(0.0, 1.0, 30)[:, None, None] + np.zeros((30, 4, 1))
+    still[:, 2:] *= -1.0  # walkers that keep their sides
+    assert autocorrelation_time(still) == 30.0
+
+
 @pytest.mark.parametrize("trusted", [False, True])
 def test_means_scatter_as_the_effective_samples_say(trusted):
     """Over 15 seeds and four coordinates, within four standard errors; the worst coordinate sets the size."""

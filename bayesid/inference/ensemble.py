@@ -14,7 +14,6 @@ from pathlib import Path
 import emcee
 import h5py
 import numpy as np
-from emcee.autocorr import auto_window
 from emcee.moves import DEMove, DESnookerMove
 from emcee.moves.red_blue import RedBlueMove
 
@@ -246,7 +245,8 @@ class _KeyedBackend(emcee.backends.HDFBackend):
 def autocorrelation_time(chain: Floats) -> float:
     """Return the longest autocorrelation time of the coordinates of walkers (steps, walkers, n) [steps].
 
-    The autocovariance is that about the mean of all walkers, and is summed up in Sokal's window.
+    The autocovariance is that about the mean of all walkers, and is summed up in Sokal's window. A chain that ends
+    before the window has an autocorrelation time of at least its length.
     """
     steps = len(chain)
     spectrum = np.fft.rfft(chain - chain.mean(axis=(0, 1)), n=2 * steps, axis=0)
@@ -255,7 +255,10 @@ def autocorrelation_time(chain: Floats) -> float:
     if not np.all(covariance[0] > 0.0):
         return float(steps)
     times = 2.0 * np.cumsum(covariance / covariance[0], axis=0) - 1.0
-    return max(1.0, *(float(time[auto_window(time, BURN_IN)]) for time in times.T))
+    inside = np.arange(steps)[:, None] < BURN_IN * times
+    if inside.all(axis=0).any():
+        return float(steps)
+    return max(1.0, float(np.take_along_axis(times, inside.argmin(axis=0)[None], axis=0).max()))
 
 
 def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
