@@ -14,6 +14,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.hypothesis import Hypothesis
+from bayesid.diagnosis.perturbed_fit import CLOSE
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.model import Manoeuvre
@@ -44,7 +45,7 @@ def extended_start(hypothesis: Hypothesis, posterior: Posterior) -> Floats:
 
 
 def exactly_fitted(hypothesis: Hypothesis) -> Hypothesis:
-    """Return a hypothesis at the mode of its own simulation, or as it is where that is no better."""
+    """Return a hypothesis at the mode of its own simulation, or as it is where that is worse."""
     posterior, found = extended_posterior(hypothesis), hypothesis.fit
     mode = fit(posterior, extended_start(hypothesis, posterior)).z
     free = len(found.own_coordinates)
@@ -56,7 +57,7 @@ def exactly_fitted(hypothesis: Hypothesis) -> Hypothesis:
     for _ in range(ROUNDS):
         exact = engine.fit(found.effects, coordinates, z=z, operating=operating, iterations=0)
         operating = engine.operating(z, engine.pushes(found.effects, coordinates, operating))
-    if exact.cost >= found.cost:
+    if exact.cost > found.cost + CLOSE:
         return hypothesis
     columns = posterior.jacobian(mode)[: exact.residual.size]
     own, *added = np.split(columns, ends[:-1], axis=1)

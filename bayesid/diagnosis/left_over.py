@@ -28,9 +28,6 @@ MOST_FITS = 4
 LIKELY = 0.05
 """Probability from which a set is fitted in full."""
 
-SUSPICIOUS = 1.0
-"""Log odds of something else from which a fit of large causes is made exact before it counts [nats]."""
-
 
 def with_left_over(
     weighed: WeighedCauses, effects: Sequence[Effect]
@@ -69,11 +66,10 @@ def with_left_over(
             hypothesis = fit_hypothesis(weighed.state(best.causes), best.causes, effects)
         except InputError:  # no motion with these causes: what they leave is not evaluated
             break
-        more = log_odds_of_anything(log_p_left(hypothesis))
-        if more > SUSPICIOUS and weighed.state(best.causes).point.far:
+        if weighed.state(best.causes).point.far:
             hypothesis = exactly_fitted(hypothesis)
-            more = log_odds_of_anything(log_p_left(hypothesis))
         fitted[frozenset(best.causes)] = hypothesis
+        more = log_odds_of_anything(log_p_left(hypothesis))
         companion = CauseSet(best.causes, LEFT_OVER, best.log_evidence + more)
         found = SetProbabilities.of([*found.sets, companion], found.causes, generics, found.prior)
     return replace(weighed, probabilities=found), fitted
