@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.perturbed_fit import CLOSE
@@ -45,8 +46,14 @@ def extended_start(hypothesis: Hypothesis, posterior: Posterior) -> Floats:
 
 
 def exactly_fitted(hypothesis: Hypothesis) -> Hypothesis:
-    """Return a hypothesis at the mode of its own simulation, or as it is where that is worse."""
-    posterior, found = extended_posterior(hypothesis), hypothesis.fit
+    """Return a hypothesis at the mode of its own simulation, or as it is where that is worse or does not exist."""
+    found = hypothesis.fit
+    try:
+        posterior = extended_posterior(hypothesis)
+    except InputError:  # no motion at the prior's centre of the extended model
+        return hypothesis
+    if posterior.residual_shape != found.posterior.residual_shape:  # outliers left out: derivatives have other rows
+        return hypothesis
     mode = fit(posterior, extended_start(hypothesis, posterior)).z
     free = len(found.own_coordinates)
     ends = np.cumsum([free, *(own.size for own in found.coordinates)])
@@ -56,7 +63,7 @@ def exactly_fitted(hypothesis: Hypothesis) -> Hypothesis:
     engine, operating = hypothesis.engine, found.operating
     for _ in range(ROUNDS):
         exact = engine.fit(found.effects, coordinates, z=z, operating=operating, iterations=0)
-        operating = engine.operating(z, engine.pushes(found.effects, coordinates, operating))
+        operating = engine.operating(z, engine.pushes(found.effects, coordinates, operating, vibrations=False))
     if exact.cost > found.cost + CLOSE:
         return hypothesis
     columns = posterior.jacobian(mode)[: exact.residual.size]
