@@ -187,8 +187,11 @@ def _refuse_milliseconds(posterior: Posterior, seen: Sequence[_Comparison]) -> N
     recording = manoeuvre.recording
     shorter = Recording(recording.name, recording.file, MILLISECOND * recording.time, recording.channels)
     hastened = replace(manoeuvre, recording=shorter, motion=_Hastened(manoeuvre.motion))
-    other = Posterior.of(posterior.model, [hastened], step=MILLISECOND * posterior.step, window=0)
-    again = {comparison.column: comparison.factor for comparison in _compared(other)[0]}
+    try:
+        other = Posterior.of(posterior.model, [hastened], step=MILLISECOND * posterior.step, window=0)
+        again = {comparison.column: comparison.factor for comparison in _compared(other)[0]}
+    except InputError:  # no motion in so short a time: seconds it is
+        return
     if all(1.0 / WRONG_UNIT < again[comparison.column] < WRONG_UNIT for comparison in loud):
         raise InputError(
             "the readings follow the joints' motion only if times are milliseconds",

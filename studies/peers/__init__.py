@@ -1,1 +1,5 @@
 """Peers: bayesid beside what its users would use instead, on the same density and on the same task."""
+
+from studies.peers.report import main
+
+__all__ = ["main"]

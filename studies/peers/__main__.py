@@ -1,6 +1,5 @@
 """Write the report: ``python -m studies.peers --full``."""
 
-from studies.peers.report import main
+from studies.peers import main
 
-if __name__ == "__main__":
-    main()
+main()
