@@ -84,6 +84,6 @@ def test_the_whole_study_small(tmp_path):
     assert own.last_step.max() < 0.5
     assert np.all(result.cloud.intended <= result.cloud.motion + 1e-12)  # differences only take away
     write_report(result, tmp_path / "report.pdf")
-    assert broken_rules(tmp_path / "report.pdf") == []
+    assert broken_rules(tmp_path / "report.pdf", full=False) == []
     wrong = {"d-optimal": replace(own, errors=3.0 * own.errors)}
     assert Verdict.FAIL in [goal.verdict for goal in goals(replace(result, realised=wrong))]
