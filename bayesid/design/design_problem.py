@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
+from bayesid._math.kept_jit import QUICKLY
 from bayesid.design.criteria import Criterion
 from bayesid.design.encoder_shadow import Encoder, encoder_shadow, position_noise
 from bayesid.design.flight import Flight
@@ -26,9 +27,6 @@ from bayesid.design.plan import FlightOutcome, Plan
 from bayesid.design.trajectory import Trajectory
 
 __all__ = ["FINER", "Known", "Problem", "Reached"]
-
-QUICKLY = {"xla_llvm_disable_expensive_passes": True, "xla_cpu_use_fusion_emitters": False}
-"""Options of XLA with which compilation takes half the time and the compiled code is as fast."""
 
 FINER = 8
 """Ratio of the optimiser's time step to the one at which the limits of a result are checked."""

@@ -6,8 +6,9 @@ import jax
 import numpy as np
 from jax import Array
 
+from bayesid._math.kept_jit import QUICKLY
 from bayesid.design.criteria import Separation
-from bayesid.design.design_problem import QUICKLY, Problem
+from bayesid.design.design_problem import Problem
 from bayesid.design.flight import Flight
 from bayesid.design.plan import FlightOutcome
 from bayesid.design.search_starts import random_start

@@ -6,6 +6,7 @@ Text that callers give is never read as markup: it reaches Typst as string liter
 from __future__ import annotations
 
 import io
+import math
 import re
 import tempfile
 from collections.abc import Sequence
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import typst
+from matplotlib.artist import Artist
 from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -219,15 +221,27 @@ def _check_table(header: Sequence[str], rows: Sequence[Sequence[str]], align: Se
 
 
 def _svg(fig: Figure) -> bytes:
-    for line in fig.findobj(Line2D):
-        if isinstance(line, Line2D) and len(line.get_xdata()) > MANY_POINTS:  # type: ignore[arg-type]
-            line.set_rasterized(True)
-    for points in fig.findobj(PathCollection):
-        if isinstance(points, PathCollection) and len(points.get_offsets()) > MANY_POINTS:  # type: ignore[arg-type]
-            points.set_rasterized(True)
-    for mesh in fig.findobj(QuadMesh):
-        mesh.set_rasterized(True)
+    """Return a figure as SVG, what has many points as a picture in it."""
+    for artist in fig.findobj():
+        if _points(artist) > MANY_POINTS:
+            artist.set_rasterized(True)
+    engine = fig.get_layout_engine()
+    if engine is not None:  # saving would lay the figure out twice, and draw it once more for that
+        engine.execute(fig)
+        fig.set_layout_engine("none")
     content = io.BytesIO()
     with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": "bayesid"}):
         fig.savefig(content, format="svg", dpi=RESOLUTION, metadata={"Date": None})
     return content.getvalue()
+
+
+def _points(artist: Artist) -> float:
+    """Return the number of points of a line, of a scatter plot, or of a mesh, which counts as many; otherwise 0."""
+    match artist:
+        case Line2D():
+            return len(artist.get_xdata())  # type: ignore[arg-type]
+        case PathCollection():
+            return len(artist.get_offsets())  # type: ignore[arg-type]
+        case QuadMesh():
+            return math.inf
+    return 0
