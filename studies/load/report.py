@@ -63,6 +63,14 @@ def goals(result: Result) -> tuple[Goal, ...]:
             Verdict.of(result.loop.status != "no-go"),
         )
     )
+    trusted = sum(review["trusted"] for review in result.loop.reviews)
+    rows.append(
+        Goal(
+            "The model, which is right, is trusted after every manoeuvre, from a diagnosis of all recordings so far",
+            f"after {trusted} of {len(result.loop.reviews)}",
+            Verdict.of(trusted == len(result.loop.reviews)),
+        )
+    )
     for name, flight in _flights(result).items():
         used = ", ".join(f"{LIMIT_TITLES[key]} {format_percent(part, 4)}" for key, part in flight.used.items())
         text = f"Every limit kept in MuJoCo, {TITLES[name]}"
@@ -99,7 +107,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         goals=goals(result),
         valid=(
             "the base is known exactly and rests before each manoeuvre, the load is rigid and held rigidly, and "
-            "nothing but the gravity gradient acts. The recordings were not diagnosed between the steps."
+            "nothing but the gravity gradient acts, as the diagnosis of each step was to find."
         ),
         full=result.full,
     )
@@ -172,6 +180,10 @@ def _failures(document: Document, result: Result) -> None:
             f"({quantiles})."
         )
     document.items(attempts)
+    verdicts = ", ".join(
+        f"{review['status']}{''.join(f' ({cause})' for cause in review['causes'])}" for review in loop.reviews
+    )
+    document.paragraph(f"Diagnoses of all recordings so far, after each manoeuvre: {verdicts}.")
     ratio = ", ".join(format_fixed(value, 2) for value in loop.chi2)
     document.paragraph(f"Chi-square per sample of the loop's fits: {ratio}.")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from bayesid._math.arrays import Floats
 from bayesid.design import DOptimal, Laplace, Loop, RelativePrecision, Search
 from bayesid.design.excitation_loop import flown
 from bayesid.design.knowledge_update import bodies_of_draws, updated_model
+from bayesid.diagnosis import DiagnosisReview
 from bayesid.inference.body_quantities import BodyDraws
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
@@ -54,6 +55,8 @@ class Flight:
         Chi-square per sample of every fit.
     largest : list of dict
         Largest values of the limited quantities in MuJoCo, by limit.
+    reviews : list of dict
+        Entry of every step's diagnosis in the loop's history; empty where the steps are not diagnosed.
     """
 
     status: str
@@ -61,6 +64,7 @@ class Flight:
     bodies: list[BodyDraws]
     chi2: list[float]
     largest: list[dict[str, float]]
+    reviews: list[dict[str, Any]] = field(default_factory=list)
 
     def error(self, step: int) -> Floats:
         """Return the posterior mean less the truth over `paper.SCALE`, shape (10,)."""
@@ -86,7 +90,7 @@ class Flight:
 
 
 def fly_loop(folder: Path, *, seed: int, search: Search, progress: Progress = silent) -> Flight:
-    """Fly the loop with the arm known to 5 %, on a spacecraft whose arm is drawn from that.
+    """Fly the loop with the arm known to 5 %, on a spacecraft whose arm is drawn from that; every step is diagnosed.
 
     Parameters
     ----------
@@ -108,6 +112,7 @@ def fly_loop(folder: Path, *, seed: int, search: Search, progress: Progress = si
         at_most=AT_MOST,
         search=search,
         identifier=Laplace(),
+        reviewer=DiagnosisReview(knows_latitude=True),
     )
     spacecraft = MuJoCoSpacecraft(seed, ARM_SPREAD)
     history = loop.run(spacecraft, folder, progress)
@@ -119,6 +124,7 @@ def fly_loop(folder: Path, *, seed: int, search: Search, progress: Progress = si
         bodies=[bodies_of_draws(own.plan.model, item)[LOAD] for item in draws],
         chi2=[step["identification"]["chi2"] / step["identification"]["samples"] for step in done],
         largest=[_largest(spacecraft, folder / f"step-{step['step']}-plan.csv") for step in done],
+        reviews=[step["diagnosis"] for step in done],
     )
 
 
