@@ -126,6 +126,7 @@ def test_nothing_hidden_leaves_noise_and_finds_the_base(tmp_path: Path) -> None:
     assert miss @ np.linalg.solve(np.cov(found.T), miss) < chi2.ppf(0.9999, 10)
 
 
+@pytest.mark.slow
 def test_hidden_slosh_shows(tmp_path: Path) -> None:
     file = write_basilisk_study(tmp_path, 11, hidden=BasiliskHidden(slosh=Slosh(mass=4.0)), manoeuvres=SHORT)
     posterior, optimum = maximise(load_posterior(Study.load(file)), np.random.default_rng(0))

@@ -316,6 +316,7 @@ def test_a_missing_study_is_an_error(tmp_path: Path) -> None:
     assert "none.toml" in text
 
 
+@pytest.mark.slow
 def test_a_users_effect_joins_a_study(study: Path, tmp_path: Path) -> None:
     folder = tmp_path / "study"
     folder.mkdir()

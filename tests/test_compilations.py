@@ -68,6 +68,7 @@ def compiled(planar_posterior: Callable[..., Posterior]) -> Posterior:
     return posterior
 
 
+@pytest.mark.slow
 def test_another_prior_compiles_nothing(compiled):
     model = compiled.model
     wider = tuple(replace(prior, spread=1.7 * prior.spread) for prior in model.priors)

@@ -218,6 +218,7 @@ class Half(Steady):
     parameters = (*Steady.parameters, Parameter("unseen", "rad/s", 1e-3))
 
 
+@pytest.mark.slow
 def test_separation_seeks_the_worst_direction_among_those_that_manoeuvres_show() -> None:
     own = plan(effects=(Half(), Growing()), unknown=False)
     everywhere = Separation(("half", "growing"))

@@ -223,6 +223,7 @@ def test_bad_input_gives_one_clear_error(kind: str, tmp_path: Path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_limits_that_only_rest_keeps_are_an_error(tmp_path: Path):
     limits = f"tip_speed = {TIP_SPEED}\ntip_rate = {TIP_RATE}"
     file = write(tmp_path, lambda text: text.replace(limits, "quiet_band = [0.0, 0.5]"))

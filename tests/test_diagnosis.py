@@ -153,6 +153,7 @@ def test_the_probabilities_of_all_sets_sum_to_one(small):
         assert probability["causes"][name] == pytest.approx(own, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_order_of_the_candidates_does_not_matter(small):
     result, turned = shown(small()), shown(small(names=NAMES[::-1]))
     assert result.keys() == turned.keys()
@@ -160,6 +161,7 @@ def test_the_order_of_the_candidates_does_not_matter(small):
     assert small().verdict == small(names=NAMES[::-1]).verdict
 
 
+@pytest.mark.slow
 def test_the_seed_hardly_matters(small):
     result, other = small(), small(seed=4)
     draws = [found.alarm.candidates.largest.values for found in (result, other)]
@@ -200,7 +202,7 @@ def engine_and_fit(tmp_path_factory):
     return engine, engine.fit()
 
 
-@pytest.mark.parametrize("label", ["aerodynamic-drag", "encoder-offset:joint1"])
+@pytest.mark.parametrize("label", ["aerodynamic-drag", pytest.param("encoder-offset:joint1", marks=pytest.mark.slow)])
 def test_a_push_is_the_effect_in_the_simulation(label, engine_and_fit):
     """A push on the model and the effect in the simulation give one residual, to 2 % of what the effect does."""
     engine, fit = engine_and_fit

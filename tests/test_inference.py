@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from types import SimpleNamespace
 
 import emcee
@@ -206,10 +207,15 @@ def interrupt_within(stub, file, calls: int):
     stub.limit = np.inf
 
 
+@pytest.fixture(scope="module")
+def whole():
+    """A run that nothing interrupts."""
+    return drawn(LinearGaussian())
+
+
 @pytest.mark.parametrize("calls", [None, 2, 60, 180, 330, 520, 1000])
-def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(calls, tmp_path):
+def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(calls, whole, tmp_path):
     """Interrupted between blocks, or at any evaluation (two per step and ensemble): the same samples bit for bit."""
-    whole = drawn(LinearGaussian())
     file, stub = tmp_path / "chain.h5", LinearGaussian()
     if calls is None:
         interrupt_between_blocks(stub, file)
@@ -222,7 +228,7 @@ def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(calls, tmp_path):
     assert resumed.effective_samples == whole.effective_samples
 
 
-@pytest.mark.parametrize("calls", [60, 330])
+@pytest.mark.parametrize("calls", [60, pytest.param(330, marks=pytest.mark.slow)])
 def test_an_interrupted_run_stops_where_the_uninterrupted_one_did(calls, tmp_path):
     """Convergence is looked at after the same numbers of steps."""
     goals = {"effective_samples": 3000.0, "max_steps": 3000}
@@ -244,10 +250,17 @@ def test_a_finished_run_is_read_not_repeated(tmp_path):
     np.testing.assert_array_equal(again.z, first.z)
 
 
-@pytest.mark.parametrize("change", ["seed", "data", "names", "version"])
-def test_another_runs_file_is_refused(change, tmp_path, monkeypatch):
-    file = tmp_path / "chain.h5"
+@pytest.fixture(scope="module")
+def chain(tmp_path_factory):
+    """The file of a finished run."""
+    file = tmp_path_factory.mktemp("finished") / "chain.h5"
     drawn(LinearGaussian(), file=file)
+    return file
+
+
+@pytest.mark.parametrize("change", ["seed", "data", "names", "version"])
+def test_another_runs_file_is_refused(change, chain, tmp_path, monkeypatch):
+    file = shutil.copy(chain, tmp_path)
     stub = LinearGaussian(seed=1 if change == "data" else 0)
     if change == "names":
         stub.unknowns = SimpleNamespace(names=("a", "b", "c", "d"))

@@ -44,7 +44,7 @@ def by_differences(posterior: Posterior, z: np.ndarray, arrays, push: Perturbati
     [
         (),
         (WheelMomentum(), AccelBias(1e-3), RateScale(), AccelLatency()),
-        (FuelSlosh(), FlexibleAppendage()),
+        pytest.param((FuelSlosh(), FlexibleAppendage()), marks=pytest.mark.slow),
     ],
     ids=["rigid", "sensors and wheels", "vibrations"],
 )

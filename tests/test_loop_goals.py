@@ -82,6 +82,7 @@ def test_a_cause_is_decided_either_way():
         goal.value(knowledge(causes={"unknown": 0.3}))
 
 
+@pytest.mark.slow
 def test_the_region_of_the_tip_is_the_ellipsoid_of_its_draws_and_shrinks_with_the_prior():
     known = knowledge()
     value = TipRegion(0.001, "tip").value(known)

@@ -95,6 +95,7 @@ def test_the_jump_is_that_of_pinocchio_with_momentum_conserved(truth, motion):
     assert (np.array(error) < 1e-4 * np.array(effect)).all()
 
 
+@pytest.mark.slow
 def test_a_jump_at_the_end_of_a_step_costs_no_accuracy(truth, motion):
     """The error is that without a jump; in the midst of a step of 0.5 s it would be some thirty times larger."""
     robot, effect = Robot.from_urdf(SERVICER3), MassShift((INSTANT,))

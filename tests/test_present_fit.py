@@ -65,6 +65,7 @@ def engine(spun):
     return Engine(Posterior.of(*spun, step=0.1))
 
 
+@pytest.mark.slow
 def test_a_fit_that_strays_gives_way_to_one_with_its_body_held(engine):
     assert strayed(engine.fit())
     found = fit_present_model(engine)

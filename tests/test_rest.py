@@ -127,6 +127,7 @@ class _Exact:
         return self.motion.evaluate(time)
 
 
+@pytest.mark.slow
 def test_a_speed_error_is_the_momentum_of_that_joint(flights):
     """Against Pinocchio's centroidal momentum: a joint believed too fast by d lets the base start at - I^-1 h(d)."""
     posterior = posterior_of(flights[:1], np.random.default_rng(1), speed_errors=True, rate_sigma=0.0)

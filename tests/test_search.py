@@ -79,6 +79,7 @@ def test_errors_of_an_encoder_hide_a_swinging_rate_in_closed_form() -> None:
         assert left == pytest.approx(expected, rel=0.05)  # the ends count double in the encoders' cosines
 
 
+@pytest.mark.slow
 def test_a_search_is_the_same_in_threads_and_keeps_every_limit(planar: Problem) -> None:
     search, criterion = Search(starts=6, iterations=12), planar.criteria[0]
     alone = optimise(planar, criterion, np.random.default_rng(2), search)
