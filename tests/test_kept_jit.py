@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import weakref
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 from bayesid._math.kept_jit import forget_executables, kept_jit
+from bayesid.app.compilation_cache import keep_compiled
 from bayesid.simulation.effects import AerodynamicDrag, WheelMomentum
 from bayesid.simulation.effects.effect_key import EffectKey
 from bayesid.simulation.sensors import Kind
@@ -141,3 +143,19 @@ def test_without_a_folder_nothing_is_written(folder):
     jax.config.update("jax_compilation_cache_dir", None)
     assert float(scaled(10, X)) == 28.0
     assert kept(folder) == []
+
+
+def test_what_nobody_uses_is_removed_and_nothing_else(folder):
+    float(scaled(10, X))
+    (file,) = kept(folder)
+    old, users = folder / "other.executable", folder / "notes.txt"
+    for item in (old, users):
+        item.write_text("")
+    for item in (old, users, file):
+        os.utime(item, (0.0, 0.0))
+    forget_executables()
+    float(scaled(10, X))  # read, and so used
+    keep_compiled(folder)
+    assert file.is_file()
+    assert users.is_file()
+    assert not old.exists()

@@ -14,6 +14,7 @@ import os
 import pickle
 import platform
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import cache, update_wrapper
@@ -137,6 +138,7 @@ class KeptJit:
             except Exception:  # whatever is wrong with a file of a cache, another one takes its place
                 file.unlink(missing_ok=True)
             else:
+                _mark_as_used(file)
                 self._ready[key] = executable
                 return result
         self._ready[key] = self._compiled(self._jit, args) if file is None else self._kept(file, args)
@@ -177,6 +179,12 @@ class KeptJit:
             return None
         parts = (_surroundings(), self._name, described, str(tree), str([(s, s.weak_type) for s in shapes]))
         return Path(folder) / (hashlib.sha256(repr(parts).encode()).hexdigest() + SUFFIX)
+
+
+def _mark_as_used(file: Path) -> None:
+    """Date the file anew, since those that nobody uses are removed some day."""
+    with suppress(OSError):
+        os.utime(file)
 
 
 def _shape(leaf: object) -> Any:

@@ -352,7 +352,7 @@ def _relative(name: str, crowd: Crowd, costs: Floats) -> Floats:
 
 @styled
 def _crowd_figure(result: Result) -> Figure:
-    figure = wide_figure(2.3)
+    figure = wide_figure(1.95)
     panels = figure.subplots(1, len(result.crowds))
     for axes, (name, crowd) in zip(panels, result.crowds.items(), strict=True):
         ordered, total = np.sort(crowd.costs), len(crowd.costs)
@@ -376,7 +376,7 @@ def _crowd_figure(result: Result) -> Figure:
 @styled
 def _cloud_figure(result: Result) -> Figure:
     cloud = result.cloud
-    figure = wide_figure(2.3)
+    figure = wide_figure(1.9)
     titles = ("(26) as printed", "(26) as intended", "sum of squared excursions")
     panels = figure.subplots(1, 3, sharey=True)
     for axes, title, values in zip(panels, titles, (cloud.printed, cloud.intended, cloud.motion), strict=True):
@@ -389,7 +389,7 @@ def _cloud_figure(result: Result) -> Figure:
 
 @styled
 def _realised_figure(result: Result) -> Figure:
-    figure = wide_figure(2.2)
+    figure = wide_figure(1.7)
     axes = figure.subplots()
     axes.axhspan(1.0 - WITHIN, 1.0 + WITHIN, color="#e8e8e8", linewidth=0.0)
     place = np.arange(10)
