@@ -36,6 +36,14 @@ def test_options_are_those_that_a_study_has(tmp_path, monkeypatch, capsys):
     assert "python -m studies.load: error: unrecognized arguments: --full" in capsys.readouterr().err
 
 
+def test_a_store_is_not_the_file_of_the_summary(tmp_path, capsys):
+    own = Command("planning", "Plan.", extra={"--store": {"type": Path}})
+    with pytest.raises(SystemExit, match="2"):
+        own.parse(["--output", str(tmp_path / "x.pdf"), "--store", str(tmp_path / "x.json")])
+    assert "give another name" in capsys.readouterr().err
+    assert own.parse(["--output", str(tmp_path / "x.pdf"), "--store", str(tmp_path / "y.json")]).store.name == "y.json"
+
+
 @pytest.mark.parametrize("name", STUDIES)
 def test_every_study_has_a_command_of_its_name(name, capsys):
     study = importlib.import_module(f"studies.{name}")

@@ -68,5 +68,9 @@ class Command:
         options = parser.parse_args(arguments)
         if options.output.is_dir() or not options.output.suffix:
             options.output /= report.name
+        summary = options.output.with_suffix(".json")  # written beside the report
+        for name, value in vars(options).items():
+            if isinstance(value, Path) and value == summary:
+                parser.error(f"--{name} {value} is the file of the report's summary: give another name")
         options.output.parent.mkdir(parents=True, exist_ok=True)
         return options
