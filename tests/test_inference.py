@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
 import emcee
@@ -260,7 +261,7 @@ def chain(tmp_path_factory):
 
 @pytest.mark.parametrize("change", ["seed", "data", "names", "version"])
 def test_another_runs_file_is_refused(change, chain, tmp_path, monkeypatch):
-    file = shutil.copy(chain, tmp_path)
+    file = Path(shutil.copy(chain, tmp_path))
     stub = LinearGaussian(seed=1 if change == "data" else 0)
     if change == "names":
         stub.unknowns = SimpleNamespace(names=("a", "b", "c", "d"))

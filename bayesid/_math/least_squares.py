@@ -16,7 +16,11 @@ HUGE = 1e12
 
 
 def levenberg_marquardt(
-    residual: Callable[[Floats], Floats], jacobian: Callable[[Floats], Floats], start: Floats, tolerance: float
+    residual: Callable[[Floats], Floats],
+    jacobian: Callable[[Floats], Floats],
+    start: Floats,
+    tolerance: float,
+    at_most: int | None = None,
 ) -> OptimizeResult:
     """Minimise half the sum of squared residuals from one point.
 
@@ -28,6 +32,8 @@ def levenberg_marquardt(
         Coordinates to start from.
     tolerance : float
         Relative change of cost, of coordinates, and cosine of the gradient at which the search ends.
+    at_most : int, optional
+        Largest number of evaluations of the residuals; by default a hundred for each coordinate.
 
     Returns
     -------
@@ -40,5 +46,13 @@ def levenberg_marquardt(
         return np.where(np.isfinite(values), values, HUGE)
 
     return least_squares(
-        finite, start, jacobian, method="lm", x_scale="jac", ftol=tolerance, xtol=tolerance, gtol=tolerance
+        finite,
+        start,
+        jacobian,
+        method="lm",
+        x_scale="jac",
+        ftol=tolerance,
+        xtol=tolerance,
+        gtol=tolerance,
+        max_nfev=at_most,
     )
