@@ -136,10 +136,12 @@ def true_arm(robot: Robot, rng: np.random.Generator, arm_spread: float = ARM_SPR
     return robot
 
 
-def fly(motion: Motion, robot: Robot | None = None, duration: float = DURATION, **hidden: Any) -> Truth:
+def fly(
+    motion: Motion, robot: Robot | None = None, duration: float = DURATION, step: float = TRUTH_STEP, **hidden: Any
+) -> Truth:
     """Fly a manoeuvre in MuJoCo and return what truly happened at the samples; see `studies.common.flight.fly`."""
     times = sample_times(duration, INTERVAL)
-    return flight.fly(ship() if robot is None else robot, motion, times, step=TRUTH_STEP, **hidden)
+    return flight.fly(ship() if robot is None else robot, motion, times, step=step, **hidden)
 
 
 def recorded(truth: Truth, rng: np.random.Generator, name: str = "manoeuvre", bias: Floats | None = None) -> Manoeuvre:

@@ -21,13 +21,16 @@ from studies.common.ets7 import INTERVAL
 from studies.load import paper
 from studies.load.setting import MuJoCoSpacecraft, excitation, ideal
 
-__all__ = ["STEP", "Iteration", "iterate"]
+__all__ = ["STEP", "TRUTH_STEP", "Iteration", "iterate"]
 
 ITERATIONS = 2
 """Number of iterations, as in the paper."""
 
 STEP = 0.5
 """Integration step of the fit [s]."""
+
+TRUTH_STEP = 0.25
+"""MuJoCo's integration step [s]; with twice that its own error is up to 5e-6 of the load's quantities."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +66,7 @@ def iterate(*, seed: int, search: Search) -> list[Iteration]:
     search : Search
         Effort of each design.
     """
-    known, spacecraft, criterion = ideal(), MuJoCoSpacecraft(), Paper26Intended()
+    known, spacecraft, criterion = ideal(), MuJoCoSpacecraft(step=TRUTH_STEP), Paper26Intended()
     present = mission.problem(known, excitation(), criterion)
     z: Floats = np.zeros(10)
     iterations = []

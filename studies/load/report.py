@@ -28,7 +28,7 @@ from studies.common.template import (
 )
 from studies.load import Result, paper
 from studies.load.figures import LIMIT_TITLES, TITLES, error_figure, loop_figure
-from studies.load.noise_free import STEP
+from studies.load.noise_free import TRUTH_STEP
 from studies.load.safe_loop import AT_MOST, GOAL, SPREAD, Flight
 from studies.load.setting import LOAD, SAFE, excitation, ship
 
@@ -84,7 +84,7 @@ def goals(result: Result) -> tuple[Goal, ...]:
     rows.append(
         Goal(
             "Without noise, relative error at most 10⁻⁶ after two iterations",
-            f"{format_number(error, 2)}, within the flight's rule and with steps of {STEP:g} s",
+            f"{format_number(error, 2)}, within the flight's rule, MuJoCo's steps {TRUTH_STEP:g} s",
             Verdict.of(error <= NOISE_FREE),
         )
     )

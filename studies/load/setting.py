@@ -67,10 +67,13 @@ class MuJoCoSpacecraft:
         Seed of arm, bias and noise; the arm is nominal and there is no noise where left out.
     arm_spread : float
         Relative width of the distribution from which the true arm is drawn.
+    step : float
+        MuJoCo's integration step [s].
     """
 
     seed: int | None = None
     arm_spread: float = 0.0
+    step: float = mission.TRUTH_STEP
 
     @cached_property
     def robot(self) -> Robot:
@@ -85,7 +88,7 @@ class MuJoCoSpacecraft:
 
     def execute(self, plan: Recording) -> Recording:
         """Fly a plan and return its recording."""
-        truth = mission.fly(self.motion(plan), self.robot)
+        truth = mission.fly(self.motion(plan), self.robot, step=self.step)
         rng = None if self.seed is None else np.random.default_rng([self.seed, *plan.name.encode()])
         if self.seed is not None:
             bias = BIAS * np.random.default_rng([self.seed, 1]).standard_normal(3)
