@@ -11,6 +11,7 @@ from bayesid.diagnosis.loop_review import DiagnosisReview
 from bayesid.diagnosis.probable_verdict import ProbableVerdict
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
 from bayesid.diagnosis.status import Status
+from bayesid.diagnosis.torque_reading import TorqueCause, TorqueReading, Unread
 
 __all__ = [
     "Candidate",
@@ -24,7 +25,10 @@ __all__ = [
     "ProbableVerdict",
     "SetProbabilities",
     "Status",
+    "TorqueCause",
+    "TorqueReading",
     "Unexplained",
+    "Unread",
     "candidates",
     "diagnose",
     "identify_extended",

@@ -17,7 +17,7 @@ from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
-__all__ = ["MOMENT_UNITS", "catalogue_signatures", "group_names", "moment_spreads"]
+__all__ = ["MOMENT_UNITS", "amplitude_signatures", "catalogue_signatures", "group_names", "moment_spreads"]
 
 MOMENT_UNITS = ("kg", "kg m", "kg m2")
 """Units of mass, first and second moments, in which a body that is missing is linear."""
@@ -77,7 +77,7 @@ def catalogue_signatures(
             body = MissingBody(sizes["kg"], reach, radii, rigid_moments) if isinstance(effect, Payload) else None
             causes.append(CandidateCause(effect.label, groups[0], others=tuple(groups[1:]), body=body))
             continue
-        found = _by_unit(engine, effect, next(columns))
+        found = amplitude_signatures(effect, next(columns), len(engine.posterior.manoeuvres))
         signatures |= {item.name: item for item in found.values()}
         if not sizes:
             (item,) = found.values()
@@ -98,14 +98,23 @@ def _start(engine: Engine, linear: Effect) -> Floats:
     return np.tile(linear.starts[0], len(engine.posterior.manoeuvres) if linear.per_recording else 1)
 
 
-def _by_unit(engine: Engine, effect: Effect, columns: Floats) -> dict[str, Signatures]:
-    """Return the signatures of an effect by the unit of their amplitudes."""
+def amplitude_signatures(effect: Effect, columns: Floats, recordings: int) -> dict[str, Signatures]:
+    """Return the signatures of an effect by the unit of their amplitudes.
+
+    Parameters
+    ----------
+    effect : Effect
+    columns : (N, n) array
+        Derivatives of the residual in the coordinates of the effect in amplitudes.
+    recordings : int
+        Number of recordings.
+    """
     linear = effect.in_amplitudes()
     if not linear.parameters:
         return {"1": Signatures(effect.label, columns)}
-    recordings = len(engine.posterior.manoeuvres) if effect.per_recording else 1
-    columns = columns / np.tile([parameter.sigma for parameter in linear.parameters], recordings)
-    units = np.tile([parameter.unit for parameter in linear.parameters], recordings)
+    times = recordings if effect.per_recording else 1
+    columns = columns / np.tile([parameter.sigma for parameter in linear.parameters], times)
+    units = np.tile([parameter.unit for parameter in linear.parameters], times)
     return {unit: Signatures(name, columns[:, units == unit]) for unit, name in group_names(effect).items()}
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from bayesid.diagnosis.candidate_table import Candidate
+from bayesid.diagnosis.torque_reading import TorqueReading, Unread
 from bayesid.inference import Identification
 from bayesid.inference.body_quantities import quantity
 
@@ -45,6 +46,7 @@ def diagnosis_dict(result: Diagnosis, identification: Identification | None) -> 
             "signal_to_noise": result.unexplained.signal_to_noise,
             "fixed_in": None if result.unexplained.fixed_in is None else result.unexplained.fixed_in.value,
         },
+        "joint_torques": _torques(result.torques),
         "bodies_held": result.held,
         "gain": _gain(result),
         "p_value": result.alarm.p_value,
@@ -100,6 +102,33 @@ def _gain(result: Diagnosis) -> dict[str, Any]:
         "within_one_sigma": {"before": gain.before.inside, "after": gain.after.inside},
         "parameter_shift_in_sd": dict(zip(names, gain.shift.tolist(), strict=True)),
         "parameter_sd_ratio": dict(zip(names, (gain.after.bodies.sd / gain.before.bodies.sd).tolist(), strict=True)),
+    }
+
+
+def _torques(found: TorqueReading | Unread | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    if isinstance(found, Unread):
+        return {"status": "not evaluated", "reason": found.reason}
+    before, after = found.chi2_per_sample
+    return {
+        "status": found.verdict.status.value,
+        "causes": [name for name in found.verdict.causes if name in found.probabilities.causes],
+        "ambiguous_with": [list(names) for names in found.verdict.ambiguous_with],
+        "probability": {"nothing": found.probabilities.nothing, "unknown": found.probabilities.unknown},
+        "candidates": [
+            {
+                "name": row.name,
+                "probability": row.probability,
+                "amplitude": {
+                    item.name: quantity(mean, sd, item.unit)
+                    for item, mean, sd in zip(row.quantities, row.mean.tolist(), row.sd.tolist(), strict=True)
+                },
+            }
+            for row in found.causes
+        ],
+        "p_value": found.p_value,
+        "chi2_per_sample": {"before": before, "after": after},
     }
 
 

@@ -33,6 +33,7 @@ from bayesid.diagnosis.probable_verdict import UNKNOWN, ProbableVerdict
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import SetProbabilities
 from bayesid.diagnosis.status import Status
+from bayesid.diagnosis.torque_reading import TorqueReading, Unread, torques_beside
 from bayesid.diagnosis.verdict_sensitivity import VerdictSensitivity, verdict_sensitivity
 from bayesid.inference import Identification, identify
 from bayesid.inference.noise_changes import relinearised
@@ -69,6 +70,8 @@ class Diagnosis:
         What it would take in the present model.
     unexplained : Unexplained
         Left by the named causes, or by the present model where none is named.
+    torques : TorqueReading, Unread or None
+        What the joint torques say beyond the motion, or why they were not read; None where the study has none.
     effects : tuple of Effect
         Candidates of the catalogue.
     bounds : mapping of str to tuple of PhysicalBound
@@ -87,6 +90,7 @@ class Diagnosis:
     gain: Gain
     disturbance: Unexplained
     unexplained: Unexplained
+    torques: TorqueReading | Unread | None
     effects: tuple[Effect, ...]
     bounds: Mapping[str, tuple[PhysicalBound, ...]]
     seed: int
@@ -148,7 +152,10 @@ def diagnose(
     executor: Executor | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
-    """Show what a model gets wrong about recordings, and name the cause. Joint torques are not used.
+    """Show what a model gets wrong about recordings, and name the cause.
+
+    The verdict is on the motion; joint torques are read after it (`read_torques`), unless something that has no name
+    moves the base.
 
     Parameters
     ----------
@@ -173,7 +180,6 @@ def diagnose(
     InputError
         If the numbers of a recording cannot be in the units of the format.
     """
-    model = model.without_torque  # whose friction no catalogue of causes holds
     with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
         return _diagnose(
             model, manoeuvres, seed, effects, bounds, prior or CausePrior(), knows_latitude, executor, progress
@@ -192,9 +198,10 @@ def _diagnose(
     progress: Progress,
 ) -> Diagnosis:
     rng, clock = np.random.default_rng(seed), PhaseClock()
+    whole, model = model, model.without_torque
     at_rest = model.rate_sigma == 0.0
     posterior = Posterior.of(replace(model, rate_sigma=RATE_SIGMA, speed_errors=True) if at_rest else model, manoeuvres)
-    refuse_wrong_units(posterior)
+    refuse_wrong_units(posterior if whole.torque is None else Posterior.of(whole, manoeuvres))
     clock.ends("load")
     rates = posterior.unknowns.layout.all_rates
     engine = Engine(posterior, range(rates.start, rates.stop) if at_rest else ())
@@ -236,6 +243,10 @@ def _diagnose(
     disturbance = unexplained_wrench(lacking, weighed.base.bank, open_question)
     unexplained = unexplained_wrench(after, weighed.state(named).point.bank, False) if named else disturbance
     table = candidate_table(weighed, catalogue, rng)
+    torques: TorqueReading | Unread | None = None
+    if whole.torque is not None:
+        progress(0.95, "reading the joint torques")
+        torques = torques_beside(verdict, after, whole, prior, rng)
     clock.ends("consequences")
     return Diagnosis(
         before,
@@ -247,6 +258,7 @@ def _diagnose(
         gain,
         disturbance,
         unexplained,
+        torques,
         tuple(catalogue),
         limits,
         seed,

@@ -7,6 +7,7 @@ as a wheel that turns the base by radians. The extended model's own simulation h
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -18,6 +19,8 @@ from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.perturbed_fit import CLOSE
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre
 
 __all__ = ["exactly_fitted", "extended_posterior", "extended_start"]
@@ -26,12 +29,28 @@ ROUNDS = 6
 """Simulations after which motion and pushes agree at given unknowns."""
 
 
-def extended_posterior(hypothesis: Hypothesis) -> Posterior:
-    """Build the posterior of a hypothesis, its effects in the simulation itself."""
+def extended_posterior(
+    hypothesis: Hypothesis, *, torque: TorqueSensor | None = None, added: Sequence[Effect] = ()
+) -> Posterior:
+    """Build the posterior of a hypothesis, its effects in the simulation itself.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    torque : TorqueSensor, optional
+        Sensors of the joints' torques, which a hypothesis of a diagnosis has not.
+    added : sequence of Effect
+        Further effects, whose coordinates are the last.
+
+    Raises
+    ------
+    InputError
+        If one of its effects is not carried into the torques.
+    """
     fit = hypothesis.fit
-    model = fit.posterior.model
-    for index, effect in enumerate(fit.effects):
-        model = model.extend(effect.tuned(fit.values(index)))
+    model = replace(fit.posterior.model, torque=torque)
+    for effect in (*(effect.tuned(fit.values(index)) for index, effect in enumerate(fit.effects)), *added):
+        model = model.extend(effect)
     if hypothesis.engine.frozen.size:
         model = replace(model, rate_sigma=0.0)
     manoeuvres = [_without(manoeuvre, fit.posterior, index) for index, manoeuvre in enumerate(fit.posterior.manoeuvres)]

@@ -10,9 +10,10 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
+from bayesid.inference.posterior import Posterior
 from bayesid.robot.robot_size import RobotSize
 
-__all__ = ["FORCE", "TORQUE", "WAVES", "generic_signatures"]
+__all__ = ["FORCE", "TORQUE", "WAVES", "error_signatures", "generic_signatures"]
 
 TORQUE, FORCE = "disturbing torque", "disturbing force"
 """Names of the smooth disturbances."""
@@ -47,18 +48,15 @@ def generic_signatures(engine: Engine, fit: Fit) -> SignatureBank:
     - pulse of torque: at one instant of one recording, about any axis;
     - error of each sensor: smooth courses of its channels.
     """
-    size = RobotSize.of(engine.posterior.model.robot)
+    posterior = engine.posterior
+    kinds, size = posterior.model.channels.kinds, RobotSize.of(posterior.model.robot)
     force = ACCELERATION * size.mass
     torque = force * size.radius
     banks = [
         _smooth(engine, fit, TORQUE, 3, torque),
-        *(
-            [_smooth(engine, fit, FORCE, 0, force)]
-            if any(sensor.kind.feels_force for sensor in engine.posterior.model.sensors)
-            else []
-        ),
+        *([_smooth(engine, fit, FORCE, 0, force)] if any(kind.feels_force for kind in kinds) else []),
         _pulses(engine, fit, torque),
-        *_errors(engine),
+        *(error_signatures(posterior, f"error of {kind.value}", posterior.model.channels.of(kind)) for kind in kinds),
     ]
     return SignatureBank.joined(banks)
 
@@ -123,25 +121,29 @@ def _wrenches(
     return list(found.reshape(len(times[0]), -1, 3 * count))
 
 
-def _errors(engine: Engine) -> list[SignatureBank]:
-    """Return the banks of smooth errors of each sensor, in standard deviations of its samples."""
-    posterior = engine.posterior
+def error_signatures(posterior: Posterior, name: str, channels: slice) -> SignatureBank:
+    """Return the bank of smooth errors of some channels of the residual, in standard deviations of their samples.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    name : str
+        Name of the candidate.
+    channels : slice
+        Columns of the residual, which have one variance.
+    """
     _, outputs, width = posterior.residual_shape
-    banks = []
-    for kind in posterior.model.channels.kinds:
-        name, channels = f"error of {kind.value}", posterior.model.channels.of(kind)
-        signatures, waves = [], []
-        for r, item in enumerate(posterior.whitenings):
-            for channel in range(channels.start, channels.stop):
-                there = np.flatnonzero(item.outputs[:, channel])
-                waves.append(min(ERROR_WAVES, len(there) // 3))
-                own = np.zeros((outputs, width, waves[-1]))
-                place = (np.arange(len(there)) + 0.5) / max(len(there), 1)
-                own[there, channel] = np.cos(np.pi * np.arange(waves[-1]) * place[:, None])
-                signatures.append(Signatures(name, own.reshape(outputs * width, -1), r))
-        if sum(waves):
-            spreads = [np.concatenate([_variances(count, corner) for count in waves if count]) for corner in CORNERS]
-            forms = [(AmplitudeGroup(name, ERROR, spread=spread),) for spread in spreads]
-            cause = CandidateCause(name, forms[0], True, tuple(forms[1:]))
-            banks.append(SignatureBank(tuple(signatures), (cause,)))
-    return banks
+    signatures, waves = [], []
+    for r, item in enumerate(posterior.whitenings):
+        for channel in range(channels.start, channels.stop):
+            there = np.flatnonzero(item.outputs[:, channel])
+            waves.append(min(ERROR_WAVES, len(there) // 3))
+            own = np.zeros((outputs, width, waves[-1]))
+            place = (np.arange(len(there)) + 0.5) / max(len(there), 1)
+            own[there, channel] = np.cos(np.pi * np.arange(waves[-1]) * place[:, None])
+            signatures.append(Signatures(name, own.reshape(outputs * width, -1), r))
+    if not sum(waves):
+        return SignatureBank()
+    spreads = [np.concatenate([_variances(count, corner) for count in waves if count]) for corner in CORNERS]
+    forms = [(AmplitudeGroup(name, ERROR, spread=spread),) for spread in spreads]
+    return SignatureBank(tuple(signatures), (CandidateCause(name, forms[0], True, tuple(forms[1:])),))

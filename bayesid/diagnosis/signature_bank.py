@@ -4,15 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.gram import Gram
-from bayesid.diagnosis.perturbed_fit import Fit
 from bayesid.diagnosis.scale_prior import CandidateCause
+from bayesid.inference.posterior import Posterior
 
-__all__ = ["SignatureBank", "Signatures"]
+__all__ = ["Fitted", "SignatureBank", "Signatures"]
+
+
+class Fitted(Protocol):
+    """A fitted model beside which signatures are weighed, such as a `Fit`."""
+
+    @property
+    def posterior(self) -> Posterior:
+        """Posterior of whose recordings the rows of the residual are, one after the other."""
+
+    @property
+    def residual(self) -> Floats:
+        """Whitened residual, shape (N,)."""
+
+    @property
+    def own(self) -> Floats:
+        """Derivatives of the residual in the model's n unknowns, each with a standard normal prior, shape (N, n)."""
+
+    @property
+    def own_coordinates(self) -> Floats:
+        """Those unknowns, shape (n,)."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +84,7 @@ class SignatureBank:
             causes += bank.causes
         return SignatureBank(tuple(item for items in found.values() for item in items), tuple(causes))
 
-    def gram(self, fit: Fit) -> Gram:
+    def gram(self, fit: Fitted) -> Gram:
         """Return the Gram of all signatures beside the model's own unknowns at a fit.
 
         The products of signatures less those of what the unknowns take are exact to a part in 1e16 of the former. Only

@@ -16,13 +16,13 @@ from studies.peers.reference import reference
 from studies.peers.samplers import SAMPLERS, Budget, Sampler
 from studies.peers.task import Recipe, attempt_recipe
 
-__all__ = ["EFFECTIVE", "LIMIT", "NESTED", "REFERENCE", "attempt", "tasks"]
+__all__ = ["EFFECTIVE", "LIMITS", "NESTED", "REFERENCE", "attempt", "tasks"]
 
 EFFECTIVE = 4000.0
 """Number of effective samples that are wanted."""
 
-LIMIT = 80.0
-"""Limit of a peer's processor time [s]; more than five times what the package takes for the base body."""
+LIMITS = {10: 80.0, 19: 80.0, 39: 150.0, 79: 500.0}
+"""Limits of a peer's processor time by the number of unknowns [s]; more than five times what the package takes."""
 
 LONG = 15_000.0
 """Number of effective samples of a reference."""
@@ -44,9 +44,9 @@ def tasks(full: bool) -> list[Task]:
     """Return the trials, those that decide first; the small study has the smallest case and what is quick."""
     cases = CASES if full else [min(CASES)]
     samplers = [Sampler.OURS, REFERENCE, *list(Sampler)[1:]] if full else [Sampler.OURS, REFERENCE, Sampler.DE]
-    size = {"effective": EFFECTIVE, "limit": LIMIT} if full else {"effective": 500.0, "limit": 20.0, "duration": 40.0}
+    size = {"effective": EFFECTIVE} if full else {"effective": 500.0, "duration": 40.0}
     contests = [
-        {"unknowns": unknowns, "sampler": str(sampler), **size}
+        {"unknowns": unknowns, "sampler": str(sampler), **size, "limit": LIMITS[unknowns] if full else 20.0}
         for sampler in samplers
         for unknowns in cases
         if unknowns <= NESTED or sampler not in (Sampler.DYNESTY, Sampler.NAUTILUS)

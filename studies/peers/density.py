@@ -124,7 +124,8 @@ class Target:
     @cached_property
     def log_density_of_one(self) -> jax.stages.Compiled:
         """Compiled log density at one point, for samplers that take no batches."""
-        return jax.jit(self.traced).lower(jnp.zeros(self.size)).compile()
+        mode = self.whitened(self.laplace.mean[None])[0]  # which finds the factor before anything is traced
+        return jax.jit(self.traced).lower(mode).compile()
 
 
 def target_of(unknowns: int, *, duration: float = DURATION, seed: int = 0) -> Target:

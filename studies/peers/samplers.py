@@ -44,6 +44,9 @@ BLOCK = 100
 LOWEST = -1e300
 """Log likelihood outside the support, for nested samplers that refuse infinite ones."""
 
+PACE = 200
+"""Number of evaluations that are timed to turn the limit of time into one of evaluations."""
+
 LIVE = 500
 """Number of live points of dynesty, its own default."""
 
@@ -256,10 +259,11 @@ def dynesty(target: Target, budget: Budget, rng: np.random.Generator) -> Reached
 
     one = target.log_density_of_one
     density = _Counted(_log_likelihood(one, target.size))
+    density(np.zeros(target.size))  # the first call takes longer
     each = _Clock()
-    for x in rng.standard_normal((20, target.size)):
+    for x in rng.standard_normal((PACE, target.size)):
         density(x)
-    calls, clock = int(20 * budget.seconds / each.seconds), _Clock()
+    calls, clock = int(PACE * budget.seconds / each.seconds), _Clock()
     density.evaluations = 0
     sampler = DynamicNestedSampler(density, nested_prior, target.size, nlive=LIVE, rstate=rng)
     sampler.run_nested(n_effective=int(budget.effective_samples), maxcall=calls, print_progress=False)

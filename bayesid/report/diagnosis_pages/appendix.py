@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bayesid.diagnosis import Diagnosis
+from bayesid.diagnosis import Diagnosis, TorqueReading
 from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.report import figures
 from bayesid.report.diagnosis_pages.evidence_page import add_other_residuals
@@ -28,6 +28,7 @@ def add_appendix(document: Document, result: Diagnosis) -> None:
         ["left", "left", "left"],
     )
     _add_candidates(document, result)
+    _add_torques(document, result)
     document.table(
         ["cause", "largest size", "why no more is plausible"],
         probability_tables.bound_rows(dict(result.bounds)),
@@ -56,6 +57,17 @@ def _add_candidates(document: Document, result: Diagnosis) -> None:
         "where nothing was evaluated.",
         ["left", "right", "right", "right", "right", "left", "right"],
     )
+
+
+def _add_torques(document: Document, result: Diagnosis) -> None:
+    if isinstance(result.torques, TorqueReading):
+        document.table(
+            ["candidate", "probability", "size ± sd"],
+            probability_tables.torque_rows(result.torques),
+            "What could act on the joint torques alone, read beside the verdict on the motion: the probability of "
+            "being at work, and the size where it is. Something unknown is a torque of any smooth course at one joint.",
+            ["left", "right", "left"],
+        )
 
 
 def add_measured(document: Document, result: Diagnosis) -> None:

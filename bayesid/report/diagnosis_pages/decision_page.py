@@ -15,6 +15,7 @@ from bayesid.report.sentences.diagnosis_sentences import cause_summary, verdict_
 from bayesid.report.sentences.next_steps import action_sentence
 from bayesid.report.sentences.set_words import set_text, verdict_text
 from bayesid.report.sentences.size_words import size_text
+from bayesid.report.sentences.torque_sentences import torque_sentence
 from bayesid.report.simulation_errors import SimulationError, simulation_errors, strongest_recording
 from bayesid.report.tables import change_tables, probability_tables
 
@@ -80,6 +81,8 @@ def decision_entries(
     ]
     if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
         entries.append(("What is left", wrench_sentence(result.unexplained)))
+    if result.torques is not None:
+        entries.append(("Joint torques", torque_sentence(result.torques)))
     if record:
         entries.append(("Record", record))
     entries += [

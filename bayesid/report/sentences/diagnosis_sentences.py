@@ -21,6 +21,7 @@ from bayesid.report.numbers import (
 )
 from bayesid.report.sentences.amplitude_words import amplitude_text
 from bayesid.report.sentences.set_words import NOTHING, probability_text, set_text
+from bayesid.report.sentences.torque_sentences import torque_sentence
 
 __all__ = [
     "alarm_sentence",
@@ -59,6 +60,8 @@ def diagnosis_sentences(result: Diagnosis) -> Iterator[str]:
     yield gain_sentence(result)
     if result.verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
         yield wrench_sentence(result.unexplained)
+    if result.torques is not None:
+        yield torque_sentence(result.torques)
 
 
 def verdict_sentence(result: Diagnosis) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayesid.diagnosis import Diagnosis
+from bayesid.diagnosis import Diagnosis, TorqueReading
 from bayesid.report.class_probabilities import class_of
 from bayesid.report.document import Rows
 from bayesid.report.inseparable_causes import CausePair
@@ -18,10 +18,11 @@ from bayesid.report.numbers import (
     format_unit,
 )
 from bayesid.report.sentences.set_words import NOTHING, SOMETHING, verdict_text
+from bayesid.report.sentences.torque_sentences import torque_size
 from bayesid.report.set_sizes import GroupSize, set_sizes
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
-__all__ = ["bound_rows", "pair_rows", "probability_rows", "sensitivity_rows", "set_rows"]
+__all__ = ["bound_rows", "pair_rows", "probability_rows", "sensitivity_rows", "set_rows", "torque_rows"]
 
 
 def probability_rows(result: Diagnosis, most: int) -> Rows:
@@ -41,6 +42,16 @@ def probability_rows(result: Diagnosis, most: int) -> Rows:
         *rows,
         [SOMETHING, format_probability(probabilities.unknown)],
         [NOTHING, format_probability(probabilities.nothing)],
+    ]
+
+
+def torque_rows(found: TorqueReading) -> Rows:
+    """Return name, probability and size of each candidate that acts on the joint torques, nothing and unknown last."""
+    rows = [[row.name, format_probability(row.probability), torque_size(found, row.name)] for row in found.causes]
+    return [
+        *rows,
+        [SOMETHING, format_probability(found.probabilities.unknown), ""],
+        [NOTHING, format_probability(found.probabilities.nothing), ""],
     ]
 
 
