@@ -31,6 +31,9 @@ from studies.truth.urdf import moving_joints
 COMPILED = "BAYESID_TEST_COMPILED"
 """Names the folder in which the processes of one run share compiled functions."""
 
+QUICKLY = "--xla_backend_optimization_level=0"
+"""Option of XLA: what is compiled for a test runs a third as fast, and most of a test's time is compilation."""
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="run only the tests that are otherwise left out")
@@ -39,6 +42,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "slow: left to ``pytest --slow``, as tests with the fixture of that name")
+    given = os.environ.get("XLA_FLAGS", "")
+    if QUICKLY not in given:  # as in the processes of a run that has set it
+        os.environ["XLA_FLAGS"] = f"{QUICKLY} {given}"
     if COMPILED not in os.environ:
         folder = tempfile.TemporaryDirectory()
         os.environ[COMPILED] = folder.name

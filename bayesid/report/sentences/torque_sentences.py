@@ -23,7 +23,7 @@ def torque_sentence(found: TorqueReading | Unread) -> str:
             )
         case Status.EXPLAINED:
             rows = [row for row in found.causes if row.name in found.verdict.causes]
-            sizes = joined([f"{row.name} ({torque_size(found, row.name)})" for row in rows])
+            sizes = joined([f"{row.name} ({torque_size(found, row.name)}, ± sd)" for row in rows])
             return (
                 f"The joint torques are explained by {sizes}; chi-square per sample goes from {before} to {after}. "
                 "It changes no motion, since that of the joints is measured."
