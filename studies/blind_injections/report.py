@@ -139,19 +139,23 @@ def _setup(trials: Sequence[Trial], planned: int) -> Setup:
     )
 
 
+def _failure(trial: Trial) -> str:
+    """Return the sentence on one wrong answer."""
+    stated = "" if trial.probability is None else f", stated with a probability of {trial.probability:.3f}"
+    if trial.kind == "adequate":
+        case = trial.case.removeprefix("null, ")
+        return f"Nothing was hidden ({case}, seed {trial.seed}), and the verdict was {_said(trial)}{stated}."
+    called = f"{_hidden(trial)} was called {_said(trial)}{stated}"
+    if trial.signal_to_noise is None:
+        return f"{called}; a fault of the noise has no signal-to-noise ratio."
+    beside = " beside the best known cause" if trial.kind == "unknown" else ""
+    return f"{called}; its signal-to-noise ratio{beside} is {trial.signal_to_noise:.1f}."
+
+
 def _failures(trials: Sequence[Trial]) -> list[str]:
     """Return sentences on every wrong answer, and on what is missed though it is large."""
     wrong = [trial for trial in trials if trial.misnamed or (trial.kind == "adequate" and trial.alarmed)]
-    texts = [
-        f"{_hidden(trial)} was called {_said(trial)}, stated with a probability of {trial.probability or 0.0:.3f}; "
-        + (
-            "it stood out of the noise by no number of standard deviations."
-            if trial.signal_to_noise is None
-            else f"its signal-to-noise ratio{' beside the best known cause' if trial.kind == 'unknown' else ''} is "
-            f"{trial.signal_to_noise:.1f}."
-        )
-        for trial in wrong
-    ]
+    texts = [_failure(trial) for trial in wrong]
     if not wrong:
         texts.append("No trial was misnamed, and none without anything hidden raised an alarm.")
     missed = [trial for trial in trials if trial.kind != "adequate" and not trial.alarmed]
