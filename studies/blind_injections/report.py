@@ -139,23 +139,33 @@ def _setup(trials: Sequence[Trial], planned: int) -> Setup:
     )
 
 
-def _failure(trial: Trial) -> str:
-    """Return the sentence on one wrong answer."""
-    stated = "" if trial.probability is None else f", stated with a probability of {trial.probability:.3f}"
-    if trial.kind == "adequate":
-        case = trial.case.removeprefix("null, ")
-        return f"Nothing was hidden ({case}, seed {trial.seed}), and the verdict was {_said(trial)}{stated}."
-    called = f"{_hidden(trial)} was called {_said(trial)}{stated}"
-    if trial.signal_to_noise is None:
-        return f"{called}; a fault of the noise has no signal-to-noise ratio."
-    beside = " beside the best known cause" if trial.kind == "unknown" else ""
-    return f"{called}; its signal-to-noise ratio{beside} is {trial.signal_to_noise:.1f}."
+def _failure(alike: Sequence[Trial]) -> str:
+    """Return the sentence on the trials of one case that were answered wrongly in the same way."""
+    first = alike[0]
+    said = _said(first)
+    each = []
+    for trial in alike:
+        parts = [f"seed {trial.seed}"]
+        if trial.probability is not None:
+            parts.append(f"stated {trial.probability:.3f}")
+        if trial.signal_to_noise is not None:
+            parts.append(f"{trial.signal_to_noise:.1f} σ")
+        each.append(", ".join(parts))
+    if first.kind == "adequate":
+        return (
+            f"Nothing was hidden ({first.case.removeprefix('null, ')}), and the verdict was {said}: {'; '.join(each)}."
+        )
+    where = ", outside the catalogue," if first.kind == "unknown" else ""
+    return f"{first.case.replace(', ', ' + ')}{where} was called {said}: {'; '.join(each)}."
 
 
 def _failures(trials: Sequence[Trial]) -> list[str]:
     """Return sentences on every wrong answer, and on what is missed though it is large."""
     wrong = [trial for trial in trials if trial.misnamed or (trial.kind == "adequate" and trial.alarmed)]
-    texts = [_failure(trial) for trial in wrong]
+    alike: dict[tuple[str, str], list[Trial]] = {}
+    for trial in wrong:
+        alike.setdefault((trial.case, _said(trial)), []).append(trial)
+    texts = [_failure(group) for group in alike.values()]
     if not wrong:
         texts.append("No trial was misnamed, and none without anything hidden raised an alarm.")
     missed = [trial for trial in trials if trial.kind != "adequate" and not trial.alarmed]
@@ -173,8 +183,7 @@ def _failures(trials: Sequence[Trial]) -> list[str]:
     outside = [trial for trial in wrong if trial.kind == "unknown"]
     if outside and all((trial.signal_to_noise or 0.0) < LEFT for trial in outside):
         texts.append(
-            f"Every outside effect that was misnamed left less than {LEFT:g} standard deviations beside the causes it "
-            "was taken for: their goal does not count it."
+            f"Every outside effect that was misnamed left less than {LEFT:g} σ beside the causes it was taken for."
         )
     return texts
 
@@ -254,10 +263,8 @@ def _files(document: Document, trials: Sequence[Trial], output: Path) -> None:
     ]
     seconds = np.array([trial.seconds["total"] for trial in trials])
     document.paragraph(
-        f"Beside this report: every trial, with the seed and strength that repeat it ({files[0]}), the answers to each "
-        f"hidden case ({files[1]}), and Brier and logarithmic scores of all stated probabilities ({files[2]}). A "
-        f"trial, with its flight and its diagnosis, took {np.median(seconds):.0f} s on a loaded core in the median and "
-        f"{seconds.max():.0f} s at most."
+        f"Beside this report: every trial with its seed and strength ({files[0]}), the answers by case ({files[1]}), "
+        f"and Brier and logarithmic scores ({files[2]}). A trial took {np.median(seconds):.0f} s in the median."
     )
 
 
