@@ -32,7 +32,7 @@ COMPILED = "BAYESID_TEST_COMPILED"
 """Names the folder in which the processes of one run share compiled functions."""
 
 QUICKLY = "--xla_backend_optimization_level=0"
-"""Option of XLA: what is compiled for a test runs a third as fast, and most of a test's time is compilation."""
+"""Option of XLA for all but the slow tests, whose time is mostly compilation: what is compiled runs a third as fast."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -43,7 +43,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "slow: left to ``pytest --slow``, as tests with the fixture of that name")
     given = os.environ.get("XLA_FLAGS", "")
-    if QUICKLY not in given:  # as in the processes of a run that has set it
+    if not (config.getoption("--slow") or config.getoption("--catalogue") or QUICKLY in given):
         os.environ["XLA_FLAGS"] = f"{QUICKLY} {given}"
     if COMPILED not in os.environ:
         folder = tempfile.TemporaryDirectory()
