@@ -32,6 +32,9 @@ from tests.conftest import PLANAR
 SUN = (0.6, 0.64, 0.48)
 TIME = np.arange(0.0, 60.1, 0.5)
 
+STEP = 0.25
+"""Step of the integration [s]: where the ramps end, the jerk jumps, and longer steps cost accuracy."""
+
 
 @Kind.register
 class SunDirection(Kind):
@@ -84,7 +87,7 @@ def flown() -> tuple[Model, Posterior, np.ndarray]:
     channels = {**sample_joints(motion, robot, TIME), **blank_channels(sensors, len(TIME))}
     for name in ("gyro2.a", "gyro2.b"):
         channels[name] = np.where(np.arange(len(TIME)) % 3 == 1, channels[name], np.nan)
-    blank = Posterior.of(model, [Manoeuvre(Recording("sunny", None, TIME, channels), motion)], step=1.0)
+    blank = Posterior.of(model, [Manoeuvre(Recording("sunny", None, TIME, channels), motion)], step=STEP)
     z = np.random.default_rng(5).normal(size=blank.size) * 0.3
     z[blank.unknowns.layout.all_rates] = 0.05
     recording = simulate_recordings(blank, np.random.default_rng(6), z)[0]
@@ -93,7 +96,7 @@ def flown() -> tuple[Model, Posterior, np.ndarray]:
     joints = {name: recording.channels[name] + 1e-6 * noise.normal(size=len(TIME)) for name in positions}
     recording = Recording("sunny", None, TIME, {**recording.channels, **joints})
     measured = MeasuredMotion.from_recording(recording, robot, sigma={0: 1e-6})
-    return model, Posterior.of(model, [Manoeuvre(recording, measured)], step=1.0), z
+    return model, Posterior.of(model, [Manoeuvre(recording, measured)], step=STEP), z
 
 
 def test_it_reads_what_it_should(flown):
@@ -103,7 +106,7 @@ def test_it_reads_what_it_should(flown):
     seen = Model(model.robot, (star, *model.sensors), model.priors, model.orbit, model.effects)
     channels = {**posterior.manoeuvres[0].recording.channels, **blank_channels((star,), len(TIME))}
     manoeuvre = Manoeuvre(Recording("sunny", None, TIME, channels), posterior.manoeuvres[0].motion)
-    both = predicted_readings(Posterior.of(seen, [manoeuvre], step=1.0), z)[0]
+    both = predicted_readings(Posterior.of(seen, [manoeuvre], step=STEP), z)[0]
     x, y, zz, w = both.attitude.T
     rows = [
         [1.0 - 2.0 * (y * y + zz * zz), 2.0 * (x * y - zz * w), 2.0 * (x * zz + y * w)],

@@ -15,8 +15,9 @@ from scipy.interpolate import BPoly
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.recording import Recording
-from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
+from bayesid.recording.smoothing import JointSamples, SmoothedJoint
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
 
@@ -130,14 +131,9 @@ class MeasuredMotion:
             If a joint of the robot is not recorded, or the recording holds a joint that the robot lacks.
         """
         check_joints(recording, robot)
-        joints = tuple(
-            smooth(
-                _samples(recording, joint.name, sigma or {}),
-                start=None if f"position.{joint.name}" in recording.channels else (start or {}).get(joint.name, 0.0),
-            )
-            for joint in robot.joints
-        )
-        return cls(joints, tuple(joint.name for joint in robot.joints))
+        names = tuple(joint.name for joint in robot.joints)
+        starts = [None if f"position.{name}" in recording.channels else (start or {}).get(name, 0.0) for name in names]
+        return cls(smooth_joints([_samples(recording, name, sigma or {}) for name in names], starts), names)
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,)."""

@@ -4,12 +4,13 @@ The joint's position is an integrated Wiener process: its ``order``-th derivativ
 given the samples is the smoothing spline of degree ``2 order - 1`` (Wahba 1978), and the posterior covariance is what
 the likelihood needs: the uncertainty of velocity and acceleration with their correlation in time. The order, the
 intensity of the process, and any noise level the user did not declare, maximise the marginal likelihood. All algebra
-is banded.
+is banded. Instants at which the acceleration or the jerk jumps are found elsewhere (`bayesid.recording.jumps`).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,6 +21,7 @@ from scipy.optimize import minimize, minimize_scalar
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid.recording.band_covariance import covariances_by_distance
+from bayesid.recording.integrated_process import IntegratedProcess, Jump
 
 __all__ = ["JointSamples", "SmoothedJoint", "smooth"]
 
@@ -28,6 +30,9 @@ ORDERS = (4, 3, 5)
 """Orders of the derivative that may be white noise, of which the marginal likelihood chooses one: 3 gives the quintic
 spline, the roughest with a continuous acceleration, 5 leaves a fiftieth of its error on smooth motion, and 6 would need
 square-root algebra."""
+
+RELIABLE = 1e-6
+"""Information on a jump over that on it if the process were observed, below which it is lost in rounding."""
 
 SNAP = 0.02
 """Fraction of the median step below which two sample times share a node, because the algebra needs separate nodes."""
@@ -73,6 +78,8 @@ class SmoothedJoint:
         Samples.
     start : float or None
         Exact position at time 0, if known.
+    jumps : tuple of Jump
+        Jumps of the acceleration or the jerk that the process has.
     """
 
     nodes: Floats
@@ -88,12 +95,35 @@ class SmoothedJoint:
     samples: int
     series: tuple[JointSamples, ...]
     start: float | None
+    jumps: tuple[Jump, ...]
 
     def with_noise(self, factor: float) -> SmoothedJoint:
         """Smooth the samples anew with the declared noise times a factor; estimated noise is estimated again."""
-        return smooth(
-            [replace(one, sigma=None if one.sigma is None else factor * one.sigma) for one in self.series], self.start
-        )
+        series = [replace(one, sigma=None if one.sigma is None else factor * one.sigma) for one in self.series]
+        return smooth(series, self.start, self.jumps)
+
+    def with_jumps(self, jumps: Sequence[Jump]) -> SmoothedJoint:
+        """Smooth the samples anew with further jumps of the process."""
+        return smooth(list(self.series), self.start, (*self.jumps, *jumps), orders=(self.order,))
+
+    def jump_scores(self) -> tuple[Floats, Floats]:
+        """Return score and information of a jump of each state at the end of each step, both (n - 1, order).
+
+        They are in scaled time, at a jump of zero, and marginal over everything else: the auxiliary residual of the
+        increment is the score over the root of the information (de Jong and Penzer 1998). Information that is lost
+        in rounding is zero.
+        """
+        process = IntegratedProcess(np.diff(self.nodes / self.scale), self.order, self.jumps)
+        precision, _ = process.precision(self.intensity * self.scale ** (self.order - 0.5))
+        blocks = covariances_by_distance(self.factor, self.order)
+        own, next_ = next(blocks), next(blocks)
+        lifted = process.transition @ next_
+        covariance = own[1:] - lifted - lifted.transpose(0, 2, 1)
+        covariance += process.transition @ own[:-1] @ process.transition.transpose(0, 2, 1)
+        score = np.einsum("kij,kj->ki", precision, process.increments(self.states))
+        whole = np.diagonal(precision, axis1=1, axis2=2)
+        information = whole - np.diagonal(precision @ covariance @ precision, axis1=1, axis2=2)
+        return score, np.where(information > RELIABLE * whole, information, 0.0)
 
     @property
     def _units(self) -> Floats:
@@ -184,7 +214,12 @@ class SmoothedJoint:
         return np.sqrt(np.diagonal(self.lag_covariance(time, 0)[0], axis1=1, axis2=2)).T
 
 
-def smooth(samples: list[JointSamples], start: float | None = None) -> SmoothedJoint:
+def smooth(
+    samples: list[JointSamples],
+    start: float | None = None,
+    jumps: Sequence[Jump] = (),
+    orders: Sequence[int] = ORDERS,
+) -> SmoothedJoint:
     """Fit the smoothing spline of one joint.
 
     Parameters
@@ -193,11 +228,15 @@ def smooth(samples: list[JointSamples], start: float | None = None) -> SmoothedJ
         Series of samples, at least one of them of positions or velocities.
     start : float, optional
         Exact position at time 0 of a joint that is recorded by its speed only.
+    jumps : sequence of Jump, optional
+        Jumps of the acceleration or the jerk, as `bayesid.recording.jumps` finds them.
+    orders : sequence of int, optional
+        Orders of the derivative that may be white noise, of which the marginal likelihood chooses one.
     """
     nodes, scale = _nodes(np.concatenate([series.time for series in samples]))
     best = None
-    for order in ORDERS:
-        fit = _fit(samples, nodes, scale, start, order)
+    for order in orders:
+        fit = _fit(samples, nodes, scale, start, order, tuple(jump for jump in jumps if jump.derivative < order))
         if best is not None and order > best.order and fit.log_likelihood < best.log_likelihood:
             break
         if best is None or fit.log_likelihood > best.log_likelihood:
@@ -206,8 +245,15 @@ def smooth(samples: list[JointSamples], start: float | None = None) -> SmoothedJ
     return best
 
 
-def _fit(samples: list[JointSamples], nodes: Floats, scale: float, start: float | None, order: int) -> SmoothedJoint:
-    problem = _Problem(nodes / scale, [_scaled(series, nodes, scale) for series in samples], start, order)
+def _fit(
+    samples: list[JointSamples],
+    nodes: Floats,
+    scale: float,
+    start: float | None,
+    order: int,
+    jumps: tuple[Jump, ...],
+) -> SmoothedJoint:
+    problem = _Problem(nodes / scale, [_scaled(series, nodes, scale) for series in samples], start, order, jumps)
     units = [scale**series.derivative for series in samples]
     guess = [math.log(problem.roughness() * 10.0)]
     guess += [
@@ -257,6 +303,7 @@ def _fit(samples: list[JointSamples], nodes: Floats, scale: float, start: float 
         samples=sum(len(series.time) for series in samples),
         series=tuple(samples),
         start=start,
+        jumps=jumps,
     )
 
 
@@ -279,25 +326,15 @@ class _Problem:
     """Normal equations of the smoothing problem in scaled time, which are banded."""
 
     def __init__(
-        self, nodes: Floats, series: list[tuple[int, Integers, Floats]], start: float | None, order: int
+        self,
+        nodes: Floats,
+        series: list[tuple[int, Integers, Floats]],
+        start: float | None,
+        order: int,
+        jumps: Sequence[Jump],
     ) -> None:
         self.series, self.count, self.order = series, len(nodes), order
-        step = np.diff(nodes)
-        powers = np.arange(order)
-        lift = powers[None, :] - powers[:, None]
-        factorial = np.array([math.factorial(max(int(value), 0)) for value in lift.ravel()]).reshape(lift.shape)
-        self.transition = np.where(lift >= 0, step[:, None, None] ** np.maximum(lift, 0) / factorial, 0.0)
-        exponent = 2 * order - 1 - powers[:, None] - powers[None, :]
-        denominator = np.array([math.factorial(order - 1 - i) for i in powers])
-        unit = 1.0 / (exponent * np.outer(denominator, denominator))
-        inverse = np.linalg.inv(unit)
-        self.process = inverse * step[:, None, None] ** (-exponent)
-        self.process_logdet = len(step) * np.linalg.slogdet(inverse)[1] - order**2 * np.log(step).sum()
-        lower = np.einsum("kji,kjl->kil", self.transition, self.process)
-        self.diagonal = np.zeros((self.count, order, order))
-        self.diagonal[:-1] += lower @ self.transition
-        self.diagonal[1:] += self.process
-        self.below = -np.swapaxes(lower, 1, 2)
+        self.process = IntegratedProcess(np.diff(nodes), order, jumps)
         spread = max(float(np.abs(values).max()) for _, _, values in series)
         self.initial = np.full(order, 1.0 / (100.0 * (spread + 1e-6)) ** 2)
         self.initial_mean = np.zeros(order)
@@ -317,8 +354,12 @@ class _Problem:
 
     def solve(self, intensity: float, sigmas: list[float]) -> tuple[float, Floats, Floats, float]:
         """Return the log marginal likelihood, the states (n, order), the banded factor and chi-square."""
-        order, weight = self.order, intensity**-2
-        diagonal = weight * self.diagonal
+        order = self.order
+        precision, prior_logdet = self.process.precision(intensity)
+        lower = np.einsum("kji,kjl->kil", self.process.transition, precision)
+        diagonal = np.zeros((self.count, order, order))
+        diagonal[:-1] += lower @ self.process.transition
+        diagonal[1:] += precision
         diagonal[0] += np.diag(self.initial)
         for (derivative, node, _), sigma in zip(self.series, sigmas, strict=True):
             np.add.at(diagonal[:, derivative, derivative], node, sigma**-2)
@@ -327,37 +368,35 @@ class _Problem:
             for column in range(order):
                 if row >= column:
                     band[row - column, :, column] = diagonal[:, row, column]
-                band[order + row - column, :-1, column] = weight * self.below[:, row, column]
+                band[order + row - column, :-1, column] = -lower[:, column, row]
         try:
             factor = sla.cholesky_banded(band.reshape(2 * order, -1), lower=True, check_finite=False)
         except np.linalg.LinAlgError:
             return -1e300, np.zeros((self.count, order)), band.reshape(2 * order, -1), np.inf
         states = np.zeros((self.count, order))
         for _ in range(2):  # iterative refinement: positions of 1 rad carry noise of 1e-6
-            gradient = self._gradient(states, weight, sigmas)
+            gradient = self._gradient(states, precision, sigmas)
             states = states + sla.cho_solve_banded((factor, True), gradient.ravel(), check_finite=False).reshape(
                 states.shape
             )
-        jump = states[1:] - np.einsum("kij,kj->ki", self.transition, states[:-1])
+        increments = self.process.increments(states)
         chi2 = sum(
             float(np.sum(((values - states[node, d]) / s) ** 2))
             for (d, node, values), s in zip(self.series, sigmas, strict=True)
         )
-        energy = chi2 + weight * float(np.einsum("ki,kij,kj->", jump, self.process, jump))
+        energy = chi2 + float(np.einsum("ki,kij,kj->", increments, precision, increments))
         energy += float(np.sum(self.initial * (states[0] - self.initial_mean) ** 2))
         counts = [len(values) for _, _, values in self.series]
-        prior_logdet = self.process_logdet - 2.0 * (self.count - 1) * order * math.log(intensity)
         prior_logdet += float(np.log(self.initial).sum())
         noise_logdet = sum(2.0 * n * math.log(s) for n, s in zip(counts, sigmas, strict=True))
         log_likelihood = 0.5 * (prior_logdet - noise_logdet - energy) - float(np.log(factor[0]).sum())
         return log_likelihood, states, factor, chi2
 
-    def _gradient(self, states: Floats, weight: float, sigmas: list[float]) -> Floats:
-        jump = states[1:] - np.einsum("kij,kj->ki", self.transition, states[:-1])
-        force = weight * np.einsum("kij,kj->ki", self.process, jump)
+    def _gradient(self, states: Floats, precision: Floats, sigmas: list[float]) -> Floats:
+        force = np.einsum("kij,kj->ki", precision, self.process.increments(states))
         gradient = np.zeros_like(states)
         gradient[1:] -= force
-        gradient[:-1] += np.einsum("kji,kj->ki", self.transition, force)
+        gradient[:-1] += np.einsum("kji,kj->ki", self.process.transition, force)
         gradient[0] -= self.initial * (states[0] - self.initial_mean)
         for (derivative, node, values), sigma in zip(self.series, sigmas, strict=True):
             np.add.at(gradient[:, derivative], node, (values - states[node, derivative]) / sigma**2)

@@ -3,7 +3,8 @@
 The smoothing takes a joint's motion as an m-fold integral of white noise. In frequency w its posterior variance is that
 of the encoder times H = 1 / (1 + (w / c)^2m), of which H^2 is noise let through and H - H^2 roughness not resolved. Of
 the r-th derivative's variance the second part is (2r + 1) / 2m. A motion of a few sines has no such roughness, so that
-the mean square of its errors is 1 - (2r + 1) / 2m of what is stated; at a jump of the jerk it is far more.
+the mean square of its errors is 1 - (2r + 1) / 2m of what is stated; at a jump of the jerk that is not found in the
+samples (`bayesid.recording.jumps`) it is far more.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesid._math.arrays import Floats
-from bayesid.recording.smoothing import ORDERS, JointSamples, smooth
+from bayesid.recording.jumps import smooth_joints
+from bayesid.recording.smoothing import ORDERS, JointSamples
 from studies.calibration.data import AMPLITUDE, DURATION
 from studies.truth.mujoco import smooth_motion
 
@@ -70,5 +72,5 @@ def _ratios(time: Floats, encoder: float, seed: int) -> Floats:
     motion = smooth_motion(1, DURATION, seed, amplitude=AMPLITUDE, ramp=RAMP)
     exact = np.array([np.ravel(motion(float(now))) for now in time]).T
     noisy = exact[0] + encoder * np.random.default_rng(seed).normal(size=len(time))
-    joint = smooth([JointSamples(0, time, noisy, encoder)])
+    (joint,) = smooth_joints([[JointSamples(0, time, noisy, encoder)]])
     return np.asarray(((joint.evaluate(time) - exact) / joint.standard_deviation(time)) ** 2)

@@ -140,9 +140,10 @@ def _add_chi_square(document: Document, cases: Sequence[Replicates]) -> None:
         "have, whatever the sampling and the encoder, as long as the encoder's noise and not the interval limits the "
         f"smoothing. Ratios of {', '.join(f'{smooth_share(order):.1f}' for order in range(3))} follow, and a sensor "
         "whose errors are mostly carried accelerations shows a chi-square down to one half. Within a second of the "
-        "ends of quintic ramps, where the jerk jumps, the stated acceleration is too sharp by a factor of "
-        f"{sharp.min():.1f} to {sharp.max():.1f}. A sensor with as much noise of its own, as here, shows little of "
-        "either. The remedy would be a smoother process with jumps of the jerk as unknowns; it is not made."
+        "ends of quintic ramps, where the jerk jumps, the actual error of the acceleration is "
+        f"{sharp.min():.1f} to {sharp.max():.1f} times what is stated: jumps that the samples show are unknowns of "
+        "the process, but one joint alone, as here, does not show all. A sensor with as much noise of its own shows "
+        "little of either."
     )
     add_number_table(
         document,
@@ -187,7 +188,8 @@ def _findings(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], flo
     sentences.append(
         f"Chi-square per sample at the truth is {_mean(chi2[0])} for rates and {_mean(chi2[1])} for accelerations, but "
         "not by merit alone: the noise carried from the encoders is overstated where joints move smoothly and "
-        "understated where their jerk jumps, which shows where it outweighs the sensors' own (section 4)."
+        "understated where their jerk jumps too little to be seen, which shows where it outweighs the sensors' own "
+        "(section 4)."
     )
     return sentences
 

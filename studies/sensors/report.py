@@ -174,10 +174,10 @@ def _negatives(document: Document, result: Result) -> None:
     ratio = float(equal.sd[k] / weighted.sd[k])
     error = ratio * float(np.hypot(*(spread.sd_error[k] / spread.sd[k] for spread in (equal, weighted))))
     texts = [
-        f"The package's likelihood itself: near the junctions of (27), where the joints' third derivative jumps, its "
-        f"smoother is biased. Actual over stated errors are {honesty_of(result.joints[standard][LIKELIHOOD])} at "
-        f"{format_text(standard)}, and {honesty_of(result.joints[standard][WITHOUT_JUNCTIONS])} if those samples are "
-        "left out.",
+        "The package's likelihood itself: near the junctions of (27), where the joints' third derivative jumps, a "
+        "jump that the samples do not show biases its smoother. Actual over stated errors are "
+        f"{honesty_of(result.joints[standard][LIKELIHOOD])} at {format_text(standard)}, and "
+        f"{honesty_of(result.joints[standard][WITHOUT_JUNCTIONS])} if those samples are left out.",
         "Integrated as in (21), with velocities taken for white and equal weights, the accelerometer makes the worst "
         f"moment {percent(0.01 * ratio, 0.01 * error)} times as uncertain, and a constant bias of 10⁻⁴ m/s² changes "
         f"the mass by {format_percent(abs(float(falsified[EQUAL].bias[MASS])), 2)} (as it reads: "

@@ -15,7 +15,8 @@ from scipy import signal
 from scipy.interpolate import make_smoothing_spline
 
 from bayesid._math.arrays import Floats
-from bayesid.recording.smoothing import JointSamples, smooth
+from bayesid.recording.jumps import smooth_joints
+from bayesid.recording.smoothing import JointSamples
 
 __all__ = ["Differences", "LowPass", "Polynomial", "SavitzkyGolay", "SmoothingSpline", "Treatment", "Wiener"]
 
@@ -154,5 +155,5 @@ class Wiener:
 
     def __call__(self, time: Floats, values: Floats, sigma: float) -> Floats:
         """Return values and two derivatives, shape (3, T, n)."""
-        fits = [smooth([JointSamples(0, time, column, sigma)]) for column in values.T]
+        fits = smooth_joints([[JointSamples(0, time, column, sigma)] for column in values.T])
         return np.stack([fit.evaluate(time) for fit in fits], axis=-1)

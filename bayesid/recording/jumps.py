@@ -1,0 +1,155 @@
+"""Instants at which the acceleration or the jerk of the joints jumps, found in their samples.
+
+Profiles of speed are smooth but for the instants where they begin and end. A process of one intensity would be far too
+sure of itself there. The smoothed increments of the process show such instants (the auxiliary residuals of Harvey and
+Koopman 1992 and of de Jong and Penzer 1998), and the joints of a robot often begin and end together, so that a jump is
+sought in each joint and in all of them. What is found is an unknown of the process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import chi2
+
+from bayesid._math.arrays import Floats
+from bayesid.recording.integrated_process import Jump
+from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
+
+__all__ = ["smooth_joints"]
+
+DERIVATIVES = (2, 3)
+"""Derivatives of the position that may jump: acceleration and jerk."""
+
+LEVEL = 1e-3
+"""p-value below which a jump is an unknown. Each step is tested, so that a rough joint without a jump gets one or two:
+a jump too many widens the errors near one instant, a jump missed makes errors of ten times what is stated."""
+
+MOST_ROUNDS = 4
+"""Rounds of the search: what has jumped less is seen once the larger jumps no longer count as roughness."""
+
+APART = 10
+"""Steps between two jumps that are found in one round, as the smaller one may be the shadow of the larger."""
+
+UNLIKELY = 0.05
+"""Probability of a step relative to the likeliest below which the jump is not placed there."""
+
+FREE = 10.0
+"""Prior standard deviation of a jump over its estimate, with which the data alone decide on its size."""
+
+
+MOST_LOST = 5.0
+"""Log likelihood that a jump may cost a joint, twice that of a jump of which it shows nothing, ``log(FREE)``."""
+
+
+class _Scores(NamedTuple):
+    """Scores and information of the jumps of one joint, (n - 1, 2) each; both are zero where there is none."""
+
+    score: Floats
+    information: Floats
+
+    @property
+    def statistic(self) -> Floats:
+        """Square of a jump over its variance."""
+        known = self.information > 0.0
+        return np.divide(self.score**2, self.information, out=np.zeros_like(self.score), where=known)
+
+
+class _Group(NamedTuple):
+    """Joints sampled at the same times, with the statistic of a jump of all of them and its p-value, (n - 1, 2)."""
+
+    members: list[int]
+    nodes: Floats
+    statistic: Floats
+    log_p: Floats
+
+    @classmethod
+    def of(cls, members: list[int], joints: Sequence[SmoothedJoint], scores: Sequence[_Scores]) -> _Group:
+        """Sum the statistics of some joints."""
+        statistic = np.sum([scores[index].statistic for index in members], axis=0)
+        degrees = np.sum([scores[index].information > 0.0 for index in members], axis=0)
+        return cls(members, joints[members[0]].nodes, statistic, chi2.logsf(statistic, np.maximum(degrees, 1)))
+
+    def leave_out(self, begin: float, end: float) -> None:
+        """Look for no jump between two times."""
+        self.log_p[np.searchsorted(self.nodes, begin, side="right") - 1 : np.searchsorted(self.nodes, end)] = 0.0
+
+
+def smooth_joints(
+    samples: Sequence[list[JointSamples]], starts: Sequence[float | None] | None = None
+) -> tuple[SmoothedJoint, ...]:
+    """Smooth the joints of one recording, with the jumps of acceleration and jerk that their samples show.
+
+    Parameters
+    ----------
+    samples : sequence of list of JointSamples
+        Series of samples of each joint.
+    starts : sequence, optional
+        Exact position at time 0 of each joint that is recorded by its speed only, else None.
+    """
+    starts = [None] * len(samples) if starts is None else starts
+    joints = [smooth(series, start) for series, start in zip(samples, starts, strict=True)]
+    for _ in range(MOST_ROUNDS):
+        found = _new_jumps(joints) if joints else []
+        if not any(found):
+            break
+        joints = [_extended(joint, new) for joint, new in zip(joints, found, strict=True)]
+    return tuple(joints)
+
+
+def _extended(joint: SmoothedJoint, jumps: list[Jump]) -> SmoothedJoint:
+    """Return the joint with further jumps, or as it was where rounding spoils its likelihood with them."""
+    if not jumps:
+        return joint
+    extended = joint.with_jumps(jumps)
+    most_lost = MOST_LOST * len(jumps)
+    return extended if extended.log_likelihood > joint.log_likelihood - most_lost else joint
+
+
+def _new_jumps(joints: Sequence[SmoothedJoint]) -> list[list[Jump]]:
+    """Return the significant jumps that each joint's process does not have yet."""
+    scores = [_scores(joint) for joint in joints]
+    alone = [[index] for index in range(len(joints))]
+    groups = [_Group.of(members, joints, scores) for members in alone + _together(joints)]
+    found: list[list[Jump]] = [[] for _ in joints]
+    while True:
+        best = min(groups, key=lambda group: float(group.log_p.min()))
+        step, column = np.unravel_index(np.argmin(best.log_p), best.log_p.shape)
+        if best.log_p[step, column] > np.log(LEVEL):
+            return found
+        first, probability = _place(best.statistic[:, column], int(step))
+        for index in best.members:
+            score, information = scores[index].score[step, column], scores[index].information[step, column]
+            if information > 0.0:
+                variance = FREE**2 * ((score / information) ** 2 + 1.0 / information)
+                found[index].append(Jump(first, DERIVATIVES[column], tuple(variance * probability)))
+        last = first + len(probability)
+        for group in groups:
+            group.leave_out(best.nodes[max(0, first - APART)], best.nodes[min(last + APART, len(best.nodes) - 1)])
+
+
+def _scores(joint: SmoothedJoint) -> _Scores:
+    score, information = joint.jump_scores()
+    which = [derivative for derivative in DERIVATIVES if derivative < joint.order]
+    whole = np.zeros((2, len(score), len(DERIVATIVES)))
+    whole[0, :, : len(which)], whole[1, :, : len(which)] = score[:, which], information[:, which]
+    return _Scores(whole[0], whole[1])
+
+
+def _together(joints: Sequence[SmoothedJoint]) -> list[list[int]]:
+    """Return the groups of two and more joints that are sampled at the same times."""
+    groups: dict[bytes, list[int]] = {}
+    for index, joint in enumerate(joints):
+        groups.setdefault(joint.nodes.tobytes(), []).append(index)
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def _place(statistic: Floats, peak: int) -> tuple[int, Floats]:
+    """Return the first of the steps around a peak in which the jump may lie, and their probabilities."""
+    relative = np.exp(np.minimum(0.5 * (statistic - statistic[peak]), 0.0))
+    unlikely = np.flatnonzero(relative < UNLIKELY)
+    first = int(unlikely[unlikely < peak].max(initial=-1)) + 1
+    last = int(unlikely[unlikely > peak].min(initial=len(statistic)))
+    return first, relative[first:last] / relative[first:last].sum()
