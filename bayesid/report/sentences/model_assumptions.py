@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bayesid._io.words import counted
 from bayesid.design import Plan
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
@@ -154,11 +155,14 @@ def _orbit_sentence(model: Model) -> str:
 
 
 def _motion_sentence(posterior: Posterior) -> str:
-    if not any(isinstance(manoeuvre.motion, MeasuredMotion) for manoeuvre in posterior.manoeuvres):
+    measured = [item.motion for item in posterior.manoeuvres if isinstance(item.motion, MeasuredMotion)]
+    if not measured:
         return "The motion of the joints is prescribed and exact."
     window = max(item.window for item in posterior.whitenings)
     reach = f"correlated over up to {window} samples" if window else "which it correlates too little to matter"
+    jumps = sum(len(joint.jumps) for motion in measured for joint in motion.joints)
+    free = f" that leaves {counted(jumps, 'jump')} of acceleration or jerk free" if jumps else ""
     return (
-        "The motion of the joints is a smoothing spline through the samples of the encoders (last table); its "
+        f"The motion of the joints is a smoothing spline{free} through the samples of the encoders (last table); its "
         f"uncertainty is carried into the noise of the sensors, {reach}."
     )
