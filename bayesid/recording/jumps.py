@@ -147,9 +147,13 @@ def _together(joints: Sequence[SmoothedJoint]) -> list[list[int]]:
 
 
 def _place(statistic: Floats, peak: int) -> tuple[int, Floats]:
-    """Return the first of the steps around a peak in which the jump may lie, and their probabilities."""
+    """Return the first of the steps around a peak in which the jump may lie, and their probabilities.
+
+    A jump just beside a node fits the samples in either of the steps next to it, but not the state at that node.
+    """
     relative = np.exp(np.minimum(0.5 * (statistic - statistic[peak]), 0.0))
     unlikely = np.flatnonzero(relative < UNLIKELY)
-    first = int(unlikely[unlikely < peak].max(initial=-1)) + 1
-    last = int(unlikely[unlikely > peak].min(initial=len(statistic)))
-    return first, relative[first:last] / relative[first:last].sum()
+    first = max(int(unlikely[unlikely < peak].max(initial=-1)), 0)
+    last = min(int(unlikely[unlikely > peak].min(initial=len(statistic))), len(statistic) - 1)
+    likely = np.maximum(relative[first : last + 1], UNLIKELY)
+    return first, likely / likely.sum()
