@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bayesid.diagnosis.encoder_fault import noise_of
 from bayesid.recording.integrated_process import IntegratedProcess, Jump
 from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
@@ -93,6 +94,23 @@ def test_errors_where_profiles_of_speed_begin_and_end_are_covered(begin, sigma):
             assert np.abs(ratio[2, away]).max() < 5.0
             squares.append(np.mean(ratio[:2] ** 2))
     assert np.mean(squares) < 1.4
+
+
+@pytest.mark.parametrize("factor", [1.0, 2.0])
+def test_profiles_of_speed_are_not_taken_for_noise_of_the_encoder(factor):
+    """Five moves in a row, each with four jumps, with as much noise as declared and with twice as much.
+
+    With the differences across the jumps, noise as declared is taken for 2.2 times its variance.
+    """
+    begins = (5.0, 33.2, 61.3, 90.4, 120.1)
+    moves = [sum(trapezoid(2.0 * begin, d, 2.0 * TIME)[0] for begin in begins) for d in (0.4, 0.7, 1.0)]
+    noise = factor * 1e-6 * np.random.default_rng(1).normal(size=(3, len(TIME)))
+    joints = smooth_joints([[JointSamples(0, TIME, value, 1e-6)] for value in np.array(moves) + noise])
+    jumps = [joint.jump_intervals for joint in joints]
+    found = noise_of([joint.series[0] for joint in joints], fewest=3.0, jumps=jumps)
+    assert found is not None
+    assert found.degrees > 10.0
+    assert found.ratio == pytest.approx(factor**2, abs=4.0 * factor**2 * np.sqrt(2.0 / found.degrees))
 
 
 def test_what_one_joint_cannot_show_all_together_do():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import replace
 from math import comb
 from typing import NamedTuple
@@ -50,19 +50,25 @@ class EncoderNoise(NamedTuple):
 def encoder_noise(posterior: Posterior) -> EncoderNoise | None:
     """Estimate the noise of all encoders of a posterior by one factor (`noise_of`)."""
     motions = [item.motion for item in posterior.manoeuvres if isinstance(item.motion, MeasuredMotion)]
-    return noise_of([one for motion in motions for joint in motion.joints for one in joint.series])
+    series = [(one, joint.jump_intervals) for motion in motions for joint in motion.joints for one in joint.series]
+    return noise_of([one for one, _ in series], jumps=[intervals for _, intervals in series])
 
 
-def noise_of(series: Iterable[JointSamples], fewest: float = FEWEST) -> EncoderNoise | None:
+def noise_of(
+    series: Sequence[JointSamples], fewest: float = FEWEST, jumps: Sequence[Floats] | None = None
+) -> EncoderNoise | None:
     """Estimate the noise of samples by one factor, from their high differences; None where none is declared.
 
     A difference of order k of white noise has ``comb(2k, k)`` times its variance. Unlike the likelihood of smoothing,
     it needs no model of the motion, which smoothing takes for integrated noise; and as motion only adds to it, the
     least of some orders is taken. The median over the samples leaves out where the motion is rough, and the median
-    over the joints those of which other things are wrong. Series of fewer degrees of freedom than ``fewest`` are not
-    used.
+    over the joints those of which other things are wrong. Differences across an instant of ``jumps``, intervals (n, 2)
+    [s] for each series, are left out, as a profile of speed has many. Series of fewer degrees of freedom than
+    ``fewest`` are not used.
     """
-    found = [own for one in series if one.sigma is not None and (own := _of(one, one.sigma)).degrees >= fewest]
+    jumps = [np.zeros((0, 2))] * len(series) if jumps is None else jumps
+    every = [_of(one, one.sigma, own) for one, own in zip(series, jumps, strict=True) if one.sigma is not None]
+    found = [own for own in every if own.degrees >= fewest]
     if not found:
         return None
     # the median of many has 2 / pi of the degrees of freedom of the mean
@@ -70,10 +76,12 @@ def noise_of(series: Iterable[JointSamples], fewest: float = FEWEST) -> EncoderN
     return EncoderNoise(float(np.median([own.ratio for own in found])), degrees)
 
 
-def _of(samples: JointSamples, sigma: float) -> EncoderNoise:
+def _of(samples: JointSamples, sigma: float, jumps: Floats) -> EncoderNoise:
     """Return the variance of one series relative to the declared one, by the order of differences that gives least."""
     steps = np.diff(samples.time)
     even = np.abs(steps / np.median(steps) - 1.0) < EVEN
+    begin, end = samples.time[:-1, None], samples.time[1:, None]
+    even &= ~((begin < jumps[:, 1]) & (end > jumps[:, 0])).any(axis=1)
     best = EncoderNoise(np.inf, 0.0)
     for order, share in ORDERS.items():
         if len(steps) < order:

@@ -126,6 +126,12 @@ class SmoothedJoint:
         return score, np.where(information > RELIABLE * whole, information, 0.0)
 
     @property
+    def jump_intervals(self) -> Floats:
+        """Begin and end of the steps in which each jump may lie, (n, 2) [s]."""
+        ends = [(jump.first, jump.first + len(jump.variances)) for jump in self.jumps]
+        return self.nodes[np.array(ends, dtype=np.intp).reshape(-1, 2)]
+
+    @property
     def _units(self) -> Floats:
         return self.scale ** -np.arange(self.order, dtype=float)
 
