@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.diagnosis import Status, diagnose
 from bayesid.diagnosis.encoder_fault import noise_of
 from bayesid.recording.integrated_process import IntegratedProcess, Jump
 from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
-from studies.truth.motions import smooth_motion
+from studies.truth.motions import ProfiledManoeuvres, smooth_motion, trapezoid
+from studies.truth.mujoco import write_study
+from studies.truth.urdf import SERVICER3
 from tests.test_smoothing import swing
 
 TIME = np.arange(0.0, 160.01, 0.5)
@@ -60,18 +65,9 @@ def test_jumps_are_found_where_ramps_end_and_nowhere_else():
         assert all(min(abs(time - RAMP), abs(time - 160.0 + RAMP)) < 5.0 for time in likeliest)
 
 
-def trapezoid(begin: float, distance: float, time: np.ndarray = TIME) -> np.ndarray:
+def profile(begin: float, distance: float, time: np.ndarray = TIME) -> np.ndarray:
     """Motion of 60 s by a trapezoidal profile of speed with ramps of 6 s, with two derivatives, shape (3, T)."""
-    whole, ramp = 60.0, 6.0
-    speed = distance / (whole - ramp)
-    x = np.clip(time - begin, 0.0, whole)
-    left = whole - x
-    rising, falling = x < ramp, left < ramp
-    inside = (time > begin) & (time < begin + whole)
-    position = np.where(rising, 0.5 * x**2, np.where(falling, ramp * (whole - ramp) - 0.5 * left**2, ramp * x - 18.0))
-    velocity = np.where(rising, x, np.where(falling, left, ramp))
-    acceleration = np.where(inside & rising, 1.0, np.where(inside & falling, -1.0, 0.0))
-    return speed / ramp * np.stack([position, velocity, acceleration])
+    return distance * np.array([trapezoid(float(now) - begin, 60.0, 6.0) for now in time]).T
 
 
 @pytest.mark.parametrize("sigma", [1e-6, 1e-4])
@@ -82,7 +78,7 @@ def test_errors_where_profiles_of_speed_begin_and_end_are_covered(begin, sigma):
     Accelerations next to a jump are left out: between two samples a mean of both sides is as good as it gets. The mean
     square is over 12 joints of some five pieces each; 1.07 and 0.87 were measured for position and speed over 72.
     """
-    truth = [trapezoid(begin, distance) for distance in (0.4, 0.7, 1.0)]
+    truth = [profile(begin, distance) for distance in (0.4, 0.7, 1.0)]
     ends = begin + np.array([0.0, 6.0, 54.0, 60.0])
     away = np.abs(TIME[:, None] - ends).min(axis=1) > 0.5
     squares = []
@@ -103,7 +99,7 @@ def test_profiles_of_speed_are_not_taken_for_noise_of_the_encoder(factor):
     With the differences across the jumps, noise as declared is taken for 2.2 times its variance.
     """
     begins = (5.0, 33.2, 61.3, 90.4, 120.1)
-    moves = [sum(trapezoid(2.0 * begin, d, 2.0 * TIME)[0] for begin in begins) for d in (0.4, 0.7, 1.0)]
+    moves = [sum(profile(2.0 * begin, d, 2.0 * TIME)[0] for begin in begins) for d in (0.4, 0.7, 1.0)]
     noise = factor * 1e-6 * np.random.default_rng(1).normal(size=(3, len(TIME)))
     joints = smooth_joints([[JointSamples(0, TIME, value, 1e-6)] for value in np.array(moves) + noise])
     jumps = [joint.jump_intervals for joint in joints]
@@ -188,3 +184,17 @@ def test_motion_sampled_at_other_times_has_its_own_jumps():
         ends = joint.nodes[[jump.first + 1 for jump in joint.jumps]]
         assert len(ends)
         assert (np.minimum(np.abs(ends - RAMP), np.abs(ends - 160.0 + RAMP)) < 2.0).all()
+
+
+@pytest.mark.usefixtures("slow")  # a whole diagnosis
+def test_profiles_of_speed_raise_no_alarm(tmp_path):
+    """Three joints in MuJoCo, moved by trapezoidal profiles; nothing is hidden.
+
+    Where a jump of the acceleration was taken for smooth, outliers and a late accelerometer were named for certain.
+    """
+    moves = ProfiledManoeuvres(count=2, duration=120.0)
+    written = write_study(tmp_path, SERVICER3, np.random.default_rng(71), manoeuvres=moves, step=0.02)
+    study = Study.load(written.file)
+    model = load_model(study)
+    result = diagnose(model, load_manoeuvres(study, model.robot), 1, knows_latitude=True)
+    assert result.verdict.status is Status.ADEQUATE, result.verdict

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from studies.truth.numerics import Array, quintic_step
 
-__all__ = ["Manoeuvres", "Motion", "smooth_motion"]
+__all__ = ["Manoeuvres", "Motion", "ProfiledManoeuvres", "smooth_motion"]
 
 Motion = Callable[[float], tuple[Array, Array, Array]]
 """Time [s] -> positions, speeds, accelerations of the joints, each (joints,)."""
@@ -101,3 +101,50 @@ class Manoeuvres:
             frequencies=self.frequencies,
             ramp=self.ramp,
         )
+
+
+@dataclass(frozen=True)
+class ProfiledManoeuvres(Manoeuvres):
+    """Moves one after another by trapezoidal profiles of speed, as a robot's controller makes them.
+
+    The accelerations jump where a joint begins or ends to speed up or to brake, at instants that are no sample times.
+    `ramp` is the time of speeding up and of braking [s], and `amplitude` the longest move [rad].
+    """
+
+    ramp: float = 6.0
+
+    def draw(self, kinds: Sequence[str], generator: np.random.Generator) -> Motion:
+        """Motion of joints of these kinds, as the URDF names them."""
+        scale = np.array([1.0 / 3.0 if kind == "prismatic" else 1.0 for kind in kinds])
+        rest = self.centre_spread * scale * generator.uniform(-1.0, 1.0, len(kinds))
+        moves: list[tuple[float, float, Array]] = []
+        end = 7.0
+        while True:
+            begin, length = end + generator.uniform(1.0, 3.0), generator.uniform(20.0, 30.0)
+            end = begin + length
+            if end > self.duration - 2.0:
+                break
+            moves.append((begin, length, self.amplitude * scale * generator.uniform(-1.0, 1.0, len(kinds))))
+
+        def motion(time: float) -> tuple[Array, Array, Array]:
+            state = [rest.copy(), np.zeros(len(kinds)), np.zeros(len(kinds))]
+            for begin, length, distance in moves:
+                for part, value in zip(state, trapezoid(time - begin, length, self.ramp), strict=True):
+                    part += value * distance
+            return state[0], state[1], state[2]
+
+        return motion
+
+
+def trapezoid(time: float, length: float, ramp: float) -> tuple[float, float, float]:
+    """Return distance, speed and acceleration of a move of one in a time, with even speed between two ramps."""
+    speed = 1.0 / (length - ramp)
+    slope = speed / ramp
+    if time <= 0.0 or time >= length:
+        return float(time >= length), 0.0, 0.0
+    if time < ramp:
+        return 0.5 * slope * time**2, slope * time, slope
+    left = length - time
+    if left < ramp:
+        return 1.0 - 0.5 * slope * left**2, slope * left, -slope
+    return speed * (time - 0.5 * ramp), speed, 0.0
