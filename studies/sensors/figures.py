@@ -52,7 +52,7 @@ def treatment_figure(tables: Mapping[str, Mapping[str, Spread]], without: Sequen
         Treatments that are left out, since they would spoil the scale.
     """
     names = [name for name in next(iter(tables.values())) if name not in without]
-    figure = wide_figure(0.75 + 0.16 * len(names))
+    figure = wide_figure(0.72 + 0.125 * len(names))
     panels = figure.subplots(1, len(tables), sharey=True, squeeze=False)[0]
     for axes, (level, spreads) in zip(panels, tables.items(), strict=True):
         for index, (label, chosen) in enumerate((("mass", [MASS]), ("moment with the largest error", MOMENTS))):
