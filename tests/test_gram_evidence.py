@@ -225,6 +225,18 @@ def test_scores_of_nothing_have_the_gram_as_their_covariance():
 # scales ---------------------------------------------------------------------------------------------------------------
 
 
+def test_evidence_of_every_form_is_that_of_its_group_by_itself():
+    rng = np.random.default_rng(12)
+    problem = LinearProblem.random(rng, {"a": 3, "b": 2}).observed(rng, {"a": np.array([0.5, 1.0, -2.0])})
+    spreads = (np.ones(3), np.array([1.0, 0.1, 3.0]), np.array([0.2, 1.0, 1.0]))
+    groups = [(AmplitudeGroup("a", 20.0, 1e-3, spread),) for spread in spreads]
+    several = CandidateCause("several", groups[0], others=tuple(groups[1:]), shares=(0.5, 0.3, 0.2))
+    gram = problem.gram()
+    evidence = SetEvidence(gram, [cause("b", 1e-3, 20.0), several])
+    alone = [SetEvidence(gram, [CandidateCause("own", own)]).log_evidence(["own"]) for own in groups]
+    assert evidence.of_forms("several") == pytest.approx(np.array(alone) + np.log([0.5, 0.3, 0.2]), abs=1e-10)
+
+
 def test_floor_set_by_the_data_is_where_evidence_ceases():
     rng = np.random.default_rng(14)
     gram = LinearProblem.random(rng, {"a": 2}).observed(rng).gram()

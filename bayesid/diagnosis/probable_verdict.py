@@ -79,7 +79,10 @@ def probable_verdict(
     inclusion = probabilities.inclusion
     ordered = [sorted(members, key=lambda name: (-inclusion[name], name)) for members in classes]
     names = {members[0]: ordered[index] for index, members in enumerate(map(sorted, classes))}
-    held = {key: probabilities.of_any(members) for key, members in names.items()}
+    held = dict.fromkeys(names, 0.0)
+    for item, probability in merged.items():
+        for key in item - {UNKNOWN}:
+            held[key] += probability
 
     def named(item: frozenset[str]) -> tuple[str, ...]:
         known = sorted(item - {UNKNOWN}, key=lambda key: (-held[key], key))

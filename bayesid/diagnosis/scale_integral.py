@@ -62,14 +62,32 @@ class GroupSpectrum:
     score: Floats
 
     @staticmethod
-    def of(group: AmplitudeGroup, gram: Gram) -> GroupSpectrum:
-        """Return the spectrum of a group."""
-        own = gram.groups[group.name]
-        root = group.roots(len(own))
-        values, vectors = np.linalg.eigh(root[:, None] * gram.matrix[np.ix_(own, own)] * root)
-        score = vectors.T @ (root * gram.score[own])
-        values = np.maximum(values, 0.0)
-        return GroupSpectrum(own, root, range_of(group, float(values.max(initial=0.0))), values, vectors, score)
+    def of(groups: Sequence[AmplitudeGroup], gram: Gram) -> list[GroupSpectrum]:
+        """Return the spectra of groups; those of one size are decomposed together."""
+        sizes: dict[int, list[int]] = {}
+        for place, group in enumerate(groups):
+            sizes.setdefault(len(gram.groups[group.name]), []).append(place)
+        found: dict[int, GroupSpectrum] = {}
+        for size, places in sizes.items():
+            own = np.stack([gram.groups[groups[place].name] for place in places])
+            root = np.stack([groups[place].roots(size) for place in places])
+            information = root[:, :, None] * gram.matrix[own[:, :, None], own[:, None, :]] * root[:, None, :]
+            values, vectors = np.linalg.eigh(information)
+            score = (np.swapaxes(vectors, 1, 2) @ (root * gram.score[own])[:, :, None])[..., 0]
+            values = np.maximum(values, 0.0)
+            for row, place in enumerate(places):
+                scales = range_of(groups[place], float(values[row].max(initial=0.0)))
+                found[place] = GroupSpectrum(own[row], root[row], scales, values[row], vectors[row], score[row])
+        return [found[place] for place in range(len(groups))]
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the evidence of the group by itself, averaged over its scale."""
+        nodes = self.nodes()
+        squared = nodes.scales[:, None] ** 2
+        visible = squared * self.values
+        gain = (squared / (1.0 + visible)) @ self.score**2 - np.log1p(visible).sum(axis=1)
+        return log_sum(0.5 * gain + nodes.log_weights)
 
     def nodes(self, thinned: float = 1.0) -> LogNodes:
         """Return nodes over the whole range of the scale."""

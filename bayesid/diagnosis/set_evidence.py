@@ -81,8 +81,10 @@ class SetEvidence:
                 if len({group.name for group in groups}) < len(groups):
                     raise ValueError(f"{cause.name!r} names one group of columns twice; each has one scale")
             self.causes[cause.name] = cause
+        every = [g for cause in self.causes.values() for variant in cause.variants for g in variant.groups]
+        spectra = iter(GroupSpectrum.of(every, gram))
         self._spectra = {
-            name: tuple(tuple(GroupSpectrum.of(g, gram) for g in variant.groups) for variant in cause.variants)
+            name: tuple(tuple(next(spectra) for _ in variant.groups) for variant in cause.variants)
             for name, cause in self.causes.items()
         }
         self._known: dict[tuple[tuple[str, ...], tuple[int, ...]], float] = {}
@@ -234,7 +236,12 @@ class SetEvidence:
 
     def of_forms(self, name: str) -> Floats:
         """Return the logarithms of the evidence of each form of one cause, times the form's prior probability."""
-        found = [self._of([name], (place,)).log_evidence for place in range(len(self._spectra[name]))]
+        forms = self._spectra[name]
+        single = not self.causes[name].fixed
+        found = [
+            own[0].log_evidence if single and len(own) == 1 else self._of([name], (place,)).log_evidence
+            for place, own in enumerate(forms)
+        ]
         return np.array(found) + self._log_weights[name]
 
     def most_probable(self, names: Iterable[str], forms: Mapping[str, int]) -> tuple[Integers, Floats]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
@@ -67,17 +67,17 @@ class SetProbabilities:
     ) -> SetProbabilities:
         """Return the probabilities of sets of known evidence, the empty one among them."""
         causes, generics = tuple(sorted(causes)), tuple(sorted(generics))
-        weighed = [
-            replace(
-                item,
-                log_prior=prior.log_probability(len(item.causes), len(causes), item.generic is not None, len(generics)),
-            )
-            for item in sets
-        ]
-        weighed.sort(key=lambda item: (-item.log_prior - item.log_evidence, item.names))
-        logs = np.array([item.log_prior + item.log_evidence for item in weighed])
-        shares = np.exp(logs - logsumexp(logs))
-        found = tuple(replace(item, probability=float(p)) for item, p in zip(weighed, shares, strict=True))
+        sets = list(sets)
+        sizes = [(len(item.causes), item.generic is not None) for item in sets]
+        log_priors = {own: prior.log_probability(own[0], len(causes), own[1], len(generics)) for own in set(sizes)}
+        own_priors = [log_priors[own] for own in sizes]
+        totals = [log_prior + item.log_evidence for log_prior, item in zip(own_priors, sets, strict=True)]
+        shares = np.exp(np.array(totals) - logsumexp(totals)).tolist()
+        order = sorted(range(len(sets)), key=lambda index: (-totals[index], sets[index].names))
+        found = tuple(
+            CauseSet(item.causes, item.generic, item.log_evidence, own_priors[index], shares[index])
+            for index, item in ((index, sets[index]) for index in order)
+        )
         return SetProbabilities(found, causes, generics, prior)
 
     def under(self, prior: CausePrior) -> SetProbabilities:
@@ -96,7 +96,8 @@ class SetProbabilities:
 
     def of_any(self, names: Collection[str]) -> float:
         """Return the probability that at least one of some candidates is at work, such as a class of equivalents."""
-        return float(sum(item.probability for item in self.sets if not set(names).isdisjoint(item.names)))
+        wanted = set(names)
+        return float(sum(item.probability for item in self.sets if not wanted.isdisjoint(item.names)))
 
     @property
     def inclusion(self) -> dict[str, float]:

@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sla
-from scipy.interpolate import BPoly
+from scipy.interpolate import PPoly
 from scipy.optimize import minimize, minimize_scalar
 
 from bayesid._math.arrays import Floats, Integers
@@ -140,8 +140,12 @@ class SmoothedJoint:
         return np.stack([spline(time) for spline in self._splines])
 
     @cached_property
-    def _splines(self) -> tuple[BPoly, BPoly, BPoly]:
-        spline = BPoly.from_derivatives(self.nodes, self.states * self._units, extrapolate=True)
+    def _splines(self) -> tuple[PPoly, PPoly, PPoly]:
+        length, power = np.diff(self.nodes)[:, None], np.arange(2 * self.order)
+        ends = self.states * self._units
+        states = np.concatenate([ends[:-1], ends[1:]], axis=1) * length ** np.tile(np.arange(self.order), 2)
+        powers = states @ np.linalg.inv(_derivatives_at_ends(self.order)).T / length**power
+        spline = PPoly(powers.T[::-1], self.nodes, extrapolate=True)
         return spline, spline.derivative(1), spline.derivative(2)
 
     def lag_covariance(self, time: Floats, lags: int) -> Floats:
@@ -202,15 +206,8 @@ class SmoothedJoint:
         left = np.clip(np.searchsorted(self.nodes, time, side="right") - 1, 0, len(self.nodes) - 2)
         length = np.diff(self.nodes)[left]
         s = (time - self.nodes[left]) / length
-        powers, order = np.arange(2 * self.order), np.arange(self.order)
-
-        def derivatives(at: Floats, which: Integers) -> Floats:
-            """Return the derivatives of the monomials, shape (T, which, powers)."""
-            factor = np.array([[math.perm(int(j), int(r)) for j in powers] for r in which], dtype=float)
-            return factor * at[:, None, None] ** np.maximum(powers[None, :] - which[:, None], 0)
-
-        ends = np.concatenate([derivatives(np.zeros(1), order)[0], derivatives(np.ones(1), order)[0]])
-        curve = derivatives(s, np.arange(3)) @ np.linalg.inv(ends)
+        order = np.arange(self.order)
+        curve = _derivatives(s, 3, 2 * self.order) @ np.linalg.inv(_derivatives_at_ends(self.order))
         scaled = length / self.scale
         curve *= (scaled[:, None] ** np.tile(order, 2))[:, None, :] / (length[:, None] ** np.arange(3))[:, :, None]
         return left, curve
@@ -218,6 +215,18 @@ class SmoothedJoint:
     def standard_deviation(self, time: Floats) -> Floats:
         """Return the standard deviations of position, velocity and acceleration at the times (T,), shape (3, T)."""
         return np.sqrt(np.diagonal(self.lag_covariance(time, 0)[0], axis1=1, axis2=2)).T
+
+
+def _derivatives(at: Floats, count: int, powers: int) -> Floats:
+    """Return the derivatives of the monomials at points (T,), shape (T, count, powers)."""
+    which, power = np.arange(count), np.arange(powers)
+    factor = np.array([[math.perm(int(j), int(r)) for j in power] for r in which], dtype=float)
+    return factor * at[:, None, None] ** np.maximum(power[None, :] - which[:, None], 0)
+
+
+def _derivatives_at_ends(order: int) -> Floats:
+    """Return the derivatives of 2 ``order`` monomials at 0 and at 1, shape (2 order, 2 order)."""
+    return _derivatives(np.array([0.0, 1.0]), order, 2 * order).reshape(2 * order, 2 * order)
 
 
 def smooth(

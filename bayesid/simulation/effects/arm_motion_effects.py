@@ -228,19 +228,18 @@ class _Deflection:
         model = _loaded(robot)
         data = model.createData()
         state = motion.evaluate(knots)
-        ratio = np.zeros(len(knots))
         beyond = pin.crba(model, data, configuration(robot, np.zeros(len(robot.joints))))[6 + index, 6 + index]
-        for row in range(len(knots)):
-            q = configuration(robot, state.position[row])
-            speed, acceleration = state.velocity[row], state.acceleration[row]
-            mass = pin.crba(model, data, q)
-            mass = np.triu(mass) + np.triu(mass, 1).T
-            # the base floats with zero momentum and without an external wrench
-            base_speed = -np.linalg.solve(mass[:6, :6], mass[:6, 6:] @ speed)
-            drift = pin.nonLinearEffects(model, data, q, np.concatenate([base_speed, speed]))
-            base = -np.linalg.solve(mass[:6, :6], mass[:6, 6:] @ acceleration + drift[:6])
-            torque = mass[6 + index, :6] @ base + mass[6 + index, 6:] @ acceleration + drift[6 + index]
-            ratio[row] = -torque / beyond
+        places = [configuration(robot, position) for position in state.position]
+        upper = np.triu(np.stack([np.array(pin.crba(model, data, q)) for q in places]))
+        mass = upper + np.swapaxes(np.triu(upper, 1), 1, 2)
+        # the base floats with zero momentum and without an external wrench
+        speed, acceleration = state.velocity[..., None], state.acceleration[..., None]
+        base_speed = -np.linalg.solve(mass[:, :6, :6], mass[:, :6, 6:] @ speed)
+        speeds = np.concatenate([base_speed, speed], axis=1)[..., 0]
+        drift = np.stack([pin.nonLinearEffects(model, data, q, v).copy() for q, v in zip(places, speeds, strict=True)])
+        base = -np.linalg.solve(mass[:, :6, :6], mass[:, :6, 6:] @ acceleration + drift[:, :6, None])
+        torque = mass[:, 6 + index, None] @ np.concatenate([base, acceleration], axis=1)
+        ratio = -(torque[:, 0, 0] + drift[:, 6 + index]) / beyond
         self.spline = make_interp_spline(knots, ratio, k=5)
         self.span = (knots[0], knots[-1])
 
