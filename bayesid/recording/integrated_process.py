@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from bayesid._math.arrays import Floats
 
-__all__ = ["IntegratedProcess", "Jump"]
+__all__ = ["IntegratedProcess", "Jump", "jump_moments"]
 
 
 class Jump(NamedTuple):
@@ -23,13 +23,60 @@ class Jump(NamedTuple):
         Number of the first of the steps, which lie between two nodes each and follow one another.
     derivative : int
         2 for the acceleration, 3 for the jerk.
-    variances : tuple of float
-        Variance of the jump times the probability of each step, in scaled time.
+    variances : tuple of tuples of float
+        Variance of the jump times the probability of each of the equal parts of each step, in scaled time.
     """
 
     first: int
     derivative: int
-    variances: tuple[float, ...]
+    variances: tuple[tuple[float, ...], ...]
+
+    @property
+    def steps(self) -> range:
+        """Numbers of the steps."""
+        return range(self.first, self.first + len(self.variances))
+
+    @property
+    def variance(self) -> float:
+        """Variance of the jump wherever it is."""
+        return float(sum(map(sum, self.variances)))
+
+
+def jump_moments(derivative: int, order: int, step: float, parts: int) -> Floats:
+    """Return the mean product of what a unit jump adds until the end of a step to a position and its derivatives.
+
+    Where a derivative jumps, the higher ones do, too, independently and as far in scaled time.
+
+    Parameters
+    ----------
+    derivative : int
+        Order of the lowest derivative that jumps.
+    order : int
+        Number of states: the position and its derivatives.
+    step : float
+        Length of the step in scaled time.
+    parts : int
+        Number of equal parts of the step; the jump is uniform within each.
+
+    Returns
+    -------
+    (parts, order, order) array
+    """
+    found = np.zeros((parts, order, order))
+    for own in range(derivative, order):
+        unit, powers = _moments_of_unit_step(own, parts)
+        found[:, : own + 1, : own + 1] += unit * step**powers
+    return found
+
+
+@lru_cache(maxsize=32)
+def _moments_of_unit_step(derivative: int, parts: int) -> tuple[Floats, Floats]:
+    """Return the moments for a step of one, and the power of the step with which each grows."""
+    powers = derivative - np.arange(derivative + 1)
+    factorial = np.array([math.factorial(power) for power in powers])
+    total = np.asarray(powers[:, None] + powers, dtype=float)
+    ends = np.linspace(1.0, 0.0, parts + 1)[:, None, None] ** (total + 1.0)
+    return (ends[:-1] - ends[1:]) * parts / ((total + 1.0) * np.outer(factorial, factorial)), total
 
 
 class IntegratedProcess:
@@ -42,7 +89,7 @@ class IntegratedProcess:
     order : int
         Order of the derivative of the position that is white noise; the states are the derivatives below it.
     jumps : sequence of Jump
-        Jumps of a derivative below the order. The instant of a jump is uniform within its step.
+        Jumps of a derivative below the order. The instant of a jump is uniform within each part of its steps.
     """
 
     def __init__(self, step: Floats, order: int, jumps: Sequence[Jump] = ()) -> None:
@@ -55,15 +102,14 @@ class IntegratedProcess:
         inverse = np.linalg.inv(_unit(order))
         self._precision = inverse * step[:, None, None] ** -_exponent(order)
         self._logdet = len(step) * np.linalg.slogdet(inverse)[1] - order**2 * np.log(step).sum()
-        variance: dict[int, Floats] = {}
-        for jump in jumps:
-            own = jump.derivative + 1
-            for place, size in enumerate(jump.variances, start=jump.first):
-                added = variance.setdefault(place, np.zeros((order, order)))
-                # white noise of the next derivative within the step has the moments of one jump at a uniform time
-                added[:own, :own] += size * _unit(own) * step[place] ** (_exponent(own) - 1)
-        self._jumped = np.array(sorted(variance), dtype=np.intp)
-        self._jumps = np.array([variance[place] for place in sorted(variance)]).reshape(-1, order, order)
+        self._added: dict[int, list[tuple[int, Floats]]] = {}
+        for number, jump in enumerate(jumps):
+            for place, sizes in zip(jump.steps, jump.variances, strict=True):
+                moments = jump_moments(jump.derivative, order, step[place], len(sizes))
+                self._added.setdefault(place, []).append((number, np.einsum("p,pij", sizes, moments)))
+        self._jumped = np.array(sorted(self._added), dtype=np.intp)
+        sums = [sum(matrix for _, matrix in self._added[place]) for place in sorted(self._added)]
+        self._jumps = np.array(sums).reshape(-1, order, order)
 
     @cached_property
     def _usual(self) -> Floats:
@@ -83,6 +129,11 @@ class IntegratedProcess:
             logdet += float((np.linalg.slogdet(scaled)[1] + 2.0 * np.log(scale).sum(axis=1)).sum())
             process[self._jumped] = wider
         return process, logdet
+
+    def covariance(self, intensity: float, place: int, without: int | None = None) -> Floats:
+        """Return the covariance of the increments of one step, (order, order), without one of the jumps if given."""
+        usual = _unit(self.order) * self._step[place] ** _exponent(self.order) * intensity**2
+        return np.asarray(usual + sum(own for number, own in self._added.get(place, []) if number != without))
 
     def increments(self, states: Floats) -> Floats:
         """Return what the states (n, order) add to those carried over from the node before, (n - 1, order)."""

@@ -16,6 +16,7 @@ from scipy.stats import chi2
 
 from bayesid._math.arrays import Floats
 from bayesid.recording.integrated_process import Jump
+from bayesid.recording.jump_placing import placed_jumps
 from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
 
 __all__ = ["smooth_joints"]
@@ -27,8 +28,14 @@ LEVEL = 1e-3
 """p-value below which a jump is an unknown. Each step is tested, so that a rough joint without a jump gets one or two:
 a jump too many widens the errors near one instant, a jump missed makes errors of ten times what is stated."""
 
-MOST_ROUNDS = 4
-"""Rounds of the search: what has jumped less is seen once the larger jumps no longer count as roughness."""
+MOST_ROUNDS = 20
+"""Most rounds of the search: what has jumped less is seen once the larger jumps no longer count as roughness."""
+
+CYCLES = 3
+"""Most times that jumps are sought and placed: a small one next to a large one is seen once that has its place."""
+
+PLACINGS = 2
+"""Times that all jumps are placed, since each is placed beside what is known of its neighbours."""
 
 APART = 10
 """Steps between two jumps that are found in one round, as the smaller one may be the shadow of the larger."""
@@ -40,8 +47,9 @@ FREE = 10.0
 """Prior standard deviation of a jump over its estimate, with which the data alone decide on its size."""
 
 
-MOST_LOST = 5.0
-"""Log likelihood that a jump may cost a joint, twice that of a jump of which it shows nothing, ``log(FREE)``."""
+MOST_LOST = 10.0
+"""Log likelihood that a jump may cost a joint: twice that of a jump of two derivatives of which it shows nothing,
+``2 log(FREE)``."""
 
 
 class _Scores(NamedTuple):
@@ -91,19 +99,31 @@ def smooth_joints(
     """
     starts = [None] * len(samples) if starts is None else starts
     joints = [smooth(series, start) for series, start in zip(samples, starts, strict=True)]
+    for _ in range(CYCLES):
+        before = [joint.jumps for joint in joints]
+        joints = _searched(joints)
+        if [joint.jumps for joint in joints] == before:
+            break
+        for _ in range(PLACINGS):
+            joints = placed_jumps(joints)
+    return tuple(joints)
+
+
+def _searched(joints: list[SmoothedJoint]) -> list[SmoothedJoint]:
+    """Return the joints with all jumps that their samples show."""
     for _ in range(MOST_ROUNDS):
         found = _new_jumps(joints) if joints else []
         if not any(found):
             break
         joints = [_extended(joint, new) for joint, new in zip(joints, found, strict=True)]
-    return tuple(joints)
+    return joints
 
 
 def _extended(joint: SmoothedJoint, jumps: list[Jump]) -> SmoothedJoint:
     """Return the joint with further jumps, or as it was where rounding spoils its likelihood with them."""
     if not jumps:
         return joint
-    extended = joint.with_jumps(jumps)
+    extended = joint.with_jumps((*joint.jumps, *jumps))
     most_lost = MOST_LOST * len(jumps)
     return extended if extended.log_likelihood > joint.log_likelihood - most_lost else joint
 
@@ -124,7 +144,7 @@ def _new_jumps(joints: Sequence[SmoothedJoint]) -> list[list[Jump]]:
             score, information = scores[index].score[step, column], scores[index].information[step, column]
             if information > 0.0:
                 variance = FREE**2 * ((score / information) ** 2 + 1.0 / information)
-                found[index].append(Jump(first, DERIVATIVES[column], tuple(variance * probability)))
+                found[index].append(Jump(first, DERIVATIVES[column], tuple((part,) for part in variance * probability)))
         last = first + len(probability)
         for group in groups:
             group.leave_out(best.nodes[max(0, first - APART)], best.nodes[min(last + APART, len(best.nodes) - 1)])

@@ -34,6 +34,10 @@ square-root algebra."""
 RELIABLE = 1e-6
 """Information on a jump over that on it if the process were observed, below which it is lost in rounding."""
 
+HORIZON = 3.0
+"""Steps within which a process leaves a polynomial that is rough enough for the information on a jump, which grows with
+the fifth power of their number, not to be lost in rounding."""
+
 SNAP = 0.02
 """Fraction of the median step below which two sample times share a node, because the algebra needs separate nodes."""
 
@@ -103,32 +107,63 @@ class SmoothedJoint:
         return smooth(series, self.start, self.jumps)
 
     def with_jumps(self, jumps: Sequence[Jump]) -> SmoothedJoint:
-        """Smooth the samples anew with further jumps of the process."""
-        return smooth(list(self.series), self.start, (*self.jumps, *jumps), orders=(self.order,))
+        """Smooth the samples anew with other jumps of the process."""
+        return smooth(list(self.series), self.start, jumps)
+
+    def process(self, jumps: Sequence[Jump]) -> IntegratedProcess:
+        """Return the process with some jumps, in scaled time."""
+        return IntegratedProcess(np.diff(self.nodes / self.scale), self.order, jumps)
+
+    @property
+    def scaled_intensity(self) -> float:
+        """Intensity of the process in scaled time."""
+        return self.intensity * self.scale ** (self.order - 0.5)
 
     def jump_scores(self) -> tuple[Floats, Floats]:
         """Return score and information of a jump of each state at the end of each step, both (n - 1, order).
 
         They are in scaled time, at a jump of zero, and marginal over everything else: the auxiliary residual of the
-        increment is the score over the root of the information (de Jong and Penzer 1998). Information that is lost
-        in rounding is zero.
+        increment is the score over the root of the information (de Jong and Penzer 1998). Where a process that hardly
+        moves leaves the information to rounding, a rougher one takes its place, whose residuals are smaller. What is
+        lost even so has no information.
         """
-        process = IntegratedProcess(np.diff(self.nodes / self.scale), self.order, self.jumps)
-        precision, _ = process.precision(self.intensity * self.scale ** (self.order - 0.5))
-        blocks = covariances_by_distance(self.factor, self.order)
+        score, information = self._scores(self.scaled_intensity, self.states, self.factor)
+        lost = information == 0.0
+        if lost.any():
+            problem, sigmas = self._problem
+            rougher = problem.intensity_over(HORIZON, sigmas)
+            if rougher > self.scaled_intensity:
+                _, states, factor, _ = problem.solve(rougher, sigmas)
+                others = self._scores(rougher, states, factor)
+                score, information = np.where(lost, others[0], score), np.where(lost, others[1], information)
+        return score, information
+
+    def _scores(self, intensity: float, states: Floats, factor: Floats) -> tuple[Floats, Floats]:
+        process = self.process(self.jumps)
+        precision, _ = process.precision(intensity)
+        blocks = covariances_by_distance(factor, self.order)
         own, next_ = next(blocks), next(blocks)
         lifted = process.transition @ next_
         covariance = own[1:] - lifted - lifted.transpose(0, 2, 1)
         covariance += process.transition @ own[:-1] @ process.transition.transpose(0, 2, 1)
-        score = np.einsum("kij,kj->ki", precision, process.increments(self.states))
+        score = np.einsum("kij,kj->ki", precision, process.increments(states))
         whole = np.diagonal(precision, axis1=1, axis2=2)
         information = whole - np.diagonal(precision @ covariance @ precision, axis1=1, axis2=2)
         return score, np.where(information > RELIABLE * whole, information, 0.0)
 
     @property
+    def _problem(self) -> tuple[_Problem, list[float]]:
+        """Normal equations, and the standard deviation of each series in scaled time."""
+        series = [_scaled(one, self.nodes, self.scale) for one in self.series]
+        problem = _Problem(self.nodes / self.scale, series, self.start, self.order, self.jumps)
+        return problem, [
+            sigma * self.scale**one.derivative for sigma, one in zip(self.sigmas, self.series, strict=True)
+        ]
+
+    @property
     def jump_intervals(self) -> Floats:
         """Begin and end of the steps in which each jump may lie, (n, 2) [s]."""
-        ends = [(jump.first, jump.first + len(jump.variances)) for jump in self.jumps]
+        ends = [(jump.steps.start, jump.steps.stop) for jump in self.jumps]
         return self.nodes[np.array(ends, dtype=np.intp).reshape(-1, 2)]
 
     @property
@@ -355,6 +390,15 @@ class _Problem:
         self.initial_mean = np.zeros(order)
         if start is not None:
             self.initial[0], self.initial_mean[0] = 1e20 if not start else (1e10 / max(abs(start), 1.0)) ** 2, start
+
+    def intensity_over(self, horizon: float, sigmas: Sequence[float]) -> float:
+        """Return the intensity with which the process leaves a polynomial by the noise within a number of steps."""
+        found = []
+        for (derivative, _, _), sigma in zip(self.series, sigmas, strict=True):
+            power = self.order - derivative
+            growth = horizon ** (power - 0.5) / (math.sqrt(2 * power - 1) * math.factorial(power - 1))
+            found.append(sigma / growth)
+        return min(found)
 
     def roughness(self) -> float:
         """Return a first guess of the intensity from finite differences of the longest series."""
