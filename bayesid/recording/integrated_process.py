@@ -42,8 +42,8 @@ class Jump(NamedTuple):
         return float(sum(map(sum, self.variances)))
 
 
-def jump_moments(derivative: int, order: int, step: float, parts: int) -> Floats:
-    """Return the mean product of what a unit jump adds until the end of a step to a position and its derivatives.
+def jump_moments(derivative: int, order: int, step: Floats, weights: Floats) -> Floats:
+    """Return the mean product of what a unit jump adds until the end of its step to a position and its derivatives.
 
     Where a derivative jumps, the higher ones do, too, independently and as far in scaled time.
 
@@ -53,19 +53,21 @@ def jump_moments(derivative: int, order: int, step: float, parts: int) -> Floats
         Order of the lowest derivative that jumps.
     order : int
         Number of states: the position and its derivatives.
-    step : float
-        Length of the step in scaled time.
-    parts : int
-        Number of equal parts of the step; the jump is uniform within each.
+    step : (n,) array
+        Lengths of steps in scaled time.
+    weights : (n, parts) array
+        Weight of each of the equal parts of each step, in which the jump is uniform.
 
     Returns
     -------
-    (parts, order, order) array
+    (n, order, order) array
     """
-    found = np.zeros((parts, order, order))
+    found = np.zeros((len(step), order, order))
     for own in range(derivative, order):
-        unit, powers = _moments_of_unit_step(own, parts)
-        found[:, : own + 1, : own + 1] += unit * step**powers
+        unit, powers = _moments_of_unit_step(own, weights.shape[1])
+        size = len(powers)
+        moments = (weights @ unit.reshape(len(unit), -1)).reshape(-1, size, size)
+        found[:, :size, :size] += moments * step[:, None, None] ** powers
     return found
 
 
@@ -104,9 +106,9 @@ class IntegratedProcess:
         self._logdet = len(step) * np.linalg.slogdet(inverse)[1] - order**2 * np.log(step).sum()
         self._added: dict[int, list[tuple[int, Floats]]] = {}
         for number, jump in enumerate(jumps):
-            for place, sizes in zip(jump.steps, jump.variances, strict=True):
-                moments = jump_moments(jump.derivative, order, step[place], len(sizes))
-                self._added.setdefault(place, []).append((number, np.einsum("p,pij", sizes, moments)))
+            moments = jump_moments(jump.derivative, order, step[jump.steps], np.array(jump.variances))
+            for place, own in zip(jump.steps, moments, strict=True):
+                self._added.setdefault(place, []).append((number, own))
         self._jumped = np.array(sorted(self._added), dtype=np.intp)
         sums = [sum(matrix for _, matrix in self._added[place]) for place in sorted(self._added)]
         self._jumps = np.array(sums).reshape(-1, order, order)

@@ -64,7 +64,10 @@ def placed_jumps(joints: Sequence[SmoothedJoint]) -> list[SmoothedJoint]:
             jump = joints[index].jumps[number]
             variances = tuple(tuple(row) for row in (jump.variance * kept).tolist())
             placed[index][number] = Jump(steps[likely[0]], jump.derivative, variances)
-    return [joint.with_jumps(_apart(joint, own)) if own else joint for joint, own in zip(joints, placed, strict=True)]
+    return [
+        joint.with_jumps(_apart(joint, own), (joint.order,)) if own else joint
+        for joint, own in zip(joints, placed, strict=True)
+    ]
 
 
 def _apart(joint: SmoothedJoint, jumps: list[Jump]) -> list[Jump]:
@@ -110,7 +113,7 @@ class _NearNodes:
         found = np.empty((len(steps), PARTS))
         for row, step in enumerate(steps):
             columns = weight[:, row * order : (row + 1) * order]
-            moments = jump_moments(jump.derivative, order, lengths[step], PARTS)
+            moments = jump_moments(jump.derivative, order, np.full(PARTS, lengths[step]), np.eye(PARTS))
             factor = np.linalg.cholesky(known + jump.variance * columns @ moments @ columns.T)
             left = np.linalg.solve(factor, np.broadcast_to(seen[:, None], (PARTS, len(seen), 1)))[..., 0]
             log_det = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)

@@ -17,7 +17,7 @@ from scipy.stats import chi2
 from bayesid._math.arrays import Floats
 from bayesid.recording.integrated_process import Jump
 from bayesid.recording.jump_placing import placed_jumps
-from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
+from bayesid.recording.smoothing import ORDERS, JointSamples, SmoothedJoint, smooth
 
 __all__ = ["smooth_joints"]
 
@@ -31,11 +31,11 @@ a jump too many widens the errors near one instant, a jump missed makes errors o
 MOST_ROUNDS = 20
 """Most rounds of the search: what has jumped less is seen once the larger jumps no longer count as roughness."""
 
-CYCLES = 3
+CYCLES = 4
 """Most times that jumps are sought and placed: a small one next to a large one is seen once that has its place."""
 
-PLACINGS = 2
-"""Times that all jumps are placed, since each is placed beside what is known of its neighbours."""
+ROUNDS_OF_ORDERS = 2
+"""Rounds in which the order of the process is chosen anew: the largest jumps decide on it."""
 
 APART = 10
 """Steps between two jumps that are found in one round, as the smaller one may be the shadow of the larger."""
@@ -104,26 +104,26 @@ def smooth_joints(
         joints = _searched(joints)
         if [joint.jumps for joint in joints] == before:
             break
-        for _ in range(PLACINGS):
-            joints = placed_jumps(joints)
+        joints = placed_jumps(joints)
     return tuple(joints)
 
 
 def _searched(joints: list[SmoothedJoint]) -> list[SmoothedJoint]:
     """Return the joints with all jumps that their samples show."""
-    for _ in range(MOST_ROUNDS):
+    for number in range(MOST_ROUNDS):
         found = _new_jumps(joints) if joints else []
         if not any(found):
             break
-        joints = [_extended(joint, new) for joint, new in zip(joints, found, strict=True)]
+        any_order = number < ROUNDS_OF_ORDERS
+        joints = [_extended(joint, new, any_order) for joint, new in zip(joints, found, strict=True)]
     return joints
 
 
-def _extended(joint: SmoothedJoint, jumps: list[Jump]) -> SmoothedJoint:
+def _extended(joint: SmoothedJoint, jumps: list[Jump], any_order: bool) -> SmoothedJoint:
     """Return the joint with further jumps, or as it was where rounding spoils its likelihood with them."""
     if not jumps:
         return joint
-    extended = joint.with_jumps((*joint.jumps, *jumps))
+    extended = joint.with_jumps((*joint.jumps, *jumps), ORDERS if any_order else (joint.order,))
     most_lost = MOST_LOST * len(jumps)
     return extended if extended.log_likelihood > joint.log_likelihood - most_lost else joint
 

@@ -23,7 +23,7 @@ from bayesid._math.arrays import Floats, Integers
 from bayesid.recording.band_covariance import covariances_by_distance
 from bayesid.recording.integrated_process import IntegratedProcess, Jump
 
-__all__ = ["JointSamples", "SmoothedJoint", "smooth"]
+__all__ = ["ORDERS", "JointSamples", "SmoothedJoint", "smooth"]
 
 
 ORDERS = (4, 3, 5)
@@ -106,9 +106,9 @@ class SmoothedJoint:
         series = [replace(one, sigma=None if one.sigma is None else factor * one.sigma) for one in self.series]
         return smooth(series, self.start, self.jumps)
 
-    def with_jumps(self, jumps: Sequence[Jump]) -> SmoothedJoint:
-        """Smooth the samples anew with other jumps of the process."""
-        return smooth(list(self.series), self.start, jumps)
+    def with_jumps(self, jumps: Sequence[Jump], orders: Sequence[int]) -> SmoothedJoint:
+        """Smooth the samples anew with other jumps of the process, of one of some orders."""
+        return smooth(list(self.series), self.start, jumps, orders)
 
     def process(self, jumps: Sequence[Jump]) -> IntegratedProcess:
         """Return the process with some jumps, in scaled time."""
