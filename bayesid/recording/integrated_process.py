@@ -36,6 +36,11 @@ class Jump(NamedTuple):
         """Numbers of the steps."""
         return range(self.first, self.first + len(self.variances))
 
+    def within(self, steps: range) -> Jump:
+        """Return the part of the jump in some of its steps, which are numbered anew from zero."""
+        kept = self.variances[max(steps.start - self.first, 0) : max(steps.stop - self.first, 0)]
+        return Jump(max(self.first - steps.start, 0), self.derivative, kept)
+
     @property
     def variance(self) -> float:
         """Variance of the jump wherever it is."""
@@ -104,14 +109,13 @@ class IntegratedProcess:
         inverse = np.linalg.inv(_unit(order))
         self._precision = inverse * step[:, None, None] ** -_exponent(order)
         self._logdet = len(step) * np.linalg.slogdet(inverse)[1] - order**2 * np.log(step).sum()
-        self._added: dict[int, list[tuple[int, Floats]]] = {}
-        for number, jump in enumerate(jumps):
+        self._added: dict[int, Floats] = {}
+        for jump in jumps:
             moments = jump_moments(jump.derivative, order, step[jump.steps], np.array(jump.variances))
             for place, own in zip(jump.steps, moments, strict=True):
-                self._added.setdefault(place, []).append((number, own))
+                self._added[place] = self._added.get(place, 0.0) + own
         self._jumped = np.array(sorted(self._added), dtype=np.intp)
-        sums = [sum(matrix for _, matrix in self._added[place]) for place in sorted(self._added)]
-        self._jumps = np.array(sums).reshape(-1, order, order)
+        self._jumps = np.array([self._added[place] for place in sorted(self._added)]).reshape(-1, order, order)
 
     @cached_property
     def _usual(self) -> Floats:
@@ -132,10 +136,10 @@ class IntegratedProcess:
             process[self._jumped] = wider
         return process, logdet
 
-    def covariance(self, intensity: float, place: int, without: int | None = None) -> Floats:
-        """Return the covariance of the increments of one step, (order, order), without one of the jumps if given."""
+    def covariance(self, intensity: float, place: int) -> Floats:
+        """Return the covariance of the increments of one step, (order, order)."""
         usual = _unit(self.order) * self._step[place] ** _exponent(self.order) * intensity**2
-        return np.asarray(usual + sum(own for number, own in self._added.get(place, []) if number != without))
+        return np.asarray(usual + self._added.get(place, 0.0))
 
     def increments(self, states: Floats) -> Floats:
         """Return what the states (n, order) add to those carried over from the node before, (n - 1, order)."""

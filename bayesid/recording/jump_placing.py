@@ -9,14 +9,14 @@ step is weighed by it as the place of the jump, of all joints that jump there to
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations, islice
+from itertools import islice, permutations
 
 import numpy as np
 import scipy.linalg as sla
 
 from bayesid._math.arrays import Floats
 from bayesid.recording.band_covariance import covariances_by_distance
-from bayesid.recording.integrated_process import Jump, jump_moments
+from bayesid.recording.integrated_process import IntegratedProcess, Jump, jump_moments
 from bayesid.recording.smoothing import SmoothedJoint
 
 __all__ = ["placed_jumps"]
@@ -26,6 +26,9 @@ PARTS = 10
 
 BESIDE = 1
 """Steps on either side of those found that may hold the jump, too."""
+
+SWEEPS = 3
+"""Times that every jump is placed beside the others."""
 
 MOST_STEPS = 8
 """Steps above which a jump stays where it was found: the samples show too little of it to say more."""
@@ -38,56 +41,86 @@ UNSEEN = 1e-9
 
 
 def placed_jumps(joints: Sequence[SmoothedJoint]) -> list[SmoothedJoint]:
-    """Return the joints smoothed anew with every jump in the parts of its steps that the samples allow."""
+    """Return the joints smoothed anew with every jump in the parts of its steps that the samples allow.
+
+    Jumps near each other are placed in turns, each beside what is known of the others by then.
+    """
+    joints = [_freed(joint) for joint in joints]
     together: dict[tuple[bytes, int, int, int], list[tuple[int, int]]] = {}
     for index, joint in enumerate(joints):
         for number, jump in enumerate(joint.jumps):
             key = (joint.nodes.tobytes(), jump.first, len(jump.variances), jump.derivative)
             together.setdefault(key, []).append((index, number))
     placed = [list(joint.jumps) for joint in joints]
-    near = [_NearNodes(joint) if joint.jumps else None for joint in joints]
-    for members in together.values():
-        index, number = members[0]
-        steps = _searched(joints[index], joints[index].jumps[number])
-        if len(steps) > MOST_STEPS:
-            continue
-        log_p = np.zeros((len(steps), PARTS))
-        for index, number in members:
-            own = near[index]
-            assert own is not None
-            log_p += own.log_evidence(number, steps)
-        probability = np.exp(log_p - log_p.max())
-        probability[probability < UNLIKELY] = 0.0
-        likely = np.flatnonzero(probability.sum(axis=1))
-        kept = probability[likely[0] : likely[-1] + 1] / probability.sum()
-        for index, number in members:
-            jump = joints[index].jumps[number]
-            variances = tuple(tuple(row) for row in (jump.variance * kept).tolist())
-            placed[index][number] = Jump(steps[likely[0]], jump.derivative, variances)
+    near = {index: _NearNodes(joint) for index, joint in enumerate(joints) if joint.jumps}
+    for sweep in range(SWEEPS):
+        for members in together.values():
+            index, number = members[0]
+            steps = _beside(joints[index], joints[index].jumps[number])
+            alone = not any(_close(joints[index].jumps, number) for index, number in members)
+            if len(steps) > MOST_STEPS or (sweep and alone):
+                continue
+            log_p = np.sum(
+                [near[index].log_evidence(number, steps, placed[index]) for index, number in members], axis=0
+            )
+            probability = np.exp(log_p - log_p.max())
+            probability[probability < UNLIKELY] = 0.0
+            likely = np.flatnonzero(probability.sum(axis=1))
+            kept = probability[likely[0] : likely[-1] + 1] / probability.sum()
+            for index, number in members:
+                jump = joints[index].jumps[number]
+                variances = tuple(tuple(row) for row in (jump.variance * kept).tolist())
+                placed[index][number] = Jump(steps[likely[0]], jump.derivative, variances)
     return [
         joint.with_jumps(_apart(joint, own), (joint.order,)) if own else joint
         for joint, own in zip(joints, placed, strict=True)
     ]
 
 
-def _apart(joint: SmoothedJoint, jumps: list[Jump]) -> list[Jump]:
-    """Return the jumps with those free that share a node: the samples between cannot tell one from the other."""
-    shared = {
-        number
-        for (first, one), (second, other) in combinations(enumerate(jumps), 2)
-        if one.steps.start <= other.steps.stop and other.steps.start <= one.steps.stop
-        for number in (first, second)
-    }
-    return [_free(joint, jump) if number in shared else jump for number, jump in enumerate(jumps)]
+def _overlap(some: range, others: range) -> bool:
+    return some.start < others.stop and others.start < some.stop
+
+
+def _close(jumps: Sequence[Jump], number: int) -> bool:
+    """Return whether another jump may lie in the steps in which one is sought."""
+    own = jumps[number].steps
+    wider = range(own.start - BESIDE, own.stop + BESIDE)
+    return any(_overlap(jump.steps, wider) for place, jump in enumerate(jumps) if place != number)
+
+
+def _apart(joint: SmoothedJoint, placed: Sequence[Jump]) -> list[Jump]:
+    """Return the jumps as placed, but free about both places where two share a node.
+
+    The samples between cannot tell one from the other.
+    """
+    wider = [range(jump.steps.start, jump.steps.stop + 1) for jump in placed]
+    shared = {i for i, j in permutations(range(len(placed)), 2) if _overlap(wider[i], wider[j])}
+    return [
+        _even(jump, joint.jumps[number].steps, _beside(joint, jump)) if number in shared else jump
+        for number, jump in enumerate(placed)
+    ]
+
+
+def _freed(joint: SmoothedJoint) -> SmoothedJoint:
+    """Return the joint with jumps that were placed before free within their steps and those beside them."""
+    jumps = [_free(joint, jump) for jump in joint.jumps]
+    return joint if jumps == list(joint.jumps) else joint.with_jumps(jumps, (joint.order,))
 
 
 def _free(joint: SmoothedJoint, jump: Jump) -> Jump:
-    """Return a jump as likely in each of its steps and in those beside them."""
-    steps = _searched(joint, jump)
-    return Jump(steps.start, jump.derivative, ((jump.variance / len(steps),),) * len(steps))
+    found = all(len(parts) == 1 for parts in jump.variances)
+    return jump if found else _even(jump, _beside(joint, jump))
 
 
-def _searched(joint: SmoothedJoint, jump: Jump) -> range:
+def _even(jump: Jump, *steps: range) -> Jump:
+    """Return a jump as likely in every step of some ranges and between them."""
+    first = min(own.start for own in steps)
+    count = max(own.stop for own in steps) - first
+    return Jump(first, jump.derivative, ((jump.variance / count,),) * count)
+
+
+def _beside(joint: SmoothedJoint, jump: Jump) -> range:
+    """Return the steps of a jump and those beside them."""
     return range(max(jump.steps.start - BESIDE, 0), min(jump.steps.stop + BESIDE, len(joint.nodes) - 1))
 
 
@@ -98,26 +131,42 @@ class _NearNodes:
         self.joint = joint
         self.blocks = list(islice(covariances_by_distance(joint.factor, joint.order), MOST_STEPS + 1))
         self.process = joint.process(joint.jumps)
+        self._seen: dict[int, tuple[Floats, Floats]] = {}
 
-    def log_evidence(self, number: int, steps: range) -> Floats:
+    def log_evidence(self, number: int, steps: range, jumps: Sequence[Jump]) -> Floats:
         """Return the log evidence of the samples with one of the jumps in each part of each step, (steps, PARTS).
 
         It is relative to a constant, which does not depend on the place.
+
+        Parameters
+        ----------
+        number : int
+            Number of the jump.
+        steps : range
+            Steps in which it may be.
+        jumps : sequence of Jump
+            All jumps as far as they are placed.
         """
         joint, order = self.joint, self.joint.order
         jump = joint.jumps[number]
-        weight, seen = self._observed(steps)
-        rest = sla.block_diag(*(self.process.covariance(joint.scaled_intensity, step, number) for step in steps))
+        if number not in self._seen:
+            self._seen[number] = self._observed(steps)
+        weight, seen = self._seen[number]
+        lengths = np.diff(joint.nodes[steps.start : steps.stop + 1] / joint.scale)
+        others = [
+            own.within(steps) for place, own in enumerate(jumps) if place != number and _overlap(own.steps, steps)
+        ]
+        process = IntegratedProcess(lengths, order, others)
+        rest = sla.block_diag(*(process.covariance(joint.scaled_intensity, row) for row in range(len(steps))))
         known = np.eye(len(seen)) + weight @ rest @ weight.T
-        lengths = np.diff(joint.nodes / joint.scale)
         found = np.empty((len(steps), PARTS))
-        for row, step in enumerate(steps):
+        for row, length in enumerate(lengths):
             columns = weight[:, row * order : (row + 1) * order]
-            moments = jump_moments(jump.derivative, order, np.full(PARTS, lengths[step]), np.eye(PARTS))
+            moments = jump_moments(jump.derivative, order, np.full(PARTS, length), np.eye(PARTS))
             factor = np.linalg.cholesky(known + jump.variance * columns @ moments @ columns.T)
             left = np.linalg.solve(factor, np.broadcast_to(seen[:, None], (PARTS, len(seen), 1)))[..., 0]
             log_det = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-            found[row] = -0.5 * (left**2).sum(axis=1) - log_det + np.log(lengths[step])
+            found[row] = -0.5 * (left**2).sum(axis=1) - log_det + np.log(length)
         return found
 
     def _observed(self, steps: range) -> tuple[Floats, Floats]:
