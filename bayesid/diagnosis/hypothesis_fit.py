@@ -13,7 +13,6 @@ from bayesid.diagnosis.amplitude_posterior import AmplitudePosterior
 from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.linearisation import Linearisation
-from bayesid.diagnosis.mass_shift_signatures import shift_instants
 from bayesid.diagnosis.noise_states import NoiseState
 from bayesid.diagnosis.perturbed_fit import Fit
 from bayesid.diagnosis.vibration_signatures import coupling_matrix, slosh_entries
@@ -97,10 +96,9 @@ def _settled(effect: Effect, point: Linearisation, names: Sequence[str]) -> Effe
     if not isinstance(effect, MassShift):
         return effect
     form = point.evidence.forms(names)[effect.label]
-    ends = np.asarray(point.fit.operating.node.environment.time).max(axis=1)
-    recording, place = divmod(form, len(shift_instants(1.0)))
-    instants = [np.inf] * len(ends)
-    instants[recording] = float(shift_instants(float(ends[recording]))[place])
+    group = point.evidence.causes[effect.label].variants[form].groups[0].name
+    instants = next(item.instants for item in point.bank.signatures if item.name == group)
+    assert instants is not None
     return MassShift(instants).attach(point.engine.posterior.model.robot)
 
 

@@ -14,7 +14,7 @@ from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
-__all__ = ["mass_shift_signatures", "shift_instants"]
+__all__ = ["jump_signatures", "mass_shift_signatures", "shift_instants", "shift_spread"]
 
 INSTANTS = 16
 """Instants of the grid in each recording."""
@@ -46,31 +46,51 @@ def mass_shift_signatures(
     shift = next((effect for effect in effects if isinstance(effect, MassShift)), None)
     if shift is None:
         return SignatureBank()
-    times = [np.asarray(side.environment.time) for side in (fit.operating.node, fit.operating.sample)]
-    ends = times[0].max(axis=1)
-    columns = _columns(engine, fit, times, ends)
-    sizes = {bound.unit: bound.largest for bound in bounds[shift.label]}
-    spread = np.repeat([1.0, (sizes["kg m2"] / sizes["kg m"]) ** 2], [3, 6])
+    ends = np.asarray(fit.operating.node.environment.time).max(axis=1)
+    grid = np.stack([shift_instants(float(end)) for end in ends])
+    columns = jump_signatures(engine, fit, grid)
+    size, spread = shift_spread(bounds[shift.label])
     signatures = [
-        Signatures(f"{shift.label} at {instant:.5g} s in recording {r + 1}", columns[r, k], r)
-        for r, end in enumerate(ends)
-        for k, instant in enumerate(shift_instants(float(end)))
+        Signatures(
+            f"{shift.label} at {instant:.5g} s in recording {r + 1}",
+            columns[r, k],
+            r,
+            instants=tuple(float(instant) if other == r else np.inf for other in range(len(ends))),
+        )
+        for r, row in enumerate(grid)
+        for k, instant in enumerate(row)
     ]
-    forms = [(AmplitudeGroup(item.name, sizes["kg m"], spread=spread),) for item in signatures]
+    forms = [(AmplitudeGroup(item.name, size, spread=spread),) for item in signatures]
     return SignatureBank(tuple(signatures), (CandidateCause(shift.label, forms[0], others=tuple(forms[1:])),))
 
 
-def _columns(engine: Engine, fit: Fit, times: Sequence[Floats], ends: Floats) -> Floats:
-    """Return the responses of each recording to unit moments from each instant on, shape (R, INSTANTS, rows, 9)."""
+def shift_spread(bounds: Sequence[PhysicalBound]) -> tuple[float, Floats]:
+    """Return the bound of the first moments [kg m], and the variances of all nine relative to its square."""
+    sizes = {bound.unit: bound.largest for bound in bounds}
+    return sizes["kg m"], np.repeat([1.0, (sizes["kg m2"] / sizes["kg m"]) ** 2], [3, 6])
+
+
+def jump_signatures(engine: Engine, fit: Fit, instants: Floats) -> Floats:
+    """Return the responses of each recording to unit moments that jump at some instants of its own.
+
+    Parameters
+    ----------
+    engine : Engine
+    fit : Fit
+    instants : (R, K) array
+        Instants in each recording [s]; infinite ones change nothing.
+
+    Returns
+    -------
+    (R, K, rows, 9) array
+    """
     tables = []
-    for time in times:
-        own = [
-            [MassShift.table_at(time[r], instant) for r, instant in enumerate(row)]
-            for row in np.stack([shift_instants(float(end)) for end in ends], axis=1)
-        ]
-        tables.append(np.moveaxis(np.array(own), -1, 1))  # (INSTANTS, 9, R, T, 28)
-    count = tables[0].shape[1]
-    rows = [part.reshape(INSTANTS * count, *part.shape[2:]) for part in tables]
-    push = engine.perturbation(INSTANTS * count, node_rows=rows[0], sample_rows=rows[1])
+    for side in (fit.operating.node, fit.operating.sample):
+        time = np.asarray(side.environment.time)
+        own = [[MassShift.table_at(time[r], instant) for r, instant in enumerate(row)] for row in instants.T]
+        tables.append(np.moveaxis(np.array(own), -1, 1))  # (K, 9, R, T, 28)
+    some, count = tables[0].shape[:2]
+    rows = [part.reshape(some * count, *part.shape[2:]) for part in tables]
+    push = engine.perturbation(some * count, node_rows=rows[0], sample_rows=rows[1])
     found = engine.respond(push, fit.z, fit.data)
-    return np.moveaxis(found.reshape(len(ends), -1, INSTANTS, count), 2, 1)
+    return np.moveaxis(found.reshape(len(instants), -1, some, count), 2, 1)

@@ -16,6 +16,7 @@ from bayesid.diagnosis.linearisation import Linearisation, linearise
 from bayesid.diagnosis.perturbed_fit import Fit
 from bayesid.diagnosis.set_enumeration import enumerate_sets
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
+from bayesid.diagnosis.shift_tuning import plausible_shift, with_tuned_shift
 from bayesid.diagnosis.signature_bank import SignatureBank
 from bayesid.diagnosis.tone_tuning import with_tuned_tones
 from bayesid.diagnosis.vibration_fits import plausible_vibrations
@@ -64,9 +65,7 @@ def settled(
     """
     base = _with_bursts(base)
     point, found, best = base, enumerate_sets(base.evidence, prior), base.fit
-    if beside := plausible_vibrations(found, effects):
-        point = with_tuned_tones(point, effects, bounds, beside)
-        found = enumerate_sets(point.evidence, prior)
+    point, found = _tuned(point, found, effects, bounds, prior)
     if base.held:
         return _settled_far(point, found, effects, bounds, prior)
     for _ in range(ROUNDS):
@@ -81,10 +80,25 @@ def settled(
             return point, found, best
         point = _with_bursts(linearise(point.engine, best, effects, bounds))
         found = enumerate_sets(point.evidence, prior)
-        if beside := plausible_vibrations(found, effects):
-            point = with_tuned_tones(point, effects, bounds, beside)
-            found = enumerate_sets(point.evidence, prior)
+        point, found = _tuned(point, found, effects, bounds, prior)
     return point, found, best
+
+
+def _tuned(
+    point: Linearisation,
+    found: SetProbabilities,
+    effects: Sequence[Effect],
+    bounds: Mapping[str, Sequence[PhysicalBound]],
+    prior: CausePrior,
+) -> tuple[Linearisation, SetProbabilities]:
+    """Resolve the forms of plausible causes between those of the grid: tones of vibrations, instants of a jump."""
+    if beside := plausible_vibrations(found, effects):
+        point = with_tuned_tones(point, effects, bounds, beside)
+        found = enumerate_sets(point.evidence, prior)
+    if plausible := plausible_shift(found, effects):
+        point = with_tuned_shift(point, *plausible, bounds)
+        found = enumerate_sets(point.evidence, prior)
+    return point, found
 
 
 def _settled_far(

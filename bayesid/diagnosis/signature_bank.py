@@ -50,12 +50,15 @@ class Signatures:
         Number of that one recording.
     tone : pair of float, optional
         Frequency [Hz] and damping ratio of a vibration.
+    instants : tuple of float, optional
+        Instant of a jump in each recording [s], infinite where it does not jump.
     """
 
     name: str
     columns: Floats
     recording: int | None = None
     tone: tuple[float, float] | None = None
+    instants: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
