@@ -8,7 +8,10 @@ import pinocchio as pin
 import pytest
 
 from bayesid._io.errors import InputError
+from bayesid.diagnosis import Status, diagnose
 from bayesid.inference.posterior import Posterior
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.recording.recording import Recording
 from bayesid.robot.composite_tables import composite_rows
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.joint_state import JointState
@@ -16,7 +19,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Load, Robot
 from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects import MassShift, create
-from bayesid.simulation.model import Model
+from bayesid.simulation.model import BodyPrior, Manoeuvre, Model
 from bayesid.simulation.sensors import Kind, Sensor, White
 from studies.truth import mujoco as mj
 from studies.truth import stepwise as ref
@@ -39,21 +42,21 @@ def simulated(robot: Robot, motion, effect: MassShift | None = None, moments=MOM
     return predicted(robot, motion, TIMES, rate0, POINT, effect, moments, **options)
 
 
-def stepwise(moments: np.ndarray, step: float = 0.05):
+def stepwise(moments: np.ndarray, step: float = 0.05, instant: float = INSTANT, motion=MOTION, rate0=RATE0):
     """The same by Pinocchio, which at the instant changes the base's body and keeps both momenta of the robot."""
-    reference = ref.Reference(SERVICER3, MOTION, zenith=None, wheel=np.zeros(3), base_force=None, base_torque=None)
-    state, time, rows = reference.initial_state(RATE0, np.eye(3)), 0.0, []
+    reference = ref.Reference(SERVICER3, motion, zenith=None, wheel=np.zeros(3), base_force=None, base_torque=None)
+    state, time, rows = reference.initial_state(rate0, np.eye(3)), 0.0, []
 
     def momentum():
         q, v, _ = reference.configuration(time, state)
         pin.ccrba(reference.model, reference.data, q, v)
         return reference.data.Ag.copy(), reference.data.hg.vector.copy(), v
 
-    for target in np.sort([*TIMES, INSTANT]):
+    for target in np.sort([*TIMES, instant]):
         for part in range(count := int(np.ceil((target - time) / step - 1e-9))):
             state = reference.advance(time + part * (target - time) / count, state, (target - time) / count)
         time = target
-        if target != INSTANT:
+        if target != instant:
             rotation = pin.Quaternion(state[3:7] / np.linalg.norm(state[3:7])).toRotationMatrix()
             rows.append((state[10:].copy(), reference.accelerometer(time, state, np.array(POINT)), rotation))
             continue
@@ -213,3 +216,36 @@ def test_bounds_are_those_of_a_part_of_the_base():
     first, second = MassShift().physical_bounds(model)
     assert np.abs(MOMENTS[:3]).max() < first.largest
     assert np.abs(MOMENTS[3:]).max() < second.largest
+
+
+@pytest.mark.slow
+def test_a_jump_in_every_recording_is_named_and_measured_with_its_instants():
+    """Three recordings by Pinocchio, in each of which the same part moves at an instant of its own.
+
+    With one recording and every fortieth part of it alone among the forms, two jumps in three were left without a name.
+    """
+    rng, instants, noise = np.random.default_rng(8), (11.2, 16.3, 29.7), 1e-5
+    moments, rows = 0.3 * MOMENTS, len(TIMES)
+    robot, recordings = Robot.from_urdf(SERVICER3), []
+    for index, instant in enumerate(instants):
+        motion = mj.smooth_motion(3, 40.0, 20 + index, amplitude=0.5, frequencies=(0.03, 0.06), ramp=10.0)
+        rate, accel, _ = stepwise(moments, 0.1, instant, motion, np.roll(RATE0, index))
+        columns = {f"rate.{axis}": rate[:, i] + noise * rng.normal(size=rows) for i, axis in enumerate("xyz")}
+        columns |= {f"accel.{axis}": accel[:, i] + noise * rng.normal(size=rows) for i, axis in enumerate("xyz")}
+        angles = np.array([motion(float(now))[0] for now in TIMES]) + 1e-6 * rng.normal(size=(rows, 3))
+        columns |= {f"position.{joint.name}": angles[:, i] for i, joint in enumerate(robot.joints)}
+        recordings.append(Recording(f"flight-{index + 1}", None, TIMES, columns))
+    guess = robot.perturbed("base_link", 0.1, np.random.default_rng(1))
+    sensors = Sensor(Kind.RATE, White(noise)), Sensor(Kind.ACCEL, White(noise), position=POINT)
+    model = Model(guess, sensors, (BodyPrior("base_link", guess.link("base_link").inertial, 0.3),))
+    flights = [Manoeuvre(one, MeasuredMotion.from_recording(one, guess, sigma={0: 1e-6})) for one in recordings]
+    result = diagnose(model, flights, 1)
+    assert result.verdict.status is Status.EXPLAINED
+    assert result.verdict.causes == ("mass-shift",)
+    (row,) = [row for row in result.to_dict()["candidates"] if row["name"] == "mass-shift"]
+    found = list(row["instants"].values())
+    assert found == pytest.approx(instants, abs=0.5)
+    error = [(item["mean"] - true) / item["sd"] for item, true in zip(row["amplitude"].values(), moments, strict=True)]
+    assert np.abs(error).max() < 4.0
+    signal = [item["mean"] / item["sd"] for item in row["amplitude"].values()]
+    assert np.abs(signal).max() > 5.0

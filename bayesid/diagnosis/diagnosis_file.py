@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bayesid.diagnosis.candidate_table import Candidate
+from bayesid.diagnosis.cause_amplitudes import amplitudes_of
+from bayesid.diagnosis.probable_verdict import UNKNOWN
 from bayesid.diagnosis.torque_reading import TorqueReading, Unread
 from bayesid.inference import Identification
 from bayesid.inference.body_quantities import quantity
+from bayesid.simulation.effects.mass_shift import MassShift
 
 if TYPE_CHECKING:
     from bayesid.diagnosis.diagnosis_run import Diagnosis
@@ -29,6 +34,7 @@ def diagnosis_dict(result: Diagnosis, identification: Identification | None) -> 
     """
     verdict, found = result.verdict, result.probabilities
     inclusion = found.inclusion
+    fitted = {name: _fitted(result, name) for name in verdict.causes if name != UNKNOWN}
     return {
         "status": verdict.status.value,
         "causes": [name for name in verdict.causes if name in inclusion and name in found.causes],
@@ -40,7 +46,7 @@ def diagnosis_dict(result: Diagnosis, identification: Identification | None) -> 
             "causes": {members[0]: found.of_any(members) for members in _ordered(result)},
         },
         "sets": _sets(result),
-        "candidates": [_candidate(row) for row in result.candidates],
+        "candidates": [_candidate(row, fitted.get(row.name)) for row in result.candidates],
         "unexplained": {
             "file": "unexplained.csv",
             "signal_to_noise": result.unexplained.signal_to_noise,
@@ -132,7 +138,23 @@ def _torques(found: TorqueReading | Unread | None) -> dict[str, Any] | None:
     }
 
 
-def _candidate(row: Candidate) -> dict[str, Any]:
+def _fitted(result: Diagnosis, name: str) -> dict[str, Any]:
+    """Return what the extended model says of a named cause: amplitudes, and instants of a jump by recording [s]."""
+    fit = result.after.fit
+    sizes = {
+        item.quantity.name: quantity(item.mean, item.sd, item.quantity.unit)
+        for item in amplitudes_of(result.after, name)
+    }
+    jump = next((effect for effect in fit.effects if isinstance(effect, MassShift) and effect.name == name), None)
+    if jump is None:
+        return {"amplitude": sizes}
+    names = [item.recording.name for item in fit.posterior.manoeuvres]
+    times = {own: time if np.isfinite(time) else None for own, time in zip(names, jump.instants, strict=True)}
+    return {"amplitude": sizes, "instants": times}
+
+
+def _candidate(row: Candidate, fitted: dict[str, Any] | None) -> dict[str, Any]:
+    """Return a candidate beside the present model alone, with its amplitudes in the extended model if it is named."""
     entries = list(zip(row.quantities, row.mean.tolist(), row.sd.tolist(), row.upper_limit.tolist(), strict=True))
     return {
         "name": row.name,
@@ -145,4 +167,5 @@ def _candidate(row: Candidate) -> dict[str, Any]:
         "upper_limit_95": {key: limit for (key, _), _, _, limit in entries},
         "power": row.power,
         "generic": row.generic,
+        **(fitted or {}),
     }

@@ -8,7 +8,7 @@ from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, Status, Unexplained
 from bayesid.diagnosis.cause_amplitudes import amplitudes_of
 from bayesid.diagnosis.noise_faults import SUMMARIES
-from bayesid.diagnosis.probable_verdict import COVERED, UNKNOWN
+from bayesid.diagnosis.probable_verdict import COVERED, NAMED, UNKNOWN
 from bayesid.report.class_probabilities import alternative_probability, alternatives, cause_probability
 from bayesid.report.numbers import (
     format_fixed,
@@ -36,6 +36,9 @@ __all__ = [
 
 AT_MOST = 6
 """Largest number of quantities of one cause in a sentence."""
+
+WORTH_SAYING = 0.1
+"""Probability of something without a name from which it is said beside causes that are named."""
 
 SHOWN_SETS = 3
 """Sets named in the sentence of a verdict that names none."""
@@ -72,8 +75,14 @@ def verdict_sentence(result: Diagnosis) -> str:
             return "Adequate: the simulation leaves nothing but the declared noise."
         case Status.EXPLAINED:
             one = len(result.verdict.causes) == 1
+            unknown = result.probabilities.unknown
+            beside = (
+                "needs no other explanation."
+                if unknown < WORTH_SAYING
+                else f"may still lack something without a name ({probability_text(unknown)})."
+            )
             return (
-                f"Explained by {causes}: with {'it' if one else 'them'} the simulation needs no other explanation. "
+                f"Explained by {causes}: with {'it' if one else 'them'} the simulation {beside} "
                 f"The probability that {'it is' if one else 'all are'} at work is "
                 f"{_is(alternative_probability(result, result.verdict.causes))}."
             )
@@ -98,6 +107,23 @@ def verdict_sentence(result: Diagnosis) -> str:
     return (
         "Unknown: what the simulation leaves belongs most probably to no cause of the catalogue "
         f"({probability_text(result.probabilities.unknown)}). Of what names no cause, the most probable is: {generic}."
+        f"{_nearly_certain(result)}"
+    )
+
+
+def _nearly_certain(result: Diagnosis) -> str:
+    """Return a sentence on causes that would be named if they left nothing without a name, or nothing."""
+    found = result.probabilities
+    inclusion = found.inclusion
+    likely = [members for members in result.classes if found.of_any(members) >= NAMED]
+    certain = [max(members, key=lambda name: inclusion[name]) for members in likely]
+    if not certain:
+        return ""
+    one = len(certain) == 1
+    return (
+        f" Beside it {'the cause' if one else 'the causes'} {joined(certain)} {'has' if one else 'have'} a probability "
+        f"of {format_percent(NAMED, 2)} or more {'and is' if one else 'each and are'} not named, since what has no "
+        "name may imitate a part of any cause."
     )
 
 
