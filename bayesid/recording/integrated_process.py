@@ -11,7 +11,11 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 
-__all__ = ["IntegratedProcess", "Jump", "jump_moments"]
+__all__ = ["HIGHER", "IntegratedProcess", "Jump", "jump_moments"]
+
+
+HIGHER = 0.3
+"""Variance of the jump of each derivative relative to that of the one below it, in scaled time."""
 
 
 class Jump(NamedTuple):
@@ -50,7 +54,7 @@ class Jump(NamedTuple):
 def jump_moments(derivative: int, order: int, step: Floats, weights: Floats) -> Floats:
     """Return the mean product of what a unit jump adds until the end of its step to a position and its derivatives.
 
-    Where a derivative jumps, the higher ones do, too, independently and as far in scaled time.
+    Where a derivative jumps, the higher ones do, too, independently and less far in scaled time (`HIGHER`).
 
     Parameters
     ----------
@@ -72,7 +76,7 @@ def jump_moments(derivative: int, order: int, step: Floats, weights: Floats) -> 
         unit, powers = _moments_of_unit_step(own, weights.shape[1])
         size = len(powers)
         moments = (weights @ unit.reshape(len(unit), -1)).reshape(-1, size, size)
-        found[:, :size, :size] += moments * step[:, None, None] ** powers
+        found[:, :size, :size] += HIGHER ** (own - derivative) * moments * step[:, None, None] ** powers
     return found
 
 

@@ -30,6 +30,9 @@ BESIDE = 1
 SWEEPS = 3
 """Times that every jump is placed beside the others."""
 
+NARROW = 2
+"""Most steps of a place that is widened where another jump shares a node with it."""
+
 MOST_STEPS = 8
 """Steps above which a jump stays where it was found: the samples show too little of it to say more."""
 
@@ -96,7 +99,7 @@ def _apart(joint: SmoothedJoint, placed: Sequence[Jump]) -> list[Jump]:
     wider = [range(jump.steps.start, jump.steps.stop + 1) for jump in placed]
     shared = {i for i, j in permutations(range(len(placed)), 2) if _overlap(wider[i], wider[j])}
     return [
-        _even(jump, joint.jumps[number].steps, _beside(joint, jump)) if number in shared else jump
+        _even(jump, joint.jumps[number].steps, _about(joint, jump)) if number in shared else jump
         for number, jump in enumerate(placed)
     ]
 
@@ -117,6 +120,10 @@ def _even(jump: Jump, *steps: range) -> Jump:
     first = min(own.start for own in steps)
     count = max(own.stop for own in steps) - first
     return Jump(first, jump.derivative, ((jump.variance / count,),) * count)
+
+
+def _about(joint: SmoothedJoint, jump: Jump) -> range:
+    return _beside(joint, jump) if len(jump.steps) <= NARROW else jump.steps
 
 
 def _beside(joint: SmoothedJoint, jump: Jump) -> range:
