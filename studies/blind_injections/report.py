@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid._io.files import write_json
+from bayesid._io.words import joined
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, BEFORE, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_number
@@ -170,7 +172,10 @@ def _failures(trials: Sequence[Trial]) -> list[str]:
         texts.append("No trial was misnamed, and none without anything hidden raised an alarm.")
     missed = [trial for trial in trials if trial.kind != "adequate" and not trial.alarmed]
     if missed:
-        texts.append(f"No alarm was raised by {', '.join(map(_hidden, missed))}.")
+        counts = Counter(map(_hidden, missed))
+        named = joined([case if count == 1 else f"{case} ({count})" for case, count in sorted(counts.items())])
+        largest = max(trial.signal_to_noise or 0.0 for trial in missed)
+        texts.append(f"No alarm was raised by {named}; the largest of them has {largest:.1f} σ.")
     framed = [t for t in trials if t.kind == "unknown" and t.true_frame is not None and t.status == "unknown"]
     if framed:
         right, wrongly = (sum(test(t) for t in framed) for test in (_framed, _misframed))
@@ -197,8 +202,8 @@ def _misframed(trial: Trial) -> bool:
 
 
 def _hidden(trial: Trial) -> str:
-    outside = "outside the catalogue, " if trial.kind == "unknown" else ""
-    return f"{trial.case.replace(', ', ' + ')} ({outside}seed {trial.seed})"
+    outside = " (outside the catalogue)" if trial.kind == "unknown" else ""
+    return trial.case.replace(", ", " + ") + outside
 
 
 def _said(trial: Trial) -> str:
