@@ -39,6 +39,9 @@ MOST_STEPS = 8
 UNLIKELY = 1e-4
 """Probability of a part relative to the likeliest below which the jump is not there."""
 
+ROUNDING = 1e-14
+"""Variance of an increment relative to its prior below which it is rounding."""
+
 UNSEEN = 1e-9
 """Information on an increment relative to its prior below which it is none."""
 
@@ -63,9 +66,11 @@ def placed_jumps(joints: Sequence[SmoothedJoint]) -> list[SmoothedJoint]:
             alone = not any(_close(joints[index].jumps, number) for index, number in members)
             if len(steps) > MOST_STEPS or (sweep and alone):
                 continue
-            log_p = np.sum(
-                [near[index].log_evidence(number, steps, placed[index]) for index, number in members], axis=0
-            )
+            try:
+                each = [near[index].log_evidence(number, steps, placed[index]) for index, number in members]
+            except np.linalg.LinAlgError:  # rounding has spoilt a covariance: the jump stays where it was found
+                continue
+            log_p = np.sum(each, axis=0)
             probability = np.exp(log_p - log_p.max())
             probability[probability < UNLIKELY] = 0.0
             likely = np.flatnonzero(probability.sum(axis=1))
@@ -74,10 +79,15 @@ def placed_jumps(joints: Sequence[SmoothedJoint]) -> list[SmoothedJoint]:
                 jump = joints[index].jumps[number]
                 variances = tuple(tuple(row) for row in (jump.variance * kept).tolist())
                 placed[index][number] = Jump(steps[likely[0]], jump.derivative, variances)
-    return [
-        joint.with_jumps(_apart(joint, own), (joint.order,)) if own else joint
-        for joint, own in zip(joints, placed, strict=True)
-    ]
+    return [_smoothed(joint, _apart(joint, own)) for joint, own in zip(joints, placed, strict=True)]
+
+
+def _smoothed(joint: SmoothedJoint, jumps: list[Jump]) -> SmoothedJoint:
+    """Return the joint smoothed anew with other jumps, or as it was where rounding leaves that without a solution."""
+    if jumps == list(joint.jumps):
+        return joint
+    changed = joint.with_jumps(jumps, (joint.order,))
+    return changed if np.isfinite(changed.chi2) else joint
 
 
 def _overlap(some: range, others: range) -> bool:
@@ -106,8 +116,7 @@ def _apart(joint: SmoothedJoint, placed: Sequence[Jump]) -> list[Jump]:
 
 def _freed(joint: SmoothedJoint) -> SmoothedJoint:
     """Return the joint with jumps that were placed before free within their steps and those beside them."""
-    jumps = [_free(joint, jump) for jump in joint.jumps]
-    return joint if jumps == list(joint.jumps) else joint.with_jumps(jumps, (joint.order,))
+    return _smoothed(joint, [_free(joint, jump) for jump in joint.jumps])
 
 
 def _free(joint: SmoothedJoint, jump: Jump) -> Jump:
@@ -204,7 +213,7 @@ class _NearNodes:
         whiten = sla.block_diag(*(_whitener(self.process.covariance(joint.scaled_intensity, step)) for step in steps))
         change = whiten @ change
         values, vectors = np.linalg.eigh(change @ covariance.reshape(change.shape[1], -1) @ change.T)
-        values = np.clip(values, np.finfo(float).tiny, 1.0)
+        values = np.clip(values, ROUNDING, 1.0)
         informed = 1.0 - values > UNSEEN
         values, vectors = values[informed], vectors[:, informed]
         weight = np.sqrt(1.0 / values - 1.0)[:, None] * (vectors.T @ whiten)

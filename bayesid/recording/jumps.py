@@ -101,7 +101,7 @@ def smooth_joints(
     joints = [smooth(series, start) for series, start in zip(samples, starts, strict=True)]
     for _ in range(CYCLES):
         searched = _searched(joints)
-        if all(one.jumps == before.jumps for one, before in zip(searched, joints, strict=True)):
+        if _same(searched, joints):
             break
         joints = placed_jumps(searched)
     return tuple(joints)
@@ -114,8 +114,14 @@ def _searched(joints: list[SmoothedJoint]) -> list[SmoothedJoint]:
         if not any(found):
             break
         any_order = number < ROUNDS_OF_ORDERS
-        joints = [_extended(joint, new, any_order) for joint, new in zip(joints, found, strict=True)]
+        before, joints = joints, [_extended(joint, new, any_order) for joint, new in zip(joints, found, strict=True)]
+        if _same(joints, before):
+            break
     return joints
+
+
+def _same(joints: Sequence[SmoothedJoint], others: Sequence[SmoothedJoint]) -> bool:
+    return all(one.jumps == other.jumps for one, other in zip(joints, others, strict=True))
 
 
 def _extended(joint: SmoothedJoint, jumps: list[Jump], any_order: bool) -> SmoothedJoint:

@@ -133,9 +133,10 @@ class SmoothedJoint:
             problem, sigmas = self._problem
             rougher = problem.intensity_over(HORIZON, sigmas)
             if rougher > self.scaled_intensity:
-                _, states, factor, _ = problem.solve(rougher, sigmas)
-                others = self._scores(rougher, states, factor)
-                score, information = np.where(lost, others[0], score), np.where(lost, others[1], information)
+                _, states, factor, chi2 = problem.solve(rougher, sigmas)
+                if np.isfinite(chi2):
+                    others = self._scores(rougher, states, factor)
+                    score, information = np.where(lost, others[0], score), np.where(lost, others[1], information)
         return score, information
 
     def _scores(self, intensity: float, states: Floats, factor: Floats) -> tuple[Floats, Floats]:
