@@ -29,6 +29,13 @@ __all__ = ["GroupSpectrum", "ScaleAverage", "average_over_scales", "log_ratios"]
 MOST_NODES = 2000
 """Product of the numbers of nodes of all groups but the last above which the grid is thinned and then narrowed."""
 
+COARSE_NODES = 40
+"""The same for the first grid of large groups, which only finds where the integrand is not negligible."""
+
+LARGE = 1e7
+"""Product of the number of nodes and the cube of the number of columns from which groups are large: some ten
+milliseconds of eigendecompositions."""
+
 NEGLIGIBLE = 14.0
 """Logarithm below the largest of the integrand at which a coarse grid is cut off before it is refined."""
 
@@ -156,12 +163,14 @@ def average_over_scales(groups: Sequence[GroupSpectrum], gram: Gram) -> ScaleAve
     logarithm is about 0.02 for four groups, 0.1 for five and up to 0.4 for six.
     """
     parts = [(group.range.low, group.range.high) for group in groups]
-    for _ in range(ROUNDS):
+    cube = float(sum(len(group.columns) for group in groups[1:])) ** 3
+    for turn in range(ROUNDS):
         counts = [
             len(log_nodes(group.range, part, len(group.columns)).scales)
             for group, part in zip(groups, parts, strict=True)
         ]
-        thinned = thinning(counts[:-1], MOST_NODES)
+        coarse = turn == 0 and cube * float(np.prod(counts[:-1], dtype=float)) > LARGE
+        thinned = thinning(counts[:-1], COARSE_NODES if coarse else MOST_NODES)
         nodes = tuple(
             log_nodes(group.range, part, len(group.columns), thinned if place + 1 < len(groups) else 1.0)
             for place, (group, part) in enumerate(zip(groups, parts, strict=True))
@@ -170,7 +179,7 @@ def average_over_scales(groups: Sequence[GroupSpectrum], gram: Gram) -> ScaleAve
         for axis, own in enumerate(nodes):
             log_terms = log_terms + own.log_weights.reshape([-1 if axis == other else 1 for other in range(len(nodes))])
         narrower = [_narrowed(own, axis, log_terms) for axis, own in enumerate(nodes)]
-        if thinned == 1.0 or narrower == parts:
+        if thinned == 1.0 or (narrower == parts and not coarse):
             break
         parts = narrower
     log_evidence = log_sum(log_terms)

@@ -32,9 +32,10 @@ PROMISING = 1e-4
 size: what is added to a less probable one would have to earn some 15 nats to matter."""
 
 
-NEAR = 9.0
+NEAR = 6.0
 """Logarithm of the probability relative to the most probable set so far down to which a set that the screening has
-weighed is evaluated in full."""
+weighed is evaluated in full. The screening is off by about one nat at most in such sets, bodies apart, where it is an
+upper bound."""
 
 FORMS_NEAR, MOST_FORMS = 4.0, 4
 """Nats below a cause's best form down to which its forms are evaluated in full, and how many of them at most."""

@@ -88,6 +88,7 @@ class SetEvidence:
             for name, cause in self.causes.items()
         }
         self._known: dict[tuple[tuple[str, ...], tuple[int, ...]], float] = {}
+        self._scaled: dict[tuple[tuple[str, ...], tuple[int, ...]], tuple[Integers, Floats]] = {}
         self._log_weights = {
             name: np.array([variant.log_weight for variant in cause.variants]) for name, cause in self.causes.items()
         }
@@ -249,7 +250,14 @@ class SetEvidence:
 
         What physics fixes is left out.
         """
-        ordered = sorted(names)
+        ordered = tuple(sorted(names))
+        key = (ordered, tuple(forms[name] for name in ordered))
+        if key not in self._scaled:
+            self._scaled[key] = self._at_peak(ordered, forms)
+        return self._scaled[key]
+
+    def _at_peak(self, ordered: Sequence[str], forms: Mapping[str, int]) -> tuple[Integers, Floats]:
+        """Return what `most_probable` returns, and find it."""
         average = self._of(ordered, tuple(forms[name] for name in ordered))
         where = np.unravel_index(int(np.argmax(average.log_posterior)), average.log_posterior.shape)
         free = [name for name in ordered if not self.causes[name].fixed]

@@ -120,13 +120,14 @@ def _sought(
     items = [Signatures(f"{r},{k}", columns[r, k], r) for r, row in enumerate(choices) for k in range(len(row))]
     gram = _beside(point, items, others, shift.label)
     best = [None if now is None else int(np.argmin(np.abs(padded[r] - now))) for r, now in enumerate(chosen)]
-    value = _value(gram, group, best)
+    sizes = [len(row) for row in choices]
+    value = _weighed(gram, group, best, sizes)
     for _ in range(SWEEPS):
         before = list(best)
         for r, row in enumerate(choices):
             for k in (None, *range(len(row))):
                 trial = [*best[:r], k, *best[r + 1 :]]
-                now = _value(gram, group, trial) - np.log(len(row)) * (k is not None)
+                now = _weighed(gram, group, trial, sizes)
                 if now > value:
                     best, value = trial, now
         if best == before:
@@ -151,12 +152,13 @@ def _beside(point: Linearisation, items: Sequence[Signatures], others: Sequence[
     return own.beside(others, own.forms(others), [label])
 
 
-def _value(gram: Gram, group: AmplitudeGroup, best: Sequence[int | None]) -> float:
-    """Return the log evidence of the same moments in all recordings that jump."""
-    own = [gram.groups[f"{r},{k}"] for r, k in enumerate(best) if k is not None]
-    if not own:
+def _weighed(gram: Gram, group: AmplitudeGroup, best: Sequence[int | None], sizes: Sequence[int]) -> float:
+    """Return the log evidence of the same moments in all recordings that jump, each at one of so many instants."""
+    jumping = [(r, k) for r, k in enumerate(best) if k is not None]
+    if not jumping:
         return 0.0
+    own = [gram.groups[f"{r},{k}"] for r, k in jumping]
     matrix = np.sum([gram.matrix[np.ix_(one, two)] for one in own for two in own], axis=0)
     score = np.sum([gram.score[one] for one in own], axis=0)
     (spectrum,) = GroupSpectrum.of([group], Gram(matrix, score, {group.name: np.arange(len(score))}))
-    return spectrum.log_evidence
+    return spectrum.log_evidence - float(sum(np.log(sizes[r]) for r, _ in jumping))
