@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -13,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from studies.truth import hidden_causes
 from studies.truth import mujoco as mj
+from studies.truth.bodies import join
 from studies.truth.hidden_causes import causes as hide
 from studies.truth.hidden_causes.case import merge
 from studies.truth.urdf import SERVICER3, SERVICER4, link_body
@@ -24,7 +26,7 @@ CATALOGUE = {
     *("joint-flexibility", "rate-bias", "rate-drift", "rate-scale", "rate-misalignment", "accel-bias", "accel-drift"),
     *("accel-scale", "accel-misalignment", "accel-position", "rate-latency", "accel-latency", "joint-latency"),
     *("encoder-offset", "rate-noise", "accel-noise", "coloured-noise", "outliers", "quantisation"),
-    *("encoder-noise", "rate-clock", "accel-clock", "attitude-misalignment", "wheel-history"),
+    *("encoder-noise", "rate-clock", "accel-clock", "attitude-misalignment", "wheel-history", "mass-shift"),
 }
 
 
@@ -221,3 +223,24 @@ def test_two_causes_cannot_spoil_the_same_samples() -> None:
     spoilt = hide.outliers("rate", np.random.default_rng(0), 1.0)
     with pytest.raises(ValueError, match="common cause"):
         merge(spoilt, spoilt)
+
+
+def test_a_mass_that_jumps_has_a_start_in_each_recording_and_changes_the_moments_of_the_base() -> None:
+    """Moments about the base's origin, of the base joined with the body before and after it has moved."""
+    mover = mj.Mover(
+        mj.Body(2.0, np.array([0.3, -0.1, 0.2]), 0.01 * np.eye(3)), (0.0, 0.6, 0.8), 0.5, 1.0, 0.1, (3.0, 7.0)
+    )
+    assert [mover.in_recording(index).start for index in (0, 1)] == [3.0, 7.0]
+    assert mover.in_recording(1).motion(7.1)[0] == 0.5
+    base = link_body(SERVICER3, "base_link")
+    moved = replace(mover, body=mover.body._replace(com=mover.body.com + np.array([0.0, 0.3, 0.4])))
+    change = [joined_moments(base, item.body) for item in (mover, moved)]
+    np.testing.assert_allclose(mover.moments, change[1] - change[0], atol=1e-12)
+
+
+def joined_moments(base: mj.Body, part: mj.Body) -> np.ndarray:
+    """First moments and second moments xx, yy, zz, xy, xz, yz of two bodies joined, from their rotational inertia."""
+    whole = join(base, part)
+    about = whole.inertia + whole.mass * (whole.com @ whole.com * np.eye(3) - np.outer(whole.com, whole.com))
+    second = 0.5 * np.trace(about) * np.eye(3) - about
+    return np.concatenate([whole.mass * whole.com, second[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])

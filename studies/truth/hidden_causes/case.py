@@ -77,9 +77,11 @@ class Case:
         """Magnitudes of what is hidden, by cause, for causes that are a vector or a number."""
         true: dict[str, Array] = {}
         for options in self._causes(seed, strength):
-            rotor = options["hidden"].rotor if "hidden" in options else None
-            if rotor is not None:
-                true["wheel-momentum"] = np.asarray(rotor.momentum)
+            hidden = options.get("hidden", Hidden())
+            if hidden.rotor is not None:
+                true["wheel-momentum"] = np.asarray(hidden.rotor.momentum)
+            for mover in hidden.movers:
+                true["mass-shift"] = mover.moments
             fault = options.get("distort")
             if isinstance(fault, VectorFault):
                 sizes = {key: np.asarray(value) for key, value in vars(fault).items() if key != "sensor"}

@@ -104,6 +104,7 @@ CASES: tuple[Case, ...] = (
         sensors={"rate_period": None, "attitude_period": 0.5},
     ),
     _effect("wheel-history:z", hide.changing_wheel),
+    _effect("mass-shift", hide.jumping_mass),
     _case(
         "wheel-momentum, accel-bias",
         ["wheel-momentum", "accel-bias"],

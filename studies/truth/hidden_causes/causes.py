@@ -26,6 +26,9 @@ from studies.truth.hidden_causes.sensor_faults import (
 )
 from studies.truth.urdf import link_body
 
+JUMP = 0.1
+"""Time within which a mass jumps [s], shorter than the step between two samples."""
+
 
 def _hide(**parts: Any) -> Options:
     """Keywords that hide parts or fields."""
@@ -192,7 +195,16 @@ def shifting_mass(draw: Generator, strength: float) -> Options:
     """Mass that moves within the base once."""
     body = mj.Body(3.0, direction(draw, 0.4), 0.01 * np.eye(3))
     start = float(draw.integers(60, 80))
-    return _hide(movers=[mj.Mover(body, tuple(direction(draw).tolist()), 0.015 * strength, start)]) | {"step": 0.125}
+    return _hide(movers=[mj.Mover(body, tuple(direction(draw).tolist()), 0.015 * strength, start)])
+
+
+def jumping_mass(draw: Generator, strength: float) -> Options:
+    """Mass that moves within the base once in each recording, in a tenth of a second between two samples."""
+    body = mj.Body(6.0, direction(draw, 0.4), 0.01 * np.eye(3))
+    starts = 0.5 * draw.integers(60, 220, 3) + draw.uniform(0.05, 0.35, 3)
+    travel = tuple(direction(draw).tolist())
+    path = mj.Mover(body, travel, 0.3 * strength, float(starts[0]), JUMP, tuple(starts.tolist()))
+    return _hide(movers=[path])
 
 
 def bias_jump(draw: Generator, strength: float) -> Options:

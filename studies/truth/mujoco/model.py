@@ -31,6 +31,9 @@ from studies.truth.urdf import attribute, link_bodies, moving, root_link
 
 __all__ = ["TruthModel"]
 
+STEPS = 40
+"""Least number of steps within which a body moves within the base."""
+
 
 class TruthModel:
     """A robot in MuJoCo with the given hidden parts; `run` moves it.
@@ -282,11 +285,16 @@ class TruthModel:
         rows += self._march(motion, times[times >= 0.0], state, step)
         return Truth(*(np.array(column) for column in zip(*rows, strict=True)))
 
+    def _moves(self, time: float, target: float) -> list[float]:
+        """Return the steps that bodies need which move within the base between two times."""
+        ends = sorted((time, target))
+        return [m.duration / STEPS for m in self.movers if m.start < ends[1] and m.start + m.duration > ends[0]]
+
     def _march(self, motion: Motion, times: Array, state: Array, step: float) -> list[tuple[Array, ...]]:
         """Read the robot at times that lead away from 0, where it has the given state."""
         time, rows = 0.0, []
         for target in times:
-            for now, size in substeps(time, target, step):
+            for now, size in substeps(time, target, min([step, *self._moves(time, target)])):
                 state = self._step(motion, now, state, size)
             time = target
             rows.append(self._read(motion, time, state))

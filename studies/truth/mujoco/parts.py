@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -87,13 +87,29 @@ class Flexibility:
 
 @dataclass(frozen=True)
 class Mover:
-    """A body in the base that is moved by `travel` along `direction` (base axes) from `start` on, within `duration`."""
+    """A body in the base that is moved by `travel` along `direction` (base axes) from `start` on, within `duration`.
+
+    In a study, `starts` may hold the start of each recording in place of the one of all.
+    """
 
     body: Body
     direction: tuple[float, float, float]
     travel: float
     start: float
     duration: float = 2.0
+    starts: tuple[float, ...] = ()
+
+    def in_recording(self, index: int) -> Mover:
+        """Return the mover with the start of one recording."""
+        return replace(self, start=self.starts[index], starts=()) if self.starts else self
+
+    @property
+    def moments(self) -> Array:
+        """Changes of the base's first moments x, y, z [kg m] and second moments xx, yy, zz, xy, xz, yz [kg m2]."""
+        travel = self.travel * np.asarray(self.direction)
+        before, after = self.body.com, self.body.com + travel
+        second = self.body.mass * (np.outer(after, after) - np.outer(before, before))
+        return np.concatenate([self.body.mass * travel, second[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]])
 
     def motion(self, time: float) -> tuple[float, float, float]:
         """Position, speed and acceleration of a quintic step."""

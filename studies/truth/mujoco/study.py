@@ -168,6 +168,7 @@ def write_study(
             place = replace(orbit, argument_of_latitude=latitudes[index - 1])
         orbits.append(place)
         fields = [*hidden.fields, *([] if place is None else [make(place) for make in hidden.environment])]
+        options["movers"] = [mover.in_recording(index - 1) for mover in hidden.movers]
         model = TruthModel(urdf, orbit=place, fields=fields, changed=changed, configuration=configuration, **options)
         whole = model.run(
             motion, np.unique(np.concatenate(list(taken.values()))), rate0=rate, attitude0=attitudes[-1], step=step
