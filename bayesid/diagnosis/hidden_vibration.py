@@ -35,9 +35,10 @@ BATCHES = (1, 16)
 class Vibration(NamedTuple):
     """What drives oscillators in the base, of all recordings, on a fine grid of N times.
 
-    forcing (R, N, 15): acceleration of the base origin, angular acceleration and ``w w' - w^2 1``; yielding
-    (R, N, 6, 6): the base's acceleration under unit force and torque at its origin; times (R, S) and (R, T) where
-    results are wanted, and the centre of mass there.
+    forcing (R, N, 27): acceleration of the base origin and of rotation, without the derivative of the velocity by
+    components, and ``w w' - w^2 1``; velocity of the base origin and of rotation; its derivative by components.
+    compliance (R, N, 6, 6): the base's acceleration under unit force and torque at its origin; times (R, S) and (R, T)
+    where results are wanted, and the centre of mass there.
     """
 
     forcing: Floats
@@ -51,19 +52,21 @@ class Vibration(NamedTuple):
         times = np.asarray(node.environment.time)
         end = float(times.max())
         fine = FINE * np.arange(int(np.ceil(end / FINE)) + 2)
-        rate = np.asarray(node.rate)
-        spread = rate[..., :, None] * rate[..., None, :] - (rate**2).sum(axis=-1)[..., None, None] * np.eye(3)
-        parts = [np.asarray(node.acceleration), np.asarray(node.rate_change), spread.reshape(*rate.shape[:2], 9)]
-        excitation = np.concatenate(parts, axis=-1)
+        curves = _curves(node)
         forcing, compliance = [], []
         for index in range(len(times)):
             own = np.concatenate([[True], np.diff(times[index]) > 0.0])  # padding repeats the last instant
-            inside = np.minimum(fine, times[index].max())
-            forcing.append(CubicSpline(times[index][own], excitation[index][own])(inside))
+            given = times[index][own]
+            inside = np.minimum(fine, given.max())
+            moving = CubicHermiteSpline(given, curves.velocity[index][own], curves.slope[index][own])
+            turning = CubicHermiteSpline(given, curves.spread[index][own], curves.spread_rate[index][own])
+            rest = CubicSpline(given, curves.rest[index][own])(inside)
+            parts = [rest, np.zeros_like(rest), turning(inside), moving(inside), moving.derivative()(inside)]
+            forcing.append(np.concatenate(parts, axis=-1))
             soft = _yielding(*(np.asarray(x)[index][own] for x in (node.body.mass, node.body.com, node.body.inverse)))
             flat = soft.reshape(len(soft), -1)
             compliance.append(
-                np.stack([np.interp(inside, times[index][own], column) for column in flat.T], axis=-1).reshape(-1, 6, 6)
+                np.stack([np.interp(inside, given, column) for column in flat.T], axis=-1).reshape(-1, 6, 6)
             )
         both = (times, np.asarray(sample.environment.time))
         com = (np.asarray(node.body.com), np.asarray(sample.body.com))
@@ -134,6 +137,44 @@ class Vibration(NamedTuple):
         return _rows(momentum, change, com)
 
 
+class _Curves(NamedTuple):
+    """What moves oscillators, at the nodes.
+
+    velocity (R, S, 6): of the base origin and of rotation, base axes; slope (R, S, 6): its derivative by components;
+    rest (R, S, 3): what the acceleration of the base origin has beside; spread (R, S, 9): ``w w' - w^2 1``; spread_rate
+    (R, S, 9): its derivative.
+    """
+
+    velocity: Floats
+    slope: Floats
+    rest: Floats
+    spread: Floats
+    spread_rate: Floats
+
+
+def _curves(node: Instant) -> _Curves:
+    """Return continuous curves where the motion of the joints may jump in its acceleration.
+
+    The velocity of the base origin follows from the centre of mass, which moves steadily. Its derivative jumps with the
+    joints' acceleration, between two nodes as well, and a curve through its values would miss that by half a step.
+    """
+    rate, change = np.asarray(node.rate), np.asarray(node.rate_change)
+    com, com_rate, bend = (np.asarray(x) for x in (node.body.com, node.body.com_rate, node.body.com_acceleration))
+    velocity = -(np.cross(rate, com) + com_rate)
+    slope = -(np.cross(change, com) + np.cross(rate, com_rate) + bend)
+    outer = rate[..., :, None] * change[..., None, :]
+    spread = rate[..., :, None] * rate[..., None, :] - (rate**2).sum(axis=-1)[..., None, None] * np.eye(3)
+    both = outer + np.swapaxes(outer, -1, -2)
+    spread_rate = both - np.trace(both, axis1=-2, axis2=-1)[..., None, None] * np.eye(3)
+    return _Curves(
+        np.concatenate([velocity, rate], axis=-1),
+        np.concatenate([slope, change], axis=-1),
+        np.asarray(node.acceleration) - slope,
+        spread.reshape(*rate.shape[:2], 9),
+        spread_rate.reshape(*rate.shape[:2], 9),
+    )
+
+
 def _interpolated(times: Floats, flow: Floats, flow_rate: Floats) -> tuple[Floats, Floats]:
     """Return momenta (n, R, N, 6) on the fine grid, and their derivatives, at other times (R, S)."""
     fine = FINE * np.arange(flow.shape[2])
@@ -179,23 +220,41 @@ def _oscillate(coupling: Array, load: Array, omega: Array, damping: Array, forci
 
 
 def _run(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Array, compliance: Array) -> Array:
+    """Integrate the momenta of the modes: the velocity of the base is continuous where its acceleration jumps.
+
+    The modes follow ``M q'' = push - c v'`` with the mass matrix ``M`` that the yielding base leaves. The state holds
+    ``q`` and ``p = q' + M^-1 c v``.
+    """
     count = len(omega)
-    push = -forcing @ load.T
+    steady, velocity, slope = -forcing[:, :15] @ load.T, forcing[:, 15:21], forcing[:, 21:]
     mass = jnp.eye(count) - jnp.einsum("ia,tab,jb->tij", coupling, compliance, coupling)
     soft = jax.vmap(inverse_small)(mass)
+    driven = velocity @ load[:, :6].T
+    drawn = jnp.einsum("tij,tj->ti", soft, driven)
+    # of the derivative of M^-1 c v, what the acceleration of the base does not give
+    softening = jnp.einsum("tij,tj->ti", jnp.diff(soft, axis=0), 0.5 * (driven[:-1] + driven[1:])) / FINE
 
-    def change(state: Array, push: Array, soft: Array) -> Array:
-        amplitude, speed = state
-        return jnp.stack([speed, soft @ (push - 2.0 * damping * omega * speed - omega**2 * amplitude)])
+    def spring(amplitude: Array, speed: Array, push: Array, soft: Array) -> Array:
+        return soft @ (push - 2.0 * damping * omega * speed - omega**2 * amplitude)
 
-    def step(state: Array, given: tuple[Array, Array, Array, Array]) -> tuple[Array, Array]:
-        here, there, soft_here, soft_there = given
-        half = (0.5 * (here + there), 0.5 * (soft_here + soft_there))
-        new, k1, _ = runge_kutta_step(
-            lambda s, at: change(s, *at), state, jnp.asarray(FINE), (here, soft_here), half, (there, soft_there)
+    def change(state: Array, push: Array, soft: Array, drawn: Array, softening: Array) -> Array:
+        amplitude, momentum = state
+        speed = momentum - drawn
+        return jnp.stack([speed, spring(amplitude, speed, push, soft) + softening])
+
+    def step(state: Array, given: tuple[tuple[Array, ...], tuple[Array, ...], Array]) -> tuple[Array, Array]:
+        here, there, softening = given
+        half = tuple(0.5 * (one + other) for one, other in zip(here, there, strict=True))
+        new, _, _ = runge_kutta_step(
+            lambda s, at: change(s, *at, softening), state, jnp.asarray(FINE), here, half, there
         )
-        return new, jnp.stack([state[1], k1[1]])
+        return new, state
 
-    final, found = jax.lax.scan(step, jnp.zeros((2, count)), (push[:-1], push[1:], soft[:-1], soft[1:]))
-    end = jnp.stack([final[1], change(final, push[-1], soft[-1])[1]])
-    return jnp.concatenate([found, end[None]])
+    rows = (steady, soft, drawn)
+    before, after = (tuple(row[part] for row in rows) for part in (slice(None, -1), slice(1, None)))
+    # at rest at the start
+    final, found = jax.lax.scan(step, jnp.stack([jnp.zeros(count), drawn[0]]), (before, after, softening))
+    amplitude, momentum = jnp.moveaxis(jnp.concatenate([found, final[None]]), 1, 0)
+    speed = momentum - drawn
+    push = steady - slope @ load[:, :6].T
+    return jnp.stack([speed, jax.vmap(spring)(amplitude, speed, push, soft)], axis=1)
