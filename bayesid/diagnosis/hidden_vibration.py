@@ -237,7 +237,8 @@ def _run(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Ar
     def spring(amplitude: Array, speed: Array, push: Array, soft: Array) -> Array:
         return soft @ (push - 2.0 * damping * omega * speed - omega**2 * amplitude)
 
-    def change(state: Array, push: Array, soft: Array, drawn: Array, softening: Array) -> Array:
+    def change(state: Array, at: tuple[Array, ...], softening: Array) -> Array:
+        push, soft, drawn = at
         amplitude, momentum = state
         speed = momentum - drawn
         return jnp.stack([speed, spring(amplitude, speed, push, soft) + softening])
@@ -246,7 +247,7 @@ def _run(coupling: Array, load: Array, omega: Array, damping: Array, forcing: Ar
         here, there, softening = given
         half = tuple(0.5 * (one + other) for one, other in zip(here, there, strict=True))
         new, _, _ = runge_kutta_step(
-            lambda s, at: change(s, *at, softening), state, jnp.asarray(FINE), here, half, there
+            lambda s, at: change(s, at, softening), state, jnp.asarray(FINE), here, half, there
         )
         return new, state
 
