@@ -132,8 +132,10 @@ class JointFlexibility(DisplacedMotion, OnJoint):
     ``frequency`` is that of all bodies beyond the joint on the spring, with the base held and all joints at zero, so
     that one frequency is one stiffness in all recordings. The deflection follows the torque through the joint if the
     motion is slow against that frequency; it is computed to second order in the ratio of frequencies, which is accurate
-    above about 0.2 Hz. The deflection and the displacement of the links are computed with the bodies of the robot, and
-    with the centres of the priors for unknown ones: the displacement of a load far from its prior's centre is wrong.
+    above about 0.2 Hz. Where the acceleration of the joints jumps the spring rings, which is left out: with trapezoidal
+    speeds something remains beside the joint's compliance. The deflection and the displacement of the links are
+    computed with the bodies of the robot, and with the centres of the priors for unknown ones: the displacement of a
+    load far from its prior's centre is wrong.
     """
 
     name = "joint-flexibility"
