@@ -28,6 +28,7 @@ from studies.common.template import Setup, Summary, add_first_page, add_setup, w
 
 __all__ = ["main", "write_report"]
 
+SCORES = ["stated of", "statements", "Brier score", "log score", "mean stated", "share true"]
 TICKS = (3, 5, 7, 10, 20, 50, 100)
 """Ticks of the signal-to-noise ratio in the figure."""
 
@@ -94,6 +95,7 @@ def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None
     document.items(_failures(trials))
     _evidence(document, trials)
     _calibration(document, trials)
+    _answers(document, trials)
     _files(document, trials, file)
     write_study(document, summary, file, origin)
 
@@ -247,6 +249,38 @@ def _calibration(document: Document, trials: Sequence[Trial]) -> None:
     )
 
 
+def _answers(document: Document, trials: Sequence[Trial]) -> None:
+    """Add scores of the stated probabilities, and the answers of cases that were not always answered rightly."""
+    add_number_table(
+        document,
+        SCORES,
+        [[row[0], *(cell.replace("-", "−") for cell in row[1:])] for row in scores(trials)],
+        "Scores of the stated probabilities with standard errors, over the trials: of each cause stated above 1 %, of "
+        "something outside the catalogue, and of nothing.",
+    )
+    mixed = {trial.case for trial in trials if not _answered(trial)}
+    always = len({trial.case for trial in trials} - mixed)
+    document.section("What was said of what was hidden")
+    if mixed:
+        add_number_table(
+            document,
+            ["hidden", "said, with the number of trials"],
+            sorted(confusion([trial for trial in trials if trial.case in mixed])),
+            f"Answers of the {len(mixed)} cases that were not answered rightly in every trial, all strengths together; "
+            f"{always} others were.",
+            words=2,
+        )
+    else:
+        document.paragraph(f"All {always} cases were answered rightly in every trial.")
+
+
+def _answered(trial: Trial) -> bool:
+    """Return whether exactly what is hidden is said: its causes, nothing, or something outside the catalogue."""
+    if trial.kind == "effect":
+        return trial.named_rightly
+    return trial.status == trial.kind
+
+
 def _files(document: Document, trials: Sequence[Trial], output: Path) -> None:
     """Write the further tables and say where they are."""
     fields = {name: None for trial in trials for name in asdict(trial)}
@@ -262,7 +296,7 @@ def _files(document: Document, trials: Sequence[Trial], output: Path) -> None:
         write_table(
             output,
             "scores",
-            ["stated of", "statements", "Brier score", "log score", "mean stated", "share true"],
+            SCORES,
             scores(trials),
         ),
     ]
