@@ -45,8 +45,9 @@ WEAK_TO_STRONG, OUTSIDE = (0.1, 1.5), (0.3, 2.0)
 FIRST_SEED = {False: 200, True: 90_000}
 """Seed of the first trial of the small and of the full plan; those of tests and of development are others."""
 
-LATER, FROM, EVERY = ("mass-shift",), 700, 65
-"""Cases that were added when the first trials of the full plan had been made, and the trials that they replace."""
+LATER, FROM, EVERY = ("mass-shift",), 700, 26
+"""Cases that were added when the first trials of the full plan had been made; from which trial on, and how many of the
+others with a cause of the catalogue there are for each that they replace."""
 
 SPOILT = ("outliers", "quantisation")
 """Beginnings of the names of causes that do not change the mean of the data."""
@@ -187,9 +188,9 @@ def plan(full: bool) -> list[Plan]:
         for number, (name, ends) in enumerate(cases)
     ]
     shuffled = [plans[number] for number in draw.permutation(len(plans))]
-    for place in range(FROM, len(shuffled), EVERY):
-        strength = float(f"{np.exp(draw.uniform(*np.log(WEAK_TO_STRONG))):.3g}")
-        shuffled[place] = Plan(LATER[place % len(LATER)], shuffled[place].seed, strength)
+    places = [place for place in range(FROM, len(shuffled)) if shuffled[place].case in effects]
+    for number, place in enumerate(places[::EVERY]):
+        shuffled[place] = replace(shuffled[place], case=LATER[number % len(LATER)])
     return shuffled
 
 
