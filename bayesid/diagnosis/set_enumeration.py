@@ -126,17 +126,20 @@ def _screened(
         CauseSet(*key, value)
         for key, (value, _) in sorted(weighed.items(), key=lambda item: (item[0][0], item[0][1] or ""))
     ]
-    everything = SetProbabilities.of(found + sets, evidence.catalogue, evidence.generics, prior).sets
-    least = np.exp(-NEAR) * everything[0].probability
-    matter = {(item.causes, item.generic) for item in everything if item.probability >= least}
-    result = []
-    for item in sets:
-        key = (item.causes, item.generic)
-        if key in matter:
-            result.append(replace(item, log_evidence=evidence.log_evidence(item.names, weighed[key][1])))
-        else:
-            result.append(item)
-    return result
+    whole: set[tuple[tuple[str, ...], str | None]] = set()
+    while True:
+        # a bound that was too high hides others, so that the best one must have been evaluated
+        everything = SetProbabilities.of(found + sets, evidence.catalogue, evidence.generics, prior).sets
+        least = np.exp(-NEAR) * everything[0].probability
+        likely = {(item.causes, item.generic) for item in everything if item.probability >= least}
+        matter = likely & weighed.keys() - whole
+        if not matter:
+            return sets
+        sets = [
+            replace(item, log_evidence=evidence.log_evidence(item.names, weighed[key][1])) if key in matter else item
+            for item, key in ((item, (item.causes, item.generic)) for item in sets)
+        ]
+        whole |= matter
 
 
 def _best(found: list[CauseSet], size: int, evidence: SetEvidence, prior: CausePrior) -> list[CauseSet]:
