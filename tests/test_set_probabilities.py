@@ -120,6 +120,20 @@ def test_a_triple_is_found_though_something_generic_takes_the_place_of_two_of_it
     assert found.sets[0].names == ("cause 00", "cause 04", "cause 21")
 
 
+def test_bounds_that_are_too_high_do_not_hide_other_sets(monkeypatch):
+    """Bounds of bodies far above their evidence: what comes near the best set is evaluated all the same."""
+    monkeypatch.setattr("bayesid.diagnosis.set_enumeration.FEW", 0)
+    rng = np.random.default_rng(7)
+    names = [*"abcdefgh"]
+    problem = LinearProblem.random(rng, dict.fromkeys(names, 1)).observed(rng, {"a": np.array([2.0])})
+    evidence = SetEvidence(problem.gram(), [cause(name) for name in names])
+    evidence.__dict__["bodily"] = {"b": 40.0, "c": 20.0, "d": 10.0}
+    found = enumerate_sets(evidence)
+    assert found.sets[0].names == ("a",)
+    for item in found.sets[:20]:
+        assert item.log_evidence == pytest.approx(evidence.log_evidence(item.names), abs=0.1), item.names
+
+
 def test_causes_drawn_from_the_prior_are_at_work_as_often_as_stated():
     rng = np.random.default_rng(4)
     causes, generics, trials = [*"abcd"], ["generic x"], 3000
