@@ -243,9 +243,13 @@ def test_a_jump_in_every_recording_is_named_and_measured_with_its_instants():
     assert result.verdict.status is Status.EXPLAINED
     assert result.verdict.causes == ("mass-shift",)
     (row,) = [row for row in result.to_dict()["candidates"] if row["name"] == "mass-shift"]
-    found = list(row["instants"].values())
-    assert found == pytest.approx(instants, abs=0.5)
-    error = [(item["mean"] - true) / item["sd"] for item, true in zip(row["amplitude"].values(), moments, strict=True)]
+    found = row["amplitude"]
+    times = [found.pop(f"flight-{index + 1}.time") for index in range(3)]
+    assert [item["mean"] for item in times] == pytest.approx(instants, abs=0.5)
+    # no instant between two samples differs from another
+    assert all(0.13 < item["sd"] < 0.5 and item["unit"] == "s" for item in times)
+    error = [(item["mean"] - true) / item["sd"] for item, true in zip(found.values(), moments, strict=True)]
+    error += [(item["mean"] - true) / item["sd"] for item, true in zip(times, instants, strict=True)]
     assert np.abs(error).max() < 4.0
-    signal = [item["mean"] / item["sd"] for item in row["amplitude"].values()]
+    signal = [item["mean"] / item["sd"] for item in found.values()]
     assert np.abs(signal).max() > 5.0

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from bayesid.diagnosis.candidate_table import Candidate
 from bayesid.diagnosis.cause_amplitudes import amplitudes_of
+from bayesid.diagnosis.jump_instants import jump_instants
 from bayesid.diagnosis.probable_verdict import UNKNOWN
 from bayesid.diagnosis.torque_reading import TorqueReading, Unread
 from bayesid.inference import Identification
@@ -139,18 +138,11 @@ def _torques(found: TorqueReading | Unread | None) -> dict[str, Any] | None:
 
 
 def _fitted(result: Diagnosis, name: str) -> dict[str, Any]:
-    """Return what the extended model says of a named cause: amplitudes, and instants of a jump by recording [s]."""
-    fit = result.after.fit
-    sizes = {
-        item.quantity.name: quantity(item.mean, item.sd, item.quantity.unit)
-        for item in amplitudes_of(result.after, name)
-    }
-    jump = next((effect for effect in fit.effects if isinstance(effect, MassShift) and effect.name == name), None)
-    if jump is None:
-        return {"amplitude": sizes}
-    names = [item.recording.name for item in fit.posterior.manoeuvres]
-    times = {own: time if np.isfinite(time) else None for own, time in zip(names, jump.instants, strict=True)}
-    return {"amplitude": sizes, "instants": times}
+    """Return what the extended model says of a named cause: its amplitudes, and of a jump the instants."""
+    found = amplitudes_of(result.after, name)
+    if name == MassShift.name:
+        found += jump_instants(result.after)
+    return {"amplitude": {item.quantity.name: quantity(item.mean, item.sd, item.quantity.unit) for item in found}}
 
 
 def _candidate(row: Candidate, fitted: dict[str, Any] | None) -> dict[str, Any]:

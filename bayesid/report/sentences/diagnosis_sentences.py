@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, Status, Unexplained
 from bayesid.diagnosis.cause_amplitudes import amplitudes_of
+from bayesid.diagnosis.jump_instants import jump_instants
 from bayesid.diagnosis.noise_faults import SUMMARIES
 from bayesid.diagnosis.probable_verdict import COVERED, NAMED, UNKNOWN
 from bayesid.report.class_probabilities import alternative_probability, alternatives, cause_probability
@@ -22,6 +23,7 @@ from bayesid.report.numbers import (
 from bayesid.report.sentences.amplitude_words import amplitude_text
 from bayesid.report.sentences.set_words import NOTHING, probability_text, set_text
 from bayesid.report.sentences.torque_sentences import torque_sentence
+from bayesid.simulation.effects.mass_shift import MassShift
 
 __all__ = [
     "alarm_sentence",
@@ -154,6 +156,8 @@ def cause_sentences(result: Diagnosis) -> Iterator[str]:
         if amplitude := amplitudes_of(result.after, label):
             rest = "; all are in the table of the named causes" if len(amplitude) > AT_MOST else ""
             parts.append(f"Its size: {amplitude_text(amplitude, AT_MOST)}{rest}.")
+        if label == MassShift.name and (instants := jump_instants(result.after)):
+            parts.append(f"When: {amplitude_text(instants, len(instants))}.")
         if others := result.verdict.equivalent_to.get(label):
             parts.append(f"Other names for the same change: {joined(others)}.")
         yield " ".join(parts)

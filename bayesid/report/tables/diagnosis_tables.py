@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesid.diagnosis import Candidate, Diagnosis
 from bayesid.diagnosis.cause_amplitudes import CauseAmplitude, amplitudes_of
+from bayesid.diagnosis.jump_instants import jump_instants
 from bayesid.diagnosis.wrench_correlations import TorqueCorrelation
 from bayesid.report.document import Rows
 from bayesid.report.numbers import (
@@ -21,6 +22,7 @@ from bayesid.report.numbers import (
     format_unit,
 )
 from bayesid.report.sentences.amplitude_words import amplitude_text, limit_text
+from bayesid.simulation.effects.mass_shift import MassShift
 
 __all__ = [
     "candidate_rows",
@@ -67,9 +69,12 @@ def _size_text(row: Candidate, alarm: float) -> str:
 
 
 def cause_rows(result: Diagnosis) -> Rows:
-    """Return quantity, unit, value, distance from zero and bound for every quantity of every named cause."""
+    """Return quantity, unit, value, distance from zero and bound for every quantity of every named cause.
+
+    The instants of a jump come last, without a distance.
+    """
     best = result.after
-    return [
+    sizes = [
         [
             f"{label}.{item.quantity.name}",
             format_unit(item.quantity.unit),
@@ -80,6 +85,11 @@ def cause_rows(result: Diagnosis) -> Rows:
         for label in best.labels
         for item in amplitudes_of(best, label)
     ]
+    instants = [
+        [f"{MassShift.name}.{quantity.name}", format_unit(quantity.unit), format_quantity(mean, sd), "", ""]
+        for quantity, mean, sd in jump_instants(best)
+    ]
+    return sizes + instants
 
 
 def _bound_text(result: Diagnosis, label: str, unit: str) -> str:
