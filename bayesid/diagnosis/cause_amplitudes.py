@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.effect_functions import report_of, report_slopes
 from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
-from bayesid.diagnosis.perturbation import physical
 from bayesid.simulation.effects.effect import Quantity
 
 __all__ = ["CauseAmplitude", "amplitudes_of", "effect_amplitude"]
@@ -71,9 +69,6 @@ def effect_amplitude(hypothesis: Hypothesis, index: int) -> tuple[Floats, Floats
         fit.covariance[first : first + count, first : first + count],
     )
 
-    def report(c: jax.Array) -> jax.Array:
-        return effect.report(physical(effect, c))
-
-    point = jnp.asarray(coordinates)
-    slope = np.asarray(jax.jacfwd(report)(point))
-    return np.asarray(report(point)), np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
+    slope = report_slopes(effect, coordinates)
+    sd = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
+    return report_of(effect, coordinates), sd

@@ -5,15 +5,13 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.inference.noise_changes import leaving_out
-from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.robot.inertial_parameters import PARAMETERS, mass_com_inertia
 
 __all__ = ["BodyFigures", "Gain", "body_figures", "measure_gain"]
 
@@ -119,14 +117,8 @@ def body_figures(hypothesis: Hypothesis) -> BodyFigures:
     fit = hypothesis.fit
     posterior = fit.posterior
     free = hypothesis.engine.free
-    inertial = posterior.unknowns.values
-
-    def vectors(z: jax.Array) -> jax.Array:
-        return inertial(z).inertial
-
-    point = jnp.asarray(fit.z)
-    vector = np.asarray(vectors(point)).reshape(-1, 10)
-    slope = np.asarray(jax.jit(jax.jacfwd(vectors))(point)).reshape(-1, 10, len(fit.z))[..., free]
+    vector = posterior.unknowns.values_at(fit.z).inertial.reshape(-1, PARAMETERS)
+    slope = posterior.unknowns.inertial_slope(fit.z).reshape(-1, PARAMETERS, len(fit.z))[..., free]
     covariance = fit.covariance[: len(free), : len(free)]
     names, mean, sd = [], [], []
     for index, prior in enumerate(posterior.model.priors):

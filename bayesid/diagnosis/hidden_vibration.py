@@ -17,6 +17,7 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from bayesid._math.arrays import Floats
 from bayesid._math.kept_jit import kept_jit
+from bayesid._math.on_device import on_device
 from bayesid._math.runge_kutta import runge_kutta_step
 from bayesid._math.small_matrices import inverse_small
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
@@ -74,7 +75,7 @@ class Vibration(NamedTuple):
 
     def rows(self, effect: Effect, values: Floats) -> tuple[Floats, Floats]:
         """Return changes of the tables by an effect's modes, for n sets of values: (n, R, S, 28), (n, R, T, 28)."""
-        modes = jax.vmap(effect.modes)(jnp.asarray(values))
+        modes = jax.vmap(effect.modes)(on_device(values))
         coupling = np.concatenate([np.asarray(modes.linear), np.asarray(modes.angular)], axis=-1)
         omega, damping = np.asarray(modes.omega), np.asarray(modes.damping)
         moments = np.asarray(modes.moment).reshape(*coupling.shape[:2], 9)
@@ -84,12 +85,12 @@ class Vibration(NamedTuple):
         for first in range(0, len(values), batch):
             chosen = np.minimum(np.arange(first, first + batch), len(values) - 1)
             found = _oscillate(
-                jnp.asarray(coupling[chosen]),
-                jnp.asarray(load[chosen]),
-                jnp.asarray(omega[chosen]),
-                jnp.asarray(damping[chosen]),
-                jnp.asarray(self.forcing),
-                jnp.asarray(self.compliance),
+                on_device(coupling[chosen]),
+                on_device(load[chosen]),
+                on_device(omega[chosen]),
+                on_device(damping[chosen]),
+                on_device(self.forcing),
+                on_device(self.compliance),
             )
             pieces.append(np.asarray(found)[: len(values) - first])
         speed, change = np.moveaxis(np.concatenate(pieces), -2, 0)  # each (n, R, N, m)
@@ -110,12 +111,12 @@ class Vibration(NamedTuple):
         coupling = np.eye(6)
         omega = 2.0 * np.pi * frequency
         found = _oscillate(
-            jnp.asarray(coupling[:, None]),
-            jnp.asarray(np.eye(6, 15)[:, None]),
-            jnp.full((6, 1), omega),
-            jnp.full((6, 1), damping),
-            jnp.asarray(self.forcing),
-            jnp.zeros_like(jnp.asarray(self.compliance)),
+            on_device(coupling[:, None]),
+            on_device(np.eye(6, 15)[:, None]),
+            np.full((6, 1), omega),
+            np.full((6, 1), damping),
+            on_device(self.forcing),
+            np.zeros_like(self.compliance),
         )
         speed, change = np.moveaxis(np.asarray(found), -2, 0)
         driven = (np.moveaxis(part[..., 0], 0, -1)[None] for part in (speed, change))

@@ -18,6 +18,7 @@ from jax import Array
 from bayesid._math.arrays import Floats
 from bayesid._math.kept_jit import kept_jit
 from bayesid._math.runge_kutta import runge_kutta_step
+from bayesid.diagnosis.effect_functions import PriorConstants, load_slopes, loads_of, physical, traced_physical
 from bayesid.diagnosis.hidden_vibration import Vibration
 from bayesid.inference.perturbed_posterior import Perturbation
 from bayesid.inference.posterior import Posterior
@@ -33,7 +34,6 @@ __all__ = [
     "linear_perturbation",
     "operating_trajectory_of",
     "perturb",
-    "physical",
 ]
 
 DIFFERENCE = 1e-3
@@ -71,14 +71,6 @@ def coordinates_shape(effect: Effect, recordings: int) -> tuple[int, ...]:
     return (recordings, count) if effect.per_recording else (count,)
 
 
-def physical(effect: Effect, coordinates: Array) -> Array:
-    """Physical values of coordinates with a standard-normal prior, shape (..., n)."""
-    if not effect.parameters:
-        return coordinates
-    columns = [parameter.value(coordinates[..., k]) for k, parameter in enumerate(effect.parameters)]
-    return jnp.stack(columns, axis=-1)
-
-
 def tables_of(effect: Effect, posterior: Posterior) -> Table:
     """Evaluate an effect's table over the recordings of a posterior."""
     grid = posterior.data.arrays.grid
@@ -92,19 +84,19 @@ def tables_of(effect: Effect, posterior: Posterior) -> Table:
 
 def perturb(effect: Effect, coordinates: Floats, operating: OperatingTrajectory, table: Table | None) -> Perturbation:
     """Return the push of one effect at some coordinates, flat."""
-    shaped = jnp.asarray(coordinates).reshape(coordinates_shape(effect, _recordings(operating)))
+    shaped = np.reshape(coordinates, coordinates_shape(effect, _recordings(operating)))
     perturbation = _nothing(operating)
     if _acts(effect):
         hooks = _evaluate(*_given(effect, operating), shaped.ravel(), *operating[1:4], _steps(operating))
         perturbation = perturbation._replace(**{key: np.asarray(value) for key, value in hooks.items()})
     if table is not None:
-        loads = np.asarray(effect.loads(physical(effect, shaped)))
+        loads = loads_of(effect, shaped)
         perturbation = perturbation._replace(
             node_rows=perturbation.node_rows + table.node @ loads,
             sample_rows=perturbation.sample_rows + table.sample @ loads,
         )
     if effect.modes_count:
-        node, sample = operating.vibration.rows(effect, np.asarray(physical(effect, shaped))[None])
+        node, sample = operating.vibration.rows(effect, physical(effect, shaped)[None])
         perturbation = perturbation._replace(
             node_rows=perturbation.node_rows + node[0], sample_rows=perturbation.sample_rows + sample[0]
         )
@@ -115,22 +107,21 @@ def linear_perturbation(
     effect: Effect, coordinates: Floats, operating: OperatingTrajectory, table: Table | None
 ) -> Perturbation:
     """Return the derivatives of `perturb` in the coordinates, leading axis n."""
-    shape = coordinates_shape(effect, _recordings(operating))
-    flat = jnp.asarray(coordinates)
     if not effect.parameters:  # the amplitude of what is either there or not
         return jax.tree.map(lambda x: x[None], perturb(effect, coordinates, operating, table))
     if effect.modes_count:
         steps = DIFFERENCE * np.concatenate([np.eye(len(coordinates)), -np.eye(len(coordinates))])
-        values = np.asarray(physical(effect, jnp.asarray(coordinates + steps)))
+        values = physical(effect, coordinates + steps)
         count = len(coordinates)
         rows = [(part[:count] - part[count:]) / (2.0 * DIFFERENCE) for part in operating.vibration.rows(effect, values)]
         return _nothing(operating, (count,))._replace(node_rows=rows[0], sample_rows=rows[1])
-    slopes = _nothing(operating, (len(flat),))
+    slopes = _nothing(operating, (len(coordinates),))
     if _acts(effect):
-        hooks = _differentiate(*_given(effect, operating), flat, *operating[1:4], _steps(operating))
+        hooks = _differentiate(*_given(effect, operating), coordinates, *operating[1:4], _steps(operating))
         slopes = slopes._replace(**{key: np.moveaxis(np.asarray(value), -1, 0) for key, value in hooks.items()})
     if table is not None:
-        loads = np.asarray(jax.jacfwd(lambda c: effect.loads(physical(effect, c.reshape(shape))))(flat)).T
+        loads = load_slopes(effect, np.reshape(coordinates, coordinates_shape(effect, _recordings(operating))))
+        loads = loads.reshape(len(loads), -1).T
         slopes = slopes._replace(
             node_rows=slopes.node_rows + np.einsum("rsdm,nm->nrsd", table.node, loads),
             sample_rows=slopes.sample_rows + np.einsum("rsdm,nm->nrsd", table.sample, loads),
@@ -159,13 +150,10 @@ def _nothing(operating: OperatingTrajectory, lead: Sequence[int] = ()) -> Pertur
 class _Given(NamedTuple):
     """Numbers that the compiled hooks of an effect take.
 
-    constants of the effect; mean and sigma (n,) of its parameters' priors; rotation (K, 3, 3), sensor to base axes, and
-    point (K, 3) of every sensor.
+    prior of the effect, with its constants; rotation (K, 3, 3), sensor to base axes, and point (K, 3) of every sensor.
     """
 
-    constants: tuple[Any, ...]
-    mean: Floats
-    sigma: Floats
+    prior: PriorConstants
     rotation: Floats
     point: Floats
 
@@ -173,9 +161,7 @@ class _Given(NamedTuple):
 def _given(effect: Effect, operating: OperatingTrajectory) -> tuple[EffectKey, tuple[Kind, ...], _Given]:
     sensors = operating.posterior.model.sensors
     given = _Given(
-        effect.constants,
-        np.array([parameter.mean for parameter in effect.parameters]),
-        np.array([parameter.sigma for parameter in effect.parameters]),
+        PriorConstants.of(effect),
         np.stack([sensor.rotation for sensor in sensors]),
         np.stack([np.asarray(sensor.position, dtype=float) for sensor in sensors]),
     )
@@ -202,10 +188,9 @@ def _hooks(
     step: Array,
 ) -> dict[str, Array]:
     """Return the parts of the perturbation that an effect's hooks make, by name."""
-    effect = key.effect.bound(given.constants)
+    effect = key.effect.bound(given.prior.constants)
     shaped = coordinates.reshape(coordinates_shape(effect, len(step)))
-    columns = [p.prior.physical(given.mean[k], given.sigma[k], shaped[..., k]) for k, p in enumerate(effect.parameters)]
-    values = jnp.stack(columns, axis=-1) if columns else shaped
+    values = traced_physical(effect, given.prior, shaped)
     axis = 0 if effect.per_recording else None
     moments = (node, sample)
     if effect.states:

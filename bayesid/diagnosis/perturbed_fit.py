@@ -14,12 +14,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.effect_functions import physical
 from bayesid.diagnosis.perturbation import (
     OperatingTrajectory,
     Table,
@@ -27,7 +27,6 @@ from bayesid.diagnosis.perturbation import (
     linear_perturbation,
     operating_trajectory_of,
     perturb,
-    physical,
     tables_of,
 )
 from bayesid.inference.linear_responses import LinearResponses
@@ -135,7 +134,7 @@ class Fit:
         """Physical values of one effect's parameters."""
         effect = self.effects[index]
         shape = coordinates_shape(effect, len(self.posterior.manoeuvres))
-        return np.asarray(physical(effect, jnp.asarray(self.coordinates[index]).reshape(shape)))
+        return np.asarray(physical(effect, np.reshape(self.coordinates[index], shape)))
 
 
 class _Point(NamedTuple):
@@ -355,7 +354,7 @@ class Engine:
         data = self.posterior.data.arrays
         if not perturbations:
             return data
-        return perturbed(data, jax.tree.map(lambda *parts: jnp.asarray(sum(parts)), *perturbations))
+        return perturbed(data, jax.tree.map(lambda *parts: sum(parts), *perturbations))
 
     def _push_shapes(self) -> list[tuple[int, ...]]:
         arrays = self.posterior.data.arrays

@@ -12,6 +12,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.unknowns import Unknowns
 from bayesid.robot.inertial_parameters import mass_com_inertia
@@ -92,13 +93,13 @@ class Linearised(NamedTuple):
 def linearise(posterior: Posterior, z: Floats) -> Linearised:
     """Linearise the reported quantities of the identified bodies at the coordinates ``z`` (size,)."""
     names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
-    quantities, point = quantities_of(posterior.unknowns), jnp.asarray(z)
+    quantities, point = quantities_of(posterior.unknowns), on_device(z)
     return Linearised(names, np.asarray(quantities(point)), np.asarray(jax.jacfwd(quantities)(point)))
 
 
 def quantities_of(unknowns: Unknowns) -> Callable[[Array], Array]:
     """Return the function from coordinates (size,) to the reported quantities of all identified bodies (n,)."""
-    identified = jnp.asarray([index for index, prior in enumerate(unknowns.bodies) if not prior.nuisance], dtype=int)
+    identified = np.array([index for index, prior in enumerate(unknowns.bodies) if not prior.nuisance], dtype=int)
 
     def quantities(z: Array) -> Array:
         return jnp.ravel(mass_com_inertia(unknowns.values(z).inertial.reshape(-1, 10)[identified]))
@@ -118,7 +119,7 @@ def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
 
 def reported_effect(effect: Effect, values: Floats) -> Floats:
     """Return the reported quantities of an effect (..., m) from values of its parameters (..., n)."""
-    flat = jnp.asarray(values.reshape(-1, values.shape[-1]))
+    flat = on_device(values.reshape(-1, values.shape[-1]))
     return np.asarray(jax.vmap(effect.report)(flat)).reshape(*values.shape[:-1], len(effect.quantities))
 
 

@@ -16,8 +16,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bayesid._math.arrays import Traceable
+from bayesid._math.arrays import Floats, Traceable
 from bayesid._math.kept_jit import kept_jit
+from bayesid._math.on_device import on_device
 from bayesid.inference import whitening
 from bayesid.inference.layout import Layout, PriorNumbers
 from bayesid.simulation.dynamics import Grid, LinearMotion
@@ -125,18 +126,26 @@ class Traced(NamedTuple):
 
 def perturbed(arrays: Arrays, perturbation: Perturbation) -> Arrays:
     """Return the arrays with a perturbation added to the known tables, wrenches and readings."""
+
+    def sum_of(one: Traceable, other: Floats) -> Array:
+        return on_device(np.asarray(one) + other)  # JAX would compile the addition for each shape
+
     node, sample = arrays.grid.node, arrays.grid.sample
     grid = arrays.grid._replace(
         node=node._replace(
-            known=node.known + perturbation.node_rows,
-            environment=node.environment._replace(wrench=node.environment.wrench + perturbation.node_wrench),
+            known=sum_of(node.known, perturbation.node_rows),
+            environment=node.environment._replace(
+                wrench=sum_of(node.environment.wrench, perturbation.node_wrench),
+            ),
         ),
         sample=sample._replace(
-            known=sample.known + perturbation.sample_rows,
-            environment=sample.environment._replace(wrench=sample.environment.wrench + perturbation.sample_wrench),
+            known=sum_of(sample.known, perturbation.sample_rows),
+            environment=sample.environment._replace(
+                wrench=sum_of(sample.environment.wrench, perturbation.sample_wrench),
+            ),
         ),
     )
-    return arrays._replace(grid=grid, offset=arrays.offset + perturbation.reading)
+    return arrays._replace(grid=grid, offset=sum_of(arrays.offset, perturbation.reading))
 
 
 class Simulated(NamedTuple):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.inference.compiled import Arrays
 from bayesid.inference.recorded_samples import RecordedSamples, Series
 from bayesid.inference.whitening import Whitening
@@ -134,18 +135,16 @@ def stacked(
     count = grid.step_of.shape[1]
 
     def padded(values: Sequence[Floats]) -> jnp.ndarray:
-        return jnp.asarray(np.stack([lengthened(item, count) for item in values]))
+        return on_device(np.stack([lengthened(item, count) for item in values]))
 
     measured = Readings(
         padded([item.time for item in recorded]),
         {kind.value: padded([item.gridded(kind) for item in recorded]) for kind in model.channels.kinds},
         padded([item.gridded_torque for item in recorded]),
     )
-    offset = jnp.asarray(np.zeros((len(recorded), count, model.channels.count)))
-    none = jnp.zeros(0)
-    return with_whitenings(
-        Arrays(grid, jnp.asarray(attitudes_of(manoeuvres)), measured, offset, none, none), whitenings
-    )
+    offset = on_device(np.zeros((len(recorded), count, model.channels.count)))
+    none = on_device(np.zeros(0))
+    return with_whitenings(Arrays(grid, on_device(attitudes_of(manoeuvres)), measured, offset, none, none), whitenings)
 
 
 def with_whitenings(arrays: Arrays, whitenings: Sequence[Whitening]) -> Arrays:
@@ -158,4 +157,4 @@ def with_whitenings(arrays: Arrays, whitenings: Sequence[Whitening]) -> Arrays:
     for row, item in enumerate(whitenings):
         weights[row, : len(item.start), :, : item.weights.shape[2]] = item.weights
         start[row, : len(item.start)] = item.start
-    return arrays._replace(weights=jnp.asarray(weights), start=jnp.asarray(start))
+    return arrays._replace(weights=on_device(weights), start=on_device(start))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
-from bayesid._math.arrays import Floats, Traceable
+from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Numbers, Simulated, Structure
 from bayesid.inference.data import attitudes_of, grids_of
@@ -91,8 +91,8 @@ def simulate_padded(
     count = steps or max(len(grid.step) for grid in grids)
     count = max(FEWEST_STEPS, 1 << (count - 1).bit_length())
     samples = rounded(max(len(grid.step_of) for grid in grids))
-    attitude = jnp.asarray(attitudes_of(manoeuvres))
-    return compiled.simulated(structure, numbers, jnp.asarray(z), pad_grids(grids, count, samples), attitude)
+    attitude = on_device(attitudes_of(manoeuvres))
+    return compiled.simulated(structure, numbers, on_device(z), pad_grids(grids, count, samples), attitude)
 
 
 def _error(
@@ -109,15 +109,17 @@ def _error(
     worst = 0.0
     for kind in model.channels.kinds:
         sigma = np.stack([item.sigma(kind) for item in recorded])
-        first, second = (item.channels[kind.value] for item in (coarse, fine))  # of JAX, which does not warn
-        worst = max(worst, _largest((first - second)[..., : kind.size] / sigma[:, None]))
+        first, second = (np.asarray(item.channels[kind.value])[..., : kind.size] for item in (coarse, fine))
+        worst = max(worst, _largest(first, second, sigma[:, None]))
     if model.torque is not None:
-        change = np.asarray(coarse.torque - fine.torque)[..., model.torque.columns(model.robot)]
-        worst = max(worst, _largest(change / np.array(model.torque.sigma)))
+        columns = model.torque.columns(model.robot)
+        first, second = (np.asarray(item.torque)[..., columns] for item in (coarse, fine))
+        worst = max(worst, _largest(first, second, np.array(model.torque.sigma)))
     return worst * 16.0 / 15.0  # error of a fourth-order method from the difference to half the step
 
 
-def _largest(change: Traceable) -> float:
-    """Return the largest absolute value, infinite where one is not finite."""
-    largest = float(jnp.abs(change).max())
+def _largest(first: Floats, second: Floats, sigma: Floats) -> float:
+    """Return the largest difference in sigma, infinite where one is not finite."""
+    with np.errstate(invalid="ignore", over="ignore"):  # a step that is far too long
+        largest = float(np.abs((first - second) / sigma).max())
     return largest if np.isfinite(largest) else float("inf")

@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid._math.hermite import hermite
+from bayesid._math.on_device import on_device
 from bayesid._math.runge_kutta import STAGE_TIMES, TABLEAU
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Arrays, Perturbation
@@ -52,7 +52,7 @@ class LinearResponses:
     @classmethod
     def about(cls, posterior: Posterior, z: Floats, arrays: Arrays) -> LinearResponses:
         """Linearise the simulation about coordinates and data."""
-        found = compiled.linearised(posterior.structure, posterior.numbers, jnp.asarray(z), arrays)
+        found = compiled.linearised(posterior.structure, posterior.numbers, on_device(z), arrays)
         return cls(posterior, z, arrays, jax.tree.map(np.asarray, found))
 
     def along(self, pushes: Perturbation) -> Floats:
@@ -64,7 +64,7 @@ class LinearResponses:
             raw, offset = self._raw(own), own.reading
             missing = BATCH - len(offset)
             padded = [np.concatenate([x, np.zeros((missing, *x.shape[1:]))]) for x in (raw, offset)]
-            at = (self.posterior.structure, self.posterior.numbers, jnp.asarray(self.z), self.arrays)
+            at = (self.posterior.structure, self.posterior.numbers, on_device(self.z), self.arrays)
             parts.append(np.asarray(compiled.read_out(*at, self.motion.reading, *padded))[: len(offset)])
         return np.concatenate(parts) if parts else np.zeros((0, *self.posterior.residual_shape))
 

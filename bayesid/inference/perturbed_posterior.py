@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Arrays, Perturbation, Traced, perturbed
 from bayesid.inference.posterior import Posterior
@@ -15,15 +15,15 @@ __all__ = ["Arrays", "Perturbation", "Traced", "jacobian_of", "perturbed", "resi
 
 def trace(posterior: Posterior, z: Floats, arrays: Arrays) -> Traced:
     """Return the simulated motion, readings and residual at ``z`` for arrays that may be `perturbed`."""
-    return compiled.traced(posterior.structure, posterior.numbers, jnp.asarray(z), arrays)
+    return compiled.traced(posterior.structure, posterior.numbers, on_device(z), arrays)
 
 
 def residual_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
     """Return the whitened residual (R, O, C) at ``z`` for arrays that may be `perturbed`."""
-    return np.asarray(compiled.residuals(posterior.structure, posterior.numbers, jnp.asarray(z), arrays))
+    return np.asarray(compiled.residuals(posterior.structure, posterior.numbers, on_device(z), arrays))
 
 
 def jacobian_of(posterior: Posterior, z: Floats, arrays: Arrays) -> Floats:
     """Return the derivatives of the whitened residual in ``z``, (R, O, C, size), for arrays that may be `perturbed`."""
-    slopes = compiled.jacobian(posterior.structure, posterior.numbers, jnp.asarray(z), arrays)
+    slopes = compiled.jacobian(posterior.structure, posterior.numbers, on_device(z), arrays)
     return np.moveaxis(np.asarray(slopes), 0, -1)

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Numbers, Structure
 from bayesid.inference.data import Data, grids_of, stacked
@@ -157,7 +157,7 @@ class Posterior:
 
     def residuals(self, z: Floats) -> Floats:
         """Return the whitened residuals of all recordings, shape (R, O, C); zero where there is no sample."""
-        return np.asarray(compiled.residuals(self.structure, self.numbers, jnp.asarray(z), self.data.arrays))
+        return np.asarray(compiled.residuals(self.structure, self.numbers, on_device(z), self.data.arrays))
 
     def least_squares(self, z: Floats) -> Floats:
         """Return residuals of which half the sum of squares is minus the log posterior density, up to a constant."""
@@ -166,7 +166,7 @@ class Posterior:
 
     def jacobian(self, z: Floats) -> Floats:
         """Return the Jacobian of `least_squares`."""
-        slopes = compiled.jacobian(self.structure, self.numbers, jnp.asarray(z), self.data.arrays)
+        slopes = compiled.jacobian(self.structure, self.numbers, on_device(z), self.data.arrays)
         j = np.asarray(slopes).reshape(self.size, -1).T
         return j if self.flat_prior else np.concatenate([j, np.eye(self.size)])
 
@@ -236,4 +236,4 @@ def _structure(model: Model, unknowns: Unknowns) -> Structure:
 
 
 def _numbers(model: Model, unknowns: Unknowns) -> Numbers:
-    return jax.tree.map(jnp.asarray, Numbers(ModelConstants.of(model), unknowns.numbers))
+    return jax.tree.map(on_device, Numbers(ModelConstants.of(model), unknowns.numbers))

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.inference.identification import Identification
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.inertial_parameters import BASIS, InertialParameters
@@ -174,7 +174,7 @@ def _centred(vectors: Floats) -> tuple[InertialParameters, Floats]:
         mean = coordinates.mean(axis=0)
         if (np.abs(mean) < 1e-9 * coordinates.std(axis=0)).all():
             break
-        centre = InertialParameters.from_vector(np.asarray(log_cholesky_vector(centre, jnp.asarray(mean))))
+        centre = InertialParameters.from_vector(np.asarray(log_cholesky_vector(centre, on_device(mean))))
     return centre, log_cholesky_coordinates(centre.pseudo_inertia, bodies)
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.inference import compiled
 from bayesid.inference.integration_step import integration_error
 from bayesid.inference.posterior import Posterior
@@ -45,7 +45,7 @@ def predicted_readings(posterior: Posterior, z: Floats) -> list[PredictedReading
     """Return the readings of each recording that are predicted at the coordinates ``z`` (size,)."""
     arrays, model = posterior.data.arrays, posterior.model
     simulated = compiled.simulated(
-        posterior.structure, posterior.numbers, jnp.asarray(z), arrays.grid, arrays.attitude
+        posterior.structure, posterior.numbers, on_device(z), arrays.grid, arrays.attitude
     ).readings
     torque = np.asarray(simulated.torque)
     if model.torque is not None:

@@ -13,12 +13,12 @@ from functools import cached_property, partial
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
 from bayesid._math.kept_jit import kept_jit
+from bayesid._math.on_device import on_device
 from bayesid.inference.layout import EffectLayout, Layout, PriorNumbers
 from bayesid.robot.body_prior import BodyPrior, Mixing, coordinates_of
 from bayesid.robot.inertial_parameters import PARAMETERS, InertialParameters
@@ -166,7 +166,11 @@ class Unknowns:
 
     def linear_slope(self, z: Floats) -> Floats:
         """Return the Jacobian of `to_linear` at one point, shape (size, size)."""
-        return np.asarray(_linear_slope(self.layout, self.numbers, jnp.asarray(z)))
+        return np.asarray(_linear_slope(self.layout, self.numbers, on_device(z)))
+
+    def inertial_slope(self, z: Floats) -> Floats:
+        """Return the derivatives of the linear parameters of all bodies at one point, shape (10 B, size)."""
+        return np.asarray(_inertial_slope(self.layout, self.numbers, on_device(z)))
 
     def coordinates(self, inertials: Sequence[InertialParameters], rate: Floats | None = None) -> Floats:
         """Return the coordinates of given bodies and initial rates (R, 3), with all others at the prior's centre."""
@@ -222,3 +226,8 @@ def _log_volume(layout: Layout, numbers: PriorNumbers, z: Array) -> Array:
 @kept_jit(static=1)
 def _linear_slope(layout: Layout, numbers: PriorNumbers, z: Array) -> Array:
     return jax.jacfwd(partial(layout.to_linear, numbers))(z)
+
+
+@kept_jit(static=1)
+def _inertial_slope(layout: Layout, numbers: PriorNumbers, z: Array) -> Array:
+    return jax.jacfwd(lambda z: layout.values(numbers, z).inertial)(z)

@@ -10,6 +10,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.diagnosis import Hypothesis
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.instant import Instant
@@ -32,10 +33,10 @@ def cause_torque(hypothesis: Hypothesis) -> list[Floats] | None:
     acting = [index for index, effect in enumerate(fit.effects) if _acts(effect)]
     if not acting:
         return None
-    node = jax.tree.map(jnp.asarray, fit.operating.node)
+    node = jax.tree.map(on_device, fit.operating.node)
     total = np.zeros(np.shape(node.rate))
     for index in acting:
-        values = jnp.asarray(fit.values(index))
+        values = on_device(fit.values(index))
         values = jnp.broadcast_to(values, (len(total), values.shape[-1]))
         over_time = jax.vmap(_torque_of(fit.effects[index]), in_axes=(None, 0))
         total = total + np.asarray(jax.vmap(over_time)(values, node))

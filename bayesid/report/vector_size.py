@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from scipy import stats
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Hypothesis
-from bayesid.diagnosis.perturbation import physical
+from bayesid.diagnosis.effect_functions import report_of, report_slopes
 
 __all__ = ["Z95", "VectorSize", "vector_size"]
 
@@ -74,16 +72,12 @@ def vector_size(hypothesis: Hypothesis, label: str) -> VectorSize | None:
     if start is None:
         return None
     count = len(effect.parameters)
-    point = jnp.asarray(fit.coordinates[index][:count])
+    point = fit.coordinates[index][:count]
     first = fit.own.shape[1] + sum(columns.shape[1] for columns in fit.added[:index])
     covariance = fit.covariance[first : first + count, first : first + count]
-
-    def reported(coordinates: jax.Array) -> jax.Array:
-        return effect.report(physical(effect, coordinates))[start : start + 3]
-
-    slope = np.asarray(jax.jacfwd(reported)(point))
+    slope, mean = (found[start : start + 3] for found in (report_slopes(effect, point), report_of(effect, point)))
     names = tuple(quantity.name for quantity in effect.quantities[start : start + 3])
-    return of_normal(names, effect.quantities[start].unit, np.asarray(reported(point)), slope @ covariance @ slope.T)
+    return of_normal(names, effect.quantities[start].unit, mean, slope @ covariance @ slope.T)
 
 
 def of_normal(axes: tuple[str, ...], unit: str, mean: Floats, covariance: Floats) -> VectorSize:

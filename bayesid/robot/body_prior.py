@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.log_cholesky import log_cholesky_vector, relative_coordinates
 
@@ -74,5 +74,5 @@ def coordinates_of(body: BodyPrior, inertial: InertialParameters) -> Floats:
 
 def draw_inertial(centre: InertialParameters, spread: float, rng: np.random.Generator) -> InertialParameters:
     """Draw a body from the log-Cholesky prior about a centre."""
-    vector = log_cholesky_vector(centre, jnp.asarray(spread * rng.normal(size=10)))
+    vector = log_cholesky_vector(centre, on_device(spread * rng.normal(size=10)))
     return InertialParameters.from_vector(np.asarray(vector))

@@ -14,6 +14,7 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.robot.inertial_parameters import InertialParameters, parameters_from_pseudo_inertia
 
 __all__ = [
@@ -61,7 +62,7 @@ def log_cholesky_factor(coordinates: Array) -> Array:
 
 def log_cholesky_vector(centre: InertialParameters, coordinates: Array) -> Array:
     """Ten linear parameters of the body with given log-Cholesky coordinates relative to a centre, shape (10,)."""
-    return vector_from_factor(jnp.asarray(upper_cholesky(centre.pseudo_inertia)), coordinates)
+    return vector_from_factor(on_device(upper_cholesky(centre.pseudo_inertia)), coordinates)
 
 
 @jax.jit  # traced once for all bodies

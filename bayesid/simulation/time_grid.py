@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._math.arrays import Floats, Traceable, namespace
+from bayesid._math.on_device import on_device
 from bayesid.recording.actions import Actions
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.composite_tables import WIDTH, composite_rows, link_table
@@ -186,7 +186,7 @@ def pad_grids(grids: Sequence[Grid], steps: int | None = None, samples: int | No
         )
         for grid in grids
     ]
-    return jax.tree.map(lambda *arrays: jnp.asarray(np.stack(arrays)), *padded)
+    return jax.tree.map(lambda *arrays: on_device(np.stack(arrays)), *padded)
 
 
 def lengthened(array: Traceable, length: int) -> Floats:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.inference.body_quantities import BODY_QUANTITIES, reported_effect
 from bayesid.inference.contraction import Contraction, ContractionVerdict
 from bayesid.inference.identification import Identification
@@ -80,7 +80,7 @@ def effect_rows(result: Identification) -> Rows:
 
 def prior_range(effect: Effect) -> tuple[Floats, Floats]:
     """Return the ends of the central 68 % of the prior of an effect's quantities."""
-    z = jnp.asarray(np.random.default_rng(0).normal(size=(2001, len(effect.parameters))))
+    z = on_device(np.random.default_rng(0).normal(size=(2001, len(effect.parameters))))
     values = np.stack([np.asarray(p.value(z[:, k])) for k, p in enumerate(effect.parameters)], axis=-1)
     low, high = np.percentile(reported_effect(effect, values), [16.0, 84.0], axis=0)
     return low, high

@@ -11,7 +11,7 @@ import pinocchio as pin
 from jax import Array
 from scipy.interpolate import make_interp_spline
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Traceable, namespace
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import configuration, kinematics
@@ -163,10 +163,10 @@ class JointFlexibility(DisplacedMotion, OnJoint):
         """Return the effect with its compliance and the lag of its damping as parameters."""
         return _JointCompliance(self)
 
-    def amplitudes(self, values: Array) -> Array:
+    def amplitudes(self, values: Traceable) -> Traceable:
         """Return the compliance and the lag, each times the inertia beyond the joint at zero."""
-        omega = 2.0 * jnp.pi * values[0]
-        return jnp.stack([omega**-2, 2.0 * values[1] * omega**-3])
+        omega = 2.0 * np.pi * values[0]
+        return namespace(values).stack([omega**-2, 2.0 * values[1] * omega**-3])
 
     def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
         """Return the compliance of the softest joints, and the lag of strong damping in them."""
@@ -204,7 +204,7 @@ class _JointCompliance(JointFlexibility):
 
     def __init__(self, flexibility: JointFlexibility) -> None:
         super().__init__(flexibility.place)
-        median = flexibility.amplitudes(jnp.array([parameter.mean for parameter in flexibility.parameters]))
+        median = flexibility.amplitudes(np.array([parameter.mean for parameter in flexibility.parameters]))
         self.parameters = (
             Parameter("compliance", "s2", float(median[0])),
             Parameter("damping-lag", "s3", float(median[1])),

@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 from jax.scipy.special import erf
-from scipy.special import erfinv
+from scipy import special
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Traceable, namespace
 
 __all__ = ["Parameter", "Prior", "Quantity", "coordinates_of"]
+
+SQRT2 = float(np.sqrt(2.0))
 
 
 class Prior(Enum):
@@ -28,12 +28,13 @@ class Prior(Enum):
     LOG_NORMAL = "log-normal"
     UNIFORM = "uniform"
 
-    def physical(self, mean: Array | float, sigma: Array | float, z: Array) -> Array:
-        """Return the physical values of coordinates with a standard-normal prior."""
+    def physical(self, mean: Traceable, sigma: Traceable, z: Traceable) -> Traceable:
+        """Return the physical values of coordinates with a standard-normal prior, arrays of NumPy or JAX."""
         if self is Prior.LOG_NORMAL:
-            return mean * jnp.exp(sigma * z)
+            return mean * namespace(z).exp(sigma * z)
         if self is Prior.UNIFORM:
-            return mean + sigma * erf(z / jnp.sqrt(2.0))
+            error_function = special.erf if namespace(z) is np else erf
+            return mean + sigma * error_function(z / SQRT2)
         return mean + sigma * z
 
 
@@ -68,7 +69,7 @@ class Parameter(NamedTuple):
         """Whether the parameter is an amplitude, which is zero where the effect is absent."""
         return self.prior is Prior.NORMAL and self.mean == 0.0
 
-    def value(self, z: Array) -> Array:
+    def value(self, z: Traceable) -> Traceable:
         """Return the physical value of a coordinate with a standard-normal prior."""
         return self.prior.physical(self.mean, self.sigma, z)
 
@@ -85,7 +86,7 @@ def coordinates_of(parameters: Sequence[Parameter], values: Sequence[float]) -> 
             coordinates.append(np.log(value / parameter.mean) / parameter.sigma)
         elif parameter.prior is Prior.UNIFORM:
             inside = np.clip((value - parameter.mean) / parameter.sigma, -WELL_INSIDE, WELL_INSIDE)
-            coordinates.append(float(np.sqrt(2.0) * erfinv(inside)))
+            coordinates.append(float(np.sqrt(2.0) * special.erfinv(inside)))
         else:
             coordinates.append((value - parameter.mean) / parameter.sigma)
     return np.array(coordinates)

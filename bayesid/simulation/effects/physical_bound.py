@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
@@ -74,7 +73,7 @@ def bounds_of_priors(parameters: Sequence[Parameter]) -> tuple[PhysicalBound, ..
     bounds = []
     for unit in dict.fromkeys(parameter.unit for parameter in parameters):
         group = [parameter for parameter in parameters if parameter.unit == unit]
-        ends = [float(abs(parameter.value(jnp.asarray([-SPREADS, SPREADS]))).max()) for parameter in group]
+        ends = [float(abs(parameter.value(np.array([-SPREADS, SPREADS]))).max()) for parameter in group]
         reason = f"No physical bound is stated; this is the size at {SPREADS:g} standard deviations of the prior."
         bounds.append(PhysicalBound(unit, max(ends), reason))
     return tuple(bounds)

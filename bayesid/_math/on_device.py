@@ -1,0 +1,19 @@
+"""Arrays of NumPy as arguments of compiled functions."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+from jax import Array
+
+from bayesid._math.arrays import Traceable
+
+__all__ = ["on_device"]
+
+
+def on_device(values: Traceable) -> Array:
+    """Return a copy of an array for JAX, and an array of JAX as it is.
+
+    ``jax.numpy.asarray`` compiles a copy for every shape that a process has not met, which takes some 10 ms.
+    """
+    return values if isinstance(values, Array) else jax.device_put(np.array(values))
