@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import jax
 import numpy as np
 
 from bayesid._io.progress import Progress
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.identifiability.normality import NORMAL, Draws, shape_errors
 from bayesid.identifiability.profile_interval import Profile, Target, profile
-from bayesid.inference.body_quantities import BODY_QUANTITIES, quantities_of
+from bayesid.inference.body_quantities import BODY_QUANTITIES, quantities_at, quantity_slopes_at
 from bayesid.inference.contraction import ContractionVerdict
 from bayesid.inference.mode import Optimum
 from bayesid.inference.posterior import Posterior
@@ -139,7 +138,5 @@ def profiled(
 
 def quantity_of(posterior: Posterior, index: int) -> Target:
     """Return one reported quantity of the bodies, by its index, as a function of the coordinates."""
-    quantities = quantities_of(posterior.unknowns)
-    value = jax.jit(lambda z: quantities(z)[index])
-    gradient = jax.jit(jax.grad(value))
-    return Target(lambda z: float(value(z)), lambda z: np.asarray(gradient(z)))
+    unknowns = posterior.unknowns
+    return Target(lambda z: float(quantities_at(unknowns, z)[index]), lambda z: quantity_slopes_at(unknowns, z)[index])

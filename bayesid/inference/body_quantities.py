@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -11,8 +10,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers, Traceable
+from bayesid._math.kept_jit import kept_jit
 from bayesid._math.on_device import on_device
+from bayesid.inference.layout import Layout, PriorNumbers
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.unknowns import Unknowns
 from bayesid.robot.inertial_parameters import mass_com_inertia
@@ -25,8 +26,9 @@ __all__ = [
     "bodies_of",
     "body_dict",
     "linearise",
-    "quantities_of",
+    "quantities_at",
     "quantity",
+    "quantity_slopes_at",
     "reported_effect",
 ]
 
@@ -93,18 +95,33 @@ class Linearised(NamedTuple):
 def linearise(posterior: Posterior, z: Floats) -> Linearised:
     """Linearise the reported quantities of the identified bodies at the coordinates ``z`` (size,)."""
     names = tuple(f"{prior.name}.{key}" for prior in posterior.model.bodies for key in BODY_QUANTITIES)
-    quantities, point = quantities_of(posterior.unknowns), on_device(z)
-    return Linearised(names, np.asarray(quantities(point)), np.asarray(jax.jacfwd(quantities)(point)))
+    unknowns = posterior.unknowns
+    return Linearised(names, quantities_at(unknowns, z), quantity_slopes_at(unknowns, z))
 
 
-def quantities_of(unknowns: Unknowns) -> Callable[[Array], Array]:
-    """Return the function from coordinates (size,) to the reported quantities of all identified bodies (n,)."""
-    identified = np.array([index for index, prior in enumerate(unknowns.bodies) if not prior.nuisance], dtype=int)
+def quantities_at(unknowns: Unknowns, z: Floats) -> Floats:
+    """Return the reported quantities of all identified bodies (n,) at coordinates (size,)."""
+    return np.asarray(_quantities(unknowns.layout, unknowns.numbers, _identified(unknowns), on_device(z)))
 
-    def quantities(z: Array) -> Array:
-        return jnp.ravel(mass_com_inertia(unknowns.values(z).inertial.reshape(-1, 10)[identified]))
 
-    return quantities
+def quantity_slopes_at(unknowns: Unknowns, z: Floats) -> Floats:
+    """Return their derivatives by the coordinates, shape (n, size)."""
+    return np.asarray(_quantity_slopes(unknowns.layout, unknowns.numbers, _identified(unknowns), on_device(z)))
+
+
+def _identified(unknowns: Unknowns) -> Integers:
+    return np.array([index for index, prior in enumerate(unknowns.bodies) if not prior.nuisance], dtype=int)
+
+
+@kept_jit(static=1)
+def _quantities(layout: Layout, numbers: PriorNumbers, identified: Traceable, z: Array) -> Array:
+    vectors = layout.values(numbers, z).inertial.reshape(-1, len(BODY_QUANTITIES))
+    return jnp.ravel(mass_com_inertia(vectors[identified]))
+
+
+@kept_jit(static=1)
+def _quantity_slopes(layout: Layout, numbers: PriorNumbers, identified: Traceable, z: Array) -> Array:
+    return jax.jacfwd(lambda z: _quantities(layout, numbers, identified, z))(z)
 
 
 def bodies_of(posterior: Posterior, z: Floats) -> dict[str, BodyDraws]:
