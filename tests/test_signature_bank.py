@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,8 @@ from bayesid.diagnosis.mass_shift_signatures import mass_shift_signatures, shift
 from bayesid.diagnosis.perturbed_fit import Engine
 from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.set_evidence import SetEvidence
+from bayesid.diagnosis.signature_bank import Signatures
+from bayesid.diagnosis.signature_products import SignatureProducts
 from bayesid.diagnosis.vibration_signatures import PAIRS, slosh_entries
 from bayesid.inference.importance import choose_parameterisation, importance_sample
 from bayesid.inference.mode import maximise
@@ -138,6 +141,41 @@ def test_forms_of_a_cause_are_averaged_and_what_is_fixed_has_no_freedom():
     assert evidence.log_evidences(["a", "there"], scores)[0] == pytest.approx(expected + beside, abs=1e-6)
 
 
+def test_products_of_signatures_that_join_others_are_those_of_all_together():
+    """Signatures of all recordings and of one, of which some are known; those that are left out are forgotten."""
+    rng, rows = np.random.default_rng(4), 30
+    fit = SimpleNamespace(
+        posterior=SimpleNamespace(manoeuvres=[0, 1, 2]),
+        residual=rng.normal(size=3 * rows),
+        own=rng.normal(size=(3 * rows, 4)),
+        own_coordinates=rng.normal(size=4),
+    )
+    whole = [Signatures(name, rng.normal(size=(3 * rows, k))) for name, k in (("a", 2), ("b", 1), ("c", 3))]
+    single = [Signatures("d", rng.normal(size=(rows, 2)), r) for r in (1, 2)]
+    every = [whole[2], single[0], whole[0], single[1], whole[1]]
+    known = SignatureProducts.of([whole[0], single[0], whole[1]], fit)
+    found, expected = SignatureProducts.of(every, fit, known), SignatureProducts.of(every, fit)
+    columns = []
+    for item in every:
+        count = item.columns.shape[1]
+        placed = np.zeros((3, rows, count))
+        placed[slice(None) if item.recording is None else [item.recording]] = item.columns.reshape(-1, rows, count)
+        columns.append(placed.reshape(3 * rows, count))
+    separate = np.concatenate(columns, axis=1)
+    for products in (found, expected):
+        full = np.zeros_like(separate)
+        full[:, np.concatenate(products.places)] = separate
+        np.testing.assert_allclose(products.matrix, full.T @ full, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(products.score, full.T @ fit.residual, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(products.shared, fit.own.T @ full, rtol=1e-12, atol=1e-12)
+        taken = full.T @ fit.own @ np.linalg.inv(fit.own.T @ fit.own + np.eye(4)) @ fit.own.T @ full
+        gram = products.gram()
+        np.testing.assert_allclose(gram.matrix, full.T @ full - taken, atol=1e-9)
+        for name in "abcd":
+            own = [where for item, where in zip(every, products.places, strict=True) if item.name == name]
+            np.testing.assert_array_equal(gram.groups[name], np.concatenate(own))
+
+
 SETS = (
     ("rate-bias",),
     ("accel-bias",),
@@ -158,7 +196,7 @@ def test_evidence_of_the_gram_is_that_of_the_extended_model(null):
     engine, fit, effects, bounds = null
     labels = {effect.label: effect for effect in effects}
     bank = catalogue_signatures(engine, fit, [labels[name] for name in {n for own in SETS for n in own}], bounds)
-    gram = bank.gram(fit)
+    gram = SignatureProducts.of(bank.signatures, fit).gram()
     scales = {name: 4.0 / np.sqrt(np.diag(gram.matrix)[own].max()) for name, own in gram.groups.items()}
     causes = [
         CandidateCause(

@@ -17,6 +17,7 @@ from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.present_fit import with_bodies_held
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.signature_bank import SignatureBank
+from bayesid.diagnosis.signature_products import SignatureProducts
 from bayesid.diagnosis.vibration_signatures import vibration_signatures
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
@@ -38,6 +39,8 @@ class Linearisation:
         Of sets of causes relative to nothing, by the linear model.
     log_nothing : float
         Logarithm of the evidence of the present model without any cause, by the linear model.
+    products : SignatureProducts
+        Of all signatures of the bank.
     held : bool
         Whether the bodies are held where the fit has them, since the present model's own fit diverged.
     far : bool
@@ -49,12 +52,13 @@ class Linearisation:
     bank: SignatureBank
     evidence: SetEvidence
     log_nothing: float
+    products: SignatureProducts
     held: bool = False
     far: bool = False
 
     def with_bank(self, bank: SignatureBank) -> Linearisation:
         """Return the linearisation with another bank about the same fit."""
-        return _assembled(self.engine, self.fit, bank, self.held, self.far)
+        return _assembled(self.engine, self.fit, bank, self.held, self.far, self.products)
 
     def holding_bodies(self) -> Linearisation:
         """Return the linearisation about the same fit with the bodies held there."""
@@ -106,8 +110,11 @@ def linearise(
     return _assembled(engine, with_bodies_held(fit) if held else fit, bank, held, far)
 
 
-def _assembled(engine: Engine, fit: Fit, bank: SignatureBank, held: bool, far: bool) -> Linearisation:
-    gram = bank.gram(fit)
+def _assembled(
+    engine: Engine, fit: Fit, bank: SignatureBank, held: bool, far: bool, known: SignatureProducts | None = None
+) -> Linearisation:
+    products = SignatureProducts.of(bank.signatures, fit, known)
+    gram = products.gram()
     amplitudes = _amplitudes(fit, gram)
     own = fit.own
     pull = np.linalg.cholesky(own.T @ own + np.eye(own.shape[1]))
@@ -118,7 +125,7 @@ def _assembled(engine: Engine, fit: Fit, bank: SignatureBank, held: bool, far: b
     taken = gram.matrix @ amplitudes
     log_nothing = constant - cost + float(gram.score @ amplitudes - 0.5 * amplitudes @ taken)
     gram = replace(gram, score=gram.score - taken)
-    return Linearisation(engine, fit, bank, SetEvidence(gram, bank.causes), log_nothing, held, far)
+    return Linearisation(engine, fit, bank, SetEvidence(gram, bank.causes), log_nothing, products, held, far)
 
 
 def _amplitudes(fit: Fit, gram: Gram) -> Floats:

@@ -28,6 +28,7 @@ from bayesid.diagnosis.set_enumeration import enumerate_sets
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import SetProbabilities
 from bayesid.diagnosis.signature_bank import SignatureBank
+from bayesid.diagnosis.signature_products import SignatureProducts
 from bayesid.diagnosis.status import Status
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
@@ -188,7 +189,7 @@ def read_torques(hypothesis: Hypothesis, model: Model, prior: CausePrior, rng: n
     ]
     fitted = _TorqueFit.of(hypothesis, model, known, candidates)
     bank = _bank(fitted, model, candidates)
-    evidence = SetEvidence(bank.gram(fitted), bank.causes)
+    evidence = SetEvidence(SignatureProducts.of(bank.signatures, fitted).gram(), bank.causes)
     alarm = EvidenceAlarm.of(evidence, rng)
     probabilities = enumerate_sets(evidence, prior)
     verdict = probable_verdict(probabilities, [(effect.label,) for effect in candidates], alarm.silent())
