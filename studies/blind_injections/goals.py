@@ -37,19 +37,12 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
     left = [t for t in trials if t.kind == "unknown" and t.signal_to_noise is not None and t.signal_to_noise >= LEFT]
     sure = [t for t in trials if t.probability is not None and t.probability >= SURE]
     limited = [t for t in clear if t.detection is not None and t.naming is not None]
-    limit = sum((t.detection or 0.0) * (t.naming or 0.0) for t in limited)
     amplitudes = np.array([e for t in trials if t.named_rightly for e in t.amplitude_errors])
     bodies = np.array([e for t in trials if t.named_rightly or t.kind == "adequate" for e in t.body_errors])
     return [
         _rate("false alarms where nothing is hidden", 0.01, sum(t.alarmed for t in nulls), len(nulls)),
         _least("named causes right where 0.9 and more is stated", 0.93, sum(t.holds for t in sure), len(sure)),
-        Goal(
-            f"named alone at {CLEAR:g} sigma and more, relative to the simulated limit: 0.97",
-            f"{sum(t.named_rightly for t in limited) / limit:.2f} ({len(limited)} trials)" if limited else "-",
-            _verdict(*Share(sum(t.named_rightly for t in limited), len(limited)).interval, 0.97)
-            if limited
-            else Verdict.NOT_TESTED,
-        ),
+        _relative(f"named alone at {CLEAR:g} sigma and more, relative to the simulated limit", 0.97, limited),
         _least(f"hidden causes in the reported set at {CLEAR:g} sigma", 0.97, sum(t.in_set for t in clear), len(clear)),
         _least(
             f"outside effects with {LEFT:g} sigma left called unknown",
@@ -75,6 +68,18 @@ def _least(text: str, goal: float, count: int, total: int) -> Goal:
         share_text(count, total),
         _verdict(*Share(count, total).interval, goal) if total else Verdict.NOT_TESTED,
     )
+
+
+def _relative(text: str, goal: float, trials: Sequence[Trial]) -> Goal:
+    """Return the goal on how many are named alone, relative to how many the simulated decisions name."""
+    goal_text = f"{text}: at least {goal:g}"
+    limit = sum((t.detection or 0.0) * (t.naming or 0.0) for t in trials)
+    if not limit:
+        return Goal(goal_text, "none", Verdict.NOT_TESTED)
+    named = Share(sum(t.named_rightly for t in trials), len(trials))
+    low, high = (end * len(trials) / limit for end in named.interval)
+    reached = f"{named.count / limit:.2f} ({low:.2f} to {high:.2f}): {named.count} where the limit is {limit:.1f}"
+    return Goal(goal_text, f"{reached} of {len(trials)}", _verdict(low, high, goal))
 
 
 def _most(text: str, goal: float, count: int, total: int) -> Goal:

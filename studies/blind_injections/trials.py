@@ -11,22 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from bayesid._math.arrays import Floats
 from bayesid._math.kept_jit import forget_executables
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
-from bayesid.diagnosis import Diagnosis, Frame, diagnose
+from bayesid.diagnosis import Diagnosis, Frame, Status, diagnose
 from bayesid.diagnosis.cause_amplitudes import effect_amplitude
-from bayesid.diagnosis.family_alarm import FamilyAlarm
-from bayesid.diagnosis.perturbed_fit import Fit
-from bayesid.diagnosis.probable_verdict import UNKNOWN
-from bayesid.diagnosis.scale_prior import AmplitudeGroup
-from bayesid.diagnosis.signature_bank import SignatureBank
+from bayesid.diagnosis.probable_verdict import UNKNOWN, ProbableVerdict
 from bayesid.inference.perturbed_posterior import residual_of
 from bayesid.inference.posterior import Posterior
+from studies.blind_injections.limits import Limits, limits_of, what_is_left
 from studies.common.monte_carlo import Workers, read_store, run_trials
 from studies.truth import hidden_causes
 from studies.truth.mujoco import Study as Written
@@ -48,6 +44,9 @@ FIRST_SEED = {False: 200, True: 90_000}
 LATER, FROM, EVERY = ("mass-shift",), 700, 26
 """Cases that were added when the first trials of the full plan had been made; from which trial on, and how many of the
 others with a cause of the catalogue there are for each that they replace."""
+
+_NOT_SEEN = Limits(None, None, None)
+"""Limits where what is hidden does not change the mean of the data."""
 
 SPOILT = ("outliers", "quantisation")
 """Beginnings of the names of causes that do not change the mean of the data."""
@@ -87,8 +86,8 @@ class Trial:
         Root of the noncentrality of what is hidden, after the model's unknowns have taken their share; None for faults
         of the noise, which do not change the mean. For outside effects, what the best set of causes leaves of it.
     detection, naming : float or None
-        Limits of theory: probability of an alarm by the test of the hidden effect alone, and of a larger likelihood
-        than the closest effect of another name.
+        Limits of theory: probability of an alarm by the test of the hidden effect alone, and share of simulated data in
+        which the Bayes decision with all rivals names what is hidden alone.
     p_value : float
         Family-wise p-value of what the present model leaves.
     probability : float or None
@@ -258,7 +257,7 @@ def make(item: Plan) -> Trial:
         result = diagnose(model, load_manoeuvres(study, model.robot), item.seed, knows_latitude=knows)
         total = time.perf_counter() - began
         weaker = case.make(Path(folder) / "weaker", item.seed, WEAKER * item.strength) if _visible(case) else None
-        size = (None, None, None) if weaker is None else _limits(result, case, Study.load(weaker))
+        size = _NOT_SEEN if weaker is None else _limits(result, case, item.seed, _signal(result, Study.load(weaker)))
     return Trial(
         case=item.case,
         seed=item.seed,
@@ -269,9 +268,9 @@ def make(item: Plan) -> Trial:
         status=result.verdict.status.value,
         causes=result.verdict.causes,
         sets=_sets(result),
-        signal_to_noise=size[0],
-        detection=size[1],
-        naming=size[2],
+        signal_to_noise=size.signal_to_noise,
+        detection=size.detection,
+        naming=size.naming,
         p_value=result.alarm.p_value,
         probability=_probability(result),
         probabilities=_inclusion(result),
@@ -291,87 +290,27 @@ def _visible(case: hidden_causes.Case) -> bool:
     return case.status != "adequate" and not any("noise" in c or c.startswith(SPOILT) for c in case.causes)
 
 
-def _limits(result: Diagnosis, case: hidden_causes.Case, weaker: Study) -> tuple[float, float | None, float | None]:
-    """Return the signal-to-noise ratio of what is hidden and the limits of theory.
-
-    The signal is the difference to data with the same noise and less hidden.
-    """
+def _signal(result: Diagnosis, weaker: Study) -> Floats:
+    """Return how what is hidden changes the whitened residual, from data with the same noise and less of it."""
     fit, engine = result.before.fit, result.before.engine
     arrays, model = fit.posterior.data.arrays, fit.posterior.model
     # what is hidden may lie in the study's own words, such as the place of a sensor
     model = replace(model, sensors=load_model(weaker).sensors)
     like = Posterior.of(model, load_manoeuvres(weaker, model.robot), step=fit.posterior.step)
     other = like.data.arrays._replace(weights=arrays.weights, start=arrays.start)
-    change = (engine.residual(fit.z, arrays) - residual_of(like, fit.z, other).ravel()) / (1.0 - WEAKER)
+    return (engine.residual(fit.z, arrays) - residual_of(like, fit.z, other).ravel()) / (1.0 - WEAKER)
+
+
+def _limits(result: Diagnosis, case: hidden_causes.Case, seed: int, change: Floats) -> Limits:
     if case.status == "unknown":
-        return float(np.sqrt(_best(result).project(change[:, None])[0, 0])), None, None
-    noncentrality = float(fit.project(change[:, None])[0, 0])
-    parameters = {effect.label: max(len(effect.parameters), 1) for effect in result.effects}
-    degrees = sum(parameters.get(cause, 3) for cause in case.causes)
-    closest = noncentrality
+        return replace(_NOT_SEEN, signal_to_noise=what_is_left(result, change))
     names = set(case.causes) | set(case.accept)
-    for label, columns in _columns(result).items():
-        if label not in names and len(case.causes) == 1:
-            closest = min(closest, _left(fit, columns, change))
-    return (
-        float(np.sqrt(noncentrality)),
-        _detection(result.alarm, case.causes, degrees, noncentrality),
-        float(stats.norm.cdf(0.5 * np.sqrt(max(closest, 0.0)))),
-    )
 
+    def right(verdict: ProbableVerdict) -> bool:
+        alone = len(verdict.causes) == len(case.causes) and set(verdict.causes) <= names
+        return alone and verdict.status is Status.EXPLAINED
 
-def _best(result: Diagnosis) -> Fit:
-    """Return the fit of the most probable set of known causes, beside nothing unknown; of the present model if none."""
-    best = next((item for item in result.probabilities.sets if item.causes and item.generic is None), None)
-    return result.before.fit if best is None or result.alarm.silent else result.fitted(best.causes).fit
-
-
-def _detection(alarm: FamilyAlarm, causes: Sequence[str], degrees: int, noncentrality: float) -> float | None:
-    """Return the power of chi-square at the local level that is family-wise that of the alarm.
-
-    Candidates share half of the family's level. The local level is that at which the evidence of the hidden cause
-    itself, of several the highest, is as rare as the family's largest.
-    """
-    evidence = alarm.candidates
-    least = evidence.largest.threshold(1.0 - np.sqrt(1.0 - alarm.level))
-    local = [evidence.each[cause].log_p(least) for cause in causes if cause in evidence.each]
-    if not local:
-        return None
-    return float(stats.ncx2.sf(stats.chi2.isf(np.exp(max(local)), degrees), degrees, noncentrality))
-
-
-def _columns(result: Diagnosis) -> dict[str, Floats]:
-    """Return the signatures of every cause of the catalogue at its largest plausible scales, in its best form.
-
-    The scales are the prior's widest, so that a cause imitates another as well as physics allows.
-    """
-    base = result.weighed.base
-    rows = len(base.fit.residual)
-    found = {}
-    for name, cause in base.evidence.causes.items():
-        if not cause.generic:
-            groups = cause.variants[base.evidence.forms([name])[name]].groups
-            found[name] = np.concatenate([_scaled(base.bank, group, rows) for group in groups], axis=1)
-    return found
-
-
-def _scaled(bank: SignatureBank, group: AmplitudeGroup, rows: int) -> Floats:
-    blocks = []
-    for item in bank.signatures:
-        if item.name == group.name:
-            block = np.zeros((rows, item.columns.shape[1]))
-            first = (item.recording or 0) * len(item.columns)
-            block[first : first + len(item.columns)] = item.columns
-            blocks.append(block)
-    joined = np.concatenate(blocks, axis=1)
-    return group.high * group.roots(joined.shape[1]) * joined
-
-
-def _left(fit: Fit, columns: Floats, change: Floats) -> float:
-    """Return the noncentrality that another cause leaves, its amplitudes normal in the units of its columns."""
-    both = fit.project(np.column_stack([change, columns]))
-    inner = both[1:, 1:] + np.eye(columns.shape[1])
-    return float(both[0, 0] - both[0, 1:] @ np.linalg.solve(inner, both[1:, 0]))
+    return limits_of(result, case.causes, change, right, np.random.default_rng(seed))
 
 
 def _amplitude_errors(result: Diagnosis, truth: Mapping[str, Floats]) -> tuple[float, ...]:

@@ -1,0 +1,191 @@
+"""Limits of theory on what a diagnosis can say of a hidden effect of known size."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from bayesid._math.arrays import Floats, Integers
+from bayesid.diagnosis import Diagnosis
+from bayesid.diagnosis.cause_prior import CausePrior
+from bayesid.diagnosis.equivalent_causes import classes_of_equivalents
+from bayesid.diagnosis.family_alarm import FamilyAlarm
+from bayesid.diagnosis.gram import Gram, independent_directions
+from bayesid.diagnosis.perturbed_fit import Fit
+from bayesid.diagnosis.probable_verdict import ProbableVerdict, probable_verdict
+from bayesid.diagnosis.set_enumeration import enumerate_sets
+from bayesid.diagnosis.set_evidence import SetEvidence
+from bayesid.diagnosis.signature_products import SignatureProducts
+from bayesid.inference.posterior import Posterior
+
+__all__ = ["Limits", "limits_of", "simulated_naming", "what_is_left"]
+
+DRAWS = 8
+"""Number of simulated data sets from each of which the decision is taken."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of theory for one hidden effect.
+
+    Attributes
+    ----------
+    signal_to_noise : float or None
+        Root of the noncentrality, after the model's unknowns have taken their share; None where what is hidden does not
+        change the mean of the data.
+    detection : float or None
+        Probability of an alarm by the test of the hidden effect alone; None where none of the causes has a test.
+    naming : float or None
+        Share of simulated data in which the Bayes decision names the hidden causes alone; None where the model cannot
+        have one of them.
+    """
+
+    signal_to_noise: float | None
+    detection: float | None
+    naming: float | None
+
+
+def limits_of(
+    result: Diagnosis,
+    causes: Sequence[str],
+    change: Floats,
+    right: Callable[[ProbableVerdict], bool],
+    rng: np.random.Generator,
+) -> Limits:
+    """Return the limits for hidden causes of the catalogue.
+
+    Parameters
+    ----------
+    result : Diagnosis
+    causes : sequence of str
+        What is hidden.
+    change : (N,) array
+        What is hidden as a change of the whitened residual.
+    right : callable
+        Whether a verdict names what is hidden, and nothing else.
+    rng : Generator
+    """
+    noncentrality = float(result.before.fit.project(change[:, None])[0, 0])
+    parameters = {effect.label: max(len(effect.parameters), 1) for effect in result.effects}
+    degrees = sum(parameters.get(cause, 3) for cause in causes)
+    return Limits(
+        float(np.sqrt(noncentrality)),
+        _detection(result.alarm, causes, degrees, noncentrality),
+        _naming(result, causes, change, right, rng),
+    )
+
+
+def what_is_left(result: Diagnosis, change: Floats) -> float:
+    """Return the signal-to-noise ratio of what the most probable set of known causes leaves of a change."""
+    return float(np.sqrt(_best(result).project(change[:, None])[0, 0]))
+
+
+def _best(result: Diagnosis) -> Fit:
+    """Return the fit of the most probable set of known causes, beside nothing unknown; of the present model if none."""
+    best = next((item for item in result.probabilities.sets if item.causes and item.generic is None), None)
+    return result.before.fit if best is None or result.alarm.silent else result.fitted(best.causes).fit
+
+
+def _detection(alarm: FamilyAlarm, causes: Sequence[str], degrees: int, noncentrality: float) -> float | None:
+    """Return the power of chi-square at the local level that is family-wise that of the alarm.
+
+    Candidates share half of the family's level. The local level is that at which the evidence of the hidden cause
+    itself, of several the highest, is as rare as the family's largest.
+    """
+    evidence = alarm.candidates
+    least = evidence.largest.threshold(1.0 - np.sqrt(1.0 - alarm.level))
+    local = [evidence.each[cause].log_p(least) for cause in causes if cause in evidence.each]
+    if not local:
+        return None
+    return float(stats.ncx2.sf(stats.chi2.isf(np.exp(max(local)), degrees), degrees, noncentrality))
+
+
+def _naming(
+    result: Diagnosis,
+    causes: Sequence[str],
+    change: Floats,
+    right: Callable[[ProbableVerdict], bool],
+    rng: np.random.Generator,
+) -> float | None:
+    """Return the share of simulated data in which the Bayes decision with all rivals names what is hidden.
+
+    The data are those of the linear model: the hidden causes with the amplitudes that come closest to what is hidden,
+    and white noise, whose scores are normal with the Gram as covariance. The decision is the verdict on the
+    probabilities of all sets of causes and generic candidates under the prior, the alarm apart.
+    """
+    base = result.weighed.base
+    evidence = base.evidence
+    if not all(cause in evidence.causes for cause in causes):
+        return None
+    fit = base.fit
+    changed = _Changed(fit.posterior, change, fit.own, np.zeros(fit.own.shape[1]))
+    score = SignatureProducts.of(base.bank.signatures, changed).gram().score
+    nearest = _nearest(evidence.gram, score, _forms(evidence, causes))
+    return simulated_naming(evidence, result.probabilities.prior, nearest, right, rng)
+
+
+def simulated_naming(
+    evidence: SetEvidence,
+    prior: CausePrior,
+    score: Floats,
+    right: Callable[[ProbableVerdict], bool],
+    rng: np.random.Generator,
+    draws: int = DRAWS,
+) -> float:
+    """Return the share of simulated data whose verdict is right, the alarm apart.
+
+    Parameters
+    ----------
+    evidence : SetEvidence
+        All candidates.
+    prior : CausePrior
+    score : (m,) array
+        What the hidden causes add to the score of the Gram.
+    right : callable
+    rng : Generator
+    draws : int
+        Number of simulated data sets.
+    """
+    count = 0
+    for noise in evidence.gram.null_scores(rng, draws):
+        drawn = SetEvidence(replace(evidence.gram, score=score + noise), evidence.causes.values())
+        found = enumerate_sets(drawn, prior)
+        count += right(probable_verdict(found, classes_of_equivalents(drawn), silent=False))
+    return count / draws
+
+
+@dataclass(frozen=True)
+class _Changed:
+    """A fit in which the residual is a change of the data alone."""
+
+    posterior: Posterior
+    residual: Floats
+    own: Floats
+    own_coordinates: Floats
+
+
+def _forms(evidence: SetEvidence, causes: Sequence[str]) -> list[Integers]:
+    """Return the columns of the causes in each combination of their forms."""
+    found = [np.zeros(0, dtype=int)]
+    for cause in causes:
+        forms = [
+            np.concatenate([evidence.gram.groups[group.name] for group in variant.groups])
+            for variant in evidence.causes[cause].variants
+        ]
+        found = [np.concatenate([before, own]) for before in found for own in forms]
+    return found
+
+
+def _nearest(gram: Gram, score: Floats, forms: Sequence[Integers]) -> Floats:
+    """Return the score of a change in all columns, the change replaced by what the best form comes closest to."""
+    found, most = np.zeros_like(score), -1.0
+    for columns in forms:
+        directions = independent_directions(gram.matrix[np.ix_(columns, columns)])
+        fitted = directions.T @ score[columns]
+        if fitted @ fitted > most:
+            most = float(fitted @ fitted)
+            found = gram.matrix[:, columns] @ (directions @ fitted)
+    return found
