@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
 from scipy.optimize import minimize
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.encoder_fault import ENCODER_NOISE, encoder_noise, with_encoder_noise
 from bayesid.diagnosis.noise_tests import lattice, leverage
+from bayesid.diagnosis.outlier_pattern import is_event
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.inference.noise_changes import leaving_out, with_sensors
 from bayesid.inference.posterior import Posterior
@@ -23,9 +23,6 @@ __all__ = ["SUMMARIES", "NoiseFault", "noise_fault", "refined"]
 
 OUTLYING = 4.5
 """Whitened residual from which a sample counts as an outlier."""
-
-NEIGHBOURS, CLUSTERED = 3, 1e-3
-"""Outliers within so many samples of each other more often than with this probability by chance are an event."""
 
 LONGEST = 0.05
 """Longest correlation time of coloured noise, in lengths of a recording; beyond it is drift."""
@@ -227,7 +224,9 @@ def _spread(points: Floats, values: Floats, otherwise: Floats) -> Floats:
 def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault | None:
     slot = _slot(fit.posterior, kind)
     whole, _ = _shaped(fit)
-    masks, count, total, near, chance = [], 0, 0, 0, 0.0
+    masks = []
+    outlying: list[Floats] = []
+    measured: list[Floats] = []
     for r, item in enumerate(fit.posterior.whitenings):
         mask = np.zeros_like(item.outputs)
         own = whole[r, : len(mask), slot]
@@ -235,14 +234,12 @@ def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault | None:
         mask[:, slot] = item.outputs[:, slot] & (np.abs(own) > OUTLYING * scale)
         mask |= fit.posterior.data.left_out[r]
         masks.append(mask)
-        count += int(mask[:, slot].any(axis=1).sum())
-        instants = np.flatnonzero(mask[:, slot].any(axis=1))
-        length = int((item.outputs | mask)[:, slot].any(axis=1).sum())
-        total += length
-        near += int((np.diff(instants) <= NEIGHBOURS).sum())
-        chance += NEIGHBOURS * len(instants) * (len(instants) - 1) / max(length, 1)
-    if stats.poisson.sf(near - 1, chance) < CLUSTERED:
-        return None  # something lasted
+        times = fit.posterior.data.recorded[r].time[item.rows]
+        outlying.append(times[mask[:, slot].any(axis=1)])
+        measured.append(times[(item.outputs | mask)[:, slot].any(axis=1)])
+    if is_event(outlying, measured):
+        return None
+    count, total = sum(map(len, outlying)), sum(map(len, measured))
     fraction = count / max(total, 1)
     sd = np.sqrt(max(fraction * (1.0 - fraction), 1.0 / max(total, 1)) / max(total, 1))
     return NoiseFault(
