@@ -172,13 +172,6 @@ def test_the_seed_hardly_matters(small):
     assert result.verdict == other.verdict
 
 
-@pytest.mark.parametrize("name", ["null, gaps"])
-def test_nothing_hidden_raises_no_alarm(name, tmp_path):
-    result = run(CASES[name].make(tmp_path, 6))
-    assert result.verdict.status is Status.ADEQUATE, (result.alarm.loudest, result.alarm.p_value)
-    assert result.verdict.causes == ()
-
-
 def test_an_effect_of_the_user_becomes_a_candidate(tmp_path):
     study = Study.load(CASES["null, three joints"].make(tmp_path, 7))
     names = [effect.label for effect in candidates(load_model(study))]

@@ -275,6 +275,7 @@ def test_another_runs_file_is_refused(change, chain, tmp_path, monkeypatch):
 # a robot --------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_laplace_importance_and_ensemble_agree_on_a_nearly_normal_posterior(planar_case):
     """Means within 0.15 sd and widths within 10 %: three times the Monte Carlo error, and what is not quite normal."""
     result = identify(planar_case.posterior, 1, effective_samples=2500.0, max_steps=2000)

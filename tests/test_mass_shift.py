@@ -87,6 +87,7 @@ def truth():
     return stepwise(MOMENTS)
 
 
+@pytest.mark.slow
 def test_the_jump_is_that_of_pinocchio_with_momentum_conserved(truth, motion):
     """The jump changes rate, acceleration and attitude by 3e-4, 3e-5 and 5e-3; the largest error is 3e-5 of that."""
     robot = Robot.from_urdf(SERVICER3)

@@ -10,6 +10,7 @@ from studies.faults.kills import content_of, half_written, kill_and_resume
 from tests.pdf_text import PdfText
 
 
+@pytest.mark.slow
 def test_a_campaign_that_is_killed_ends_as_one_left_alone(tmp_path):
     killed = kill_and_resume("campaign", tmp_path, np.random.default_rng(1), kills=3)
     assert killed.kills > 0
