@@ -20,6 +20,9 @@ SEED = 5
 
 SHORT = {"count": 2, "duration": 100.0}
 
+STRONGER = {"pulse-train": 3.0}
+"""Strengths of cases that would be too weak: of pulses of strength 1 a steady leak leaves 4.5 sigma."""
+
 FOUND = (
     "accel-position",
     "encoder-offset:joint2",
@@ -74,7 +77,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def test_what_is_hidden_is_said(case, tmp_path):
-    result = run(case.make(tmp_path, SEED))
+    result = run(case.make(tmp_path, SEED, STRONGER.get(case.name, 1.0)))
     verdict = result.verdict
     said = verdict, result.probabilities.sets[0], (result.alarm.loudest, result.alarm.p_value)
     if case.status == "effect":

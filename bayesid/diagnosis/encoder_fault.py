@@ -46,6 +46,13 @@ class EncoderNoise(NamedTuple):
         """Logarithm of the p-value of the declared noise against more."""
         return chi2_log_sf(self.ratio * self.degrees, self.degrees)
 
+    def log_gain(self, factor: float) -> float:
+        """Return what the variance seen gains in log likelihood by noise of a factor times the declared one.
+
+        The likelihood of smoothing is no measure of that: its process takes much of the noise for motion.
+        """
+        return 0.5 * self.degrees * float(self.ratio * (1.0 - factor**-2) - 2.0 * np.log(factor))
+
 
 def encoder_noise(posterior: Posterior) -> EncoderNoise | None:
     """Estimate the noise of all encoders of a posterior by one factor (`noise_of`)."""
@@ -102,8 +109,8 @@ def encoder_test(posterior: Posterior) -> dict[str, float]:
     return {} if found is None else {ENCODER_NOISE: found.log_p}
 
 
-def with_encoder_noise(posterior: Posterior, factor: float, z: Floats) -> tuple[Posterior, float]:
-    """Return the posterior with the encoders' noise times a factor, and what the joints' samples gain by it.
+def with_encoder_noise(posterior: Posterior, factor: float, z: Floats) -> Posterior:
+    """Return the posterior with the encoders' noise times a factor, the joints' motion smoothed anew.
 
     Parameters
     ----------
@@ -111,19 +118,9 @@ def with_encoder_noise(posterior: Posterior, factor: float, z: Floats) -> tuple[
     factor : float
     z : (size,) array
         Linearisation point of the encoders' noise.
-
-    Returns
-    -------
-    posterior : Posterior
-        With the joints' motion smoothed anew.
-    gain : float
-        Change of the log likelihood of the joints' samples.
     """
-    manoeuvres, gain = [], 0.0
-    for item in posterior.manoeuvres:
-        if isinstance(item.motion, MeasuredMotion):
-            motion = item.motion.with_noise(factor)
-            gain += motion.log_likelihood - item.motion.log_likelihood
-            item = replace(item, motion=motion)
-        manoeuvres.append(item)
-    return relinearised(with_manoeuvres(posterior, manoeuvres), z), gain
+    manoeuvres = [
+        replace(item, motion=item.motion.with_noise(factor)) if isinstance(item.motion, MeasuredMotion) else item
+        for item in posterior.manoeuvres
+    ]
+    return relinearised(with_manoeuvres(posterior, manoeuvres), z)

@@ -114,9 +114,9 @@ def _encoders(fit: Fit) -> NoiseFault | None:
     if found is None:
         return None
     factor, relative = float(np.sqrt(found.ratio)), float(np.sqrt(0.5 / found.degrees))
-    posterior, gain = with_encoder_noise(fit.posterior, factor, fit.z)
-    size = np.array([factor])
-    return NoiseFault(ENCODER_NOISE, (Quantity("factor", "1"),), size, size * relative, posterior, gain)
+    posterior, size = with_encoder_noise(fit.posterior, factor, fit.z), np.array([factor])
+    quantities = (Quantity("factor", "1"),)
+    return NoiseFault(ENCODER_NOISE, quantities, size, size * relative, posterior, found.log_gain(factor))
 
 
 def _coloured(label: str, kind: Kind, fit: Fit, least: float) -> NoiseFault | None:

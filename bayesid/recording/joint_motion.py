@@ -145,11 +145,6 @@ class MeasuredMotion:
         """Return the motion smoothed anew with the declared noise of the encoders times a factor."""
         return replace(self, joints=tuple(joint.with_noise(factor) for joint in self.joints))
 
-    @property
-    def log_likelihood(self) -> float:
-        """Logarithm of the marginal likelihood of all samples of the joints."""
-        return sum(joint.log_likelihood for joint in self.joints)
-
     def lag_covariance(self, time: Floats, lags: int) -> Floats:
         """Return the covariances of `SmoothedJoint.lag_covariance` for all joints, (joints, lags + 1, T, 3, 3)."""
         if not self.joints:
