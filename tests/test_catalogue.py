@@ -8,17 +8,13 @@ robot the same circumstances, so that they share compiled functions.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from bayesid.diagnosis import Diagnosis, Status
 from studies.truth import hidden_causes
-from tests.test_diagnosis import run
+from tests.hidden import diagnosed, shortened
 
 SEED = 5
-
-SHORT = {"count": 2, "duration": 100.0}
 
 STRONGER = {"pulse-train": 3.0}
 """Strengths of cases that would be too weak: of pulses of strength 1 a steady leak leaves 4.5 sigma."""
@@ -58,12 +54,6 @@ def right(result: Diagnosis, case: hidden_causes.Case) -> bool:
     return any(matches(labels) for labels in (result.verdict.causes, *result.verdict.ambiguous_with))
 
 
-def shortened(case: hidden_causes.Case) -> hidden_causes.Case:
-    """The case with shorter recordings, unless it says itself how long they are."""
-    manoeuvres = {**SHORT, **case.fixed.get("manoeuvres", {})}
-    return replace(case, fixed={**case.fixed, "manoeuvres": manoeuvres})
-
-
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     if metafunc.config.getoption("--catalogue"):
         metafunc.parametrize("case", [pytest.param(case, id=case.name) for case in hidden_causes.CASES])
@@ -77,7 +67,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 
 def test_what_is_hidden_is_said(case, tmp_path):
-    result = run(case.make(tmp_path, SEED, STRONGER.get(case.name, 1.0)))
+    result = diagnosed(case.make(tmp_path, SEED, STRONGER.get(case.name, 1.0)))
     verdict = result.verdict
     said = verdict, result.probabilities.sets[0], (result.alarm.loudest, result.alarm.p_value)
     if case.status == "effect":

@@ -7,7 +7,6 @@ import pickle
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -26,6 +25,7 @@ from bayesid.simulation.effects import create
 from bayesid.simulation.model import Manoeuvre
 from studies.truth import hidden_causes
 from studies.truth.basilisk import BasiliskHidden, Slosh, write_basilisk_study
+from tests.hidden import diagnosed, shortened
 
 CASES = {case.name: case for case in hidden_causes.CASES}
 
@@ -38,16 +38,9 @@ CANDIDATE = {"name", "probability", "signal_to_noise", "p_value", "p_value_adjus
 """Keys of a candidate in diagnosis.json."""
 
 
-def run(file: Path) -> Diagnosis:
-    study = Study.load(file)
-    model = load_model(study)
-    knows = all(section.argument_of_latitude is not None for section in study.recordings)
-    return diagnose(model, load_manoeuvres(study, model.robot), 0, knows_latitude=knows)
-
-
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory) -> Diagnosis:
-    return run(CASES["wheel-momentum"].make(tmp_path_factory.mktemp("wheel"), 5))
+    return diagnosed(shortened(CASES["wheel-momentum"]).make(tmp_path_factory.mktemp("wheel"), 5))
 
 
 def test_a_hidden_wheel_is_named_and_measured(wheel):
@@ -183,13 +176,13 @@ def test_an_effect_of_the_user_becomes_a_candidate(tmp_path):
 
 @pytest.mark.usefixtures("slow")  # the hidden causes of the catalogue, with another simulator
 def test_slosh_in_basilisk_is_found(tmp_path):
-    result = run(write_basilisk_study(tmp_path, 3, hidden=BasiliskHidden(slosh=Slosh())))
+    result = diagnosed(write_basilisk_study(tmp_path, 3, hidden=BasiliskHidden(slosh=Slosh())))
     assert ("fuel-slosh",) in {result.verdict.causes, *result.verdict.ambiguous_with}
 
 
 @pytest.fixture(scope="module")
 def engine_and_fit(tmp_path_factory):
-    study = Study.load(CASES["null, three joints"].make(tmp_path_factory.mktemp("null"), 5))
+    study = Study.load(shortened(CASES["null, three joints"]).make(tmp_path_factory.mktemp("null"), 5))
     model = load_model(study)
     engine = Engine(Posterior.of(model, load_manoeuvres(study, model.robot)))
     return engine, engine.fit()
