@@ -83,20 +83,9 @@ def catalogue_signatures(
             (item,) = found.values()
             causes.append(CandidateCause(effect.label, (AmplitudeGroup(item.name, 1.0),), fixed=True))
         else:
-            times = len(engine.posterior.manoeuvres) if effect.per_recording else 1
-            groups_of_units = tuple(
-                AmplitudeGroup(item.name, sizes[unit], spread=_spread(effect, unit, times))
-                for unit, item in found.items()
-            )
+            groups_of_units = tuple(AmplitudeGroup(item.name, sizes[unit]) for unit, item in found.items())
             causes.append(CandidateCause(effect.label, groups_of_units))
     return SignatureBank(tuple(signatures.values()), tuple(causes))
-
-
-def _spread(effect: Effect, unit: str, times: int) -> Floats | None:
-    """Return the variances of the amplitudes of one unit relative to the largest, None if all priors are as wide."""
-    sigmas = np.array([item.sigma for item in effect.in_amplitudes().parameters if item.unit == unit])
-    largest = float(sigmas.max())
-    return None if (sigmas == largest).all() else np.tile((sigmas / largest) ** 2, times)
 
 
 def _linear(engine: Engine, fit: Fit, effects: Sequence[Effect]) -> list[Floats]:

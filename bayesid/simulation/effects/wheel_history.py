@@ -13,7 +13,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.effect_parameters import Parameter, Quantity
+from bayesid.simulation.effects.effect_parameters import Parameter
 from bayesid.simulation.effects.instant import Instant
 from bayesid.simulation.effects.internal_effects import wheel_bound
 from bayesid.simulation.effects.physical_bound import PhysicalBound
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["KNOTS", "WheelHistory"]
 
 KNOTS = 24
-"""Number of instants between which the momentum is linear in time."""
+"""Number of instants at which the momentum is a parameter."""
 
 AXES = "xyz"
 
@@ -40,11 +40,6 @@ class WheelHistory(Placed):
     prior. While it changes, the wheel drives the base by the negative of its slope, which jumps at the knots. A
     momentum that is constant in all recordings is `WheelMomentum`.
 
-    The prior is a random walk: a motor's torque, not its speed, is what may change at once. The parameters are the
-    momentum at the start and its rises from knot to knot, and all rises together have the variance of the start.
-    Values that were independent from knot to knot would charge a wheel that runs up steadily for every knot, and a
-    constant torque beside it, such as a leak's, would be credited with its trend.
-
     A model does not know which channels the recordings have, so that the effect occurs in every model. Where the
     momentum of the wheels is recorded, the parameters are what the record lacks.
 
@@ -55,7 +50,7 @@ class WheelHistory(Placed):
     end : float
         Time of the last knot [s], best the length of the longest recording.
     sigma : float
-        Standard deviation of the prior of the momentum at the start, and of all rises together [N m s].
+        Standard deviation of the prior of each value [N m s].
     """
 
     name = "wheel-history"
@@ -75,9 +70,7 @@ class WheelHistory(Placed):
         if not end > 0.0:
             raise InputError(f"{self.label}: the last knot is at {end:g} s", remedy="Give the recordings' length")
         self.end = end
-        rise = sigma / float(np.sqrt(KNOTS - 1))
-        rises = (Parameter(f"rise.{knot}", "N m s", rise) for knot in range(2, KNOTS + 1))
-        self.parameters = (Parameter("momentum.1", "N m s", sigma), *rises)
+        self.parameters = tuple(Parameter(f"momentum.{knot}", "N m s", sigma) for knot in range(1, KNOTS + 1))
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
@@ -93,17 +86,8 @@ class WheelHistory(Placed):
         return self
 
     @property
-    def quantities(self) -> Sequence[Quantity]:
-        """Momentum at each knot."""
-        return [Quantity(f"momentum.{knot}", "N m s") for knot in range(1, KNOTS + 1)]
-
-    def report(self, values: Array) -> Array:
-        """Return the momentum at each knot, shape (24,) [N m s]."""
-        return jnp.cumsum(values)
-
-    @property
     def knots(self) -> Floats:
-        """Times of the knots, shape (24,) [s]."""
+        """Times of the parameters, shape (24,) [s]."""
         return np.linspace(0.0, self.end, KNOTS)
 
     def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
@@ -115,7 +99,7 @@ class WheelHistory(Placed):
         spacing = self.end / (KNOTS - 1)
         knot = jnp.clip(instant.environment.time / spacing, 0.0, KNOTS - 1.0)
         left = jnp.clip(jnp.floor(knot).astype(int), 0, KNOTS - 2)
-        rise = values[left + 1]
+        rise = values[left + 1] - values[left]
         slope = jnp.where(instant.environment.time < self.end, rise / spacing, 0.0)
         axis = jnp.eye(3)[AXES.index(self.place)]
-        return (jnp.cumsum(values)[left] + (knot - left) * rise) * axis, slope * axis
+        return (values[left] + (knot - left) * rise) * axis, slope * axis
