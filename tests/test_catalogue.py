@@ -1,9 +1,9 @@
 """Causes hidden in MuJoCo's data must be found, outside effects called unknown, and nothing hidden raise no alarm.
 
 Twelve causes, a pair, two outside effects and two nulls of `studies.truth.hidden_causes` run by default, all other
-cases with ``pytest --slow``, on two recordings of 100 s; ``pytest --catalogue`` makes them all with the recordings of
-the campaign in studies/blind_injections, which varies circumstances and strengths. The same seed gives studies of one
-robot the same circumstances, so that they share compiled functions.
+cases with ``pytest --slow``, nearly all on two recordings of 100 s; ``pytest --catalogue`` makes them all with the
+recordings of the campaign in studies/blind_injections, which varies circumstances and strengths. The same seed gives
+studies of one robot the same circumstances, so that they share compiled functions.
 """
 
 from __future__ import annotations
@@ -19,8 +19,12 @@ SEED = 5
 STRONGER = {"pulse-train": 3.0}
 """Strengths of cases that would be too weak: of pulses of strength 1 a steady leak leaves 4.5 sigma."""
 
+LONGER = ("wheel-history:z",)
+"""Cases that need the recordings of the campaign: two short ones leave this wheel unknown, an error of the rate."""
+
 FOUND = (
     "accel-position",
+    "accel-scale",
     "encoder-offset:joint2",
     "joint-flexibility:joint2",
     "joint-latency",
@@ -31,7 +35,6 @@ FOUND = (
     "rate-noise",
     "rate-scale",
     "thruster-leak",
-    "wheel-history:z",
     "wheel-momentum, accel-bias",
     "bias-jump",
     "growing-torque",
@@ -60,7 +63,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         return
     marks = [() if case.name in FOUND else pytest.mark.slow for case in hidden_causes.CASES]
     cases = [
-        pytest.param(shortened(case), id=case.name, marks=mark)
+        pytest.param(case if case.name in LONGER else shortened(case), id=case.name, marks=mark)
         for case, mark in zip(hidden_causes.CASES, marks, strict=True)
     ]
     metafunc.parametrize("case", cases)
