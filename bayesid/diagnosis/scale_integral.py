@@ -36,7 +36,7 @@ LARGE = 1e7
 """Product of the number of nodes and the cube of the number of columns from which groups are large: some ten
 milliseconds of eigendecompositions."""
 
-NEGLIGIBLE = 14.0
+NEGLIGIBLE = 9.0
 """Logarithm below the largest of the integrand at which a coarse grid is cut off before it is refined."""
 
 ROUNDS = 4
@@ -96,9 +96,10 @@ class GroupSpectrum:
         gain = (squared / (1.0 + visible)) @ self.score**2 - np.log1p(visible).sum(axis=1)
         return log_sum(0.5 * gain + nodes.log_weights)
 
-    def nodes(self, thinned: float = 1.0) -> LogNodes:
-        """Return nodes over the whole range of the scale."""
-        return log_nodes(self.range, (self.range.low, self.range.high), len(self.columns), thinned)
+    def nodes(self, thinned: float = 1.0, part: tuple[float, float] | None = None) -> LogNodes:
+        """Return nodes over a part of the range of the scale, by default all of it."""
+        part = (self.range.low, self.range.high) if part is None else part
+        return log_nodes(self.range, part, self.values, thinned)
 
 
 @dataclass(frozen=True)
@@ -160,19 +161,16 @@ def average_over_scales(groups: Sequence[GroupSpectrum], gram: Gram) -> ScaleAve
     The grid is the product of the groups' nodes. Where it would be too large, a thinned one finds where the integrand
     is not negligible, and a finer one covers that. The trapezoidal rule of a smooth integrand converges so fast that
     even the thinned grid does better than as many quasi-random points. With scales of five decades the error of the
-    logarithm is about 0.02 for four groups, 0.1 for five and up to 0.4 for six.
+    logarithm is about 0.01 (rms) for up to five groups, one of them of 180 amplitudes, and 0.1 at most.
     """
     parts = [(group.range.low, group.range.high) for group in groups]
     cube = float(sum(len(group.columns) for group in groups[1:])) ** 3
     for turn in range(ROUNDS):
-        counts = [
-            len(log_nodes(group.range, part, len(group.columns)).scales)
-            for group, part in zip(groups, parts, strict=True)
-        ]
+        counts = [len(group.nodes(part=part).scales) for group, part in zip(groups, parts, strict=True)]
         coarse = turn == 0 and cube * float(np.prod(counts[:-1], dtype=float)) > LARGE
         thinned = thinning(counts[:-1], COARSE_NODES if coarse else MOST_NODES)
         nodes = tuple(
-            log_nodes(group.range, part, len(group.columns), thinned if place + 1 < len(groups) else 1.0)
+            group.nodes(thinned if place + 1 < len(groups) else 1.0, part)
             for place, (group, part) in enumerate(zip(groups, parts, strict=True))
         )
         log_terms = log_ratios(groups, gram, nodes)

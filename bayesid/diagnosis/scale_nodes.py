@@ -12,12 +12,16 @@ from bayesid.diagnosis.scale_prior import ScaleRange
 
 __all__ = ["LogNodes", "log_nodes", "thinning"]
 
-PER_DECADE = 4.0
-"""Nodes per decade of the scale of a few amplitudes, good to 0.001 in the log evidence of one or two groups."""
+PER_DECADE = 3.0
+"""Nodes per decade of the scale where the data see no amplitude."""
 
-PER_ROOT = 2.0
-"""Nodes per decade and root of the number of amplitudes. The more there are, the better their common scale is known,
-to ``1 / sqrt(2 m)`` in its logarithm; the error of the trapezoidal rule is then below 0.01."""
+PER_ROOT = 1.5
+"""Nodes per decade and root of the number of amplitudes that the data see. The more there are, the better their common
+scale is known, to ``1 / sqrt(2 m)`` in its logarithm. The log evidence of one group is then within 0.03 of the exact
+integral, and mostly within 0.005."""
+
+FINE = 16
+"""Points per decade from which the density of the nodes is integrated."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +37,12 @@ class LogNodes:
     log_weights: Floats
 
 
-def log_nodes(whole: ScaleRange, part: tuple[float, float], amplitudes: int, thinned: float = 1.0) -> LogNodes:
-    """Return nodes over a part of a range, equally spaced in the logarithm; the first and the last weigh half.
+def log_nodes(whole: ScaleRange, part: tuple[float, float], values: Floats, thinned: float = 1.0) -> LogNodes:
+    """Return nodes over a part of a range; the first and the last weigh half.
+
+    How well the data can tell scales apart, and so how near each other the nodes must be, depends on the number of
+    amplitudes that they see: the sum of ``(v / (1 + v))^2`` over the eigenvalues ``v`` of the information at a scale,
+    half of the Fisher information on its logarithm. The nodes are equally spaced in the integral of that density.
 
     Parameters
     ----------
@@ -42,20 +50,31 @@ def log_nodes(whole: ScaleRange, part: tuple[float, float], amplitudes: int, thi
         Range over which the scale is log-uniform.
     part : pair of float
         Ends of the part.
-    amplitudes : int
-        Number of amplitudes that share the scale.
+    values : (k,) array
+        Eigenvalues of the information on the amplitudes in units of the scale.
     thinned : float
         Factor on the number of nodes, at most 1.
     """
     if whole.low == whole.high:
         return LogNodes(np.array([whole.high]), np.zeros(1))
-    decades = np.log10(part[1] / part[0])
-    count = max(int(np.ceil(decades * max(PER_DECADE, PER_ROOT * np.sqrt(amplitudes)) * thinned)) + 1, 3)
-    weights = np.full(count, np.log(part[1] / part[0]) / (count - 1) / np.log(whole.high / whole.low))
+    first, last = np.log(part[0]), np.log(part[1])
+    logs = np.linspace(first, last, max(int(FINE * (last - first) / np.log(10.0)), 8) + 1)
+    density = _density(logs, values)
+    covered = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))]) * (logs[1] - logs[0])
+    count = max(int(np.ceil(covered[-1] * thinned)) + 1, 3)
+    places = np.interp(np.linspace(0.0, covered[-1], count), covered, logs)
+    weights = covered[-1] / (count - 1) / _density(places, values) / np.log(whole.high / whole.low)
     weights[[0, -1]] *= 0.5
-    scales = np.exp(np.linspace(np.log(part[0]), np.log(part[1]), count))
+    scales = np.exp(places)
     scales[[0, -1]] = part  # exactly
     return LogNodes(scales, np.log(weights))
+
+
+def _density(logs: Floats, values: Floats) -> Floats:
+    """Return the number of nodes per unit of the logarithm of a scale, at some of these logarithms."""
+    visible = np.exp(2.0 * logs)[:, None] * values
+    seen = ((visible / (1.0 + visible)) ** 2).sum(axis=1)
+    return np.sqrt(PER_DECADE**2 + PER_ROOT**2 * seen) / np.log(10.0)
 
 
 def thinning(counts: Sequence[int], limit: int) -> float:

@@ -9,8 +9,7 @@ import numpy as np
 
 from bayesid._math.log_sum import log_sum
 from bayesid.diagnosis.cause_prior import CausePrior
-from bayesid.diagnosis.evidence_beside import evidence_beside
-from bayesid.diagnosis.set_evidence import SetEvidence
+from bayesid.diagnosis.set_evidence import SetEvidence, near_best
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
 
 __all__ = ["enumerate_sets"]
@@ -37,9 +36,6 @@ NEAR = 6.0
 weighed is evaluated in full. The screening is off by about one nat at most in such sets, bodies apart, where it is an
 upper bound."""
 
-FORMS_NEAR, MOST_FORMS = 4.0, 4
-"""Nats below a cause's best form down to which its forms are evaluated in full, and how many of them at most."""
-
 
 def enumerate_sets(
     evidence: SetEvidence,
@@ -56,7 +52,7 @@ def enumerate_sets(
     missed only if none of those within it is among these.
 
     Where there are many, all are weighed first by what their last member adds to the others at the others' most
-    probable scales (`evidence_beside`). Only those whose weight matters are then integrated over all scales.
+    probable scales (`SetEvidence.gains_beside`). Only those whose weight matters are then integrated over all scales.
 
     Parameters
     ----------
@@ -111,12 +107,10 @@ def _screened(
         if len(parent.causes) >= MOST_CAUSES or not others:
             continue
         forms = evidence.forms(parent.names)
-        for name, values in evidence_beside(evidence, parent.names, forms, others).items():
+        for name, values in evidence.gains_beside(parent.names, forms, others).items():
             key = (tuple(sorted((*parent.causes, name))), parent.generic)
             gain = log_sum(list(values.values())) + max(evidence.bodily.get(name, 0.0), 0.0)
-            order = [form for form, _ in sorted(values.items(), key=lambda item: -item[1])][:MOST_FORMS]
-            near = [form for form in order if values[form] > values[order[0]] - FORMS_NEAR]
-            choices = [{**forms, name: form} for form in near]
+            choices = [{**forms, name: form} for form in near_best(values)]
             before, others_choices = weighed.get(key, (-np.inf, []))
             weighed[key] = (
                 max(before, parent.log_evidence + gain),

@@ -18,10 +18,16 @@ from bayesid.diagnosis.scale_integral import MOST_NODES, GroupSpectrum, ScaleAve
 from bayesid.diagnosis.scale_nodes import LogNodes, thinning
 from bayesid.diagnosis.scale_prior import CandidateCause
 
-__all__ = ["SetEvidence", "precision_roots"]
+__all__ = ["SetEvidence", "near_best", "precision_roots"]
 
-MOST_FORMS, BEST_FORMS = 64, 8
-"""Combinations of forms above which only the best forms of each cause by itself are combined, and how many of them."""
+FEW_COMBINATIONS = 8
+"""Combinations of the forms of a set up to which all are integrated."""
+
+MOST_FORMS = 12
+"""Most forms of one cause that are weighed beside a set: those that do best by themselves."""
+
+FORMS_NEAR, MOST_NEAR = 4.0, 4
+"""Nats below a cause's best form down to which its forms are evaluated in full, and how many of them at most."""
 
 BLOCK = 4_000_000
 """Most numbers in one intermediate array where many scores are evaluated at once."""
@@ -51,6 +57,12 @@ def precision_roots(matrix: Floats, deviations: Floats) -> tuple[Floats, Floats]
     lower = np.linalg.cholesky(scaled)
     roots = np.linalg.solve(lower, np.eye(len(matrix)) * deviations[:, None, :])
     return roots, np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+
+
+def near_best(values: Mapping[int, float]) -> list[int]:
+    """Return the forms of a cause whose log evidence is near that of the best, the best first."""
+    order = sorted(values, key=lambda form: (-values[form], form))[:MOST_NEAR]
+    return [form for form in order if values[form] > values[order[0]] - FORMS_NEAR]
 
 
 class SetEvidence:
@@ -87,6 +99,7 @@ class SetEvidence:
             name: tuple(tuple(next(spectra) for _ in variant.groups) for variant in cause.variants)
             for name, cause in self.causes.items()
         }
+        self._chosen: dict[tuple[str, ...], dict[str, int]] = {}
         self._known: dict[tuple[tuple[str, ...], tuple[int, ...]], float] = {}
         self._scaled: dict[tuple[tuple[str, ...], tuple[int, ...]], tuple[Integers, Floats]] = {}
         self._log_weights = {
@@ -115,13 +128,56 @@ class SetEvidence:
         )
 
     def forms(self, names: Iterable[str]) -> dict[str, int]:
-        """Return the most probable form of each cause of a set, by its place among `CandidateCause.variants`."""
-        ordered = sorted(names)
-        choices = self._choices(ordered)
-        if len(choices) == 1:
-            return dict(zip(ordered, choices[0], strict=True))
-        best = max(choices, key=lambda own: self._log_evidence(ordered, own))
-        return dict(zip(ordered, best, strict=True))
+        """Return the most probable form of each cause of a set, by its place among `CandidateCause.variants`.
+
+        Where there are many combinations the forms are chosen one cause after another, each beside those before it, and
+        once more beside all others.
+        """
+        ordered = tuple(sorted(names))
+        if ordered not in self._chosen:
+            self._chosen[ordered] = self._most_probable_forms(ordered)
+        return dict(self._chosen[ordered])
+
+    def _most_probable_forms(self, ordered: Sequence[str]) -> dict[str, int]:
+        """Return what `forms` returns, and find it."""
+        if self._combinations(ordered) <= FEW_COMBINATIONS:
+            choices = list(product(*(range(len(self._spectra[name])) for name in ordered)))
+            best = choices[0] if len(choices) == 1 else max(choices, key=lambda own: self._log_evidence(ordered, own))
+            return dict(zip(ordered, best, strict=True))
+        chosen = {name: 0 for name in ordered if len(self._spectra[name]) == 1}
+        several = sorted(set(ordered) - set(chosen), key=lambda name: (-self.of_forms(name).max(), name))
+        for name in (*several, *several) if len(ordered) > 1 else several:
+            chosen.pop(name, None)
+            gains = self.gains_beside(chosen, chosen, [name])[name]
+            chosen[name] = max(gains, key=lambda form: (gains[form], -form))
+        return chosen
+
+    def _combinations(self, ordered: Sequence[str]) -> int:
+        """Return the number of combinations of the forms of some causes."""
+        return int(np.prod([len(self._spectra[name]) for name in ordered], dtype=float))
+
+    def gains_beside(
+        self, names: Iterable[str], forms: Mapping[str, int], others: Iterable[str]
+    ) -> dict[str, dict[int, float]]:
+        """Return what each other cause adds to the log evidence of a set, by the cause's forms: a screening of sets.
+
+        The set's scales are held at their most probable values, at which its amplitudes take their share of the Gram;
+        what remains is a Gram of single causes. One such Gram serves all other causes. Scales that the addition moves
+        make the true gain larger.
+
+        Parameters
+        ----------
+        names : iterable of str
+            The set.
+        forms : mapping of str to int
+            Form of each of its causes.
+        others : iterable of str
+            Causes to add, each by itself, in those of its forms that do best by themselves.
+        """
+        kept = {name: self.ranked[name][:MOST_FORMS] for name in others}
+        causes = [_with_forms(self.causes[name], places) for name, places in kept.items()]
+        rest = SetEvidence(self.beside(names, forms, kept), causes)
+        return {name: dict(zip(places, rest.of_forms(name).tolist(), strict=True)) for name, places in kept.items()}
 
     def places(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[tuple[str, int]]:
         """Return the groups of a set, each by its cause and its place in that, in the order of the integration.
@@ -272,15 +328,18 @@ class SetEvidence:
         return self._with_fixed(sorted(names), self.gram.score[None])[0][0]
 
     def _choices(self, ordered: Sequence[str]) -> list[tuple[int, ...]]:
-        """Return the combinations of forms that are integrated: all, or of each cause the best by themselves."""
-        counts = [len(self._spectra[name]) for name in ordered]
-        ranges: list[Sequence[int]] = [range(count) for count in counts]
-        if np.prod(counts, dtype=float) > MOST_FORMS:
-            ranges = [
-                self.ranked[name][:BEST_FORMS] if count > BEST_FORMS else range(count)
-                for name, count in zip(ordered, counts, strict=True)
-            ]
-        return list(product(*ranges))
+        """Return the combinations of forms that are integrated: all, or those near the best."""
+        if self._combinations(ordered) <= FEW_COMBINATIONS:
+            return list(product(*(range(len(self._spectra[name])) for name in ordered)))
+        if len(ordered) == 1:
+            return [(form,) for form in self.ranked[ordered[0]]]
+        best = self.forms(ordered)
+        near = {name: near_best(self.gains_beside(set(best) - {name}, best, [name])[name]) for name in best}
+        return [
+            own
+            for own in product(*(near[name] for name in ordered))
+            if sum(form != best[name] for name, form in zip(ordered, own, strict=True)) < 2
+        ]
 
     @cached_property
     def ranked(self) -> dict[str, tuple[int, ...]]:
@@ -368,6 +427,13 @@ class SetEvidence:
             terms = products @ weights.T + nodes.log_weights - half_log_det
             found[start : start + step] = logsumexp(terms, axis=1)
         return found
+
+
+def _with_forms(cause: CandidateCause, places: Sequence[int]) -> CandidateCause:
+    """Return a cause with some of its forms, each with the share of the prior that it has among all."""
+    chosen = [cause.variants[place] for place in places]
+    shares = tuple(float(np.exp(variant.log_weight)) for variant in chosen)
+    return replace(cause, groups=chosen[0].groups, others=tuple(own.groups for own in chosen[1:]), shares=shares)
 
 
 def _product(nodes: Sequence[LogNodes]) -> LogNodes:
