@@ -11,16 +11,17 @@ from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.equivalent_causes import classes_of_equivalents
 from bayesid.diagnosis.family_alarm import FamilyAlarm
-from bayesid.diagnosis.fault_weighing import WeighedState, weighed_states
+from bayesid.diagnosis.fault_weighing import weighed_states
 from bayesid.diagnosis.followed_motion import linearise_along_data
 from bayesid.diagnosis.linearisation import Linearisation, linearise
-from bayesid.diagnosis.noise_states import NoiseState, fault_names
+from bayesid.diagnosis.noise_states import FaultyFit, NoiseState, fault_names
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
 from bayesid.diagnosis.set_enumeration import enumerate_sets
 from bayesid.diagnosis.set_evidence import SetEvidence
-from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
+from bayesid.diagnosis.set_probabilities import SetProbabilities
 from bayesid.diagnosis.settled_sets import settled
-from bayesid.diagnosis.vibration_fits import with_fitted_vibrations
+from bayesid.diagnosis.vibration_fits import plausible_vibrations, with_fitted_vibrations
+from bayesid.diagnosis.weighed_state import WeighedState
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
@@ -132,11 +133,17 @@ def weigh_causes(
         return WeighedCauses(base, alarm, (NoiseState((), base),), _with_faults(single, faults))
     progress(0.5, "weighing the sets of causes")
     point, found, best = settled(base, effects, bounds, prior)
-    found, best = with_fitted_vibrations(point, found, effects, best)
-    first = WeighedState(base, NoiseState((), point), found, best)
+    first = WeighedState(FaultyFit.declared(base), NoiseState((), point), found, best)
     weighed = weighed_states(first, alarm, effects, bounds, prior, progress)
-    every, sets = [item.state for item in weighed], [item.found.sets for item in weighed]
-    return WeighedCauses(base, alarm, tuple(every), _joined(every, sets, found, faults))
+    likeliest = max(weighed, key=lambda item: item.highest)
+    if plausible_vibrations(_joined(weighed, faults), effects):
+        progress(0.6, "fitting vibrations")
+        fitted = with_fitted_vibrations(likeliest, effects)
+        if likeliest is first:
+            weighed = weighed_states(fitted, alarm, effects, bounds, prior, progress)
+        else:
+            weighed = [fitted if item is likeliest else item for item in weighed]
+    return WeighedCauses(base, alarm, tuple(item.state for item in weighed), _joined(weighed, faults))
 
 
 def _with_faults(found: SetProbabilities, faults: Sequence[str]) -> SetProbabilities:
@@ -144,14 +151,14 @@ def _with_faults(found: SetProbabilities, faults: Sequence[str]) -> SetProbabili
     return SetProbabilities.of(found.sets, (*found.causes, *faults), found.generics, found.prior)
 
 
-def _joined(
-    states: Sequence[NoiseState], sets: Sequence[Sequence[CauseSet]], found: SetProbabilities, faults: Sequence[str]
-) -> SetProbabilities:
+def _joined(weighed: Sequence[WeighedState], faults: Sequence[str]) -> SetProbabilities:
     """Return the probabilities of the sets of all states, with evidence relative to the declared noise and nothing."""
+    declared = weighed[0]
     every = []
-    for state, own in zip(states, sets, strict=True):
-        offset = state.log_nothing - states[0].log_nothing
-        for item in own:
-            causes = tuple(sorted((*item.causes, *state.names)))
-            every.append(replace(item, causes=causes, log_evidence=item.log_evidence + offset))
+    for item in weighed:
+        offset = item.state.log_nothing - declared.state.log_nothing
+        for own in item.found.sets:
+            causes = tuple(sorted((*own.causes, *item.state.names)))
+            every.append(replace(own, causes=causes, log_evidence=own.log_evidence + offset))
+    found = declared.found
     return SetProbabilities.of(every, (*found.causes, *faults), found.generics, found.prior)

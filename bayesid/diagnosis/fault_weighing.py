@@ -3,52 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from bayesid._io.progress import Progress
 from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.family_alarm import FamilyAlarm
-from bayesid.diagnosis.linearisation import Linearisation
-from bayesid.diagnosis.noise_states import NoiseState, noise_state
+from bayesid.diagnosis.noise_states import FaultyFit, faulty_fit
 from bayesid.diagnosis.noise_tests import noise_tests
 from bayesid.diagnosis.perturbed_fit import Fit
-from bayesid.diagnosis.set_probabilities import SetProbabilities
 from bayesid.diagnosis.settled_sets import settled
+from bayesid.diagnosis.weighed_state import WeighedState
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
-__all__ = ["WeighedState", "weighed_states"]
+__all__ = ["weighed_states"]
+
+FAR_BEHIND = 10.0
+"""Nats by which the sets of a state may be expected to stay behind the best explanation to be weighed."""
 
 SUSPECT = 1e-3
 """Local p-value of a test of the noise below which the fault is weighed as a cause."""
-
-
-@dataclass(frozen=True)
-class WeighedState:
-    """A state of the noise with the probabilities of all sets of causes under it.
-
-    Attributes
-    ----------
-    start : Linearisation
-        About the fit without causes.
-    state : NoiseState
-        Linearised where the best set holds.
-    found : SetProbabilities
-    best : Fit
-        Of the most probable set that names all of its causes.
-    """
-
-    start: Linearisation
-    state: NoiseState
-    found: SetProbabilities
-    best: Fit
-
-    @property
-    def highest(self) -> float:
-        """Log evidence of the best explanation."""
-        return self.state.log_nothing + max(item.log_evidence for item in self.found.sets)
 
 
 def weighed_states(
@@ -59,7 +35,11 @@ def weighed_states(
     prior: CausePrior,
     progress: Progress,
 ) -> list[WeighedState]:
-    """Return the noise as declared, every suspected fault by itself, and pairs with the best of them.
+    """Return the noise as declared, suspected faults by themselves, and two together.
+
+    A fault takes its share of what causes explain, so that sets of causes add no more to it than they do to the
+    declared noise. Faults with which the best explanation would stay behind even so are left out; the others are
+    weighed with all sets of causes, the most promising first.
 
     Parameters
     ----------
@@ -73,25 +53,40 @@ def weighed_states(
     prior : CausePrior
     progress : Progress
     """
+    reach = first.highest - first.state.log_nothing
+    fits: dict[tuple[str, ...], FaultyFit] = {}
     found = {first.state.names: first}
 
-    def weigh(before: WeighedState, suspects: Sequence[tuple[str, Fit]]) -> None:
-        for label, residual in suspects:
-            progress(0.6, f"weighing {label}")
-            best = max(item.highest for item in found.values())
-            at_start = replace(before.state, point=before.start)
-            state = noise_state(label, residual, at_start, effects, bounds, best)
-            if state is None:
-                continue
-            point, sets, fit = settled(state.point, effects, bounds, prior)
-            item = WeighedState(state.point, replace(state, point=point), sets, fit)
-            if state.names not in found or item.highest > found[state.names].highest:
-                found[state.names] = item
+    def best() -> WeighedState:
+        return max(found.values(), key=lambda item: item.highest)
 
-    weigh(first, _suspects(alarm, first))
-    best = max(found.values(), key=lambda item: item.highest)
-    if best is not first:
-        weigh(best, [(name, best.best) for name in _seen(best.best) if name not in best.state.names])
+    def fit(before: FaultyFit, suspects: Sequence[tuple[str, Fit]]) -> None:
+        for label, residual in suspects:
+            if label in before.names:
+                continue
+            progress(0.6, f"fitting {label}")
+            item = faulty_fit(label, residual, before, best().highest)
+            if item is not None and (item.names not in fits or item.log_nothing > fits[item.names].log_nothing):
+                fits[item.names] = item
+                found.pop(item.names, None)
+
+    def weigh() -> None:
+        for item in sorted(fits.values(), key=lambda item: -item.log_nothing):
+            if item.names in found or item.log_nothing + reach < best().highest - FAR_BEHIND:
+                continue
+            progress(0.6, f"weighing the causes beside {' and '.join(item.names)}")
+            state = item.linearised(effects, bounds)
+            point, sets, nearest = settled(state.point, effects, bounds, prior)
+            found[item.names] = WeighedState(item, replace(state, point=point), sets, nearest)
+
+    fit(first.start, _suspects(alarm, first))
+    if fits:
+        loudest = max(fits.values(), key=lambda item: item.log_nothing)
+        fit(loudest, [(name, loudest.fit) for name in _seen(loudest.fit)])
+    weigh()
+    if best() is not first:
+        fit(best().start, [(name, best().best) for name in _seen(best().best)])
+        weigh()
     return list(found.values())
 
 

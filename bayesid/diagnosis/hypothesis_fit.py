@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import product
 
+import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.amplitude_posterior import AmplitudePosterior
+from bayesid.diagnosis.effect_functions import physical
 from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.linearisation import Linearisation
@@ -25,12 +27,13 @@ __all__ = ["fit_hypothesis"]
 MOST_STARTS = 6
 """Most starting points of one fit."""
 
-HELD = (1.0, 0.85)
-"""Frequencies with the base held, from which the fit of a vibration starts, relative to the tone that is seen with the
-base free; the base's yielding raises the tone."""
+LIGHTEST = 0.25
+"""Smallest share of a mode's mass that the yielding of the base is taken to leave at the start of a fit."""
 
 
-def fit_hypothesis(state: NoiseState, causes: Sequence[str], effects: Sequence[Effect]) -> Hypothesis:
+def fit_hypothesis(
+    state: NoiseState, causes: Sequence[str], effects: Sequence[Effect], hopeless: float = np.inf
+) -> Hypothesis:
     """Fit the present model with some causes.
 
     Parameters
@@ -41,6 +44,8 @@ def fit_hypothesis(state: NoiseState, causes: Sequence[str], effects: Sequence[E
         Names of effects, of the initial rate and of the fault.
     effects : sequence of Effect
         Candidates of the catalogue.
+    hopeless : float
+        Cost at which a fit that nears its end is given up.
 
     Raises
     ------
@@ -61,7 +66,7 @@ def fit_hypothesis(state: NoiseState, causes: Sequence[str], effects: Sequence[E
     problem: InputError | None = None
     for start in list(product(*starts))[:MOST_STARTS]:
         try:
-            fit = engine.fit(chosen, start, z=z, operating=along)
+            fit = engine.fit(chosen, start, z=z, operating=along, hopeless=hopeless)
         except InputError as error:  # no motion from this start
             problem = error
             continue
@@ -87,8 +92,21 @@ def _starts(effect: Effect, point: Linearisation, names: Sequence[str]) -> Seque
     tone = next(item.tone for item in point.bank.signatures if item.name == group)
     frequency, damping = (0.1, 0.01) if tone is None else tone
     coupling = coupling_matrix(entries)
-    tones = [Resonance(share * frequency, coupling, damping) for share in HELD]
-    return [start for tone in tones for start in effect.starts_near([tone], False)]
+    (start,) = effect.starts_near([Resonance(frequency, coupling, damping)], False)
+    held = frequency * _held_to_free(effect, start, point)
+    return effect.starts_near([Resonance(held, coupling, damping)], False)
+
+
+def _held_to_free(effect: Effect, start: Floats, point: Linearisation) -> float:
+    """Return the frequency of a vibration with the base held, relative to the tone that is seen with the base free.
+
+    The base yields to the spring, as if the modes were lighter by their coupling through the base's compliance.
+    """
+    modes = effect.modes(jnp.asarray(physical(effect, start)))
+    coupling = np.concatenate([np.asarray(modes.linear), np.asarray(modes.angular)], axis=-1)
+    compliance = point.fit.operating.vibration.compliance.mean(axis=(0, 1))
+    lighter = np.linalg.eigvalsh(np.eye(len(coupling)) - coupling @ compliance @ coupling.T)
+    return float(np.sqrt(np.clip(lighter, LIGHTEST, 1.0).mean()))
 
 
 def _settled(effect: Effect, point: Linearisation, names: Sequence[str]) -> Effect:

@@ -22,7 +22,7 @@ from bayesid.diagnosis.vibration_signatures import vibration_signatures
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
-__all__ = ["Linearisation", "linearise"]
+__all__ = ["Linearisation", "amplitudes_at", "linearise"]
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Linearisation:
 
     def with_bank(self, bank: SignatureBank) -> Linearisation:
         """Return the linearisation with another bank about the same fit."""
-        return _assembled(self.engine, self.fit, bank, self.held, self.far, self.products)
+        return _assembled(self.engine, self.fit, bank, self.held, self.far, self.products, self.evidence)
 
     def holding_bodies(self) -> Linearisation:
         """Return the linearisation about the same fit with the bodies held there."""
@@ -111,11 +111,17 @@ def linearise(
 
 
 def _assembled(
-    engine: Engine, fit: Fit, bank: SignatureBank, held: bool, far: bool, known: SignatureProducts | None = None
+    engine: Engine,
+    fit: Fit,
+    bank: SignatureBank,
+    held: bool,
+    far: bool,
+    products: SignatureProducts | None = None,
+    evidence: SetEvidence | None = None,
 ) -> Linearisation:
-    products = SignatureProducts.of(bank.signatures, fit, known)
+    products = SignatureProducts.of(bank.signatures, fit, products)
     gram = products.gram()
-    amplitudes = _amplitudes(fit, gram)
+    amplitudes = amplitudes_at(fit, gram)
     own = fit.own
     pull = np.linalg.cholesky(own.T @ own + np.eye(own.shape[1]))
     moved = np.linalg.solve(pull, own.T @ fit.residual + fit.own_coordinates)
@@ -125,10 +131,10 @@ def _assembled(
     taken = gram.matrix @ amplitudes
     log_nothing = constant - cost + float(gram.score @ amplitudes - 0.5 * amplitudes @ taken)
     gram = replace(gram, score=gram.score - taken)
-    return Linearisation(engine, fit, bank, SetEvidence(gram, bank.causes), log_nothing, products, held, far)
+    return Linearisation(engine, fit, bank, SetEvidence(gram, bank.causes, evidence), log_nothing, products, held, far)
 
 
-def _amplitudes(fit: Fit, gram: Gram) -> Floats:
+def amplitudes_at(fit: Fit, gram: Gram) -> Floats:
     """Return the amplitudes of all columns of the Gram at a fit, shape (m,)."""
     found = np.zeros(len(gram.score))
     if INITIAL_RATE in gram.groups:

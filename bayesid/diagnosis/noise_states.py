@@ -18,7 +18,7 @@ from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.sensors import Kind
 
-__all__ = ["NoiseState", "fault_names", "noise_state"]
+__all__ = ["FaultyFit", "NoiseState", "fault_names", "faulty_fit"]
 
 DECADES = 3.0
 """Decades over which the size of a fault is log-uniform beforehand, and the correlation time of coloured noise."""
@@ -66,15 +66,58 @@ def fault_names(engine: Engine) -> tuple[str, ...]:
     return (*found, ENCODER_NOISE) if measured else tuple(found)
 
 
-def noise_state(
-    label: str,
-    residual: Fit,
-    before: NoiseState,
-    effects: Sequence[Effect],
-    bounds: Mapping[str, Sequence[PhysicalBound]],
-    best: float,
-) -> NoiseState | None:
-    """Return the state with one fault more, whose size is estimated from a residual.
+@dataclass(frozen=True)
+class FaultyFit:
+    """Fit of the present model, without causes, under some faults of its noise.
+
+    Attributes
+    ----------
+    faults : tuple of NoiseFault
+    engine : Engine
+    fit : Fit
+    log_charge : float
+        Logarithm of what the freedom of the faults costs.
+    held : bool
+        Whether the bodies are held, since the present model's fit diverged.
+    """
+
+    faults: tuple[NoiseFault, ...]
+    engine: Engine
+    fit: Fit
+    log_charge: float
+    held: bool
+
+    @staticmethod
+    def declared(base: Linearisation) -> FaultyFit:
+        """Return the fit with the noise as declared."""
+        return FaultyFit((), base.engine, base.fit, 0.0, base.held)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the faults, in order."""
+        return tuple(sorted(fault.label for fault in self.faults))
+
+    @property
+    def log_nothing(self) -> float:
+        """Logarithm of the evidence of the present model with these faults and no other cause."""
+        return self.fit.log_evidence + self.log_charge
+
+    def linearised(self, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]) -> NoiseState:
+        """Return the state linearised about this fit.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            Candidates of the catalogue.
+        bounds : mapping of str to sequence of PhysicalBound
+        """
+        if self.held:
+            return NoiseState(self.faults, linearise_along_data(self.engine, effects, bounds), self.log_charge)
+        return NoiseState(self.faults, linearise(self.engine, self.fit, effects, bounds), self.log_charge)
+
+
+def faulty_fit(label: str, residual: Fit, before: FaultyFit, best: float) -> FaultyFit | None:
+    """Return the fit with one fault more, whose size is estimated from a residual.
 
     It is None if the residual shows no such fault, or if the fault was to explain by itself what the model leaves and
     is far behind the best explanation.
@@ -85,32 +128,25 @@ def noise_state(
         Name of the fault.
     residual : Fit
         From whose residual the fault is estimated.
-    before : NoiseState
-        Linearised about the fit without causes of the catalogue, from which that under the fault starts.
-    effects : sequence of Effect
-        Candidates of the catalogue.
-    bounds : mapping of str to sequence of PhysicalBound
+    before : FaultyFit
+        From which the fit under the fault starts.
     best : float
         Log evidence of the best explanation so far.
     """
-    base = before.point
-    alone = residual is base.fit
+    alone = residual is before.fit
     fault = noise_fault(label, residual, best - before.log_nothing - HOPELESS if alone else -np.inf)
     if fault is None:
         return None
-    engine = base.engine.with_posterior(fault.posterior)
-    fit = engine.fit(z=base.fit.z)
+    engine = before.engine.with_posterior(fault.posterior)
+    fit = engine.fit(z=before.fit.z)
     if alone and fit.log_evidence + before.log_charge + _log_charge(fault) < best - HOPELESS:
         return None
     if label.startswith("coloured-noise"):
         fault = refined(fault, engine, residual)
         engine = engine.with_posterior(fault.posterior)
-        fit = engine.fit(z=base.fit.z)
-    charge = before.log_charge + _log_charge(fault)
-    if alone and fit.log_evidence + charge < best - BEHIND:
-        return None
-    point = linearise_along_data(engine, effects, bounds) if base.held else linearise(engine, fit, effects, bounds)
-    return NoiseState((*before.faults, fault), point, charge)
+        fit = engine.fit(z=before.fit.z)
+    found = FaultyFit((*before.faults, fault), engine, fit, before.log_charge + _log_charge(fault), before.held)
+    return None if alone and found.log_nothing < best - BEHIND else found
 
 
 def _log_charge(fault: NoiseFault) -> float:

@@ -45,6 +45,9 @@ __all__ = ["Engine", "Fit"]
 
 ITERATIONS = 25
 
+PATIENCE = 8.0
+"""Number of further steps as good as the last one that a fit may hope for."""
+
 CLOSE = 0.02
 """Change of the cost at which a fit has converged."""
 
@@ -210,6 +213,7 @@ class Engine:
         z: Floats | None = None,
         operating: OperatingTrajectory | None = None,
         iterations: int = ITERATIONS,
+        hopeless: float = np.inf,
     ) -> Fit:
         """Fit the model with effects added (Levenberg-Marquardt).
 
@@ -222,6 +226,10 @@ class Engine:
             To start from.
         situation : Situation, optional
             Of an earlier fit nearby.
+        iterations : int
+            Most steps.
+        hopeless : float
+            Cost that a fit must promise to reach: one whose next steps will not, judged by the last one, is given up.
         """
         z = self.start() if z is None else np.array(z)
         chosen = [np.array(effect.starts[0]) for effect in effects] if coordinates is None else list(coordinates)
@@ -265,6 +273,8 @@ class Engine:
             operating = self.operating(z, self.pushes(effects, chosen, operating, vibrations=False))
             if abs(cost - there) < CLOSE and here.cost - there < CLOSE:
                 converged = True
+                break
+            if there - PATIENCE * (here.cost - there) > hopeless:
                 break
             cost = there
         last = self._point(effects, chosen, z, operating)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayesid._math.log_sum import log_sum
+from bayesid._math.threads import in_threads
 from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.set_evidence import SetEvidence, near_best
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
@@ -102,12 +103,9 @@ def _screened(
 ) -> list[CauseSet]:
     """Return the sets of one candidate more than their parents; those that matter are integrated in full."""
     weighed: dict[tuple[tuple[str, ...], str | None], tuple[float, list[dict[str, int]]]] = {}
-    for parent in parents:
-        others = [name for name in evidence.catalogue if name not in parent.causes]
-        if len(parent.causes) >= MOST_CAUSES or not others:
-            continue
-        forms = evidence.forms(parent.names)
-        for name, values in evidence.gains_beside(parent.names, forms, others).items():
+    grown = [parent for parent in parents if len(parent.causes) < MOST_CAUSES and _others(parent, evidence)]
+    for parent, (forms, gains) in zip(grown, in_threads(lambda own: _gains(own, evidence), grown), strict=True):
+        for name, values in gains.items():
             key = (tuple(sorted((*parent.causes, name))), parent.generic)
             gain = log_sum(list(values.values())) + max(evidence.bodily.get(name, 0.0), 0.0)
             choices = [{**forms, name: form} for form in near_best(values)]
@@ -129,11 +127,22 @@ def _screened(
         matter = likely & weighed.keys() - whole
         if not matter:
             return sets
-        sets = [
-            replace(item, log_evidence=evidence.log_evidence(item.names, weighed[key][1])) if key in matter else item
-            for item, key in ((item, (item.causes, item.generic)) for item in sets)
-        ]
+        ordered = sorted(matter, key=lambda key: (key[0], key[1] or ""))
+        totals = in_threads(lambda key: evidence.log_evidence(_names(key), weighed[key][1]), ordered)
+        exact = dict(zip(ordered, totals, strict=True))
+        sets = [replace(item, log_evidence=exact.get((item.causes, item.generic), item.log_evidence)) for item in sets]
         whole |= matter
+
+
+def _others(parent: CauseSet, evidence: SetEvidence) -> list[str]:
+    """Return the causes of the catalogue that a set does not hold."""
+    return [name for name in evidence.catalogue if name not in parent.causes]
+
+
+def _gains(parent: CauseSet, evidence: SetEvidence) -> tuple[dict[str, int], dict[str, dict[int, float]]]:
+    """Return the forms of a set, and what every other cause adds to it, by the forms of that cause."""
+    forms = evidence.forms(parent.names)
+    return forms, evidence.gains_beside(parent.names, forms, _others(parent, evidence))
 
 
 def _best(found: list[CauseSet], size: int, evidence: SetEvidence, prior: CausePrior) -> list[CauseSet]:

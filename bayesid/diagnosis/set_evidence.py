@@ -29,6 +29,9 @@ MOST_FORMS = 12
 FORMS_NEAR, MOST_NEAR = 4.0, 4
 """Nats below a cause's best form down to which its forms are evaluated in full, and how many of them at most."""
 
+_Spectra = tuple[tuple[GroupSpectrum, ...], ...]
+"""Spectra of the groups of each form of a cause."""
+
 BLOCK = 4_000_000
 """Most numbers in one intermediate array where many scores are evaluated at once."""
 
@@ -73,6 +76,8 @@ class SetEvidence:
     gram : Gram
     causes : iterable of CandidateCause
         Candidates, generic ones included, whose groups are in the Gram.
+    known : SetEvidence, optional
+        Of another bank about the same fit: what is known of sets whose causes are the same objects in both is kept.
 
     Raises
     ------
@@ -80,7 +85,7 @@ class SetEvidence:
         If two candidates have one name, or a candidate has no group, one that is not in the Gram, or one twice.
     """
 
-    def __init__(self, gram: Gram, causes: Iterable[CandidateCause]) -> None:
+    def __init__(self, gram: Gram, causes: Iterable[CandidateCause], known: SetEvidence | None = None) -> None:
         self.gram = gram
         self.causes: dict[str, CandidateCause] = {}
         for cause in causes:
@@ -93,18 +98,35 @@ class SetEvidence:
                 if len({group.name for group in groups}) < len(groups):
                     raise ValueError(f"{cause.name!r} names one group of columns twice; each has one scale")
             self.causes[cause.name] = cause
-        every = [g for cause in self.causes.values() for variant in cause.variants for g in variant.groups]
-        spectra = iter(GroupSpectrum.of(every, gram))
-        self._spectra = {
-            name: tuple(tuple(next(spectra) for _ in variant.groups) for variant in cause.variants)
-            for name, cause in self.causes.items()
-        }
+        self._spectra: dict[str, _Spectra] = {}
         self._chosen: dict[tuple[str, ...], dict[str, int]] = {}
         self._known: dict[tuple[tuple[str, ...], tuple[int, ...]], float] = {}
         self._scaled: dict[tuple[tuple[str, ...], tuple[int, ...]], tuple[Integers, Floats]] = {}
+        if known is not None:
+            self._take(known)
+        new = {name: cause for name, cause in self.causes.items() if name not in self._spectra}
+        found = iter(GroupSpectrum.of([g for cause in new.values() for v in cause.variants for g in v.groups], gram))
+        self._spectra |= {
+            name: tuple(tuple(next(found) for _ in variant.groups) for variant in cause.variants)
+            for name, cause in new.items()
+        }
         self._log_weights = {
             name: np.array([variant.log_weight for variant in cause.variants]) for name, cause in self.causes.items()
         }
+
+    def _take(self, known: SetEvidence) -> None:
+        """Take over what is known of causes that are the same objects in another bank about the same fit."""
+        same = {name for name, cause in self.causes.items() if known.causes.get(name) is cause}
+        for name in same:
+            self._spectra[name] = tuple(
+                tuple(
+                    replace(spectrum, columns=self.gram.groups[group.name])
+                    for spectrum, group in zip(spectra, variant.groups, strict=True)
+                )
+                for spectra, variant in zip(known._spectra[name], self.causes[name].variants, strict=True)
+            )
+        self._chosen |= {names: forms for names, forms in known._chosen.items() if same.issuperset(names)}
+        self._known |= {key: value for key, value in known._known.items() if same.issuperset(key[0])}
 
     @cached_property
     def catalogue(self) -> tuple[str, ...]:

@@ -1,17 +1,27 @@
-"""Frequency and damping of a hidden vibration, found in Gram space between the tones of the grid."""
+"""Frequency and damping of a hidden vibration, found in Gram space between the tones of the grid.
+
+A vibration of little damping is seen within a few per cent of its frequency only, and beside it the tones of the grid
+earn what follows the base's acceleration anyway. All cells of the grid that earn much are therefore scanned in steps of
+the width of a resonance, and the best tone is sought from there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from bayesid.diagnosis.catalogue_signatures import group_names
+from bayesid._math.arrays import Floats
+from bayesid._math.log_sum import log_sum
+from bayesid.diagnosis.left_beside import LeftBeside
 from bayesid.diagnosis.linearisation import Linearisation
+from bayesid.diagnosis.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.scale_integral import GroupSpectrum
 from bayesid.diagnosis.scale_prior import CandidateCause
-from bayesid.diagnosis.signature_bank import SignatureBank
-from bayesid.diagnosis.vibration_signatures import DAMPING, FREQUENCIES, tone_forms, tone_signatures
+from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
+from bayesid.diagnosis.vibration_signatures import DAMPING, FREQUENCIES, tone_couplings, tone_forms, tone_signature
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
@@ -20,8 +30,30 @@ __all__ = ["with_tuned_tones"]
 DAMPINGS = (0.003, 0.008, DAMPING, 0.05)
 """Dampings that are equally probable beforehand."""
 
-ROUNDS, POINTS = 2, 5
-"""Grids of frequencies, each within the step of the one before, and points in each."""
+SCANNED = 0.5
+"""Log evidence relative to that of the best tone of the grid from which the cell of a tone is scanned."""
+
+RESONANCE = DAMPING
+"""Step of the scan in the logarithm of the frequency: half of the width of a resonance of the grid's damping."""
+
+POINTS = 5
+"""Tones tried on either side of the best one in each of two finer grids."""
+
+NEAR, MOST = 8.0, 10
+"""Nats below the best tone down to which tones are kept as forms, and how many of them at most."""
+
+Tone = tuple[float, float]
+"""Frequency [Hz] and damping ratio."""
+
+
+class _Tried(NamedTuple):
+    """A tone that was tried.
+
+    signature: its columns; log_evidence: beside the other causes, averaged over the forms at this tone.
+    """
+
+    signature: Signatures
+    log_evidence: float
 
 
 def with_tuned_tones(
@@ -30,10 +62,11 @@ def with_tuned_tones(
     bounds: Mapping[str, Sequence[PhysicalBound]],
     beside: Mapping[str, Sequence[str]],
 ) -> Linearisation:
-    """Return the linearisation with finer tones of some vibrations around their best tone of the grid.
+    """Return the linearisation with finer tones of some vibrations around their best ones.
 
-    The cell of the grid around the best tone is replaced by the tones tried in it, each with the share of the cell's
-    prior that it stands for: uniform in the logarithm of the frequency, and equal for four dampings.
+    The cells of the grid that were scanned are replaced by the best of the tones tried in them, each with the share of
+    the prior that it stands for: uniform in the logarithm of the frequency, and equal for four dampings. Tones that are
+    far less probable are left out.
 
     Parameters
     ----------
@@ -44,76 +77,134 @@ def with_tuned_tones(
     beside : mapping of str to sequence of str
         Labels of the vibrations to tune, with the other causes of the set in which they are tuned.
     """
+    couplings = _Couplings(point.engine, point.fit)
     bank = point.bank
     for effect in effects:
         if effect.label in beside:
-            tuned = _tuned(point, effect, bounds[effect.label], list(beside[effect.label]))
+            tuned = _tuned(point, effect, bounds[effect.label], list(beside[effect.label]), couplings)
             causes = tuple(cause for cause in bank.causes if cause.name != effect.label)
             bank = SignatureBank.joined([SignatureBank(bank.signatures, causes), tuned])
     return point.with_bank(bank)
 
 
+class _Couplings:
+    """Responses to the coupling entries of tones, each computed once for all vibrations."""
+
+    def __init__(self, engine: Engine, fit: Fit) -> None:
+        self._engine, self._fit = engine, fit
+        self._known: dict[Tone, Floats] = {}
+
+    def at(self, tone: Tone) -> Floats:
+        """Return the columns of one tone, (N, 21)."""
+        if tone not in self._known:
+            self._known[tone] = tone_couplings(self._engine, self._fit, tone)
+        return self._known[tone]
+
+
 def _tuned(
-    point: Linearisation, effect: Effect, bounds: Sequence[PhysicalBound], others: Sequence[str]
+    point: Linearisation,
+    effect: Effect,
+    bounds: Sequence[PhysicalBound],
+    others: Sequence[str],
+    couplings: _Couplings,
 ) -> SignatureBank:
-    """Return the bank of one vibration with the cell of its best tone resolved."""
-    evidence, grid = point.evidence, len(FREQUENCIES)
-    cause = evidence.causes[effect.label]
-    per_tone = len(cause.variants) // grid
-    cell = evidence.forms([*others, effect.label])[effect.label] // per_tone
-    names = {group.name for name in others for form in evidence.causes[name].variants for group in form.groups}
-    names |= {name for held in point.fit.effects for name in group_names(held).values()}  # whose amplitudes it needs
-    rest = SignatureBank(
-        tuple(item for item in point.bank.signatures if item.name in names), tuple(evidence.causes[n] for n in others)
-    )
-    tried: dict[tuple[float, float], tuple[SignatureBank, float]] = {}
+    """Return the bank of one vibration with the cells of its best tones resolved."""
+    evidence = point.evidence
+    cause, forms = evidence.causes[effect.label], evidence.forms(others)
+    left = LeftBeside.of(point, others, forms)
+    tried: dict[Tone, _Tried] = {}
 
-    def value(frequency: float, damping: float) -> float:
-        tone = (float(f"{frequency:.5g}"), damping)
+    def value(log_frequency: float, damping: float) -> float:
+        tone = (float(f"{np.exp(log_frequency):.5g}"), damping)
         if tone not in tried:
-            item = tone_signatures(point.engine, point.fit, [effect], tone)[effect.label]
-            forms = tone_forms(effect, item.name, bounds)
-            bank = SignatureBank((item,), (replace(cause, groups=forms[0], others=tuple(forms[1:]), shares=()),))
-            both = point.with_bank(SignatureBank.joined([rest, bank]))
-            tried[tone] = bank, both.evidence.log_evidence([*others, effect.label])
-        return tried[tone][1]
+            item = tone_signature(effect, tone, couplings.at(tone))
+            own = [groups[0] for groups in tone_forms(effect, item.name, bounds)]
+            spectra = GroupSpectrum.of(own, left.gram(item.columns, item.name))
+            tried[tone] = _Tried(item, log_sum([one.log_evidence for one in spectra]) - float(np.log(len(own))))
+        return tried[tone].log_evidence
 
+    cells = _cells(evidence.gains_beside(others, forms, [effect.label])[effect.label], cause)
+    scan = np.concatenate([_scan(cell) for cell in cells])
+    best = float(max(scan, key=lambda log: value(log, DAMPING)))
+    damping, reach = DAMPING, RESONANCE
+    for _ in range(2):
+        best = float(max(best + reach * np.linspace(-1.0, 1.0, 2 * POINTS + 1), key=lambda log: value(log, damping)))
+        damping = max(DAMPINGS, key=lambda own: value(best, own))
+        reach /= POINTS
+    return _resolved(point.bank, effect, cause, cells, scan, tried, bounds)
+
+
+def _edges(cell: int) -> tuple[float, float]:
+    """Return the ends of a cell of the grid in the logarithm of the frequency."""
     logs = np.log(FREQUENCIES)
-    step = float(np.diff(logs).mean())
-    centre, damping, reach = float(logs[cell]), DAMPING, 0.5 * step
-    for _ in range(ROUNDS):
-        points = centre + np.linspace(-reach, reach, POINTS)
-        centre = float(max(points, key=lambda x: value(float(np.exp(x)), damping)))
-        damping = max(DAMPINGS, key=lambda d: value(float(np.exp(centre)), d))
-        reach = 2.0 * reach / (POINTS - 1)
-    return _resolved(point.bank, cause, cell, per_tone, tried, float(logs[cell]), step)
+    middle = 0.5 * (logs[1:] + logs[:-1])
+    ends = np.concatenate([[logs[0] - 0.5 * (logs[1] - logs[0])], middle, [logs[-1] + 0.5 * (logs[-1] - logs[-2])]])
+    return float(ends[cell]), float(ends[cell + 1])
+
+
+def _scan(cell: int) -> Floats:
+    """Return logarithms of frequencies that cover a cell, each in the middle of its part."""
+    low, high = _edges(cell)
+    count = int(np.ceil((high - low) / RESONANCE))
+    return low + (high - low) * (np.arange(count) + 0.5) / count
+
+
+def _cells(gains: Mapping[int, float], cause: CandidateCause) -> list[int]:
+    """Return the cells of the grid whose tones earn much."""
+    per_tone = len(cause.variants) // len(FREQUENCIES)
+    most = max(gains.values())
+    return sorted({form // per_tone for form, gain in gains.items() if gain >= most - (1.0 - SCANNED) * abs(most)})
 
 
 def _resolved(
     bank: SignatureBank,
+    effect: Effect,
     cause: CandidateCause,
-    cell: int,
-    per_tone: int,
-    tried: Mapping[tuple[float, float], tuple[SignatureBank, float]],
-    middle: float,
-    step: float,
+    cells: Sequence[int],
+    scan: Floats,
+    tried: Mapping[Tone, _Tried],
+    bounds: Sequence[PhysicalBound],
 ) -> SignatureBank:
-    """Return the bank of a vibration whose best cell is replaced by the tones tried in it."""
-    grid, share = len(FREQUENCIES), 1.0 / len(cause.variants)
-    kept = [form for form in range(len(cause.variants)) if form // per_tone != cell]
+    """Return the bank of a vibration whose scanned cells are replaced by the best tones tried in them."""
+    per_tone, share = len(cause.variants) // len(FREQUENCIES), 1.0 / len(cause.variants)
+    kept = [form for form in range(len(cause.variants)) if form // per_tone not in cells]
     forms = [cause.variants[form].groups for form in kept]
     shares = [share] * len(forms)
-    signatures = [item for item in bank.signatures if item.name in {group.name for groups in forms for group in groups}]
-    for damping in DAMPINGS:
-        own = sorted(frequency for frequency, other in tried if other == damping)
-        edges = np.clip(np.log(own), middle - 0.5 * step, middle + 0.5 * step)
-        bounds = np.concatenate([[middle - 0.5 * step], 0.5 * (edges[1:] + edges[:-1]), [middle + 0.5 * step]])
-        for frequency, width in zip(own, np.diff(bounds), strict=True):
-            tuned = tried[frequency, damping][0]
-            signatures += tuned.signatures
-            for variant in tuned.causes[0].variants:
-                forms.append(variant.groups)
-                shares.append(max(float(width) / step, 1e-6) / (grid * len(DAMPINGS) * per_tone))
+    names = {group.name for groups in forms for group in groups}
+    signatures = [item for item in bank.signatures if item.name in names]
+    order = sorted(tried, key=lambda tone: (-tried[tone].log_evidence, tone))[:MOST]
+    least = tried[order[0]].log_evidence - NEAR
+    weights = _shares(scan, tried)
+    for tone in order:
+        if tried[tone].log_evidence < least:
+            break
+        item = tried[tone].signature
+        signatures.append(item)
+        for groups in tone_forms(effect, item.name, bounds):
+            forms.append(groups)
+            shares.append(weights[tone] * len(cells) * share)
     return SignatureBank(
         tuple(signatures), (replace(cause, groups=forms[0], others=tuple(forms[1:]), shares=tuple(shares)),)
     )
+
+
+def _shares(scan: Floats, tried: Mapping[Tone, _Tried]) -> dict[Tone, float]:
+    """Return the part of the scanned cells that each tone stands for.
+
+    Every step of the scan is shared equally among the dampings that were tried in it, and by each of these among the
+    frequencies by the intervals that are nearest to them.
+    """
+    half = 0.5 * float(np.diff(scan).min(initial=RESONANCE))
+    within: dict[int, dict[float, list[Tone]]] = {}
+    for tone in sorted(tried):
+        nearest = int(np.argmin(np.abs(scan - np.log(tone[0]))))
+        within.setdefault(nearest, {}).setdefault(tone[1], []).append(tone)
+    found: dict[Tone, float] = {}
+    for step, by_damping in within.items():
+        for tones in by_damping.values():
+            logs = np.log([tone[0] for tone in tones])
+            low, high = min(scan[step] - half, logs[0]), max(scan[step] + half, logs[-1])
+            ends = np.concatenate([[low], 0.5 * (logs[1:] + logs[:-1]), [high]])
+            widths = np.maximum(np.diff(ends) / (high - low), 1e-6) / len(by_damping) / len(scan)
+            found |= dict(zip(tones, widths.tolist(), strict=True))
+    return found

@@ -9,16 +9,18 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid.diagnosis.hypothesis_fit import fit_hypothesis
-from bayesid.diagnosis.linearisation import Linearisation
-from bayesid.diagnosis.noise_states import NoiseState
 from bayesid.diagnosis.perturbed_fit import Fit
 from bayesid.diagnosis.set_probabilities import CauseSet, SetProbabilities
+from bayesid.diagnosis.weighed_state import WeighedState
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["plausible_vibrations", "with_fitted_vibrations"]
 
 PLAUSIBLE = 0.01
 """Probability from which a vibration is tuned and fitted, and with it all others of the catalogue."""
+
+BEHIND = 40.0
+"""Nats behind the best vibration from which the fit of another is not followed to its end."""
 
 
 def plausible_vibrations(found: SetProbabilities, effects: Sequence[Effect]) -> dict[str, tuple[str, ...]]:
@@ -27,53 +29,54 @@ def plausible_vibrations(found: SetProbabilities, effects: Sequence[Effect]) -> 
     labels = [effect.label for effect in effects if effect.modes_count]
     if not any(inclusion[label] > PLAUSIBLE for label in labels):
         return {}
+    return _companies(found, labels)
+
+
+def _companies(found: SetProbabilities, labels: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return vibrations, each with the other causes of the most probable set that holds it and nothing generic."""
     beside = {}
     for label in labels:
         own = next(item for item in found.sets if label in item.causes and item.generic is None)
-        others = tuple(name for name in own.causes if name != label)
-        beside[label] = tuple(name for name in others if name not in labels)
+        beside[label] = tuple(name for name in own.causes if name not in labels)
     return beside
 
 
-def with_fitted_vibrations(
-    point: Linearisation, found: SetProbabilities, effects: Sequence[Effect], best: Fit
-) -> tuple[SetProbabilities, Fit]:
-    """Return the probabilities with the evidence of vibrations taken from fits, and the fit of the best set.
+def with_fitted_vibrations(weighed: WeighedState, effects: Sequence[Effect]) -> WeighedState:
+    """Return a state of the noise with the evidence of vibrations taken from fits, and the fit of the best set.
 
-    Each plausible vibration is fitted in its best company, with its frequency, its damping and the yielding of the
-    base. What the Laplace evidence of that fit is above the linear one counts in all sets that hold the vibration. A
-    fit that ends below the linear evidence has failed and counts for nothing.
+    Each vibration is fitted in its best company, with its frequency, its damping and the yielding of the base. What the
+    Laplace evidence of that fit is above the linear one counts in all sets that hold the vibration. A fit that ends
+    below the linear evidence has failed and counts for nothing.
 
     Parameters
     ----------
-    point : Linearisation
-    found : SetProbabilities
+    weighed : WeighedState
     effects : sequence of Effect
         Candidates of the catalogue.
-    best : Fit
-        Of the best set without vibrations.
     """
-    beside = plausible_vibrations(found, effects)
+    point, found = weighed.state.point, weighed.found
     gains: dict[str, float] = {}
     fits: dict[str, Fit] = {}
-    for label, others in beside.items():
+    linear = {}
+    for label, others in _companies(found, [effect.label for effect in effects if effect.modes_count]).items():
         names = tuple(sorted((*others, label)))
-        linear = next((item.log_evidence for item in found.sets if item.names == names), None)
-        if linear is None:
-            linear = point.evidence.log_evidence(names)
+        known = next((item.log_evidence for item in found.sets if item.names == names), None)
+        linear[label, names] = point.evidence.log_evidence(names) if known is None else known
+    for label, names in sorted(linear, key=lambda key: -linear[key]):
+        hopeless = min((fit.cost for fit in fits.values()), default=np.inf) + BEHIND
         try:
-            fits[label] = fit_hypothesis(NoiseState((), point), names, effects).fit
+            fits[label] = fit_hypothesis(weighed.state, names, effects, hopeless).fit
         except InputError:  # no motion with this vibration
             continue
-        gains[label] = max(fits[label].log_evidence - point.log_nothing - linear, 0.0)
+        gains[label] = max(fits[label].log_evidence - point.log_nothing - linear[label, names], 0.0)
     if not gains:
-        return found, best
-    known = {item.names: item.log_evidence for item in found.sets}
-    sets = [replace(item, log_evidence=_corrected(item, gains, known)) for item in found.sets]
+        return weighed
+    each = {item.names: item.log_evidence for item in found.sets}
+    sets = [replace(item, log_evidence=_corrected(item, gains, each)) for item in found.sets]
     corrected = SetProbabilities.of(sets, found.causes, found.generics, found.prior)
     top = next((item for item in corrected.sets if item.names), None)
     chosen = [label for label in fits if top is not None and label in top.causes]
-    return corrected, fits[chosen[0]] if chosen else best
+    return replace(weighed, found=corrected, best=fits[chosen[0]] if chosen else weighed.best)
 
 
 def _corrected(item: CauseSet, gains: Mapping[str, float], known: Mapping[tuple[str, ...], float]) -> float:

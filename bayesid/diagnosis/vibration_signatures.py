@@ -23,8 +23,9 @@ __all__ = [
     "coupling_matrix",
     "missing_body",
     "slosh_entries",
+    "tone_couplings",
     "tone_forms",
-    "tone_signatures",
+    "tone_signature",
     "vibration_signatures",
 ]
 
@@ -71,9 +72,11 @@ def vibration_signatures(
     signatures: list[Signatures] = []
     groups: dict[str, list[Signatures]] = {effect.label: [] for effect in wanted}
     for tone in tones if wanted else ():
-        for label, item in tone_signatures(engine, fit, wanted, tone).items():
+        couplings = tone_couplings(engine, fit, tone)
+        for effect in wanted:
+            item = tone_signature(effect, tone, couplings)
             signatures.append(item)
-            groups[label].append(item)
+            groups[effect.label].append(item)
     causes = []
     for effect in wanted:
         forms = [form for item in groups[effect.label] for form in tone_forms(effect, item.name, bounds[effect.label])]
@@ -82,20 +85,11 @@ def vibration_signatures(
     return SignatureBank(tuple(signatures), tuple(causes))
 
 
-def tone_signatures(
-    engine: Engine, fit: Fit, effects: Sequence[Effect], tone: tuple[float, float]
-) -> dict[str, Signatures]:
-    """Return the signatures of vibrations of one frequency [Hz] and damping, by the label of the effect."""
-    frequency, damping = tone
-    columns = _couplings(engine, fit, frequency, damping)
-    return {
-        effect.label: Signatures(
-            f"{effect.label} at {frequency:.6g} Hz, damping {damping:.3g}",
-            columns @ slosh_entries() if isinstance(effect, FuelSlosh) else columns,
-            tone=tone,
-        )
-        for effect in effects
-    }
+def tone_signature(effect: Effect, tone: tuple[float, float], couplings: Floats) -> Signatures:
+    """Return the signatures of a vibration of one frequency [Hz] and damping, of those of its coupling (N, 21)."""
+    name = f"{effect.label} at {tone[0]:.6g} Hz, damping {tone[1]:.3g}"
+    columns = couplings @ slosh_entries() if isinstance(effect, FuelSlosh) else couplings
+    return Signatures(name, columns, tone=tone)
 
 
 def tone_forms(effect: Effect, name: str, bounds: Sequence[PhysicalBound]) -> list[tuple[AmplitudeGroup, ...]]:
@@ -151,8 +145,8 @@ def slosh_entries() -> Floats:
     return np.array([[matrix[i, j] for matrix in matrices] for i, j in PAIRS])
 
 
-def _couplings(engine: Engine, fit: Fit, frequency: float, damping: float) -> Floats:
-    """Return the responses to unit entries of the coupling matrix, (N, 21)."""
-    rows = fit.operating.vibration.coupling_rows(frequency, damping, PAIRS)
+def tone_couplings(engine: Engine, fit: Fit, tone: tuple[float, float]) -> Floats:
+    """Return the responses to unit entries of the coupling matrix at a frequency [Hz] and damping, (N, 21)."""
+    rows = fit.operating.vibration.coupling_rows(*tone, PAIRS)
     perturbation = engine.perturbation(len(PAIRS), node_rows=rows[0], sample_rows=rows[1])
     return engine.respond(perturbation, fit.z, fit.data)
