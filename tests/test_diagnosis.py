@@ -16,6 +16,7 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
 from bayesid.diagnosis.extended_model import extended_start
 from bayesid.diagnosis.gain import measure_gain
+from bayesid.diagnosis.left_beside import LeftBeside
 from bayesid.diagnosis.noise_faults import noise_fault
 from bayesid.diagnosis.noise_tests import chi2_log_sf
 from bayesid.diagnosis.perturbed_fit import Engine
@@ -59,6 +60,33 @@ def test_refits_without_a_recording_run_on_any_executor(wheel):
     sent = pickle.loads(pickle.dumps(wheel.after))
     there = measure_gain(wheel.before, sent)
     np.testing.assert_allclose(there.after.held_out, wheel.gain.after.held_out, rtol=1e-9)
+
+
+@pytest.mark.parametrize("names", [(), ("wheel-momentum",), ("accel-scale", "disturbing torque", "rate-bias")])
+def test_what_a_set_leaves_of_columns_is_what_the_gram_of_all_leaves(wheel, names):
+    point = wheel.weighed.states[0].point
+    forms = point.evidence.forms(names)
+    expected = point.evidence.beside(names, forms, ["thruster-leak"])
+    left = LeftBeside.of(point, names, forms)
+    for item in point.bank.signatures:
+        if item.name in expected.groups:
+            own = expected.groups[item.name]
+            found = left.gram(item.columns, item.name)
+            size = np.sqrt(np.diag(expected.matrix)[own])
+            np.testing.assert_allclose(
+                found.matrix / np.outer(size, size), expected.matrix[np.ix_(own, own)] / np.outer(size, size), atol=1e-6
+            )
+            np.testing.assert_allclose(found.score / size, expected.score[own] / size, atol=1e-4)
+
+
+@pytest.mark.slow
+def test_a_panel_of_little_damping_between_two_tones_of_the_grid_is_named_alone(tmp_path):
+    """Beside its narrow resonance the grid earns what follows the base anyway, from which fits ended elsewhere."""
+    case = CASES["flexible-appendage"]
+    result = diagnosed(case.make(tmp_path, 1001))
+    assert result.verdict.causes == ("flexible-appendage",)
+    (found,) = (result.after.fit.values(k) for k, e in enumerate(result.after.fit.effects) if e.modes_count)
+    assert found[0] == pytest.approx(0.3203, abs=0.001)  # Hz, as hidden
 
 
 def test_the_extended_posterior_agrees_with_the_pushes(wheel):
