@@ -1,4 +1,4 @@
-"""Independent pieces of linear algebra side by side, since NumPy's factorisations leave other threads alone."""
+"""Linear algebra on several cores: independent pieces side by side, or one large piece in several threads."""
 
 from __future__ import annotations
 
@@ -7,20 +7,35 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-__all__ = ["in_threads"]
+from threadpoolctl import threadpool_limits
+
+__all__ = ["in_threads", "several_threads"]
 
 MOST = 4
-"""Most threads: what lies between factorisations is Python, of which only one thread runs at a time."""
+"""Most threads."""
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
+def several_threads() -> threadpool_limits:
+    """Return a context in which products and factorisations of large matrices use all cores."""
+    return threadpool_limits(limits=_cores())
+
+
 def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:
-    """Return the results of a function for some items, in their order."""
+    """Return the results of a function for some items, in their order.
+
+    NumPy's factorisations leave other threads alone; what lies between them runs in one thread at a time.
+    """
     items = list(items)
-    count = min(len(items), MOST, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 2)
+    count = min(len(items), _cores())
     if count < 2:
         return [function(item) for item in items]
     with ThreadPoolExecutor(count) as pool:
         return list(pool.map(function, items))
+
+
+def _cores() -> int:
+    """Return the number of cores that this process may use, up to a few."""
+    return min(MOST, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)

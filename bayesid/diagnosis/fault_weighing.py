@@ -65,7 +65,8 @@ def weighed_states(
             if label in before.names:
                 continue
             progress(0.6, f"fitting {label}")
-            item = faulty_fit(label, residual, before, best().highest)
+            known = fits.get(tuple(sorted((*before.names, label))))
+            item = faulty_fit(label, residual, before, best().highest, known)
             if item is not None and (item.names not in fits or item.log_nothing > fits[item.names].log_nothing):
                 fits[item.names] = item
                 found.pop(item.names, None)

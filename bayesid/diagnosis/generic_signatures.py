@@ -21,7 +21,7 @@ TORQUE, FORCE = "disturbing torque", "disturbing force"
 WAVES = 40
 """Cosines in time of a disturbing torque or force, per axis and recording."""
 
-ERROR_WAVES = 20
+ERROR_WAVES = 40
 """Cosines in time of an error of a sensor, per channel and recording."""
 
 CORNERS = (2.0, 7.0, 25.0)

@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 
 from bayesid._math.arrays import Floats, Integers
+from bayesid._math.threads import several_threads
 
 __all__ = ["Gram", "independent_directions"]
 
@@ -165,7 +166,9 @@ class Gram:
         covariance is the products of the projected signatures with one another, which is ``A``. No simulation is
         needed where the model is linear over its posterior.
         """
-        return rng.normal(size=(draws, self._root.shape[1])) @ self._root.T
+        drawn = rng.normal(size=(draws, self._root.shape[1]))
+        with several_threads():
+            return drawn @ self._root.T
 
     @cached_property
     def _root(self) -> Floats:
@@ -177,9 +180,13 @@ class Gram:
         length = np.sqrt(np.diag(self.matrix))
         inverse = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
         scaled = inverse[:, None] * self.matrix * inverse
+        scaled[np.diag_indices(len(length))] += JITTER
         try:
-            root = np.linalg.cholesky(scaled + JITTER * np.eye(len(length)))
+            with several_threads():
+                root = np.linalg.cholesky(scaled)
         except np.linalg.LinAlgError:
             values, vectors = np.linalg.eigh(scaled)
+            values = values - JITTER
             root = vectors * np.sqrt(np.maximum(values, 0.0))
-        return length[:, None] * root
+        root *= length[:, None]
+        return root

@@ -30,8 +30,8 @@ LONGEST = 0.05
 TRIALS = 8
 """Evaluations of the evidence in the search for the size of coloured noise."""
 
-REFITS = 2
-"""Iterations of the fit at each of them."""
+REFITS = 1
+"""Steps of the fit at each of them."""
 
 SUMMARIES = {
     "noise": "The sensor is noisier than its data sheet: every sample's error is larger by one factor.",

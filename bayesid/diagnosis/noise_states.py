@@ -26,6 +26,12 @@ DECADES = 3.0
 HOPELESS, BEHIND = 60.0, 20.0
 """Nats by which a fault alone, as first estimated and refined, may be behind the best explanation to be weighed."""
 
+SAME = 0.2
+"""Difference of the logarithms of two estimates of a fault's size, from different residuals, that leads to one end."""
+
+REFITS = 3
+"""Steps of the fit that tells what a fault is worth beside the causes that a residual's fit holds."""
+
 
 @dataclass(frozen=True)
 class NoiseState:
@@ -116,11 +122,13 @@ class FaultyFit:
         return NoiseState(self.faults, linearise(self.engine, self.fit, effects, bounds), self.log_charge)
 
 
-def faulty_fit(label: str, residual: Fit, before: FaultyFit, best: float) -> FaultyFit | None:
+def faulty_fit(
+    label: str, residual: Fit, before: FaultyFit, best: float, known: FaultyFit | None = None
+) -> FaultyFit | None:
     """Return the fit with one fault more, whose size is estimated from a residual.
 
-    It is None if the residual shows no such fault, or if the fault was to explain by itself what the model leaves and
-    is far behind the best explanation.
+    It is None if the residual shows no such fault, if the fault beside what the residual's fit holds would be far
+    behind the best explanation, or if the fault is known with this size.
 
     Parameters
     ----------
@@ -132,21 +140,30 @@ def faulty_fit(label: str, residual: Fit, before: FaultyFit, best: float) -> Fau
         From which the fit under the fault starts.
     best : float
         Log evidence of the best explanation so far.
+    known : FaultyFit, optional
+        With a fault of this name, estimated from another residual.
     """
     alone = residual is before.fit
-    fault = noise_fault(label, residual, best - before.log_nothing - HOPELESS if alone else -np.inf)
-    if fault is None:
+    least = best - before.log_charge - HOPELESS
+    fault = noise_fault(label, residual, least - residual.log_evidence)
+    if fault is None or (known is not None and _alike(fault, known)):
         return None
     engine = before.engine.with_posterior(fault.posterior)
-    fit = engine.fit(z=before.fit.z)
-    if alone and fit.log_evidence + before.log_charge + _log_charge(fault) < best - HOPELESS:
+    beside = engine.fit(residual.effects, residual.coordinates, z=residual.z, iterations=REFITS)
+    if beside.log_evidence + _log_charge(fault) < least:
         return None
     if label.startswith("coloured-noise"):
         fault = refined(fault, engine, residual)
         engine = engine.with_posterior(fault.posterior)
-        fit = engine.fit(z=before.fit.z)
+    fit = engine.fit(z=before.fit.z)
     found = FaultyFit((*before.faults, fault), engine, fit, before.log_charge + _log_charge(fault), before.held)
     return None if alone and found.log_nothing < best - BEHIND else found
+
+
+def _alike(fault: NoiseFault, known: FaultyFit) -> bool:
+    """Return whether a known fit has a fault of about the same size."""
+    other = next((own for own in known.faults if own.label == fault.label), None)
+    return other is not None and bool((np.abs(np.log(fault.mean / other.mean)) < SAME).all())
 
 
 def _log_charge(fault: NoiseFault) -> float:

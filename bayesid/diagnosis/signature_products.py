@@ -9,11 +9,16 @@ from typing import Protocol
 import numpy as np
 
 from bayesid._math.arrays import Floats, Integers
+from bayesid._math.threads import several_threads
 from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.signature_bank import Signatures
 from bayesid.inference.posterior import Posterior
 
 __all__ = ["Fitted", "SignatureProducts"]
+
+
+MANY = 200
+"""Number of new columns from which their products are worth several threads."""
 
 
 class Fitted(Protocol):
@@ -72,7 +77,12 @@ class SignatureProducts:
         """
         if known is None or known.fit is not fit:
             known = cls(fit, (), (), np.zeros((0, 0)), np.zeros(0), np.zeros((fit.own.shape[1], 0)))
-        found = known._only(signatures)._with([item for item in signatures if id(item) not in known._at])
+        new = [item for item in signatures if id(item) not in known._at]
+        if sum(item.columns.shape[1] for item in new) > MANY:
+            with several_threads():
+                found = known._only(signatures)._with(new)
+        else:
+            found = known._only(signatures)._with(new)
         places = tuple(found._at[id(item)] for item in signatures)
         return replace(found, signatures=tuple(signatures), places=places)
 
