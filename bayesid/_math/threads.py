@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext
 from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
@@ -14,13 +15,16 @@ __all__ = ["in_threads", "several_threads"]
 MOST = 4
 """Most threads."""
 
+LARGE = 200
+"""Number of columns from which several threads are worth their start."""
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def several_threads() -> threadpool_limits:
-    """Return a context in which products and factorisations of large matrices use all cores."""
-    return threadpool_limits(limits=_cores())
+def several_threads(size: int) -> AbstractContextManager[object]:
+    """Return a context in which products and factorisations of matrices use all cores if they have so many columns."""
+    return threadpool_limits(limits=_cores()) if size >= LARGE else nullcontext()
 
 
 def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:

@@ -167,7 +167,7 @@ class Gram:
         needed where the model is linear over its posterior.
         """
         drawn = rng.normal(size=(draws, self._root.shape[1]))
-        with several_threads():
+        with several_threads(len(self.score)):
             return drawn @ self._root.T
 
     @cached_property
@@ -182,7 +182,7 @@ class Gram:
         scaled = inverse[:, None] * self.matrix * inverse
         scaled[np.diag_indices(len(length))] += JITTER
         try:
-            with several_threads():
+            with several_threads(len(length)):
                 root = np.linalg.cholesky(scaled)
         except np.linalg.LinAlgError:
             values, vectors = np.linalg.eigh(scaled)

@@ -17,10 +17,6 @@ from bayesid.inference.posterior import Posterior
 __all__ = ["Fitted", "SignatureProducts"]
 
 
-MANY = 200
-"""Number of new columns from which their products are worth several threads."""
-
-
 class Fitted(Protocol):
     """A fitted model beside which signatures are weighed, such as a `Fit`."""
 
@@ -78,10 +74,7 @@ class SignatureProducts:
         if known is None or known.fit is not fit:
             known = cls(fit, (), (), np.zeros((0, 0)), np.zeros(0), np.zeros((fit.own.shape[1], 0)))
         new = [item for item in signatures if id(item) not in known._at]
-        if sum(item.columns.shape[1] for item in new) > MANY:
-            with several_threads():
-                found = known._only(signatures)._with(new)
-        else:
+        with several_threads(sum(item.columns.shape[1] for item in new)):
             found = known._only(signatures)._with(new)
         places = tuple(found._at[id(item)] for item in signatures)
         return replace(found, signatures=tuple(signatures), places=places)
