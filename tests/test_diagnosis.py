@@ -66,7 +66,8 @@ def test_refits_without_a_recording_run_on_any_executor(wheel):
 def test_what_a_set_leaves_of_columns_is_what_the_gram_of_all_leaves(wheel, names):
     point = wheel.weighed.states[0].point
     forms = point.evidence.forms(names)
-    expected = point.evidence.beside(names, forms, ["thruster-leak"])
+    leak = point.evidence.causes["thruster-leak"].groups
+    expected = point.evidence.beside(names, forms, [group.name for group in leak])
     left = LeftBeside.of(point, names, forms)
     for item in point.bank.signatures:
         if item.name in expected.groups:

@@ -7,7 +7,6 @@ static arguments, the shapes of the others, and the source of this package.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import hashlib
 import os
@@ -31,6 +30,7 @@ from jax.experimental import serialize_executable
 from jax.stages import Compiled
 
 from bayesid._io.files import complete_file
+from bayesid._math.memory import give_back_memory
 
 __all__ = ["OBTAINED", "QUICKLY", "Describable", "KeptJit", "forget_executables", "kept_jit"]
 
@@ -103,9 +103,7 @@ def forget_executables() -> None:
         function._ready.clear()
     jax.clear_caches()
     gc.collect()
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if os.name == "posix" else None
-    if trim is not None:  # glibc would keep most of what was freed
-        trim(0)
+    give_back_memory()
 
 
 class KeptJit:

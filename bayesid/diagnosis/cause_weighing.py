@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesid._io.progress import Progress, silent
+from bayesid._math.memory import give_back_memory
 from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.equivalent_causes import classes_of_equivalents
 from bayesid.diagnosis.family_alarm import FamilyAlarm
@@ -133,7 +134,9 @@ def weigh_causes(
         return WeighedCauses(base, alarm, (NoiseState((), base),), _with_faults(single, faults))
     progress(0.5, "weighing the sets of causes")
     point, found, best = settled(base, effects, bounds, prior)
-    first = WeighedState(FaultyFit.declared(base), NoiseState((), point), found, best)
+    base = base.without_products()
+    give_back_memory()
+    first = WeighedState(FaultyFit.declared(base), NoiseState((), point.without_products()), found, best)
     weighed = weighed_states(first, alarm, effects, bounds, prior, progress)
     likeliest = max(weighed, key=lambda item: item.highest)
     if plausible_vibrations(_joined(weighed, faults), effects):

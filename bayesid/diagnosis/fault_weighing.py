@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayesid._io.progress import Progress
+from bayesid._math.memory import give_back_memory
 from bayesid.diagnosis.cause_prior import CausePrior
 from bayesid.diagnosis.family_alarm import FamilyAlarm
 from bayesid.diagnosis.noise_states import FaultyFit, faulty_fit
@@ -78,7 +79,8 @@ def weighed_states(
             progress(0.6, f"weighing the causes beside {' and '.join(item.names)}")
             state = item.linearised(effects, bounds)
             point, sets, nearest = settled(state.point, effects, bounds, prior)
-            found[item.names] = WeighedState(item, replace(state, point=point), sets, nearest)
+            found[item.names] = WeighedState(item, replace(state, point=point.without_products()), sets, nearest)
+            give_back_memory()
 
     fit(first.start, _suspects(alarm, first))
     if fits:

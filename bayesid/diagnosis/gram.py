@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -166,13 +165,12 @@ class Gram:
         covariance is the products of the projected signatures with one another, which is ``A``. No simulation is
         needed where the model is linear over its posterior.
         """
-        drawn = rng.normal(size=(draws, self._root.shape[1]))
+        drawn, root = rng.normal(size=(draws, len(self.score))), self._root()
         with several_threads(len(self.score)):
-            return drawn @ self._root.T
+            return drawn @ root.T
 
-    @cached_property
     def _root(self) -> Floats:
-        """Matrix, (m, m), whose product with its transpose is ``A``, up to a part in 1e10 of its diagonal.
+        """Return a matrix, (m, m), whose product with its transpose is ``A``, up to a part in 1e10 of its diagonal.
 
         Columns that are small differences of large ones leave ``A`` slightly indefinite by rounding; the product is
         then the nearest matrix that is not.

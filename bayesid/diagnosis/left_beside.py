@@ -54,16 +54,19 @@ class LeftBeside:
         place[held] = np.arange(len(held))
         residual, scaled = fit.residual.copy(), np.zeros((len(fit.residual), len(held)))
         rows = len(fit.residual) // len(fit.posterior.manoeuvres)
-        for item, where in zip(point.bank.signatures, point.products.places, strict=True):
+        first = dict.fromkeys(evidence.gram.groups, 0)
+        for item in point.bank.signatures:
+            columns = slice(first[item.name], first[item.name] + item.columns.shape[1])
+            where, first[item.name] = evidence.gram.groups[item.name][columns], columns.stop
             chosen = place[where] >= 0
             if not (chosen.any() or shift[where].any()):
                 continue
             own = slice(None) if item.recording is None else slice(item.recording * rows, (item.recording + 1) * rows)
             residual[own] += item.columns @ shift[where]
             scaled[own, place[where][chosen]] = item.columns[:, chosen] * scale[where][chosen]
-        columns = np.concatenate([fit.own, scaled], axis=1)
-        lower = np.linalg.cholesky(columns.T @ columns + np.eye(columns.shape[1]))
-        basis = sla.solve_triangular(lower, columns.T, lower=True).T
+        whole = np.concatenate([fit.own, scaled], axis=1)
+        lower = np.linalg.cholesky(whole.T @ whole + np.eye(whole.shape[1]))
+        basis = sla.solve_triangular(lower, whole.T, lower=True).T
         pull = np.concatenate([fit.own_coordinates, np.zeros(len(held))])
         moved = basis.T @ residual + sla.solve_triangular(lower, pull, lower=True)
         return LeftBeside(residual - basis @ moved, basis)

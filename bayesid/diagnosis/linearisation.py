@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid._math.memory import give_back_memory
 from bayesid.diagnosis.catalogue_signatures import catalogue_signatures, group_names
 from bayesid.diagnosis.generic_signatures import generic_signatures
 from bayesid.diagnosis.gram import Gram
@@ -39,8 +40,8 @@ class Linearisation:
         Of sets of causes relative to nothing, by the linear model.
     log_nothing : float
         Logarithm of the evidence of the present model without any cause, by the linear model.
-    products : SignatureProducts
-        Of all signatures of the bank.
+    products : SignatureProducts or None
+        Of all signatures of the bank, while banks that differ little from it are still wanted.
     held : bool
         Whether the bodies are held where the fit has them, since the present model's own fit diverged.
     far : bool
@@ -52,13 +53,17 @@ class Linearisation:
     bank: SignatureBank
     evidence: SetEvidence
     log_nothing: float
-    products: SignatureProducts
+    products: SignatureProducts | None
     held: bool = False
     far: bool = False
 
     def with_bank(self, bank: SignatureBank) -> Linearisation:
         """Return the linearisation with another bank about the same fit."""
         return _assembled(self.engine, self.fit, bank, self.held, self.far, self.products, self.evidence)
+
+    def without_products(self) -> Linearisation:
+        """Return the linearisation without the products, which take as much memory as the Gram."""
+        return replace(self, products=None)
 
     def holding_bodies(self) -> Linearisation:
         """Return the linearisation about the same fit with the bodies held there."""
@@ -107,6 +112,7 @@ def linearise(
             beside or SignatureBank(),
         ]
     )
+    give_back_memory()  # of the responses
     return _assembled(engine, with_bodies_held(fit) if held else fit, bank, held, far)
 
 

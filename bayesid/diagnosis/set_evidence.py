@@ -198,7 +198,8 @@ class SetEvidence:
         """
         kept = {name: self.ranked[name][:MOST_FORMS] for name in others}
         causes = [_with_forms(self.causes[name], places) for name, places in kept.items()]
-        rest = SetEvidence(self.beside(names, forms, kept), causes)
+        groups = {group.name for cause in causes for variant in cause.variants for group in variant.groups}
+        rest = SetEvidence(self.beside(names, forms, groups), causes)
         return {name: dict(zip(places, rest.of_forms(name).tolist(), strict=True)) for name, places in kept.items()}
 
     def places(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[tuple[str, int]]:
@@ -265,7 +266,7 @@ class SetEvidence:
             cause = self.causes[name]
             if cause.body is not None:
                 (group,) = cause.variants[forms[name]].groups
-                beside = self.beside([other for other in ordered if other != name], forms, [name])
+                beside = self.beside([other for other in ordered if other != name], forms, [group.name])
                 own = beside.groups[group.name]
                 lightest = self._spectra[name][forms[name]][0].range.low
                 body = cause.body.log_evidence(beside.matrix[np.ix_(own, own)], beside.score[own], lightest)
@@ -281,8 +282,8 @@ class SetEvidence:
         names = [name for name, cause in self.causes.items() if cause.body is not None]
         return {name: self._bodily([name], self.forms([name])) for name in names}
 
-    def beside(self, names: Iterable[str], forms: Mapping[str, int], others: Iterable[str]) -> Gram:
-        """Return the Gram of other causes after a set at its most probable scales has taken its share.
+    def beside(self, names: Iterable[str], forms: Mapping[str, int], groups: Iterable[str]) -> Gram:
+        """Return the Gram of some groups of columns after a set at its most probable scales has taken its share.
 
         Parameters
         ----------
@@ -290,10 +291,10 @@ class SetEvidence:
             The set.
         forms : mapping of str to int
             Form of each of its causes.
-        others : iterable of str
+        groups : iterable of str
+            Names of the groups in the Gram.
         """
         names = list(names)
-        groups = {group.name for name in others for form in self.causes[name].variants for group in form.groups}
         part = self.gram.keeping(sorted(groups))
         if not names:
             return part

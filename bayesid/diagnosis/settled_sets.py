@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bayesid._math.memory import give_back_memory
 from bayesid.diagnosis.amplitude_fit import fit_in_amplitudes
 from bayesid.diagnosis.burst_signatures import burst_signatures
 from bayesid.diagnosis.cause_prior import CausePrior
@@ -166,7 +167,9 @@ def _nearest(along: _Near, near: Mapping[frozenset[str], _Near], log_nothing: fl
 
 def _with_bursts(point: Linearisation) -> Linearisation:
     """Return the linearisation with bursts of the sensors among its candidates."""
-    return point.with_bank(SignatureBank.joined([point.bank, burst_signatures(point.engine, point.fit)]))
+    found = point.with_bank(SignatureBank.joined([point.bank, burst_signatures(point.engine, point.fit)]))
+    give_back_memory()
+    return found
 
 
 def _best_known(found: SetProbabilities, effects: Sequence[Effect]) -> tuple[list[Effect], bool]:

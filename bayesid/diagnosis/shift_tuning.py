@@ -149,7 +149,7 @@ def _beside(point: Linearisation, items: Sequence[Signatures], others: Sequence[
     )
     bank = SignatureBank((*rest, *items), (*(evidence.causes[name] for name in others), jump))
     own = point.with_bank(bank).evidence
-    return own.beside(others, own.forms(others), [label])
+    return own.beside(others, own.forms(others), [item.name for item in items])
 
 
 def _weighed(gram: Gram, group: AmplitudeGroup, best: Sequence[int | None], sizes: Sequence[int]) -> float:

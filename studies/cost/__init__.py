@@ -1,0 +1,5 @@
+"""Cost: what commands take from files to answers, by phase, cold and with compiled code kept, and how that grows."""
+
+from studies.cost.report import main, write_report
+
+__all__ = ["main", "write_report"]

@@ -1,0 +1,5 @@
+"""Run the study from the command line."""
+
+from studies.cost import main
+
+main()

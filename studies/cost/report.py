@@ -1,0 +1,259 @@
+"""Report of the cost of commands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bayesid.app.compilation_cache import keep_compiled
+from bayesid.report import Document
+from bayesid.report.figures.figure_style import AFTER, BEFORE, styled, wide_figure
+from bayesid.report.numbers import format_number
+from studies.common.command import Command
+from studies.common.goals import Goal, Verdict
+from studies.common.provenance import processor, study_origin
+from studies.common.report_parts import columns
+from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
+from studies.cost.cases import COMMANDS, DIAGNOSES
+from studies.cost.commands import AFTER_VERDICT
+from studies.cost.run import Cost, middle, run
+
+__all__ = ["goals_of", "main", "write_report"]
+
+MEMORY = 1.5
+"""Largest wanted memory of a diagnosis [GB]."""
+
+SAMPLES = 30.0
+"""Longest wanted time for 4,000 effective samples of an extended model [s]."""
+
+CHEAPER = 100.0
+"""Smallest wanted ratio of one nested run for each candidate to a verdict on all of them."""
+
+
+def goals_of(cost: Cost) -> list[Goal]:
+    """Return every goal with what was reached."""
+    goals = []
+    for kind, limits in (("with compiled code kept", "warm"), ("cold", "cold")):
+        for limit in sorted({getattr(item, limits) for item in DIAGNOSES}):
+            timed = [item for item in DIAGNOSES if item.title in cost.diagnoses]
+            names = [item.title for item in timed if getattr(item, limits) == limit]
+            if names:
+                goals.append(_times(cost, names, kind, limit))
+    memory = {name: max(item.memory for item in runs) for name, runs in cost.diagnoses.items()}
+    worst = max(memory, key=lambda name: memory[name])
+    goals.append(
+        Goal(
+            f"Memory of a diagnosis: at most {MEMORY:g} GB",
+            f"{format_number(memory[worst], 3)} GB ({worst})",
+            Verdict.of(memory[worst] <= MEMORY),
+        )
+    )
+    longest = max((item.phases["sample"] for item in cost.sampled.values()), default=None)
+    goals.append(
+        Goal(
+            f"4,000 effective samples of the extended model of a single cause within {SAMPLES:g} s more",
+            "not sampled"
+            if longest is None
+            else ", ".join(f"{name} {item.phases['sample']:.1f} s" for name, item in cost.sampled.items()),
+            Verdict.of(None if longest is None else longest <= SAMPLES),
+        )
+    )
+    goals.append(_nested(cost))
+    for name, (_, limit) in COMMANDS.items():
+        if limit is not None and name in cost.commands:
+            walls = [item.wall for item in cost.commands[name][1:]]
+            goals.append(
+                Goal(
+                    f"{name}, files to report, with compiled code kept: at most {limit:g} s",
+                    _spread(walls),
+                    _verdict(walls, limit),
+                )
+            )
+    return goals
+
+
+def _times(cost: Cost, names: Sequence[str], kind: str, limit: float) -> Goal:
+    """Return the goal of the time from files to verdict of some diagnoses."""
+    part = slice(0, 1) if kind == "cold" else slice(1, None)
+    each = {name: [item.to_verdict for item in cost.diagnoses[name][part]] for name in names}
+    slowest = [max(values) for values in each.values()]
+    said = ", ".join(f"{name} {_spread(values)}" for name, values in each.items())
+    return Goal(
+        f"Files to verdict, {kind}: at most {limit:g} s for {', '.join(names)}", said, Verdict.of(max(slowest) <= limit)
+    )
+
+
+def _nested(cost: Cost) -> Goal:
+    """Return the goal of the ratio to nested sampling."""
+    text = f"One run of dynesty for each candidate over the verdict on all of them: at least {CHEAPER:g} times"
+    if cost.nested is None:
+        return Goal(text, "dynesty is not installed", Verdict.NOT_TESTED)
+    count, seconds = max(cost.candidates.items())
+    ratio = cost.nested.seconds * count / seconds
+    bound = "" if cost.nested.done else "more than "
+    said = (
+        f"{bound}{format_number(ratio, 2)}: {count} candidates, {'' if cost.nested.done else 'not ended after '}"
+        f"{cost.nested.seconds:.0f} s of processor time with {cost.nested.unknowns} unknowns"
+    )
+    return Goal(text, said, Verdict.PASS if ratio >= CHEAPER else Verdict.FAIL if cost.nested.done else Verdict.OPEN)
+
+
+def _verdict(values: Sequence[float], limit: float) -> Verdict:
+    if max(values) <= limit:
+        return Verdict.PASS
+    return Verdict.FAIL if min(values) > limit else Verdict.OPEN
+
+
+def _spread(values: Sequence[float]) -> str:
+    """Return the median with the smallest and the largest value [s]."""
+    if len(values) < 2:
+        return f"{values[0]:.1f} s"
+    return f"{np.median(values):.1f} s ({min(values):.1f} to {max(values):.1f})"
+
+
+def write_report(cost: Cost, output: Path, *, full: bool, origin: str | None = None) -> None:
+    """Write the report as PDF, and beside it its summary and all times."""
+    document = Document("Cost", "What commands take from files to answers")
+    warm = {name: middle(runs, lambda item: item.to_verdict) for name, runs in cost.diagnoses.items()}
+    quickest, slowest = min(warm, key=lambda name: warm[name]), max(warm, key=lambda name: warm[name])
+    summary = Summary(
+        "How long do commands take from files to answers, with compiled code kept and without, how much memory, and "
+        "how does that grow with the problem?",
+        f"A diagnosis of three recordings comes to its verdict in {warm[quickest]:.1f} s ({quickest}) to "
+        f"{warm[slowest]:.1f} s ({slowest}) with compiled code kept, with the whole catalogue.",
+        tuple(goals_of(cost)),
+        f"run on {processor()}, two cores, with nothing beside it. The machine's speed varies by a third from day to "
+        "day.",
+        full,
+    )
+    caption = (
+        "Time from files to report of each diagnosis, without compiled code (left bar) and with it (right bar): orange "
+        "until the verdict, blue after it. Samples are not drawn."
+    )
+    add_first_page(document, summary, phases_figure(cost), caption)
+    add_setup(
+        document,
+        Setup(
+            robot="A servicer with three joints where files are timed; ETS-VII and chains of links for evaluations.",
+            manoeuvre="Three random manoeuvres of 140 to 160 s, far faster than the flight's rule: only times count.",
+            sensors="Rate and accelerometer at 4 Hz and encoders, written to files by MuJoCo.",
+            known="Links, orbit and sensors, as the study files say.",
+            unknown="Base and initial rates, and what is hidden.",
+            replicates="One run without compiled code and three with it; medians, with the smallest and the largest.",
+        ),
+    )
+    _phases(document, cost)
+    _growth(document, cost)
+    names = ["start", "load", "compile", "fit", "verdict", *AFTER_VERDICT]
+    rows = [
+        [kind, name, number, "cold" if number == 0 else "warm", item.wall, item.processor, item.memory]
+        + [item.phases.get(phase, "") for phase in names]
+        for kind, group in (("diagnose", cost.diagnoses), ("command", cost.commands))
+        for name, runs in group.items()
+        for number, item in enumerate(runs)
+    ]
+    write_table(output, "runs", ["kind", "what", "run", "code", "wall", "processor", "memory", *names], rows)
+    write_study(document, summary, output, origin)
+
+
+def _phases(document: Document, cost: Cost) -> None:
+    document.section("Time by phase")
+    phases = ("start", "load", "compile", "fit", "verdict", "consequences", "report")
+    rows = []
+    for name, runs in cost.diagnoses.items():
+        for title, part in (("cold", runs[:1]), ("warm", runs[1:])):
+            each = [float(np.median([item.phases.get(phase, 0.0) for item in part])) for phase in phases]
+            memory = max(item.memory for item in part)
+            rows.append([name, title, *(f"{value:.1f}" for value in each), f"{memory:.2f}"])
+    document.table(
+        ["diagnosis of", "code", *(f"{phase} [s]" for phase in phases), "memory [GB]"],
+        rows,
+        "Medians. Start: import of the package, reading of the files, smoothing of the joints' motion. Compile: what "
+        "the simulation needs; further functions are compiled or read within the phases that use them.",
+        columns("ll" + "r" * (len(phases) + 1)),
+    )
+    rows = [
+        [name, f"{runs[0].wall:.1f}", _spread([item.wall for item in runs[1:]]), f"{max(r.memory for r in runs):.2f}"]
+        for name, runs in cost.commands.items()
+    ]
+    if rows:
+        document.table(
+            ["command", "cold [s]", "warm", "memory [GB]"],
+            rows,
+            "Other commands on the recordings with nothing hidden, files to report; design with its defaults.",
+            columns("lrrr"),
+        )
+
+
+def _growth(document: Document, cost: Cost) -> None:
+    document.section("Growth, and the floor")
+    rows = []
+    for name, times in cost.growth.items():
+        first = next(iter(times.values()))
+        sizes = ", ".join(f"{key}" for key in times)
+        rows.append(
+            [name, sizes, f"{1e6 * first:.0f}", ", ".join(format_number(value / first, 3) for value in times.values())]
+        )
+    if len(cost.candidates) > 1:
+        first = next(iter(cost.candidates.values()))
+        rows.append(
+            [
+                "candidates (verdict)",
+                ", ".join(map(str, cost.candidates)),
+                f"{1e6 * first:.0f}",
+                ", ".join(format_number(value / first, 3) for value in cost.candidates.values()),
+            ]
+        )
+    document.table(
+        ["what grows", "sizes", "time of the first [µs]", "ratios to the first"],
+        rows,
+        "Time of one evaluation of the log density of ETS-VII in a batch, and of a verdict by number of candidates.",
+        columns("llrl"),
+    )
+    floor = cost.floor
+    document.paragraph(
+        f"One evaluation of a recording of 120 s has {format_number(floor.operations / 1e6, 3)} million floating-point "
+        f"operations and, by the compiler's count, reads and writes {format_number(floor.traffic / 1e6, 3)} MB, most "
+        f"of it in caches. One core multiplies matrices at {format_number(floor.speed / 1e9, 3)} GFLOP/s and streams "
+        f"{format_number(floor.bandwidth / 1e9, 3)} GB/s from memory. At that speed the operations alone would take "
+        f"{format_number(1e6 * floor.least, 2)} µs, of the {format_number(1e6 * floor.seconds, 3)} µs measured: one "
+        f"evaluation is {format_number(floor.seconds / floor.least, 2)} times above that floor, as small matrices and "
+        "short loops are."
+    )
+
+
+@styled
+def phases_figure(cost: Cost) -> Figure:
+    """Draw the time until the verdict and after it, cold and warm."""
+    figure = wide_figure(2.4)
+    axes = figure.subplots()
+
+    for number, runs in enumerate(cost.diagnoses.values()):
+        for shift, part in ((-0.2, runs[:1]), (0.2, runs[1:])):
+            verdict = float(np.median([item.to_verdict for item in part]))
+            whole = float(np.median([item.wall for item in part]))
+            axes.bar(number + shift, verdict, 0.36, color=BEFORE)
+            axes.bar(number + shift, whole - verdict, 0.36, bottom=verdict, color=AFTER)
+    axes.set_xticks(range(len(cost.diagnoses)), [name.replace(" ", "\n") for name in cost.diagnoses])
+    axes.set_ylabel("time [s]")
+    return figure
+
+
+COMMAND = Command(
+    "cost",
+    "Measure what commands take from files to answers, and how that grows.",
+    full="every run repeated, samples drawn, and a nested sampler for up to ten minutes",
+    seed=0,
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the study and write its report."""
+    options = COMMAND.parse(arguments)
+    keep_compiled()
+    cost = run(full=options.full, seed=options.seed, progress=print)
+    write_report(cost, options.output, full=options.full, origin=study_origin(COMMAND.name, options))
+    print(f"Wrote {options.output}.")
