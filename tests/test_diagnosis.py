@@ -16,10 +16,12 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
 from bayesid.diagnosis.extended_model import extended_start
 from bayesid.diagnosis.gain import measure_gain
+from bayesid.diagnosis.generic_signatures import CORNERS, WAVES
 from bayesid.diagnosis.left_beside import LeftBeside
 from bayesid.diagnosis.noise_faults import noise_fault
 from bayesid.diagnosis.noise_tests import chi2_log_sf
 from bayesid.diagnosis.perturbed_fit import Engine
+from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create
@@ -78,6 +80,22 @@ def test_what_a_set_leaves_of_columns_is_what_the_gram_of_all_leaves(wheel, name
                 found.matrix / np.outer(size, size), expected.matrix[np.ix_(own, own)] / np.outer(size, size), atol=1e-6
             )
             np.testing.assert_allclose(found.score / size, expected.score[own] / size, atol=1e-4)
+
+
+def test_a_torque_that_swings_is_worth_more_in_its_band_than_beneath_any_corner(wheel):
+    """Of 40 cosines in time it holds a few; a variance that falls beyond a corner pays for all slower ones."""
+    evidence = wheel.evidence
+    waves = np.zeros((len(wheel.gain.before.held_out), WAVES, 3))
+    waves[:, 9:12] = np.random.default_rng(3).normal(size=(len(waves), 3, 3))
+    own = evidence.gram.groups["disturbing torque"]
+    matrix = evidence.gram.matrix[np.ix_(own, own)]
+    swinging = waves.ravel() * 15.0 / np.sqrt(waves.ravel() @ matrix @ waves.ravel())  # 15 sigma
+    score = evidence.gram.null_scores(np.random.default_rng(4), 1)[0]
+    score[own] -= matrix @ swinging
+    found = SetEvidence(replace(evidence.gram, score=score), [evidence.causes["disturbing torque"]])
+    values = found.of_forms("disturbing torque")
+    assert values[len(CORNERS) :].max() > values[: len(CORNERS)].max() + 10.0
+    assert found.log_evidence(["disturbing torque"]) > 60.0
 
 
 @pytest.mark.slow

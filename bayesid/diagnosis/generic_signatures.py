@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -30,6 +30,16 @@ CORNERS = (2.0, 7.0, 25.0)
 ROLL = 4.0
 """Power with which the variance falls beyond."""
 
+BANDS = (4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 32.0)
+"""Half waves in a recording about which a disturbance that swings has its variance; all bands together are as probable
+as all corners."""
+
+WIDTH = 0.2
+"""Half width of a band relative to its middle."""
+
+ABSENT = 0.03
+"""Variance relative to the largest below which a cosine is left out of a band."""
+
 INSTANTS = 20
 """Instants per recording at which something may happen."""
 
@@ -43,8 +53,8 @@ ERROR = 1000.0
 def generic_signatures(engine: Engine, fit: Fit) -> SignatureBank:
     """Return the bank of candidates that name nothing.
 
-    - disturbing torque and force: smooth courses in base axes, whose cosines have variances that fall beyond a corner;
-      the force acts through the centre of mass;
+    - disturbing torque and force: smooth courses in base axes, whose cosines have variances that fall beyond a corner,
+      or on both sides of a band where it swings; the force acts through the centre of mass;
     - pulse of torque: at one instant of one recording, about any axis;
     - error of each sensor: smooth courses of its channels.
     """
@@ -70,15 +80,27 @@ def _smooth(engine: Engine, fit: Fit, name: str, first: int, high: float) -> Sig
     columns = _wrenches(engine, fit, WAVES, waves, first)
     recordings = len(columns)
     signatures = tuple(Signatures(name, own, r) for r, own in enumerate(columns))
-    variance = [np.tile(np.repeat(_variances(WAVES, corner), 3), recordings) for corner in CORNERS]
-    forms = [(AmplitudeGroup(name, high, spread=own),) for own in variance]
-    return SignatureBank(signatures, (CandidateCause(name, forms[0], True, tuple(forms[1:])),))
+    spreads = [np.tile(np.repeat(own, 3), recordings) for own in _courses(WAVES)]
+    return SignatureBank(signatures, (_cause(name, high, spreads),))
 
 
-def _variances(waves: int, corner: float) -> Floats:
-    """Return the variances of cosines, whose sum is one."""
-    found = 1.0 / (1.0 + (np.arange(waves) / corner) ** ROLL)
-    return found / found.sum()
+def _cause(name: str, high: float, spreads: Sequence[Floats]) -> CandidateCause:
+    """Return the candidate with one form for each course, corners and bands with half of the prior each."""
+    forms = [(AmplitudeGroup(name, high, spread=own),) for own in spreads]
+    bands = len(forms) - len(CORNERS)
+    shares = [(0.5 if bands else 1.0) / len(CORNERS)] * len(CORNERS) + [0.5 / max(bands, 1)] * bands
+    return CandidateCause(name, forms[0], True, tuple(forms[1:]), tuple(shares))
+
+
+def _courses(waves: int) -> list[Floats]:
+    """Return the variances of cosines, whose sum is one, for every corner and for every band within their number."""
+    number = np.arange(waves)
+    found = [1.0 / (1.0 + (number / corner) ** ROLL) for corner in CORNERS]
+    for middle in BANDS:
+        if middle * (1.0 + WIDTH) < waves:
+            band = 1.0 / (1.0 + (np.abs(number - middle) / (WIDTH * middle)) ** ROLL)
+            found.append(np.where(band >= ABSENT * band.max(), band, 0.0))
+    return [own / own.sum() for own in found]
 
 
 def _pulses(engine: Engine, fit: Fit, high: float) -> SignatureBank:
@@ -144,6 +166,6 @@ def error_signatures(posterior: Posterior, name: str, channels: slice) -> Signat
             signatures.append(Signatures(name, own.reshape(outputs * width, -1), r))
     if not sum(waves):
         return SignatureBank()
-    spreads = [np.concatenate([_variances(count, corner) for count in waves if count]) for corner in CORNERS]
-    forms = [(AmplitudeGroup(name, ERROR, spread=spread),) for spread in spreads]
-    return SignatureBank(tuple(signatures), (CandidateCause(name, forms[0], True, tuple(forms[1:])),))
+    each = [_courses(count) for count in waves if count]
+    spreads = [np.concatenate(parts) for parts in zip(*each, strict=False)]  # bands that all channels can show
+    return SignatureBank(tuple(signatures), (_cause(name, ERROR, spreads),))

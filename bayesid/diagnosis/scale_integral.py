@@ -71,13 +71,14 @@ class GroupSpectrum:
     @staticmethod
     def of(groups: Sequence[AmplitudeGroup], gram: Gram) -> list[GroupSpectrum]:
         """Return the spectra of groups; those of one size are decomposed together."""
+        columns = [group.columns(gram) for group in groups]
         sizes: dict[int, list[int]] = {}
-        for place, group in enumerate(groups):
-            sizes.setdefault(len(gram.groups[group.name]), []).append(place)
+        for place, part in enumerate(columns):
+            sizes.setdefault(len(part), []).append(place)
         found: dict[int, GroupSpectrum] = {}
-        for size, places in sizes.items():
-            own = np.stack([gram.groups[groups[place].name] for place in places])
-            root = np.stack([groups[place].roots(size) for place in places])
+        for places in sizes.values():
+            own = np.stack([columns[place] for place in places])
+            root = np.stack([groups[place].roots(gram) for place in places])
             information = root[:, :, None] * gram.matrix[own[:, :, None], own[:, None, :]] * root[:, None, :]
             values, vectors = np.linalg.eigh(information)
             score = (np.swapaxes(vectors, 1, 2) @ (root * gram.score[own])[:, :, None])[..., 0]

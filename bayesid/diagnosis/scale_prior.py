@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.body_evidence import MissingBody
 from bayesid.diagnosis.gram import Gram
 
@@ -39,6 +39,7 @@ class AmplitudeGroup:
         Smallest scale. Where it is left out, it is what the data cannot resolve (`scale_range`).
     spread : (k,) array, optional
         Variances of the amplitudes relative to the square of the scale, the diagonal of ``Lambda``; ones by default.
+        Amplitudes of no variance are absent.
     """
 
     name: str
@@ -53,18 +54,25 @@ class AmplitudeGroup:
             raise ValueError(f"{self.name}: the floor of the scale must lie in (0, {self.high}], received {self.low}")
         if self.spread is not None:
             spread = np.array(self.spread, dtype=float)
-            if not ((spread > 0.0) & np.isfinite(spread)).all():
+            if not ((spread >= 0.0) & np.isfinite(spread)).all() or not spread.any():
                 raise ValueError(f"{self.name}: relative variances must be positive and finite, received {spread}")
             spread.setflags(write=False)
             object.__setattr__(self, "spread", spread)
 
-    def roots(self, size: int) -> Floats:
-        """Return the standard deviations of ``size`` amplitudes relative to the scale, shape (size,)."""
+    def columns(self, gram: Gram) -> Integers:
+        """Return the columns of the Gram whose amplitudes are not absent, shape (k,)."""
+        own = gram.groups[self.name]
         if self.spread is None:
-            return np.ones(size)
-        if self.spread.shape != (size,):
-            raise ValueError(f"{self.name}: {size} amplitudes need so many variances, received {self.spread.shape}")
-        return np.sqrt(self.spread)
+            return own
+        if self.spread.shape != own.shape:
+            raise ValueError(f"{self.name}: {len(own)} amplitudes need so many variances, received {self.spread.shape}")
+        return own[self.spread > 0.0]
+
+    def roots(self, gram: Gram) -> Floats:
+        """Return the standard deviations relative to the scale of the amplitudes in `columns`, shape (k,)."""
+        if self.spread is None:
+            return np.ones(len(gram.groups[self.name]))
+        return np.sqrt(self.spread[self.spread > 0.0])
 
 
 class Variant(NamedTuple):
@@ -162,8 +170,7 @@ class ScaleRange:
 
 def scale_range(group: AmplitudeGroup, gram: Gram) -> ScaleRange:
     """Return the range of a group's scale (`range_of`)."""
-    own = gram.groups[group.name]
-    root = group.roots(len(own))
+    own, root = group.columns(gram), group.roots(gram)
     values = np.linalg.eigvalsh(root[:, None] * gram.matrix[np.ix_(own, own)] * root)
     return range_of(group, float(values.max(initial=0.0)))
 

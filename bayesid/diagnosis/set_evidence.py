@@ -120,7 +120,7 @@ class SetEvidence:
         for name in same:
             self._spectra[name] = tuple(
                 tuple(
-                    replace(spectrum, columns=self.gram.groups[group.name])
+                    replace(spectrum, columns=group.columns(self.gram))
                     for spectrum, group in zip(spectra, variant.groups, strict=True)
                 )
                 for spectra, variant in zip(known._spectra[name], self.causes[name].variants, strict=True)

@@ -67,8 +67,8 @@ def set_sizes(result: Diagnosis, item: CauseSet) -> list[GroupSize]:
             found.append(GroupSize(name))
             continue
         for group in cause.variants[forms[name]].groups:
-            own = evidence.gram.groups[group.name]
-            values = np.array([amplitude[place] for place in own.tolist()]) / group.roots(len(own))
+            own = group.columns(evidence.gram)
+            values = np.array([amplitude[place] for place in own.tolist()]) / group.roots(evidence.gram)
             found.append(GroupSize(name, float(np.sqrt(np.mean(values**2))), _unit_of(result, name, group), group.high))
     return found + rest
 
