@@ -1,0 +1,94 @@
+"""The arithmetic of the study of cost on made-up times, and a small run; no time is compared with a limit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from studies.common.goals import Verdict
+from studies.cost.commands import Run, run_command
+from studies.cost.growth import Floor
+from studies.cost.nested import Nested
+from studies.cost.report import goals_of, write_report
+from studies.cost.run import Cost, run
+from tests.pdf_text import PdfText
+from tests.report_rules import broken_rules
+
+PHASES = {"load": 0.5, "compile": 0.4, "fit": 0.4, "consequences": 1.5, "sample": 0.0, "design": 0.0, "report": 5.0}
+
+
+def timed(verdict: float, memory: float = 1.2, sample: float = 0.0) -> Run:
+    """A diagnosis of which three seconds and a half come before the first phase."""
+    phases = {"start": 3.5, **PHASES, "verdict": verdict, "sample": sample}
+    return Run(sum(phases.values()), sum(phases.values()), memory, phases)
+
+
+def made_up(nested: Nested | None) -> Cost:
+    titles = ("nothing", "leak", "payload", "link", "wheel and bias", "growing torque", "swinging torque")
+    warm = {"nothing": 0.1, "leak": 0.15}
+    return Cost(
+        diagnoses={name: [timed(16.0), *(timed(warm.get(name, 4.0) + 0.01 * k) for k in range(3))] for name in titles},
+        sampled={name: timed(0.1, sample=8.0 + k) for k, name in enumerate(("leak", "payload", "link"))},
+        commands={
+            "check": [Run(20.0, 20.0, 0.6, {}), Run(5.0, 5.0, 0.5, {})],
+            "identify": [Run(40.0, 60.0, 1.0, {}), Run(19.0, 25.0, 1.0, {}), Run(21.0, 25.0, 1.0, {})],
+            "design": [Run(200.0, 300.0, 1.0, {}), Run(150.0, 250.0, 1.6, {})],
+        },
+        candidates={10: 1.5, 20: 2.0, 40: 3.0, 46: 4.6},
+        growth={"recordings": {1: 2e-4, 2: 4e-4}},
+        floor=Floor(6e5, 2.4e6, 3e10, 1e10, 2e-4),
+        nested=nested,
+    )
+
+
+def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
+    cost = made_up(Nested(100.0, 25, done=False))
+    goals = goals_of(cost)
+    verdicts = {goal.text.partition(":")[0] + f" {goal.reached[:3]}": goal.verdict for goal in goals}
+    by_text = [goal.verdict for goal in goals]
+    # warm 5 s (payload takes 8.8 s) and 10 s, cold 20 s (20.8 s) and 40 s, memory, samples, nested, identify, design
+    assert by_text == [
+        Verdict.FAIL,
+        Verdict.PASS,
+        Verdict.FAIL,
+        Verdict.PASS,
+        Verdict.PASS,
+        Verdict.PASS,
+        Verdict.PASS,
+        Verdict.OPEN,
+        Verdict.FAIL,
+    ], verdicts
+    assert "more than 1000: 46 candidates" in goals[6].reached  # 100 s for each of 46 over 4.6 s
+    write_report(cost, tmp_path / "cost.pdf", full=True)
+    text = PdfText.read(tmp_path / "cost.pdf")
+    assert "10 times above that floor" in text  # 200 µs over 6e5 operations at 3e10 a second
+    assert broken_rules(tmp_path / "cost.pdf") == []
+
+
+def test_a_nested_run_that_is_missing_or_undecided_says_so() -> None:
+    assert goals_of(made_up(None))[6].verdict is Verdict.NOT_TESTED
+    assert goals_of(made_up(Nested(5.0, 25, done=False)))[6].verdict is Verdict.OPEN
+    assert goals_of(made_up(Nested(5.0, 25, done=True)))[6].verdict is Verdict.FAIL
+
+
+def test_time_to_the_verdict_leaves_out_what_follows() -> None:
+    assert timed(4.0, sample=7.0).to_verdict == pytest.approx(3.5 + 0.5 + 0.4 + 0.4 + 4.0)
+
+
+def test_a_command_that_fails_says_why(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text("title = 1\n")
+    with pytest.raises(RuntimeError, match=r"check of .*study\.toml failed: .*title"):
+        run_command(("check",), tmp_path / "study.toml", tmp_path / "out", tmp_path / "cache")
+
+
+@pytest.mark.slow
+def test_a_small_study(tmp_path: Path) -> None:
+    cost = run(titles=("leak",), commands=("check",))
+    cold, warm = cost.diagnoses["leak"]
+    assert cold.wall > cold.to_verdict > 0.0
+    assert warm.phases["compile"] < cold.phases["compile"]
+    assert 0.3 < warm.memory < 8.0
+    assert max(cost.candidates) > 30
+    write_report(cost, tmp_path / "cost.pdf", full=False)
+    assert broken_rules(tmp_path / "cost.pdf", full=False) == []
