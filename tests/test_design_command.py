@@ -74,7 +74,7 @@ def shared_problem():
     problems, patch = {}, pytest.MonkeyPatch()
 
     def load(study: Study):
-        text = study.file.read_text()
+        text = study.file.read_text() + repr(study.design)
         if text not in problems:
             problems[text] = load_problem(study)
         return problems[text]
@@ -89,17 +89,17 @@ def made(shared_problem, tmp_path_factory: pytest.TempPathFactory):
     """A design that was interrupted in its second search and taken up again; the text of its report."""
     folder, patch = tmp_path_factory.mktemp("design"), pytest.MonkeyPatch()
     file, kept, one_at_a_time = write(folder), [], Lock()
-    minimise = _Descent.minimise
+    descend = _Descent.run
 
     def stop(self) -> None:
         with one_at_a_time:
             if len(kept) == 1:
                 raise KeyboardInterrupt
-            minimise(self)
+            descend(self)
             kept.append(self.best)
 
     with patch.context() as interrupted:
-        interrupted.setattr(_Descent, "minimise", stop)
+        interrupted.setattr(_Descent, "run", stop)
         status, text = run("design", file, "--output", folder / "out", *EFFORT)
     assert status == 130
     assert "goes on from what it has kept" in text
@@ -158,6 +158,17 @@ def test_a_search_taken_up_again_ends_as_one_never_interrupted(made, tmp_path: P
     assert json.loads((tmp_path / "design.json").read_text()) == json.loads(
         (folder / "out" / "design.json").read_text()
     )
+
+
+@pytest.mark.slow
+def test_a_thorough_search_goes_on_from_the_best_motions(made, tmp_path: Path):
+    status, text = run("design", made[0] / "study.toml", "--output", tmp_path, *EFFORT, "--thorough")
+    assert status == 0, text
+    before, after = (
+        json.loads((folder / "design.json").read_text())["manoeuvres"] for folder in (made[0] / "out", tmp_path)
+    )
+    for plain, thorough in zip(before, after, strict=True):
+        assert thorough["search"]["evaluations"] > 2 * plain["search"]["evaluations"]
 
 
 def test_the_report_holds_the_result_and_the_assumptions(made):

@@ -14,13 +14,14 @@ from search_robots import search_problem
 from test_design import PARAMETERS
 from test_design import plan as flywheel_plan
 
+from bayesid._math.arrays import Floats
 from bayesid.design import DOptimal, Fourier, Limits, Problem, Search, Store, optimise
 from bayesid.design.designed import sample_times
 from bayesid.design.encoder_shadow import encoder_shadow
 from bayesid.design.go_no_go import plan_to_go
 from bayesid.design.polish import Shared, Task, fitted_to_fine_limits, polish
 from bayesid.design.predicted_posterior import planned_manoeuvre, planned_posterior, predict
-from bayesid.design.search_starts import random_start
+from bayesid.design.search_starts import exchanged, random_start
 from bayesid.robot.composite_tables import composite_rows
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
@@ -81,7 +82,7 @@ def test_errors_of_an_encoder_hide_a_swinging_rate_in_closed_form() -> None:
 
 @pytest.mark.slow
 def test_a_search_is_the_same_in_threads_and_keeps_every_limit(planar: Problem) -> None:
-    search, criterion = Search(starts=6, iterations=12), planar.criteria[0]
+    search, criterion = Search(starts=6, iterations=12, exchanges=3, loosened=3.0), planar.criteria[0]
     alone = optimise(planar, criterion, np.random.default_rng(2), search)
     with ThreadPoolExecutor(2) as executor:
         threads = replace(search, executor=executor)
@@ -103,6 +104,42 @@ def test_a_descent_may_be_sent_to_another_process(planar: Problem) -> None:
     assert "_fractions" not in task.shared.problem.__dict__
     np.testing.assert_array_equal(task.start, start)
     assert again.shared is task.shared  # it is compiled once
+
+
+def test_an_exchange_takes_whole_courses_of_few_joints(planar: Problem) -> None:
+    rng = np.random.default_rng(11)
+    motions = [random_start(planar, rng) for _ in range(2)]
+    groups = planar.plan.family.groups
+    assert [list(groups).count(joint) for joint in (0, 1)] == [len(groups) // 2] * 2
+    whole = 0
+    for _ in range(20):
+        child = exchanged(planar, motions, rng)
+        kept = [[bool((child == motion)[groups == joint].all()) for motion in motions] for joint in (0, 1)]
+        assert sum(any(item) for item in kept) >= 1  # of two joints at most one is exchanged
+        whole += sum(any(item) for item in kept) == 2
+    assert whole > 0  # some take the other motion's course, the rest that of a random one
+
+
+def test_a_descent_within_loosened_limits_ends_within_the_limits(planar: Problem) -> None:
+    start = random_start(planar, np.random.default_rng(12))
+    task = Task(Shared(planar), planar.criteria[0], [], start, 10, 1e-3)
+    plain, loosened = polish(task), polish(replace(task, loosened=3.0))
+    assert planar.fractions(loosened.parameters)[0].max() <= 1.0 + 1e-5
+    assert np.isfinite(loosened.cost)
+    assert loosened.evaluations > plain.evaluations
+
+
+def test_exchanges_are_made_after_the_starts_and_the_best_three_of_all_are_followed(planar: Problem) -> None:
+    criterion, kept = planar.criteria[0], {}
+    search = Search(starts=2, iterations=8, exchanges=7)
+
+    def keep(name: str, parameters: Floats, cost: float, evaluations: int) -> None:
+        kept[name] = cost
+
+    found = optimise(planar, criterion, np.random.default_rng(6), search, keep=keep)
+    assert sorted(kept) == ["0.0", "0.1", *(f"1.{k}" for k in range(3)), *(f"2.{k}" for k in range(6)), "3.0"]
+    assert len(found.costs) == 3
+    assert found.cost < sorted(kept[name] for name in kept if name[0] != "1")[2]  # three were followed
 
 
 def test_a_richer_family_begins_where_the_poorer_one_ends(planar: Problem) -> None:

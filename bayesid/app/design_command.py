@@ -25,6 +25,9 @@ def run(
     seed: Seed = 0,
     starts: Annotated[int, typer.Option(min=1, help="Number of random starts for every criterion.")] = 12,
     iterations: Annotated[int, typer.Option(min=1, help="Most iterations of the optimiser from each.")] = 400,
+    thorough: Annotated[
+        bool, typer.Option(help="Search on between the best motions, which takes about three times as long.")
+    ] = False,
     separate: Annotated[
         tuple[str, str] | None,
         typer.Option(metavar="A B", help="Two effects of the catalogue that the manoeuvre is to tell apart."),
@@ -42,7 +45,7 @@ def run(
     from bayesid.app.fly_next import write_motion
     from bayesid.app.study_to_design import defining_files, load_problem, separating
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
-    from bayesid.design import Search, Store, best_design, design
+    from bayesid.design import THOROUGH, Search, Store, best_design, design
     from bayesid.report import design_report
     from bayesid.report.sentences.design_sentences import design_sentences
 
@@ -57,7 +60,7 @@ def run(
     if assumed:
         yield f"The study gives no sensors.encoder.sigma of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
     progress(0.0, "compiling")
-    effort = Search(starts, iterations)
+    effort = replace(THOROUGH if thorough else Search(), starts=starts, iterations=iterations)
     key = content_key(bayesid.__version__, *defining_files(study), seed, effort, *(separate or ()))
     with claimed_folder(output):
         store = Store.open(output / "search.json", key)

@@ -29,10 +29,11 @@ from bayesid.design.predicted_posterior import Predicted, planned_manoeuvre, pla
 from bayesid.design.search_store import Store
 from bayesid.design.simulated_spacecraft import PlannedMotion, SimulatedSpacecraft, Spacecraft
 from bayesid.design.trajectories import BSplines, Fourier, Linear, PaperExcitation, TrajectoryFamily
-from bayesid.design.trajectory_search import Found, Search, optimise
+from bayesid.design.trajectory_search import THOROUGH, Found, Search, optimise
 from bayesid.robot.end_effector import Tip
 
 __all__ = [
+    "THOROUGH",
     "AOptimal",
     "BSplines",
     "CauseProbability",

@@ -334,7 +334,7 @@ def _consistent(
     progress: Progress,
 ) -> list[Found]:
     """Return for each criterion a manoeuvre that no other is better than, by descents from those that are better."""
-    result, alone = list(found), replace(search, starts=0)
+    result, alone = list(found), replace(search, starts=0, exchanges=0)
     for number in range(PASSES):
         changed = False
         for index, criterion in enumerate(problem.criteria):

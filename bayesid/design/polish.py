@@ -21,6 +21,9 @@ __all__ = ["Polished", "Shared", "Task", "fitted_to_fine_limits", "polish"]
 TRIES = 8
 """Largest number of times that a descent goes on because its end breaks a limit between the instants of the search."""
 
+LOOSENED_ITERATIONS, LOOSENED_TOLERANCE = 60, 10.0
+"""Effort of a descent within loosened limits: largest number of iterations, and factor on the tolerance."""
+
 SPARE = 0.999
 """Fraction of a bound at which such a limit is to end."""
 
@@ -87,6 +90,8 @@ class Task:
         Largest number of iterations.
     tolerance : float
         Tolerance of the cost at which SLSQP stops, relative to that of the start where that is below one.
+    loosened : float
+        Factor on the limits of a short descent that comes first, where it is above one.
     """
 
     shared: Shared
@@ -95,14 +100,31 @@ class Task:
     start: Floats
     iterations: int
     tolerance: float
+    loosened: float = 1.0
 
 
 def polish(task: Task) -> Polished:
-    """Run a descent, from a start that is repaired first if it breaks a limit."""
-    run = _Descent(task)
-    if np.isfinite(run.best_cost) and task.iterations:
-        run.minimise()
-    return Polished(run.best, run.best_cost, run.evaluations)
+    """Run a descent, from a start that is repaired first if it breaks a limit.
+
+    Within loosened limits a descent passes by many of the minima at which one within the limits ends.
+    """
+    start, earlier = task.start, 0
+    if task.loosened > 1.0:
+        problem = task.shared.problem
+        shares = np.ones(len(problem.applied)) if problem.shares is None else np.array(problem.shares)
+        wide = _Descent(
+            replace(
+                task,
+                shared=Shared(problem.using(task.loosened * shares)),
+                iterations=min(task.iterations, LOOSENED_ITERATIONS),
+                tolerance=LOOSENED_TOLERANCE * task.tolerance,
+            )
+        )
+        wide.run()
+        start, earlier = wide.best, wide.evaluations
+    run = _Descent(replace(task, start=start))
+    run.run()
+    return Polished(run.best, run.best_cost, earlier + run.evaluations)
 
 
 class _Descent:
@@ -118,8 +140,10 @@ class _Descent:
         # most costs are in nats; SLSQP's first steps follow the size of the gradient, and its tolerance is absolute
         self.unit = float(np.clip(abs(self.best_cost), 1e-12, 1.0))
 
-    def minimise(self) -> None:
-        """Descend from the best point."""
+    def run(self) -> None:
+        """Descend from the best point, if there is one within the limits."""
+        if not np.isfinite(self.best_cost) or not self.task.iterations:
+            return
         family = self.problem.plan.family
         constraints: Any = {"type": "ineq", "fun": self._margin, "jac": self._margin_slope}
         options: Any = {"maxiter": self.task.iterations, "ftol": self.task.tolerance}

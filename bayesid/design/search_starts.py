@@ -1,7 +1,8 @@
-"""Starts of a search: random motions within the limits, motions like the paper's, and repairs of those outside."""
+"""Starts of a search: random motions within the limits, exchanges between motions, repairs of those outside."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from bayesid._math.arrays import Floats
 from bayesid.design.design_problem import Problem
 from bayesid.design.trajectories import Linear, PaperExcitation
 
-__all__ = ["SLACK", "random_start", "repaired", "within_limits"]
+__all__ = ["SLACK", "exchanged", "random_start", "repaired", "within_limits"]
 
 FILLED = (0.3, 0.95)
 """Fractions of the tightest limit between which random starts fill it, so that they begin inside the limits."""
@@ -21,6 +22,12 @@ SHRUNK = 12
 
 LIKE_THE_PAPER = 0.25
 """Fraction of the random starts that swing three joints as the paper's (27) does."""
+
+FROM_ANOTHER = 0.5
+"""Probability that an exchange takes courses from another of the motions, else from a random start."""
+
+EXCHANGED = 3
+"""Of so many groups of parameters, such as joints, one is exchanged at most."""
 
 SLACK = 1e-6
 """Fraction of a limit by which the optimiser may exceed it, since the smooth maximum lies above the true one."""
@@ -43,6 +50,16 @@ def random_start(problem: Problem, rng: np.random.Generator) -> Floats:
             break
         size *= np.clip(0.97 * filled / largest, 0.1, 0.9)
     return family.centre + size * direction
+
+
+def exchanged(problem: Problem, motions: Sequence[Floats], rng: np.random.Generator) -> Floats:
+    """Return one of the motions with the courses of one or few joints taken from another one or from a random start."""
+    chosen = motions[int(rng.integers(len(motions)))]
+    other = motions[int(rng.integers(len(motions)))] if rng.random() < FROM_ANOTHER else random_start(problem, rng)
+    groups = problem.plan.family.groups
+    count = int(groups.max()) + 1
+    taken = rng.choice(count, rng.integers(1, max(count // EXCHANGED, 1) + 1), replace=False)
+    return np.where(np.isin(groups, taken), other, chosen)
 
 
 def _like_the_paper(family: Linear, rng: np.random.Generator) -> Floats:

@@ -19,7 +19,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import null_space
 
 from bayesid._io.errors import InputError
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid.recording.joint_motion import Excitation, Motion
 from bayesid.robot.joint_state import JointState
 
@@ -78,6 +78,11 @@ class TrajectoryFamily:
     def size(self) -> int:
         """Number of parameters."""
         return len(self.names)
+
+    @property
+    def groups(self) -> Integers:
+        """Number of the group of each parameter, shape (n,); a search exchanges whole groups between motions."""
+        return np.arange(self.size)
 
     def motion(self, parameters: Floats | Array) -> ParameterisedMotion:
         """Return the motion with given parameters, shape (n,)."""
@@ -149,6 +154,11 @@ class _PerJoint(Linear):
         self.names = tuple(f"joint{joint + 1}.{label}" for joint in self.moving for label in labels)
         self.scale = np.full(len(self.names), 0.5)
         self.centre = np.zeros(len(self.names))
+
+    @property
+    def groups(self) -> Integers:
+        """Number of the joint that each parameter moves, shape (n,)."""
+        return np.repeat(np.arange(len(self.moving)), self.size // len(self.moving))
 
     def functions(self, time: Floats) -> Floats:
         """Return the m basis functions and their first two derivatives, shape (3, T, m)."""

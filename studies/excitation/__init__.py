@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from bayesid.app.compilation_cache import keep_compiled
-from bayesid.design import Search, Store
+from bayesid.design import THOROUGH, Search, Store
 from studies.common import mission
 from studies.common.command import TRIALS, Command
 from studies.common.monte_carlo import Workers
@@ -26,7 +26,7 @@ from studies.excitation.saturation import CROWDED, Crowd, crowd_of
 
 __all__ = ["Result", "main", "run"]
 
-FULL, QUICK = Search(), Search(starts=3, iterations=60)
+FULL, QUICK = THOROUGH, Search(starts=3, iterations=60)
 """Effort of each search of a full and of a quick run."""
 
 

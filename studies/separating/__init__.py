@@ -13,7 +13,7 @@ from pathlib import Path
 
 from bayesid._math.arrays import Floats
 from bayesid.app.compilation_cache import keep_compiled
-from bayesid.design import Search, Store
+from bayesid.design import THOROUGH, Search, Store
 from bayesid.recording.joint_motion import Motion
 from studies.common import mission
 from studies.common.command import TRIALS, Command
@@ -26,7 +26,7 @@ __all__ = ["Result", "main", "run"]
 FLIGHTS = 400
 """Number of sets of flights for each cause in a full run."""
 
-FULL, QUICK = Search(), Search(starts=3, iterations=60)
+FULL, QUICK = THOROUGH, Search(starts=3, iterations=60)
 """Effort of each search of a full and of a quick run."""
 
 
