@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, part_of, silent
@@ -180,6 +181,7 @@ def sample_times(duration: float, interval: float) -> Floats:
     return interval * np.arange(int(np.floor(duration / interval + 1e-6)) + 1)
 
 
+@threadpool_limits.wrap(limits=1)  # sums of several threads are rounded by chance
 def design(
     problem: Problem,
     seed: int,

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
+from threadpoolctl import threadpool_limits
 
 from bayesid._math.arrays import Floats
 from bayesid.design.criteria import Criterion
@@ -103,6 +104,7 @@ class Task:
     loosened: float = 1.0
 
 
+@threadpool_limits.wrap(limits=1)  # sums of several threads are rounded by chance
 def polish(task: Task) -> Polished:
     """Run a descent, from a start that is repaired first if it breaks a limit.
 

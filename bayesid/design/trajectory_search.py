@@ -13,6 +13,7 @@ from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
@@ -98,6 +99,7 @@ class Found:
     evaluations: int
 
 
+@threadpool_limits.wrap(limits=1)  # sums of several threads are rounded by chance
 def optimise(
     problem: Problem,
     criterion: Criterion,

@@ -76,7 +76,7 @@ def run(
     Parameters
     ----------
     full : bool
-        True for all criteria in place of four, for the default effort of each search, and to fly all of them.
+        True for all criteria in place of four, for the thorough effort of each search, and to fly all of them.
     seed : int
         Seed of all random numbers.
     search : Search, optional
@@ -127,7 +127,7 @@ def run(
 COMMAND = Command(
     "excitation",
     "Compare manoeuvres by the posterior they lead to.",
-    full="all criteria, the default effort of each search, every design flown",
+    full="all criteria, the thorough effort of each search, every design flown",
     seed=1,
     extra={
         "--repeats": {"type": int, "help": "number of flights of each design that is flown"},

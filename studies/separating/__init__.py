@@ -76,7 +76,7 @@ def run(
     Parameters
     ----------
     full : bool
-        True for the default effort of each search and `FLIGHTS` sets of flights for each truth.
+        True for the thorough effort of each search and `FLIGHTS` sets of flights for each truth.
     seed : int
         Seed of all random numbers.
     points : int
@@ -106,7 +106,7 @@ def run(
 COMMAND = Command(
     "separating",
     "Tell apart what a first manoeuvre confuses.",
-    full=f"the default effort of each search, {FLIGHTS} sets of flights for each cause",
+    full=f"the thorough effort of each search, {FLIGHTS} sets of flights for each cause",
     seed=1,
     extra={
         "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
