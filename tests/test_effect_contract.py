@@ -16,6 +16,7 @@ import pytest
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.joint_state import JointState
+from bayesid.robot.log_cholesky import relative
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import Effect, Parameter, Readings, Resonance, Wrench, known_effects
 from bayesid.simulation.effects.instant import Composite, Environment, Instant
@@ -406,6 +407,15 @@ def check_per_recording(effect: Effect, hook: str) -> None:
         np.testing.assert_array_equal(only[key][1], none[key][1])
 
 
+def check_is_body(effect: Effect, hook: str) -> None:
+    """The parameters are log-Cholesky coordinates: their entries relative to the model's body load it linearly."""
+    z = 0.3 * np.random.default_rng(5).normal(size=(24, len(effect.parameters)))
+    linear = np.stack([np.asarray(relative(jnp.asarray(row))) for row in z])
+    loads = np.stack([np.asarray(effect.loads(jnp.asarray(row))) for row in z])
+    matrix = np.linalg.lstsq(linear, loads, rcond=None)[0]
+    np.testing.assert_allclose(linear @ matrix, loads, atol=1e-9 * np.abs(loads).max())
+
+
 CHECKS: dict[str, Callable[[Effect, str], None]] = {
     **dict.fromkeys(CALLS, check_values),
     "name": check_name,
@@ -434,6 +444,7 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "in_recording": check_in_recording,
     "jumps": check_jumps,
     "per_recording": check_per_recording,
+    "is_body": check_is_body,
     "body_tables": check_body_tables,
 }
 FRAMEWORK = {"uses", "constants", "bound", "amplitude_units"}

@@ -17,7 +17,7 @@ from studies.excitation import run
 from studies.excitation.cloud import Cloud
 from studies.excitation.contest import paper_problem, shrunk
 from studies.excitation.report import goals, write_report
-from studies.excitation.saturation import Crowd
+from studies.excitation.saturation import Crowd, Searches
 from tests.report_rules import broken_rules
 
 
@@ -53,7 +53,6 @@ def test_the_best_of_some_descents_is_that_of_all_their_choices():
     for count in (1, 2, 4, 5):
         best = [min(choice) for choice in combinations(costs, count)]
         assert crowd.expected(count) == pytest.approx(np.mean(best))
-        assert crowd.chance(count, 1.15) == pytest.approx(np.mean(np.array(best) <= 0.15))
 
 
 def test_the_flight_s_manoeuvre_lies_in_the_middle_of_the_mission():
@@ -87,3 +86,13 @@ def test_the_whole_study_small(tmp_path):
     assert broken_rules(tmp_path / "report.pdf", full=False) == []
     wrong = {"d-optimal": replace(own, errors=3.0 * own.errors)}
     assert Verdict.FAIL in [goal.verdict for goal in goals(replace(result, realised=wrong))]
+    cost = result.contest.designs["d-optimal"].found.cost
+    crowds = {name: replace(crowd, costs=np.full(100, cost), cost=cost) for name, crowd in result.crowds.items()}
+    for away, verdict in ((0.0, Verdict.PASS), (0.3, Verdict.PASS), (0.5, Verdict.FAIL)):
+        searches = Searches(np.zeros(1), np.array([cost, cost + away]))
+        (near,) = (
+            goal
+            for goal in goals(replace(result, crowds=crowds, searches=searches))
+            if goal.text.startswith("A thorough search")
+        )
+        assert near.verdict is verdict

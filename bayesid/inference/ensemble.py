@@ -1,7 +1,7 @@
 """Posterior samples by emcee: independent ensembles that start from the Laplace approximation and run to convergence.
 
-Two kinds of move are mixed at random: an independence move that proposes from a Student-t about the mode, which mixes
-in a few steps where the posterior is nearly normal, and emcee's differential evolution, which needs no approximation.
+Two kinds of move are mixed at random: an independence move that proposes from an approximation about the mode, which
+mixes in a few steps where the posterior is nearly that, and emcee's differential evolution, which needs none.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
+from typing import Protocol
 
 import emcee
 import h5py
@@ -24,7 +25,6 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.mode import Optimum
 from bayesid.inference.parameterisation import Parameterisation
 from bayesid.inference.posterior import BATCH
-from bayesid.inference.proposal import StudentT
 
 __all__ = ["Chains", "LaplaceMove", "sample"]
 
@@ -47,7 +47,7 @@ beside `BURN_IN`.
 """
 
 INDEPENDENT = {True: 0.9, False: 0.5}
-"""Share of moves that propose from the Laplace approximation, where it is and is not trusted."""
+"""Share of moves that propose from the approximation about the mode, where it is and is not trusted."""
 
 R_HAT = 1.01
 """Largest potential scale reduction of a converged sampler."""
@@ -56,10 +56,22 @@ NEARLY = 1.05
 """Potential scale reduction below which the effective samples are reported as progress."""
 
 
-class LaplaceMove(RedBlueMove):
-    """Independence move of emcee, which proposes from a Student-t about the mode irrespective of the other walkers."""
+class Proposal(Protocol):
+    """Distribution of which independence moves propose, over the coordinates in which the walkers move."""
 
-    def __init__(self, proposal: StudentT) -> None:
+    def draw(self, count: int, rng: np.random.RandomState) -> Floats:
+        """Draw points, shape (count, n)."""
+        ...
+
+    def log_density(self, y: Floats) -> Floats:
+        """Return the log density at points, up to a constant, shape (count, n) -> (count,)."""
+        ...
+
+
+class LaplaceMove(RedBlueMove):
+    """Independence move of emcee, which proposes from an approximation irrespective of the other walkers."""
+
+    def __init__(self, proposal: Proposal) -> None:
         self.proposal = proposal
         super().__init__()
 
@@ -132,6 +144,7 @@ def sample(
     effective_samples: float = 4000.0,
     max_steps: int = 5000,
     trusted: bool = False,
+    proposal: Proposal | None = None,
     file: Path | None = None,
     progress: Progress = silent,
 ) -> Chains:
@@ -150,14 +163,16 @@ def sample(
     max_steps : int
         Largest number of steps of each ensemble; a sampler that stops there may not have converged.
     trusted : bool
-        Whether importance sampling trusts the Laplace approximation, so that most moves may propose from it.
+        Whether importance sampling trusts the proposal, so that most moves may propose from it.
+    proposal : Proposal, optional
+        Approximation of which independence moves propose, by default a Student-t about the mode.
     file : path, optional
         HDF5 file that keeps every step; if it holds a part of the same run, sampling goes on from there.
     progress : Progress, optional
         Function that is called after every block of steps.
     """
     posterior = parameterisation.posterior
-    proposal = parameterisation.proposal(optimum)
+    proposal = parameterisation.proposal(optimum) if proposal is None else proposal
     share = INDEPENDENT[trusted]
     moves = [(LaplaceMove(proposal), share), (DEMove(), 0.75 * (1.0 - share)), (DESnookerMove(), 0.25 * (1.0 - share))]
     walkers = _walkers(posterior.size)
@@ -204,13 +219,15 @@ def _walkers(size: int) -> int:
 
 
 def _start(
-    parameterisation: Parameterisation, proposal: StudentT, walkers: int, state: np.random.RandomState
+    parameterisation: Parameterisation, proposal: Proposal, walkers: int, state: np.random.RandomState
 ) -> Floats:
     """Return starting points of the walkers, all of finite density."""
     points = proposal.draw(4 * walkers, state)
     finite = points[np.isfinite(parameterisation.log_density(points))]
     if len(finite) < walkers:
-        raise InputError("the Laplace approximation lies outside the support", remedy="Check the priors and the data")
+        raise InputError(
+            "the approximation about the mode lies outside the support", remedy="Check the priors and the data"
+        )
     return finite[:walkers]
 
 

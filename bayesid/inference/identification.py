@@ -21,15 +21,20 @@ from bayesid.inference.body_quantities import (
     quantity,
     reported_effect,
 )
+from bayesid.inference.collapsed_proposal import collapsed_proposal
 from bayesid.inference.contraction import Contraction, compare
 from bayesid.inference.ensemble import Chains, sample
 from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise
+from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import integration_error_at
 
 __all__ = ["Identification", "identify"]
 
+
+NEARLY_NORMAL = 0.3
+"""Share of effective samples of importance sampling below which a better proposal than the Student-t is sought."""
 
 PRIOR_DRAWS = 4000
 """Number of draws from the prior that give its widths, for the comparison with the posterior."""
@@ -210,13 +215,19 @@ def identify(
     parameterisation = choose_parameterisation(refined, optimum, rng)
     evidence = importance_sample(parameterisation, optimum, rng)
     began = time.perf_counter()
+    trusted, proposal = evidence.trusted, None
+    if evidence.effective_samples < NEARLY_NORMAL * evidence.evaluations:
+        proposal = collapsed_proposal(refined, optimum, rng, effective_samples)
+    if proposal is not None:
+        parameterisation, trusted = LinearParameterisation(refined), True
     chains = sample(
         parameterisation,
         optimum,
         walkers,
         effective_samples=effective_samples,
         max_steps=max_steps,
-        trusted=evidence.trusted,
+        trusted=trusted,
+        proposal=proposal,
         file=file,
         progress=progress,
     )

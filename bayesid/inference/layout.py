@@ -32,10 +32,13 @@ class EffectLayout(NamedTuple):
         Shape of the prior of each parameter.
     per_recording : bool
         Whether the parameters differ between recordings.
+    is_body : bool
+        Whether they are the log-Cholesky coordinates of a body.
     """
 
     priors: tuple[Prior, ...]
     per_recording: bool
+    is_body: bool = False
 
 
 class PriorNumbers(NamedTuple):
@@ -128,6 +131,11 @@ class Layout:
         return slice(first, first + self._count(self.effects[index]))
 
     @property
+    def changed_bodies(self) -> tuple[tuple[int, slice], ...]:
+        """Index and coordinates of each effect whose parameters are the log-Cholesky coordinates of a body."""
+        return tuple((index, self.effect(index)) for index, effect in enumerate(self.effects) if effect.is_body)
+
+    @property
     def size(self) -> int:
         """Number of coordinates."""
         return self.all_speeds.stop + sum(self._count(effect) for effect in self.effects)
@@ -160,21 +168,31 @@ class Layout:
         """Return the coordinates that are linear in the inertial parameters.
 
         They are the entries of each body's relative pseudo-inertia, less the identity, scaled so that near the centre
-        they are z itself. All other unknowns keep their coordinates. The dynamics determines linear combinations of
-        inertial parameters sharply up to a common factor, so that ridges of the posterior are straight here.
+        they are z itself, and so for a body that an effect changes. All other unknowns keep their coordinates. The
+        dynamics determines linear combinations of inertial parameters sharply up to a common factor, so that ridges of
+        the posterior are straight here.
         """
         entries = jax.vmap(relative)(self._theta(numbers, z)).ravel()
-        return jnp.concatenate([numbers.inverse_slope @ entries, z[self.all_bodies.stop :]])
+        y = jnp.concatenate([numbers.inverse_slope @ entries, z[self.all_bodies.stop :]])
+        for index, part in self.changed_bodies:
+            sigma = numbers.effects[index][1]
+            y = y.at[part].set(relative(sigma * z[part]) / sigma)
+        return y
 
     def from_linear(self, numbers: PriorNumbers, y: Array) -> Array:
         """Return the inverse of `to_linear`, which is NaN where no physical body has these coordinates."""
         entries = numbers.slope @ y[self.all_bodies]
         theta = jax.vmap(absolute)(entries.reshape(self.bodies, PARAMETERS)).ravel()
-        return jnp.concatenate([numbers.inverse_mixing @ theta, y[self.all_bodies.stop :]])
+        z = jnp.concatenate([numbers.inverse_mixing @ theta, y[self.all_bodies.stop :]])
+        for index, part in self.changed_bodies:
+            sigma = numbers.effects[index][1]
+            z = z.at[part].set(absolute(sigma * y[part]) / sigma)
+        return z
 
     def log_volume(self, numbers: PriorNumbers, z: Array) -> Array:
         """Return the logarithm of the determinant of d to_linear / d z."""
-        return jax.vmap(log_volume)(self._theta(numbers, z)).sum()
+        changed = sum(log_volume(numbers.effects[index][1] * z[part]) for index, part in self.changed_bodies)
+        return jax.vmap(log_volume)(self._theta(numbers, z)).sum() + changed
 
     def _theta(self, numbers: PriorNumbers, z: Array) -> Array:
         """Return the log-Cholesky coordinates of each body relative to its centre, shape (B, 10)."""

@@ -97,7 +97,9 @@ class Unknowns:
             tilts=tuple(index for index, sigma in enumerate(self.tilt_sigma) if sigma > 0.0),
             joints=len(self.joints),
             effects=tuple(
-                EffectLayout(tuple(parameter.prior for parameter in effect.parameters), effect.per_recording)
+                EffectLayout(
+                    tuple(parameter.prior for parameter in effect.parameters), effect.per_recording, effect.is_body
+                )
                 for effect in self.effects
             ),
         )

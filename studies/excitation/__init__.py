@@ -8,21 +8,23 @@ errors realised over repeated flights of an independent simulator. ``python -m s
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from bayesid.app.compilation_cache import keep_compiled
-from bayesid.design import THOROUGH, Search, Store
+from bayesid.design import THOROUGH, DOptimal, Search, Store
 from studies.common import mission
 from studies.common.command import TRIALS, Command
 from studies.common.monte_carlo import Workers
 from studies.common.repeated_fits import Realised, repeat
 from studies.excitation.cloud import Cloud, random_cloud
 from studies.excitation.contest import Contest, compete, contest_problem, sparse
-from studies.excitation.saturation import CROWDED, Crowd, crowd_of
+from studies.excitation.saturation import CROWDED, Crowd, Searches, crowd_of, searches_of
 
 __all__ = ["Result", "main", "run"]
 
@@ -43,6 +45,8 @@ class Result:
         Random manoeuvres, splines of all joints.
     crowds : mapping of str to Crowd
         Searches from many starts by criterion, if there were any.
+    searches : Searches or None
+        Repeated thorough searches by d-optimality, if there were any.
     search : Search
         Effort of each other search.
     full : bool
@@ -52,6 +56,7 @@ class Result:
     realised: Mapping[str, Realised]
     cloud: Cloud
     crowds: Mapping[str, Crowd]
+    searches: Searches | None
     search: Search
     full: bool
 
@@ -62,6 +67,7 @@ def run(
     seed: int = 1,
     search: Search | None = None,
     starts: int | None = None,
+    searches: int | None = None,
     repeats: int | None = None,
     flown: Sequence[str] = ("d-optimal",),
     random: int | None = None,
@@ -69,6 +75,7 @@ def run(
     store: Store | None = None,
     trials: Path | None = None,
     workers: Workers = 1,
+    executor: Executor | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
     """Run the study.
@@ -83,6 +90,8 @@ def run(
         Effort of each design.
     starts : int, optional
         Number of cheap descents by each of `CROWDED` from which the contest begins, too; none where left out.
+    searches : int, optional
+        Number of thorough searches by d-optimality that differ in their seeds, from whose best the contest begins, too.
     repeats : int, optional
         Number of flights of each design that is flown; 400 in a full run, 100 in a quick one.
     flown : sequence of str
@@ -95,18 +104,25 @@ def run(
         Results of searches of an earlier run that was interrupted.
     trials, workers
         Folder that keeps the flights, and number of processes that fly.
+    executor : concurrent.futures.Executor, optional
+        Executor of the descents of all searches.
     progress : callable, optional
         Receives a line on what is being done.
     """
-    search = search or (FULL if full else QUICK)
+    search = replace(search or (FULL if full else QUICK), executor=executor)
     repeats = (400 if full else 100) if repeats is None else repeats
     random = (500 if full else 100) if random is None else random
     store = store or Store.forgetful()
     problem, crowds = contest_problem(full, points), {}
     if starts is not None:
-        effort = replace(QUICK, starts=starts)
+        effort = replace(QUICK, starts=starts, executor=executor)
         crowds = {item.name: crowd_of(problem, item, seed, effort, store, sparse(progress)) for item in CROWDED}
-    contest = compete(problem, seed, search, [crowd.best for crowd in crowds.values()], store, progress)
+    first, repeated = [crowd.best for crowd in crowds.values()], None
+    if searches:
+        effort = replace(THOROUGH, executor=executor)
+        repeated = searches_of(problem, DOptimal(), seed, searches, effort, store, sparse(progress))
+        first.append(repeated.best)
+    contest = compete(problem, seed, search, first, store, progress)
     own = contest.designs["d-optimal"].problem
     cloud = random_cloud(own, random, np.random.default_rng(seed))
     realised = {}
@@ -121,7 +137,7 @@ def run(
                 workers=workers,
                 progress=lambda text, name=name: progress(f"{name}: {text}"),  # type: ignore[misc]
             )
-    return Result(contest, realised, cloud, crowds, search, full)
+    return Result(contest, realised, cloud, crowds, repeated, search, full)
 
 
 COMMAND = Command(
@@ -132,6 +148,7 @@ COMMAND = Command(
     extra={
         "--repeats": {"type": int, "help": "number of flights of each design that is flown"},
         "--starts": {"type": int, "help": "number of further descents by (26) and d-optimality"},
+        "--searches": {"type": int, "help": "number of thorough searches by d-optimality that are compared"},
         "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
         **TRIALS,
     },
@@ -147,14 +164,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     keep_compiled()
     effort = FULL if options.full else QUICK
     store = None if options.store is None else Store.open(options.store, f"excitation {options.seed} {effort}")
-    result = run(
-        full=options.full,
-        seed=options.seed,
-        starts=options.starts,
-        repeats=options.repeats,
-        store=store,
-        trials=options.trials,
-        workers=options.workers,
-        progress=lambda text: print(text, flush=True),
-    )
+    with ThreadPoolExecutor(os.cpu_count()) as executor:
+        result = run(
+            full=options.full,
+            seed=options.seed,
+            starts=options.starts,
+            searches=options.searches,
+            repeats=options.repeats,
+            store=store,
+            trials=options.trials,
+            workers=options.workers,
+            executor=executor,
+            progress=lambda text: print(text, flush=True),
+        )
     write_report(result, options.output, study_origin("excitation", options))

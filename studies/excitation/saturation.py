@@ -1,9 +1,10 @@
-"""What more starts of a search are worth: the best of n among N descents from random starts."""
+"""What more starts of a search are worth: the best of n among N descents from random starts, and repeated searches."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import hypergeom
@@ -12,7 +13,7 @@ from bayesid._io.progress import Progress
 from bayesid._math.arrays import Floats
 from bayesid.design import Criterion, DOptimal, Paper26, Problem, Search, Store, optimise
 
-__all__ = ["CROWDED", "Crowd", "crowd_of"]
+__all__ = ["CROWDED", "Crowd", "Searches", "crowd_of", "searches_of"]
 
 CROWDED: tuple[Criterion, ...] = (Paper26(), DOptimal())
 """Criteria whose searches begin at many starts: the two whose ratio is a goal."""
@@ -46,19 +47,6 @@ class Crowd:
         """Return the mean cost of the best of ``count`` descents drawn of all."""
         return float(self.share_of_best(count) @ np.sort(self.costs))
 
-    def chance(self, count: int, within: float) -> float:
-        """Return the probability that the best of ``count`` of the descents costs at most so much more than the best.
-
-        Parameters
-        ----------
-        count : int
-            Number of descents drawn of all.
-        within : float
-            Difference of the cost.
-        """
-        good = int((self.costs <= self.costs.min() + within).sum())
-        return float(hypergeom.sf(0, len(self.costs), good, count))
-
 
 def crowd_of(
     problem: Problem, criterion: Criterion, seed: int, search: Search, store: Store, progress: Progress
@@ -73,3 +61,31 @@ def crowd_of(
     found = optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=progress)
     descents: Sequence[tuple[Floats, float, int] | None] = [kept.known(f"0.{k}") for k in range(search.starts)]
     return Crowd(found.parameters, found.cost, np.array([item[1] for item in descents if item is not None]))
+
+
+class Searches(NamedTuple):
+    """Searches by one criterion that differ in their seeds alone.
+
+    Attributes
+    ----------
+    best : (n,) array
+        Parameters of the best manoeuvre.
+    costs : (N,) array
+        Cost of the manoeuvre that each search ends with.
+    """
+
+    best: Floats
+    costs: Floats
+
+
+def searches_of(
+    problem: Problem, criterion: Criterion, seed: int, count: int, search: Search, store: Store, progress: Progress
+) -> Searches:
+    """Search several times, each from random starts of its own; an interrupted study goes on from the store."""
+    found = []
+    for number in range(count):
+        kept = store.of(f"search {number}.{criterion.name}")
+        rng = np.random.default_rng([seed, number])
+        found.append(optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=progress))
+    costs = np.array([item.cost for item in found])
+    return Searches(found[int(costs.argmin())].parameters, costs)

@@ -56,6 +56,7 @@ class _OnLink(Placed):
     """
 
     spread = 1.0
+    is_body = True
     constant_names = ("factor", "vector")
 
     def __init__(self, place: str = "", spread: float | None = None) -> None:

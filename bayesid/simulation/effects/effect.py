@@ -45,6 +45,8 @@ class Effect:
         Parameters with their units and priors.
     per_recording : bool
         Whether the values differ between recordings.
+    is_body : bool
+        Whether the parameters are the log-Cholesky coordinates of a body relative to the one that the model has.
     needs_orbit : bool
         Whether the effect exists only in orbit.
     needs_latitude : bool
@@ -60,6 +62,7 @@ class Effect:
     separated_by: ClassVar[str] = ""
     parameters: tuple[Parameter, ...] = ()
     per_recording: ClassVar[bool] = False
+    is_body: ClassVar[bool] = False
     needs_orbit: ClassVar[bool] = False
     needs_latitude: ClassVar[bool] = False
     states: ClassVar[int] = 0
