@@ -16,6 +16,8 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.proposal import StudentT
 from bayesid.simulation.effects import LinkInertia
 
+pytestmark = pytest.mark.slow
+
 
 class Case:
     """The small case, made by MuJoCo, with an unknown error of its last link."""
@@ -46,7 +48,6 @@ def test_the_whole_posterior_finds_its_draws_worth_more(case: Case) -> None:
     assert shares[0] > 1.5 * shares[1], shares
 
 
-@pytest.mark.slow
 def test_samples_with_it_have_the_moments_of_its_weighted_draws(case: Case) -> None:
     """emcee, with the proposal among its moves, against importance sampling by the whole posterior."""
     parameterisation = LinearParameterisation(case.posterior)

@@ -120,6 +120,7 @@ def test_an_exchange_takes_whole_courses_of_few_joints(planar: Problem) -> None:
     assert whole > 0  # some take the other motion's course, the rest that of a random one
 
 
+@pytest.mark.slow
 def test_a_descent_within_loosened_limits_ends_within_the_limits(planar: Problem) -> None:
     start = random_start(planar, np.random.default_rng(12))
     task = Task(Shared(planar), planar.criteria[0], [], start, 10, 1e-3)
@@ -129,6 +130,7 @@ def test_a_descent_within_loosened_limits_ends_within_the_limits(planar: Problem
     assert loosened.evaluations > plain.evaluations
 
 
+@pytest.mark.slow
 def test_exchanges_are_made_after_the_starts_and_the_best_three_of_all_are_followed(planar: Problem) -> None:
     criterion, kept = planar.criteria[0], {}
     search = Search(starts=2, iterations=8, exchanges=7)
