@@ -42,7 +42,7 @@ SUBJECTS = (
     Subject("Is the identification honest, and sharp enough?", ("calibration", "base_body", "sensors", "whole_system")),
     Subject("Are causes named?", ("blind_injections", "ets7_drift", "separating", "throws")),
     Subject("Are the manoeuvres good?", ("excitation", "ets7_limits", "load", "planning")),
-    Subject("Is it ahead of its peers, and fast?", ("peers", "base_parameters", "benchmark"), (GPU,)),
+    Subject("Is it ahead of its peers, and fast?", ("peers", "base_parameters", "benchmark", "cost"), (GPU,)),
     Subject("Does it withstand faults?", ("faults",)),
 )
 """Subjects in the order in which they are reported."""
