@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 from threading import Lock
 
@@ -68,6 +69,13 @@ def write(folder: Path, change=lambda text: text) -> Path:
     return folder / "study.toml"
 
 
+def wait_for(file: Path, seconds: float = 60.0) -> None:
+    """Wait until a file is there; the caller's assertions fail if it never comes."""
+    end = time.monotonic() + seconds
+    while not file.exists() and time.monotonic() < end:
+        time.sleep(0.01)
+
+
 @pytest.fixture(scope="module")
 def shared_problem():
     """Commands on the same study share one problem, so that it is compiled once."""
@@ -94,6 +102,7 @@ def made(shared_problem, tmp_path_factory: pytest.TempPathFactory):
     def stop(self) -> None:
         with one_at_a_time:
             if len(kept) == 1:
+                wait_for(folder / "out" / "search.json")  # what ends before the interruption is on disk
                 raise KeyboardInterrupt
             descend(self)
             kept.append(self.best)
