@@ -45,6 +45,13 @@ class LinearGaussian:
         squares = (((self.y - z @ self.matrix.T) / self.sigma) ** 2).sum(axis=1) + (z**2).sum(axis=1)
         return -0.5 * (squares + (30 + self.size) * np.log(2.0 * np.pi)) - 30 * np.log(self.sigma)
 
+    def log_densities(self, z: np.ndarray) -> np.ndarray:
+        """The data are one recording."""
+        z = np.atleast_2d(z)
+        total = self.log_density(z)
+        prior = -0.5 * (z**2).sum(axis=1) - 0.5 * self.size * np.log(2.0 * np.pi)
+        return np.column_stack([total, total - prior])
+
     @property
     def optimum(self) -> Optimum:
         hessian = np.eye(self.size) + self.matrix.T @ self.matrix / self.sigma**2
@@ -144,6 +151,8 @@ def test_samples_of_a_known_posterior():
     assert (np.abs(chains.flat.mean(axis=0) - stub.optimum.z) < 4.5 * error).all()
     np.testing.assert_allclose(np.cov(chains.flat.T), stub.optimum.covariance, atol=0.1 * sd.max() ** 2)
     np.testing.assert_allclose(chains.log_density.ravel()[:50], stub.log_density(chains.flat[:50]), rtol=1e-12)
+    likelihoods = stub.log_densities(chains.flat)[:, 1]
+    np.testing.assert_allclose(chains.log_likelihood.ravel(), likelihoods, rtol=1e-12)
 
 
 def test_the_autocorrelation_time_of_short_chains():

@@ -32,22 +32,31 @@ __all__ = ["Chains", "LaplaceMove", "sample"]
 ENSEMBLES = 4
 """Number of independent ensembles, so that their disagreement shows a lack of convergence."""
 
-BLOCK = 20
-"""Number of steps between two tests of convergence."""
+BLOCK, LONGER = 10, 0.1
+"""Number of steps between two tests of convergence at first, and the share of all steps by which blocks become longer.
 
-BURN_IN = 5.0
-"""Number of steps left out at first, and over which the autocorrelation is summed up, in autocorrelation times."""
+A test sees all steps made so far, so that tests after blocks of one length would come to outweigh the sampling.
+"""
+
+BURN_IN = 3.0
+"""Number of steps left out at first, in autocorrelation times, since the walkers start from weighted draws."""
+
+WINDOW = 5.0
+"""Number of steps over which the autocorrelation is summed up, in autocorrelation times (Sokal)."""
 
 LENGTHS = 20.0
 """Smallest number of steps of a converged sampler, in autocorrelation times.
 
 emcee advises 50, since its estimate takes the mean of every walker for that of the posterior, and is too small by ten
 autocorrelation times over the number of steps. Here all walkers share one mean, so that a chain need only be long
-beside `BURN_IN`.
+beside `BURN_IN` and `WINDOW`.
 """
 
-INDEPENDENT = {True: 0.9, False: 0.5}
+INDEPENDENT = {True: 0.95, False: 0.5}
 """Share of moves that propose from the approximation about the mode, where it is and is not trusted."""
+
+KEPT = "positions, log densities, log likelihoods"
+"""What the store holds of every step."""
 
 R_HAT = 1.01
 """Largest potential scale reduction of a converged sampler."""
@@ -95,6 +104,8 @@ class Chains:
         Draws in those coordinates; steps and walkers of an ensemble run along one axis, step-major.
     log_density : (ensembles, draws) array
         Log posterior density over those coordinates.
+    log_likelihood : (ensembles, draws, R) array
+        Log likelihood of each recording.
     effective_samples : float
         Number of draws divided by the longest autocorrelation time.
     r_hat : float
@@ -116,6 +127,7 @@ class Chains:
     parameterisation: Parameterisation
     y: Floats
     log_density: Floats
+    log_likelihood: Floats
     effective_samples: float
     r_hat: float
     autocorrelation: float
@@ -179,31 +191,39 @@ def sample(
     sequence = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
     # the mode stands for data and model in the key; it is rounded, so that rounding errors do not change the key
     mode = np.round(optimum.z, 6) + 0.0
-    key = content_key(version("bayesid"), posterior.unknowns.names, sequence.entropy, sequence.spawn_key, mode)
+    key = content_key(version("bayesid"), KEPT, posterior.unknowns.names, sequence.entropy, sequence.spawn_key, mode)
     samplers = []
     for number, child in enumerate(sequence.spawn(ENSEMBLES)):
         backend = _backend(file, number, key)
         state = np.random.RandomState(child.generate_state(8))
         fresh = not backend.initialized or backend.iteration == 0
         sampler = emcee.EnsembleSampler(
-            walkers, posterior.size, parameterisation.log_density, moves=moves, vectorize=True, backend=backend
+            walkers, posterior.size, parameterisation.log_densities, moves=moves, vectorize=True, backend=backend
         )
         if fresh:
             sampler.random_state = state.get_state()
         samplers.append((sampler, None if not fresh else _start(parameterisation, proposal, walkers, state)))
     while True:
         steps = min(int(sampler.iteration) for sampler, _ in samplers)
-        if steps and (steps % BLOCK == 0 or steps >= max_steps):
+        if steps and (steps in _tests(steps) or steps >= max_steps):
             chains = _summary(parameterisation, [sampler for sampler, _ in samplers], effective_samples)
             _tell(progress, chains, max_steps, effective_samples)
             if chains.converged or steps >= max_steps:
                 return chains
         # after an interruption ensembles stand at different steps; all go on to the end of the block
-        target = min((steps // BLOCK + 1) * BLOCK, max_steps)
+        target = min(_tests(steps)[-1], max_steps)
         for number, (sampler, start) in enumerate(samplers):
             if sampler.iteration < target:
                 sampler.run_mcmc(start, target - sampler.iteration, skip_initial_state_check=True)
             samplers[number] = (sampler, None)
+
+
+def _tests(steps: int) -> list[int]:
+    """Return the steps after which convergence is tested, up to the first beyond some steps."""
+    found = [BLOCK]
+    while found[-1] <= steps:
+        found.append(found[-1] + BLOCK * max(1, round(LONGER * found[-1] / BLOCK)))
+    return found
 
 
 def _tell(progress: Progress, chains: Chains, limit: int, wanted: float) -> None:
@@ -221,14 +241,18 @@ def _walkers(size: int) -> int:
 def _start(
     parameterisation: Parameterisation, proposal: Proposal, walkers: int, state: np.random.RandomState
 ) -> Floats:
-    """Return starting points of the walkers, all of finite density."""
+    """Return starting points of the walkers, of finite density: draws of the proposal, chosen by their weights.
+
+    They are chosen without putting back, by adding Gumbel noise to the logarithms of the weights and taking the
+    largest, so that no two walkers start from one point.
+    """
     points = proposal.draw(4 * walkers, state)
-    finite = points[np.isfinite(parameterisation.log_density(points))]
-    if len(finite) < walkers:
+    log_weights = parameterisation.log_density(points) - proposal.log_density(points)
+    if np.isfinite(log_weights).sum() < walkers:
         raise InputError(
             "the approximation about the mode lies outside the support", remedy="Check the priors and the data"
         )
-    return finite[:walkers]
+    return points[np.argsort(log_weights + state.gumbel(size=len(points)))[-walkers:]]
 
 
 def _backend(file: Path | None, number: int, key: str) -> emcee.backends.Backend:
@@ -272,10 +296,16 @@ def autocorrelation_time(chain: Floats) -> float:
     if not np.all(covariance[0] > 0.0):
         return float(steps)
     times = 2.0 * np.cumsum(covariance / covariance[0], axis=0) - 1.0
-    inside = np.arange(steps)[:, None] < BURN_IN * times
+    inside = np.arange(steps)[:, None] < WINDOW * times
     if inside.all(axis=0).any():
         return float(steps)
     return max(1.0, float(np.take_along_axis(times, inside.argmin(axis=0)[None], axis=0).max()))
+
+
+def _likelihoods(sampler: emcee.EnsembleSampler) -> Floats:
+    """Return the log likelihoods of R recordings, which emcee keeps beside the steps, shape (steps, walkers, R)."""
+    kept = sampler.get_blobs()
+    return kept.reshape(*kept.shape[:2], -1)  # emcee leaves out the axis of a single recording
 
 
 def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSampler], wanted: float) -> Chains:
@@ -294,6 +324,7 @@ def _summary(parameterisation: Parameterisation, samplers: list[emcee.EnsembleSa
         parameterisation=parameterisation,
         y=y,
         log_density=np.stack([density[burn:].ravel() for density in densities]),
+        log_likelihood=np.stack([_likelihoods(sampler)[burn:steps].reshape(y.shape[1], -1) for sampler in samplers]),
         effective_samples=effective,
         r_hat=r_hat,
         autocorrelation=tau,

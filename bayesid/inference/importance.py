@@ -21,6 +21,12 @@ TRUSTED = 0.7
 TRIAL = 512
 """Number of draws by which the coordinates are chosen."""
 
+ENOUGH = 1000.0
+"""Effective draws by which the evidence is estimated, to 0.03 nats or better."""
+
+MOST = 4000
+"""Most draws."""
+
 INSIDE = 0.3
 """Smallest share of the draws that are physical bodies, since an ensemble starts from such draws."""
 
@@ -58,7 +64,7 @@ class Evidence:
 
 
 def importance_sample(
-    parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator, draws: int = 4000
+    parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator, draws: int | None = None
 ) -> Evidence:
     """Estimate the evidence by importance sampling.
 
@@ -70,21 +76,23 @@ def importance_sample(
         Mode of the posterior and its Laplace approximation.
     rng : numpy.random.Generator
         Source of the draws.
-    draws : int
-        Number of draws, which is that of the evaluations of the posterior density.
+    draws : int, optional
+        Number of draws, which is that of the evaluations of the posterior density. By default as many as make 1,000
+        effective ones, judged by the first 512, and at most 4,000.
     """
-    drawn = weighted_draws(parameterisation, optimum, rng, draws)
-    if not np.isfinite(drawn.top):
+    drawn = _enough(parameterisation, optimum, rng) if draws is None else _drawn(parameterisation, optimum, rng, draws)
+    found, draws = _weighted(parameterisation, *drawn), len(drawn[0])
+    if not np.isfinite(found.top):
         return Evidence(-np.inf, np.inf, np.inf, 0.0, draws, optimum.z, np.zeros_like(optimum.z))
-    mean = drawn.weights @ drawn.z
+    mean = found.weights @ found.z
     return Evidence(
-        value=float(drawn.top + np.log(drawn.raw.mean())),
-        error=float(drawn.raw.std() / drawn.raw.mean() / np.sqrt(draws)),
-        pareto_k=drawn.pareto_k,
-        effective_samples=drawn.effective_samples,
+        value=float(found.top + np.log(found.raw.mean())),
+        error=float(found.raw.std() / found.raw.mean() / np.sqrt(draws)),
+        pareto_k=found.pareto_k,
+        effective_samples=found.effective_samples,
         evaluations=draws,
         mean=mean,
-        sd=np.sqrt(drawn.weights @ (drawn.z - mean) ** 2),
+        sd=np.sqrt(found.weights @ (found.z - mean) ** 2),
     )
 
 
@@ -129,12 +137,32 @@ def weighted_draws(
     parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator, draws: int = 4000
 ) -> WeightedDraws:
     """Draw from the Student-t about the mode and weight the draws by the posterior."""
-    import arviz as az  # imported here, since it takes a second that commands without samples save
+    return _weighted(parameterisation, *_drawn(parameterisation, optimum, rng, draws))
 
+
+def _drawn(
+    parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator, draws: int
+) -> tuple[Floats, Floats]:
+    """Return draws of the Student-t, (n, size), with the logarithms of their weights."""
     proposal = parameterisation.proposal(optimum)
     y = proposal.draw(draws, rng)
-    log_weights = parameterisation.log_density(y) - proposal.log_density(y)
-    z = np.nan_to_num(parameterisation.to_z(y))
+    return y, parameterisation.log_density(y) - proposal.log_density(y)
+
+
+def _enough(parameterisation: Parameterisation, optimum: Optimum, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Return as many draws as are expected to make enough effective ones, with the logarithms of their weights."""
+    first = _drawn(parameterisation, optimum, rng, TRIAL)
+    share = max(_weighted(parameterisation, *first).effective_samples / TRIAL, ENOUGH / MOST)
+    rest = _drawn(parameterisation, optimum, rng, int(np.ceil(ENOUGH / share)) - TRIAL)
+    y, log_weights = (np.concatenate(both) for both in zip(first, rest, strict=True))
+    return y, log_weights
+
+
+def _weighted(parameterisation: Parameterisation, y: Floats, log_weights: Floats) -> WeightedDraws:
+    """Return draws with Pareto-smoothed weights."""
+    import arviz as az  # imported here, since it takes a second that commands without samples save
+
+    z, draws = np.nan_to_num(parameterisation.to_z(y)), len(y)
     top = float(log_weights.max())
     if not np.isfinite(top):
         return WeightedDraws(z, np.full(draws, 1.0 / draws), np.inf, np.zeros(draws), top, 0.0)

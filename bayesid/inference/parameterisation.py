@@ -32,6 +32,10 @@ class Parameterisation(Protocol):
         """Return the log posterior density over y, shape (n,)."""
         ...
 
+    def log_densities(self, y: Floats) -> Floats:
+        """Return the log posterior density over y, and beside it the log likelihoods of R recordings, (n, 1 + R)."""
+        ...
+
     def proposal(self, optimum: Optimum) -> StudentT:
         """Return a Student-t proposal over y about the mode."""
         ...
@@ -51,6 +55,10 @@ class LogCholeskyParameterisation:
         """Return the log posterior density, shape (n,)."""
         return self.posterior.log_density(y)
 
+    def log_densities(self, y: Floats) -> Floats:
+        """Return the log posterior density, and beside it the log likelihoods of R recordings, shape (n, 1 + R)."""
+        return self.posterior.log_densities(y)
+
     def proposal(self, optimum: Optimum) -> StudentT:
         """Return a Student-t proposal about the mode with the Laplace covariance."""
         return StudentT.about(optimum.z, optimum.covariance)
@@ -68,11 +76,17 @@ class LinearParameterisation:
 
     def log_density(self, y: Floats) -> Floats:
         """Return the log posterior density over y, shape (n,), minus infinity where no physical body exists."""
+        return self.log_densities(y)[:, 0]
+
+    def log_densities(self, y: Floats) -> Floats:
+        """Return `log_density`, and beside it the log likelihoods of R recordings, shape (n, 1 + R)."""
         z = self.to_z(y)
         physical = np.all(np.isfinite(z), axis=1)
         inside = np.where(np.isfinite(z), z, 0.0)
-        value = self.posterior.log_density(inside) - self.posterior.unknowns.log_volume(inside)
-        return np.where(physical, value, -np.inf)
+        values = self.posterior.log_densities(inside)
+        values[:, 0] -= self.posterior.unknowns.log_volume(inside)
+        values[~physical] = -np.inf
+        return values
 
     def proposal(self, optimum: Optimum) -> StudentT:
         """Return a Student-t proposal about the mode with the Laplace covariance transformed to y."""

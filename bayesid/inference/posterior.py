@@ -185,10 +185,15 @@ class Posterior:
 
     def log_density(self, z: Floats) -> Floats:
         """Return the normalised log prior plus the log likelihood at many points, shape (n, size) -> (n,)."""
+        return self.log_densities(z)[:, 0]
+
+    def log_densities(self, z: Floats) -> Floats:
+        """Return `log_density` and beside it the log likelihoods of the R recordings, (n, size) -> (n, 1 + R)."""
         z = np.atleast_2d(z)
         log_prior = 0.0 if self.flat_prior else -0.5 * (z**2).sum(axis=1) - 0.5 * self.size * np.log(2.0 * np.pi)
-        total = self.log_likelihoods(z).sum(axis=1) + log_prior
-        return np.where(np.isfinite(total), total, -np.inf)
+        likelihoods = self.log_likelihoods(z)
+        total = likelihoods.sum(axis=1) + log_prior
+        return np.column_stack([np.where(np.isfinite(total), total, -np.inf), likelihoods])
 
 
 def starting_point(unknowns: Unknowns, recorded: Sequence[RecordedSamples]) -> Floats:

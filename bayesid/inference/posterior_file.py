@@ -45,7 +45,7 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
     posterior, dims, units = _posterior_group(result, z)
     data = az.from_dict(
         posterior=posterior,
-        log_likelihood=_log_likelihood(result, z),
+        log_likelihood=_log_likelihood(result),
         posterior_predictive=_predictive(result, few, rng),
         observed_data=_observed(result),
         dims={**dims, **_sensor_dims(result)},
@@ -159,9 +159,8 @@ def _name(kind: Kind, recording: str) -> str:
     return f"{kind.value}.{recording}"
 
 
-def _log_likelihood(result: Identification, z: Floats) -> dict[str, Floats]:
-    chains, draws, size = z.shape
-    values = result.posterior.log_likelihoods(z.reshape(-1, size)).reshape(chains, draws, -1)
+def _log_likelihood(result: Identification) -> dict[str, Floats]:
+    values = _thin(result.chains.log_likelihood, STORED)
     return {m.recording.name: values[:, :, index] for index, m in enumerate(result.posterior.manoeuvres)}
 
 

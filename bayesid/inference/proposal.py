@@ -34,10 +34,10 @@ class StudentT:
     def about(cls, mean: Floats, covariance: Floats) -> StudentT:
         """Return the proposal for a posterior of this mode and covariance.
 
-        Its degrees of freedom are the number of dimensions and at least eight: the tails are heavier than the
+        Its degrees of freedom are twice the number of dimensions and at least eight: the tails are heavier than the
         posterior's, but not so heavy that most draws in many dimensions lie outside the posterior.
         """
-        return cls(mean, np.linalg.cholesky(covariance), max(8.0, float(len(mean))))
+        return cls(mean, np.linalg.cholesky(covariance), max(8.0, 2.0 * len(mean)))
 
     def draw(self, count: int, rng: np.random.Generator | np.random.RandomState) -> Floats:
         """Draw points from the distribution, shape (count, n)."""

@@ -21,6 +21,7 @@ from matplotlib.lines import Line2D
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import complete_file
+from bayesid.report.figures.figure_style import with_plain_labels
 
 __all__ = ["Document", "Rows"]
 
@@ -225,6 +226,7 @@ def _svg(fig: Figure) -> bytes:
     for artist in fig.findobj():
         if _points(artist) > MANY_POINTS:
             artist.set_rasterized(True)
+    with_plain_labels(fig)
     engine = fig.get_layout_engine()
     if engine is not None:  # saving would lay the figure out twice, and draw it once more for that
         engine.execute(fig)
