@@ -223,7 +223,7 @@ def whole():
     return drawn(LinearGaussian())
 
 
-@pytest.mark.parametrize("calls", [None, 2, 60, 180, 330, 520, 1000])
+@pytest.mark.parametrize("calls", [None, 2, 60, 330])
 def test_an_interrupted_run_goes_on_as_if_nothing_had_happened(calls, whole, tmp_path):
     """Interrupted between blocks, or at any evaluation (two per step and ensemble): the same samples bit for bit."""
     file, stub = tmp_path / "chain.h5", LinearGaussian()

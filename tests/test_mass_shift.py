@@ -111,6 +111,7 @@ def test_a_jump_at_the_end_of_a_step_costs_no_accuracy(truth, motion):
     assert (np.array(through) > 10.0 * np.array(error)).all()
 
 
+@pytest.mark.slow
 def test_a_body_that_spins_about_a_principal_axis_turns_as_its_momentum_says(tmp_path, formula_motion):
     """The rate after the jump is the rate before times the ratio of inertias, for ever."""
     file = tmp_path / "body.urdf"
@@ -147,6 +148,7 @@ def moved_in_mujoco(
     return loaded, run, np.concatenate([MASS * travel, second[SIX]])
 
 
+@pytest.mark.slow
 def test_a_mass_that_moves_through_the_centre_of_mass_is_a_jump(formula_motion):
     """What is left of the effect is 0.5 % if it moves in MuJoCo within 0.2 s, and a quarter of that within 0.05 s."""
     away, still = np.array([0.3, 0.4, -0.2]), lambda _: (np.zeros(3),) * 3

@@ -75,6 +75,7 @@ def test_a_fit_that_strays_gives_way_to_one_with_its_body_held(engine):
     assert found.fit.own.shape[1] == engine.posterior.size  # of which the derivatives are known all the same
 
 
+@pytest.mark.slow
 def test_a_free_torque_brings_the_held_model_to_the_data(engine):
     assert step_along_data(engine.posterior) == pytest.approx(0.1)
     along = follow(engine)

@@ -75,6 +75,7 @@ def score_of_released_rates(flights: list[mj.Truth], seed: int, *, speed_errors:
     return 2.0 * (costs[0] - costs[1])
 
 
+@pytest.mark.slow
 def test_a_base_at_rest_raises_no_alarm(flights):
     """Pooled over noises the score is chi-square of 12."""
     honest = sum(score_of_released_rates(flights, seed, speed_errors=True) for seed in range(SEEDS))

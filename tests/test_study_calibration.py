@@ -74,6 +74,7 @@ def test_the_plan_holds_every_replicate_once_and_its_beginning_some_of_every_cas
     assert not any(item.sampled for item in plan(False))
 
 
+@pytest.mark.slow
 def test_the_report_is_that_of_the_outcomes(tmp_path):
     cases = read(REPORTS / "calibration.jsonl.gz")
     write_report(cases, tmp_path / "calibration.pdf")

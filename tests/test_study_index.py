@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from studies.common.goals import Verdict
 from studies.index import index_text
 from tests.pdf_text import PdfText
@@ -14,6 +16,7 @@ def test_the_page_is_that_of_the_summaries():
     assert (REPORTS / "README.md").read_text(encoding="utf-8") == index_text(REPORTS), "run python -m studies.index"
 
 
+@pytest.mark.slow
 def test_summaries_are_those_of_their_reports():
     found = sorted(REPORTS.glob("*.json"))
     assert found

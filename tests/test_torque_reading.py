@@ -66,6 +66,7 @@ def read(case: Case) -> TorqueReading:
     return read_torques(fitted(case), case[0], CausePrior(), np.random.default_rng(0))
 
 
+@pytest.mark.slow
 def test_friction_of_one_joint_is_named_and_measured(flown, friction):
     found = read(flown(3, friction))
     assert found.verdict.status is Status.EXPLAINED

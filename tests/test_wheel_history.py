@@ -44,6 +44,7 @@ def test_the_history_is_that_of_pinocchio(axis, formula_motion):
         assert np.abs(given - exact).max() < 1e-5 * np.abs(bare - exact).max()
 
 
+@pytest.mark.slow
 def test_a_constant_history_is_a_wheel_momentum(formula_motion):
     robot = Robot.from_urdf(SERVICER3)
     motion = formula_motion(MOTION, SERVICER3, robot)
