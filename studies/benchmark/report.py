@@ -32,8 +32,8 @@ ERROR = 0.01
 LINKS, WHITENING = 1.3, 1.5
 """Largest wanted ratios of the times with 60 and 6 links, and with noisy and exact joints."""
 
-SAMPLES, SECONDS = 4000.0, 15.0
-"""Number of effective samples that are wanted, and the time for them [s]."""
+SAMPLES, SECONDS = 4000.0, 8.0
+"""Number of effective samples that are wanted, and the time of an identification with them, all compiled [s]."""
 
 CHEAPER = 20.0
 """Smallest wanted ratio of the evaluations per effective sample, emcee's default move over the package's."""
@@ -70,8 +70,8 @@ def figures_of_merit(runs: Sequence[Benchmark]) -> Figures:
             False,
         ),
         (
-            f"time for {SAMPLES:.0f} effective samples [s]",
-            over(lambda item: item.sampling.seconds * SAMPLES / item.sampling.chains.effective_samples),
+            f"time of an identification to {SAMPLES:.0f} effective samples, compiled [s]",
+            over(lambda item: item.sampling.seconds),
             SECONDS,
             False,
         ),
@@ -193,7 +193,8 @@ def _samples(document: Document, runs: Sequence[Benchmark]) -> None:
         rows,
         "Cost of an effective sample, burn-in included: by the package's moves (Laplace-t independence and "
         f"differential evolution) and by emcee's default stretch move, whose chain covers {lengths:.0f} "
-        f"autocorrelation times or more{doubt}.",
+        f"autocorrelation times or more{doubt}. The package's time is that of the whole identification, with mode and "
+        "evidence.",
         columns("rlrrrr"),
     )
 

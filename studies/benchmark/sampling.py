@@ -1,4 +1,4 @@
-"""Cost of an effective sample with the package's moves and with emcee's default."""
+"""Cost of an identification and of its effective samples, with the package's moves and with emcee's default."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from emcee.autocorr import integrated_time
 
 from bayesid import Posterior
-from bayesid.inference import Chains, LogCholeskyParameterisation, maximise, sample
+from bayesid.inference import Chains, LogCholeskyParameterisation, identify
 
 __all__ = ["Sampling", "compare_moves"]
 
@@ -23,7 +23,7 @@ class Sampling(NamedTuple):
     chains : Chains
         Samples by the package's moves.
     seconds : float
-        Time that they took [s].
+        Time of the whole identification: mode, coordinates, evidence and samples [s].
     default_evaluations : int
         Number of evaluations by emcee's default move, burn-in included.
     default_effective : float
@@ -65,15 +65,16 @@ def compare_moves(posterior: Posterior, *, wanted: float, default_steps: int, se
     seed : int
         Seed of the samplers.
     """
-    refined, optimum = maximise(posterior, np.random.default_rng(seed))
-    parameterisation = LogCholeskyParameterisation(refined)
-    refined.log_density(optimum.z)  # compiles
+    identify(posterior, seed, effective_samples=1.0)  # compiles
     began = time.perf_counter()
-    chains = sample(parameterisation, optimum, seed, effective_samples=wanted)
+    result = identify(posterior, seed, effective_samples=wanted)
     seconds = time.perf_counter() - began
+    refined, chains = result.posterior, result.chains
     sampler = emcee.EnsembleSampler(chains.walkers, refined.size, refined.log_density, vectorize=True)
     sampler.random_state = np.random.RandomState(seed).get_state()
-    start = parameterisation.proposal(optimum).draw(chains.walkers, np.random.default_rng(seed))
+    start = (
+        LogCholeskyParameterisation(refined).proposal(result.optimum).draw(chains.walkers, np.random.default_rng(seed))
+    )
     began = time.perf_counter()
     sampler.run_mcmc(start, default_steps, skip_initial_state_check=True)
     default_seconds = time.perf_counter() - began
