@@ -178,6 +178,7 @@ def _add_computation(document: Document, result: Identification) -> None:
         "The coordinates in which the ensembles agree least. Left: mean of the draws so far, about the mean of all, "
         "in posterior standard deviations. Right: ranks of each ensemble's draws among all, which are spread evenly "
         "where all sample the same distribution.",
+        floating=True,
     )
 
 
