@@ -56,6 +56,8 @@ def test_identify_writes_what_the_contract_names(study: Path, tmp_path: Path) ->
     assert sorted(item.name for item in tmp_path.iterdir()) == names
     content = json.loads((tmp_path / "identification.json").read_text())
     assert set(content) >= {"bodies", "effects", "covariance", "fit", "sampler", "log_evidence"}
+    assert set(content["seconds"]) == {"load", "fit", "sample", "report"}
+    assert all(value > 0.0 for value in content["seconds"].values())
     body = content["bodies"]["base_link"]
     assert set(body["inertia"]) == {"xx", "yy", "zz", "xy", "xz", "yz"}
     assert set(body["mass"]) == {"mean", "sd", "unit"}

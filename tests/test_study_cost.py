@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -63,6 +64,19 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
     write_report(cost, tmp_path / "cost.pdf", full=True)
     text = PdfText.read(tmp_path / "cost.pdf")
     assert "10 times above that floor" in text  # 200 µs over 6e5 operations at 3e10 a second
+    assert broken_rules(tmp_path / "cost.pdf") == []
+
+
+def test_times_of_an_earlier_run_stand_beside_these(tmp_path: Path) -> None:
+    cost = made_up(None)
+    write_report(cost, tmp_path / "earlier.pdf", full=True)
+    commands = {**cost.commands, "check": [Run(20.0, 20.0, 0.6, {}), Run(2.0, 2.0, 0.5, {"start": 0.5, "load": 1.5})]}
+    write_report(
+        replace(cost, commands=commands), tmp_path / "cost.pdf", full=True, before=tmp_path / "earlier-runs.csv"
+    )
+    text = PdfText.read(tmp_path / "cost.pdf")
+    assert "check 5.0 s then, 2.0 s now. The other 9 times lie within 10 %" in text
+    assert "start 0.5, load 1.5" in text
     assert broken_rules(tmp_path / "cost.pdf") == []
 
 

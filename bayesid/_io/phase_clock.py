@@ -25,3 +25,8 @@ class PhaseClock:
         now = time.monotonic()
         self.seconds[phase] = self.seconds.get(phase, 0.0) + now - self._last
         self._last = now
+
+    def moves(self, phase: str, other: str, seconds: float) -> None:
+        """Write down that some of the time of a phase [s] was that of another."""
+        self.seconds[phase] -= seconds
+        self.seconds[other] = self.seconds.get(other, 0.0) + seconds

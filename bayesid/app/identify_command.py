@@ -25,7 +25,8 @@ def run(
 
     import numpy as np
 
-    from bayesid._io.files import claimed_folder, complete_folder
+    from bayesid._io.files import claimed_folder, complete_folder, write_json
+    from bayesid._io.phase_clock import PhaseClock
     from bayesid.app.study_to_model import load_posterior
     from bayesid.inference import identify
     from bayesid.inference.identified_robot import write_identified
@@ -33,21 +34,26 @@ def run(
     from bayesid.inference.wrong_units import refuse_wrong_units
     from bayesid.report import identification_report
 
+    clock = PhaseClock()
     posterior = load_posterior(study)
     refuse_wrong_units(posterior)
     if not posterior.size:
         raise InputError("nothing is unknown", file=file, place="unknowns.bodies", remedy="Name a body to identify")
     yield f"{study.title}: {posterior.samples} samples, {posterior.size} unknowns, step {posterior.step:g} s."
+    clock.ends("load")
     with claimed_folder(output):
         progress(0.0, "fitting")
         kept = output / "samples.h5"
         result = identify(posterior, seed, effective_samples=samples, file=kept, progress=progress)
+        clock.ends("fit")
+        clock.moves("fit", "sample", result.seconds)
         with complete_folder(output) as folder:
-            result.write_json(folder / "identification.json")
             write_netcdf(result, folder / "posterior.nc", np.random.default_rng(seed))
             if result.posterior.model.priors:
                 write_identified(result, folder)
             identification_report(result, study.title, [], folder / "report.pdf")
+            clock.ends("report")
+            write_json(folder / "identification.json", result.to_dict() | {"seconds": clock.seconds})
         kept.unlink(missing_ok=True)
     yield from _summary(result)
     yield f"Wrote {output / 'report.pdf'}."

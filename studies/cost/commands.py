@@ -18,6 +18,9 @@ PROGRAM = "from bayesid.app.command_line import app; app()"
 AFTER_VERDICT = ("consequences", "sample", "design", "report")
 """Phases of a diagnosis that follow the verdict."""
 
+STATING = ("diagnosis.json", "identification.json")
+"""Files that state the time by phase."""
+
 
 class Run(NamedTuple):
     """One command.
@@ -75,8 +78,8 @@ def run_command(words: Sequence[str], study: Path, output: Path, cache: Path) ->
     if process.returncode:
         raise RuntimeError(f"{' '.join(words)} of {study} failed: {said.strip()[-500:]}")
     phases: dict[str, float] = {}
-    file = output / "diagnosis.json"
-    if file.is_file():
-        phases = json.loads(file.read_text(encoding="utf-8"))["seconds"]
-        phases = {"start": max(wall - sum(phases.values()), 0.0), **phases}
+    for name in STATING:
+        if (output / name).is_file():
+            phases = json.loads((output / name).read_text(encoding="utf-8"))["seconds"]
+            phases = {"start": max(wall - sum(phases.values()), 0.0), **phases}
     return Run(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 2.0**20, phases)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from bayesid.report.figures.figure_style import AFTER, BEFORE, styled, wide_figu
 from bayesid.report.numbers import format_number
 from studies.common.command import Command
 from studies.common.goals import Goal, Verdict
-from studies.common.provenance import processor, study_origin
+from studies.common.provenance import MODELS, processor, study_origin
 from studies.common.report_parts import columns
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 from studies.cost.cases import COMMANDS, DIAGNOSES
@@ -28,6 +29,9 @@ MEMORY = 1.5
 
 SAMPLES = 30.0
 """Longest wanted time for 4,000 effective samples of an extended model [s]."""
+
+CHANGED = 0.1
+"""Relative change of a time beside an earlier run from which it is told."""
 
 CHEAPER = 100.0
 """Smallest wanted ratio of one nested run for each candidate to a verdict on all of them."""
@@ -114,8 +118,21 @@ def _spread(values: Sequence[float]) -> str:
     return f"{np.median(values):.1f} s ({min(values):.1f} to {max(values):.1f})"
 
 
-def write_report(cost: Cost, output: Path, *, full: bool, origin: str | None = None) -> None:
-    """Write the report as PDF, and beside it its summary and all times."""
+def write_report(
+    cost: Cost, output: Path, *, full: bool, before: Path | None = None, origin: str | None = None
+) -> None:
+    """Write the report as PDF, and beside it its summary and all times.
+
+    Parameters
+    ----------
+    cost : Cost
+    output : Path
+    full : bool
+    before : Path, optional
+        Times that an earlier run wrote, with which these are compared.
+    origin : str, optional
+        Where the report comes from.
+    """
     document = Document("Cost", "What commands take from files to answers")
     warm = {name: middle(runs, lambda item: item.to_verdict) for name, runs in cost.diagnoses.items()}
     quickest, slowest = min(warm, key=lambda name: warm[name]), max(warm, key=lambda name: warm[name])
@@ -146,6 +163,8 @@ def write_report(cost: Cost, output: Path, *, full: bool, origin: str | None = N
         ),
     )
     _phases(document, cost)
+    if before is not None:
+        _compared(document, cost, before)
     _growth(document, cost)
     names = ["start", "load", "compile", "fit", "verdict", *AFTER_VERDICT]
     rows = [
@@ -176,16 +195,45 @@ def _phases(document: Document, cost: Cost) -> None:
         columns("ll" + "r" * (len(phases) + 1)),
     )
     rows = [
-        [name, f"{runs[0].wall:.1f}", _spread([item.wall for item in runs[1:]]), f"{max(r.memory for r in runs):.2f}"]
+        [
+            name,
+            f"{runs[0].wall:.1f}",
+            _spread([item.wall for item in runs[1:]]),
+            f"{max(r.memory for r in runs):.2f}",
+            ", ".join(f"{phase} {np.median([r.phases[phase] for r in runs[1:]]):.1f}" for phase in runs[-1].phases),
+        ]
         for name, runs in cost.commands.items()
     ]
     if rows:
         document.table(
-            ["command", "cold [s]", "warm", "memory [GB]"],
+            ["command", "cold [s]", "warm", "memory [GB]", "phases, warm [s]"],
             rows,
             "Other commands on the recordings with nothing hidden, files to report; design with its defaults.",
-            columns("lrrr"),
+            columns("lrrrl"),
         )
+
+
+def _compared(document: Document, cost: Cost, before: Path) -> None:
+    """Say which commands took another time in an earlier run."""
+    with before.open(encoding="utf-8", newline="") as stream:
+        lines = [line for line in csv.DictReader(stream) if line["code"] == "warm"]
+    changed, same = [], 0
+    for kind, group in (("diagnose", cost.diagnoses), ("command", cost.commands)):
+        for name, runs in group.items():
+            earlier = [float(line["wall"]) for line in lines if (line["kind"], line["what"]) == (kind, name)]
+            if not earlier:
+                continue
+            was, now = float(np.median(earlier)), middle(runs, lambda item: item.wall)
+            if abs(now / was - 1.0) > CHANGED:
+                title = f"diagnose ({name})" if kind == "diagnose" else name
+                changed.append(f"{title} {was:.1f} s then, {now:.1f} s now")
+            else:
+                same += 1
+    said = "; ".join(changed) if changed else "nothing changed by more"
+    document.paragraph(
+        f"Files to report with compiled code kept, beside the run that wrote {before.name}: {said}. The other {same} "
+        f"times lie within {100.0 * CHANGED:.0f} % of those of that run."
+    )
 
 
 def _growth(document: Document, cost: Cost) -> None:
@@ -247,6 +295,7 @@ COMMAND = Command(
     "Measure what commands take from files to answers, and how that grows.",
     full="every run repeated, samples drawn, and a nested sampler for up to ten minutes",
     seed=0,
+    extra={"--before": {"type": Path, "help": "CSV file of the times of an earlier run to compare with"}},
 )
 
 
@@ -255,5 +304,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = COMMAND.parse(arguments)
     keep_compiled()
     cost = run(full=options.full, seed=options.seed, progress=print)
-    write_report(cost, options.output, full=options.full, origin=study_origin(COMMAND.name, options))
+    inputs = [MODELS / "ets7.urdf", *([] if options.before is None else [options.before])]
+    origin = study_origin(COMMAND.name, options, inputs)
+    write_report(cost, options.output, full=options.full, before=options.before, origin=origin)
     print(f"Wrote {options.output}.")
