@@ -228,6 +228,6 @@ def sampled_evidence(model, like: Posterior) -> float:
     """Log evidence by importance sampling of the model in the full simulation."""
     rng = np.random.default_rng(0)
     posterior, optimum = maximise(Posterior.of(model, like.manoeuvres), rng)
-    found = importance_sample(choose_parameterisation(posterior, optimum, rng), optimum, rng, draws=8000)
+    found = importance_sample(choose_parameterisation(posterior, optimum, rng), optimum, rng)
     assert found.error < 0.1
     return found.value

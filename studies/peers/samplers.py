@@ -9,6 +9,7 @@ ArviZ's for the bulk, with each walker of an ensemble as a chain; those of weigh
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -266,7 +267,9 @@ def dynesty(target: Target, budget: Budget, rng: np.random.Generator) -> Reached
     calls, clock = int(PACE * budget.seconds / each.seconds), _Clock()
     density.evaluations = 0
     sampler = DynamicNestedSampler(density, nested_prior, target.size, nlive=LIVE, rstate=rng)
-    sampler.run_nested(n_effective=int(budget.effective_samples), maxcall=calls, print_progress=False)
+    with warnings.catch_warnings():  # whether it was stopped is among what is returned
+        warnings.filterwarnings("ignore", "The sampling was stopped short", UserWarning)
+        sampler.run_nested(n_effective=int(budget.effective_samples), maxcall=calls, print_progress=False)
     found = sampler.results
     effective = float(get_neff_from_logwt(found.logwt))
     return Reached(
