@@ -6,6 +6,7 @@ import gc
 import os
 import weakref
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -61,6 +62,13 @@ def test_another_process_need_not_trace(folder):
     assert float(scaled(10, {"a": 2.0 * X["a"]})) == 112.0
     assert TRACED == [10]
     assert len(kept(folder)) == 1
+
+
+def test_threads_that_need_the_same_code_trace_it_once(folder):
+    with ThreadPoolExecutor(4) as threads:
+        results = list(threads.map(lambda factor: float(scaled(10, {"a": factor * X["a"]})), (1.0, 2.0, 3.0, 4.0)))
+    assert results == [28.0, 112.0, 252.0, 448.0]
+    assert TRACED == [10]
 
 
 def test_what_is_forgotten_is_freed_and_so_is_what_jax_compiled(folder):

@@ -115,6 +115,7 @@ class KeptJit:
         self._static = static
         self._name = f"{function.__module__}.{function.__qualname__}"
         self._ready: dict[Hashable, Callable[..., Any]] = {}
+        self._obtaining: dict[Hashable, Lock] = {}
         update_wrapper(self, function)
         _known.add(self)
 
@@ -125,8 +126,17 @@ class KeptJit:
         if any(isinstance(leaf, Tracer) for leaf in leaves):
             return self._jit(*args)  # part of a larger function
         key = (static, tree, tuple(leaf.aval if isinstance(leaf, jax.Array) else _shape(leaf) for leaf in leaves))
-        if key in self._ready:
-            return self._ready[key](*others)
+        if key not in self._ready:
+            with self._obtaining.setdefault(key, Lock()):  # threads that need the same code wait for the first of them
+                if key not in self._ready:
+                    result = self._obtained(key, args)
+                    self._obtaining.pop(key, None)
+                    return result
+        return self._ready[key](*others)
+
+    def _obtained(self, key: tuple[Any, ...], args: tuple[Any, ...]) -> Any:
+        """Read the executable from its file or compile it, and evaluate it."""
+        others = args[self._static :]
         monitoring.record_event(OBTAINED)
         file = self._file(*key)
         if file is not None and file.is_file():

@@ -28,7 +28,7 @@ from bayesid.simulation.simulator import ModelConstants, Simulator
 
 __all__ = ["BATCH", "Posterior"]
 
-BATCH = 8
+BATCH = 12
 """Number of points evaluated together; a batch that fits the processor's cache is three times faster than one of 64."""
 
 CORES = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -174,10 +174,8 @@ class Posterior:
         """Return the log likelihoods of all recordings at many points, shape (n, size) -> (n, R)."""
         z = np.atleast_2d(z)
         padded = np.concatenate([z, np.repeat(z[-1:], -len(z) % BATCH, axis=0)])
-        first, *others = np.split(padded, len(padded) // BATCH)
-        parts = [self._chi2(first)]  # the first one alone, since it may have to be compiled
         with ThreadPoolExecutor(CORES) as threads:
-            parts += threads.map(self._chi2, others)
+            parts = list(threads.map(self._chi2, np.split(padded, len(padded) // BATCH)))
         return -0.5 * np.concatenate(parts)[: len(z)] + self.log_normalisation
 
     def _chi2(self, z: Floats) -> Floats:
