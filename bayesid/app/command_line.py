@@ -9,7 +9,9 @@ errors in the file appear at once.
 
 from __future__ import annotations
 
+import atexit
 import errno
+import gc
 import importlib
 import inspect
 import pkgutil
@@ -35,6 +37,9 @@ SUFFIX = "_command"
 """Ending of the names of those modules of this folder that are commands."""
 
 FULL, CLOSED = "Free space there, and call the command again", "Choose another output folder, or allow writing there"
+
+SELDOM = 100_000
+"""Objects made from one search for unused cycles to the next; drawings make many objects and hardly any cycles."""
 
 REMEDIES = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), FULL),
@@ -145,6 +150,8 @@ for _module in pkgutil.iter_modules(bayesid.app.__path__):
 
 def main() -> None:
     """Run the command line."""
+    gc.set_threshold(SELDOM)
+    atexit.register(gc.freeze)  # what the process leaves is not searched for cycles
     sys.exit(app())
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid._math.memory import give_back_memory
+from bayesid._math.threads import in_threads
 from bayesid.diagnosis.catalogue_signatures import catalogue_signatures, group_names
 from bayesid.diagnosis.generic_signatures import generic_signatures
 from bayesid.diagnosis.gram import Gram
@@ -102,16 +103,14 @@ def linearise(
     beside : SignatureBank, optional
         Further signatures, such as those of what the fit holds beside the candidates.
     """
-    bank = SignatureBank.joined(
-        [
-            catalogue_signatures(engine, fit, effects, bounds),
-            initial_rate_signatures(engine, fit),
-            vibration_signatures(engine, fit, effects, bounds),
-            mass_shift_signatures(engine, fit, effects, bounds),
-            generic_signatures(engine, fit),
-            beside or SignatureBank(),
-        ]
-    )
+    parts: list[Callable[[], SignatureBank]] = [
+        lambda: catalogue_signatures(engine, fit, effects, bounds),
+        lambda: initial_rate_signatures(engine, fit),
+        lambda: vibration_signatures(engine, fit, effects, bounds),
+        lambda: mass_shift_signatures(engine, fit, effects, bounds),
+        lambda: generic_signatures(engine, fit),
+    ]
+    bank = SignatureBank.joined([*in_threads(lambda part: part(), parts), beside or SignatureBank()])
     give_back_memory()  # of the responses
     return _assembled(engine, with_bodies_held(fit) if held else fit, bank, held, far)
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 __all__ = ["AFTER_VERDICT", "Run", "run_command"]
 
-PROGRAM = "from bayesid.app.command_line import app; app()"
+PROGRAM = "from bayesid.app.command_line import main; main()"
 
 AFTER_VERDICT = ("consequences", "sample", "design", "report")
 """Phases of a diagnosis that follow the verdict."""
