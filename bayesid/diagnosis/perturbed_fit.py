@@ -6,11 +6,11 @@ along the motion of the last fit; a few iterations make motion and pushes agree.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from threading import Lock
 from typing import NamedTuple
 
 import jax
@@ -19,6 +19,7 @@ import scipy.linalg as sla
 from numpy.typing import NDArray
 
 from bayesid._math.arrays import Floats
+from bayesid._math.threads import in_threads
 from bayesid.diagnosis.effect_functions import physical
 from bayesid.diagnosis.perturbation import (
     OperatingTrajectory,
@@ -171,6 +172,7 @@ class Engine:
         self._released = np.array(sorted(released), dtype=int)
         self._tables: dict[str, Table] = {}
         self._linear: LinearResponses | None = None  # about the last point
+        self._lock = Lock()
 
     def with_posterior(self, posterior: Posterior) -> Engine:
         """Return an engine for the same data under another noise; tables are shared where the motion is the same."""
@@ -197,14 +199,15 @@ class Engine:
         return z
 
     def compile(self) -> None:
-        """Compile simulation and derivatives, side by side."""
+        """Compile simulation and derivatives, side by side, those first that take longest."""
         z, data = self.start(), self.posterior.data.arrays
-        with ThreadPoolExecutor(1) as other:
-            derivatives = other.submit(self.respond, self.perturbation(1), z, data)
-            trace(self.posterior, z, data)
-            residual_of(self.posterior, z, data)
-            jacobian_of(self.posterior, z, data)
-            derivatives.result()
+        parts: list[Callable[[], object]] = [
+            lambda: self.respond(self.perturbation(1), z, data),
+            lambda: jacobian_of(self.posterior, z, data),
+            lambda: trace(self.posterior, z, data),
+            lambda: residual_of(self.posterior, z, data),
+        ]
+        in_threads(lambda part: part(), parts)
 
     def fit(
         self,
@@ -346,14 +349,19 @@ class Engine:
         self, effects: Iterable[tuple[Effect, Floats]], operating: OperatingTrajectory, z: Floats, data: Arrays
     ) -> list[Floats]:
         """Return derivatives of the residual in the coordinates of each effect, (N, n)."""
-        pushes = [linear_perturbation(effect, own, operating, self._table(effect)) for effect, own in effects]
-        return [self.respond(push, z, data) for push in pushes]
+
+        def push(item: tuple[Effect, Floats]) -> Perturbation:
+            return linear_perturbation(*item, operating, self._table(item[0]))
+
+        return [self.respond(pushes, z, data) for pushes in in_threads(push, effects)]
 
     def respond(self, perturbations: Perturbation, z: Floats, data: Arrays) -> Floats:
         """Return derivatives of the residual along pushes with leading axis n, (N, n)."""
-        if self._linear is None or self._linear.arrays is not data or not np.array_equal(self._linear.z, z):
-            self._linear = LinearResponses.about(self.posterior, z, data)
-        return self._linear.along(perturbations).reshape(len(perturbations.reading), -1).T
+        with self._lock:  # threads that need the same derivatives wait for the first of them
+            if self._linear is None or self._linear.arrays is not data or not np.array_equal(self._linear.z, z):
+                self._linear = LinearResponses.about(self.posterior, z, data)
+            linear = self._linear
+        return linear.along(perturbations).reshape(len(perturbations.reading), -1).T
 
     def perturbation(self, count: int, **parts: Floats) -> Perturbation:
         """Return ``count`` pushes with the named parts, the others zero."""

@@ -9,11 +9,20 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid._math.on_device import on_device
 from bayesid.inference import compiled
-from bayesid.inference.integration_step import integration_error
+from bayesid.inference.compiled import Simulated
+from bayesid.inference.data import grids_of
+from bayesid.inference.integration_step import integration_error, simulate_padded
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.sensors import Coloured, Kind, Sensor
 
-__all__ = ["PredictedReadings", "integration_error_at", "noise_of", "noisy", "predicted_readings"]
+__all__ = [
+    "PredictedReadings",
+    "integration_error_at",
+    "noise_of",
+    "noisy",
+    "predicted_readings",
+    "readings_at_start",
+]
 
 
 class PredictedReadings(NamedTuple):
@@ -43,19 +52,29 @@ class PredictedReadings(NamedTuple):
 
 def predicted_readings(posterior: Posterior, z: Floats) -> list[PredictedReadings]:
     """Return the readings of each recording that are predicted at the coordinates ``z`` (size,)."""
-    arrays, model = posterior.data.arrays, posterior.model
-    simulated = compiled.simulated(
-        posterior.structure, posterior.numbers, on_device(z), arrays.grid, arrays.attitude
-    ).readings
-    torque = np.asarray(simulated.torque)
+    arrays = posterior.data.arrays
+    simulated = compiled.simulated(posterior.structure, posterior.numbers, on_device(z), arrays.grid, arrays.attitude)
+    return _by_recording(posterior, simulated)
+
+
+def readings_at_start(posterior: Posterior) -> list[PredictedReadings]:
+    """Return the readings that are predicted at the starting point, by the code that has chosen the step."""
+    grids = grids_of(posterior.model, posterior.manoeuvres, posterior.data.recorded, posterior.step)
+    at = (posterior.structure, posterior.numbers, posterior.starting_point())
+    return _by_recording(posterior, simulate_padded(posterior.manoeuvres, *at, grids))
+
+
+def _by_recording(posterior: Posterior, simulated: Simulated) -> list[PredictedReadings]:
+    model, readings = posterior.model, simulated.readings
+    torque = np.asarray(readings.torque)
     if model.torque is not None:
         torque = torque[..., model.torque.columns(model.robot)]
-    channels = {kind: np.asarray(simulated.channels[kind.value]) for kind in model.channels.kinds}
+    channels = {kind: np.asarray(readings.channels[kind.value]) for kind in model.channels.kinds}
     result = []
     for index, samples in enumerate(posterior.data.recorded):
         count = len(samples.time)
-        readings = {kind: values[index, :count] for kind, values in channels.items()}
-        result.append(PredictedReadings(samples.time, readings, torque[index, :count]))
+        own = {kind: values[index, :count] for kind, values in channels.items()}
+        result.append(PredictedReadings(samples.time, own, torque[index, :count]))
     return result
 
 

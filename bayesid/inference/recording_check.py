@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.predicted_readings import PredictedReadings, predicted_readings
+from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
 from bayesid.recording.channel_families import JOINT_FAMILIES
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
@@ -174,7 +174,7 @@ def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
     """Check one recording of a posterior against the readings that the prior's centre predicts."""
     manoeuvre, model = posterior.manoeuvres[index], posterior.model
     recording = manoeuvre.recording
-    predicted = predicted_readings(posterior, posterior.starting_point())[index]
+    predicted = readings_at_start(posterior)[index]
     return RecordingCheck(
         name=recording.name,
         duration=float(recording.time[-1] - recording.time[0]),

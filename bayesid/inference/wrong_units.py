@@ -23,7 +23,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.predicted_readings import PredictedReadings, predicted_readings
+from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
 from bayesid.recording.joint_motion import Motion
 from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.recording.recording import Recording
@@ -123,7 +123,7 @@ class _Comparison:
 
 def _compared(posterior: Posterior) -> list[list[_Comparison]]:
     """Return the comparisons of every recording with what is predicted at the starting point."""
-    predictions = predicted_readings(posterior, posterior.starting_point())
+    predictions = readings_at_start(posterior)
     return [_comparisons(posterior, index, predicted) for index, predicted in enumerate(predictions)]
 
 
