@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from bayesid.inference.proposal import StudentT
 from studies.common.goals import Verdict
 from studies.common.monte_carlo import run_trials
 from studies.peers.contest import REFERENCE, attempt, tasks
+from studies.peers.recipes import with_scipy, with_sysid
 from studies.peers.reference import bridge
 from studies.peers.report import goals_of, read, write_report
 from studies.peers.samplers import Sampler, effective_samples
 from studies.peers.task import Recipe, lines
+from studies.truth.urdf import SERVICER3
 from tests.pdf_text import PdfText
 from tests.report_rules import broken_rules
 
@@ -73,6 +77,39 @@ def test_the_goals_follow_from_the_trials():
 
 def test_lines_of_recipes_are_counted_without_words():
     assert 5 < lines(Recipe.BAYESID) < lines(Recipe.SCIPY)
+
+
+def test_recipes_with_mujoco_and_with_pinocchio_simulate_alike():
+    """Twice the same equations, of which neither is the package's; MuJoCo fuses what is fixed to the base."""
+    spec = mujoco.MjSpec.from_file(str(SERVICER3))
+    spec.option.gravity = np.zeros(3)
+    spec.body("base_link").add_freejoint()
+    model = spec.compile()
+    other = pin.buildModelFromUrdf(str(SERVICER3), pin.JointModelFreeFlyer())
+    other.gravity.setZero()
+    times = np.linspace(0.0, 20.0, 41)
+    both = np.linspace(0.0, 20.0, 81)[:, None]
+    speed, size = np.array([0.3, 0.5, 0.4]), np.array([0.4, -0.3, 0.5])
+    joints = [size * np.sin(speed * both), size * speed * np.cos(speed * both), -size * speed**2 * np.sin(speed * both)]
+    first = np.array([0.01, -0.02, 0.005])
+    ours = with_sysid._simulate(model, mujoco.MjData(model), times, joints, first)
+    theirs = with_scipy._simulate(other, other.createData(), times, joints, first)
+    np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
+    assert np.ptp(ours, axis=0).min() > 1e-4
+
+
+def test_peers_on_the_same_task_found_the_same():
+    """SciPy around Pinocchio and MuJoCo's toolbox minimise the same squares by other equations and other parameters."""
+    made = read(REPORTS / "peers.jsonl.gz")
+    for hidden in (False, True):
+        first, second = (
+            [item["result"] for item in made if item["task"].get("recipe") == name and item["task"]["hidden"] is hidden]
+            for name in (Recipe.SCIPY, Recipe.SYSID)
+        )
+        assert len(first) == len(second) == 3
+        for own, other in zip(first, second, strict=True):
+            np.testing.assert_allclose(np.subtract(own["mean"], other["mean"]) / np.array(own["sd"]), 0.0, atol=0.01)
+            np.testing.assert_allclose(own["sd"], other["sd"], rtol=0.01)
 
 
 def test_the_report_is_that_of_the_trials(tmp_path):

@@ -11,7 +11,9 @@ import importlib
 import inspect
 import tempfile
 import time
+from contextlib import redirect_stdout
 from enum import StrEnum
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +35,7 @@ class Recipe(StrEnum):
 
     BAYESID = "with_bayesid"
     SCIPY = "with_scipy"
+    SYSID = "with_sysid"
 
 
 def lines(recipe: Recipe) -> int:
@@ -75,7 +78,8 @@ def attempt_recipe(recipe: Recipe, hidden: bool, seed: int, *, count: int, durat
         manoeuvres = Manoeuvres(count=count, duration=duration)
         study = write_study(folder, SERVICER3, rng, orbit=None, hidden=parts, manoeuvres=manoeuvres, step=0.25)
         began = time.process_time()
-        mean, sd = module.identify(folder)
+        with redirect_stdout(StringIO()):
+            mean, sd = module.identify(folder)
         seconds = time.process_time() - began
     truth: Floats = study.base.quantities
     return {"seconds": seconds, "truth": truth.tolist(), "mean": mean.tolist(), "sd": sd.tolist()}
