@@ -110,16 +110,6 @@ def write_report(made: Made, file: Path, origin: str | None = None) -> None:
     add_setup(document, _setup())
     document.section("What went wrong")
     document.items(_failures(made))
-    document.section("On the same density")
-    add_number_table(
-        document,
-        ["unknowns, sampler", "time [s]", "evaluations", "effective", f"time to {EFFECTIVE:,.0f}", "ratio", "evidence"],
-        [row for unknowns in sorted(CASES) for row in _rows(made, unknowns)],
-        f"Processor time and evaluations until the sampler stopped, effective samples, time to {EFFECTIVE:,.0f} of "
-        "them (extrapolated where a quarter or more was reached, else a bound) and its ratio to the package's whole "
-        "time, and the error of the log evidence with the sampler's own standard error. A dash: none given. The "
-        "package's time includes the evidence.",
-    )
     recipes = _recipe_rows(made)
     if recipes:
         document.section("On the same task")
@@ -132,6 +122,16 @@ def write_report(made: Made, file: Path, origin: str | None = None) -> None:
             "within the stated 95 % intervals (of ten a study), and the root mean square of errors in stated standard "
             "deviations, 1 where the intervals are right.",
         )
+    document.section("On the same density")
+    add_number_table(
+        document,
+        ["unknowns, sampler", "time [s]", "evaluations", "effective", f"time to {EFFECTIVE:,.0f}", "ratio", "evidence"],
+        [row for unknowns in sorted(CASES) for row in _rows(made, unknowns)],
+        f"Processor time and evaluations until the sampler stopped, effective samples, time to {EFFECTIVE:,.0f} of "
+        "them (extrapolated where a quarter or more was reached, else a bound) and its ratio to the package's whole "
+        "time, and the error of the log evidence with the sampler's own standard error. A dash: none given. The "
+        "package's time includes the evidence.",
+    )
     packages = ", ".join(f"{name} {_version(name)}" for name in PACKAGES)
     write_table(
         file,
