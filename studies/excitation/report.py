@@ -252,18 +252,20 @@ def _calibration(document: Document, result: Result) -> None:
         "(26) in both readings and against the plain sum of the squared largest excursions (m² and rad²).",
     )
     document.section("Calibration and failures")
+    rows = []
     for name, item in result.realised.items():
-        title = TITLES[name]
         beyond = [LABELS[k] for k in range(10) if abs(item.rms[k] - 1.0) > WITHIN]
-        document.paragraph(
-            f"MuJoCo flew the {title} manoeuvre {len(item.errors)} times. Not within "
-            f"{format_percent(WITHIN)} of the predicted sd: "
-            f"{', '.join(beyond) or 'none'}; one standard error of a ratio is "
-            f"{format_percent(item.rms_error, 2)}, so that of ten "
-            "ratios some lie outside by chance alone. Each mode was found by Gauss-Newton steps with the Jacobian of "
-            f"the plan, of which the last changed no coordinate by more than {item.last_step.max():.2g} standard "
-            "deviations."
-        )
+        step = format_number(float(item.last_step.max()), 2)
+        rows.append([TITLES[name], str(len(item.errors)), format_percent(item.rms_error, 2), ", ".join(beyond), step])
+    add_number_table(
+        document,
+        ["manoeuvre", "flights", "error", "beyond", "last step [sd]"],
+        [[cell or "none" for cell in row] for row in rows],
+        "Flights in MuJoCo: parameters whose realised error is not within "
+        f"{format_percent(WITHIN)} of the predicted sd. With a standard error of each ratio as stated some of ten lie "
+        "outside by chance alone. The modes were found by Gauss-Newton steps with the Jacobian of the plan; last step: "
+        "largest change of a coordinate by the last of them.",
+    )
     document.figure(
         _realised_figure(result),
         "Root mean square error of every parameter over its predicted sd, with standard errors. The band is ± 5 %.",
@@ -410,5 +412,5 @@ def _realised_figure(result: Result) -> Figure:
         axes.errorbar(moved, item.rms, item.rms_error, label=TITLES[name], **look)  # type: ignore[arg-type]
     axes.set_xticks(place, LABELS)
     axes.set_ylabel("realised / predicted")
-    axes.legend()
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     return figure
