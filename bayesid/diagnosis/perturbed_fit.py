@@ -141,6 +141,10 @@ class Fit:
         return np.asarray(physical(effect, np.reshape(self.coordinates[index], shape)))
 
 
+ONE_AT_A_TIME = Lock()
+"""Held while the simulation is linearised; it belongs to no engine, since engines are sent to other processes."""
+
+
 class _Point(NamedTuple):
     """One point of a fit."""
 
@@ -172,7 +176,6 @@ class Engine:
         self._released = np.array(sorted(released), dtype=int)
         self._tables: dict[str, Table] = {}
         self._linear: LinearResponses | None = None  # about the last point
-        self._lock = Lock()
 
     def with_posterior(self, posterior: Posterior) -> Engine:
         """Return an engine for the same data under another noise; tables are shared where the motion is the same."""
@@ -357,7 +360,7 @@ class Engine:
 
     def respond(self, perturbations: Perturbation, z: Floats, data: Arrays) -> Floats:
         """Return derivatives of the residual along pushes with leading axis n, (N, n)."""
-        with self._lock:  # threads that need the same derivatives wait for the first of them
+        with ONE_AT_A_TIME:  # threads that need the same derivatives wait for the first of them
             if self._linear is None or self._linear.arrays is not data or not np.array_equal(self._linear.z, z):
                 self._linear = LinearResponses.about(self.posterior, z, data)
             linear = self._linear
