@@ -101,18 +101,22 @@ class IntegratedProcess:
         Order of the derivative of the position that is white noise; the states are the derivatives below it.
     jumps : sequence of Jump
         Jumps of a derivative below the order. The instant of a jump is uniform within each part of its steps.
+    roughness : (n - 1,) array, optional
+        Factor on the variance of the increments of each step, by default one; jumps are not changed by it.
     """
 
-    def __init__(self, step: Floats, order: int, jumps: Sequence[Jump] = ()) -> None:
+    def __init__(self, step: Floats, order: int, jumps: Sequence[Jump] = (), roughness: Floats | None = None) -> None:
         self.order, self.count = order, len(step)
+        self._roughness = np.ones(len(step)) if roughness is None else roughness
         powers = np.arange(order)
         lift = powers[None, :] - powers[:, None]
         factorial = np.array([math.factorial(max(int(value), 0)) for value in lift.ravel()]).reshape(lift.shape)
         self.transition = np.where(lift >= 0, step[:, None, None] ** np.maximum(lift, 0) / factorial, 0.0)
         self._step = step
         inverse = np.linalg.inv(_unit(order))
-        self._precision = inverse * step[:, None, None] ** -_exponent(order)
+        self._precision = inverse * step[:, None, None] ** -_exponent(order) / self._roughness[:, None, None]
         self._logdet = len(step) * np.linalg.slogdet(inverse)[1] - order**2 * np.log(step).sum()
+        self._logdet -= order * np.log(self._roughness).sum()
         self._added: dict[int, Floats] = {}
         for jump in jumps:
             moments = jump_moments(jump.derivative, order, step[jump.steps], np.array(jump.variances))
@@ -124,7 +128,8 @@ class IntegratedProcess:
     @cached_property
     def _usual(self) -> Floats:
         """Covariance for an intensity of one in the steps that hold a jump."""
-        return _unit(self.order) * self._step[self._jumped, None, None] ** _exponent(self.order)
+        roughness = self._roughness[self._jumped, None, None]
+        return _unit(self.order) * self._step[self._jumped, None, None] ** _exponent(self.order) * roughness
 
     def precision(self, intensity: float) -> tuple[Floats, float]:
         """Return the precisions of the increments, (n - 1, order, order), and the sum of their log determinants."""
@@ -142,7 +147,7 @@ class IntegratedProcess:
 
     def covariance(self, intensity: float, place: int) -> Floats:
         """Return the covariance of the increments of one step, (order, order)."""
-        usual = _unit(self.order) * self._step[place] ** _exponent(self.order) * intensity**2
+        usual = _unit(self.order) * self._step[place] ** _exponent(self.order) * intensity**2 * self._roughness[place]
         return np.asarray(usual + self._added.get(place, 0.0))
 
     def increments(self, states: Floats) -> Floats:

@@ -172,7 +172,8 @@ class _NearNodes:
         others = [
             own.within(steps) for place, own in enumerate(jumps) if place != number and _overlap(own.steps, steps)
         ]
-        process = IntegratedProcess(lengths, order, others)
+        roughness = None if joint.roughness is None else joint.roughness[steps.start : steps.stop]
+        process = IntegratedProcess(lengths, order, others, roughness)
         rest = sla.block_diag(*(process.covariance(joint.scaled_intensity, row) for row in range(len(steps))))
         known = np.eye(len(seen)) + weight @ rest @ weight.T
         found = np.empty((len(steps), PARTS))

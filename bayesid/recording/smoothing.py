@@ -4,7 +4,8 @@ The joint's position is an integrated Wiener process: its ``order``-th derivativ
 given the samples is the smoothing spline of degree ``2 order - 1`` (Wahba 1978), and the posterior covariance is what
 the likelihood needs: the uncertainty of velocity and acceleration with their correlation in time. The order, the
 intensity of the process, and any noise level the user did not declare, maximise the marginal likelihood. All algebra
-is banded. Instants at which the acceleration or the jerk jumps are found elsewhere (`bayesid.recording.jumps`).
+is banded. Instants at which the acceleration or the jerk jumps, and intensities that change along the recording, are
+found elsewhere (`bayesid.recording.jumps`, `bayesid.recording.local_roughness`).
 """
 
 from __future__ import annotations
@@ -84,6 +85,8 @@ class SmoothedJoint:
         Exact position at time 0, if known.
     jumps : tuple of Jump
         Jumps of the acceleration or the jerk that the process has.
+    roughness : (n - 1,) array or None
+        Factor on the variance of the process in each step between nodes; None for one.
     """
 
     nodes: Floats
@@ -100,19 +103,34 @@ class SmoothedJoint:
     series: tuple[JointSamples, ...]
     start: float | None
     jumps: tuple[Jump, ...]
+    roughness: Floats | None
 
     def with_noise(self, factor: float) -> SmoothedJoint:
         """Smooth the samples anew with the declared noise times a factor; estimated noise is estimated again."""
         series = [replace(one, sigma=None if one.sigma is None else factor * one.sigma) for one in self.series]
-        return smooth(series, self.start, self.jumps)
+        return smooth(series, self.start, self.jumps, self._orders(ORDERS), self.roughness)
 
     def with_jumps(self, jumps: Sequence[Jump], orders: Sequence[int]) -> SmoothedJoint:
-        """Smooth the samples anew with other jumps of the process, of one of some orders."""
-        return smooth(list(self.series), self.start, jumps, orders)
+        """Smooth the samples anew with other jumps of the process, of one of some orders.
+
+        Where the roughness has been found, the order stays that for which it was found.
+        """
+        return smooth(list(self.series), self.start, jumps, self._orders(orders), self.roughness)
+
+    def with_roughness(self, roughness: Floats) -> SmoothedJoint:
+        """Smooth the samples anew with factors (n - 1,) on the variance of the process in each step."""
+        problem, sigmas = replace(self, roughness=roughness)._problem
+        log_likelihood, states, factor, chi2 = problem.solve(self.scaled_intensity, sigmas)
+        return replace(
+            self, roughness=roughness, log_likelihood=log_likelihood, states=states, factor=factor, chi2=chi2
+        )
+
+    def _orders(self, orders: Sequence[int]) -> Sequence[int]:
+        return orders if self.roughness is None else (self.order,)
 
     def process(self, jumps: Sequence[Jump]) -> IntegratedProcess:
         """Return the process with some jumps, in scaled time."""
-        return IntegratedProcess(np.diff(self.nodes / self.scale), self.order, jumps)
+        return IntegratedProcess(np.diff(self.nodes / self.scale), self.order, jumps, self.roughness)
 
     @property
     def scaled_intensity(self) -> float:
@@ -142,21 +160,41 @@ class SmoothedJoint:
     def _scores(self, intensity: float, states: Floats, factor: Floats) -> tuple[Floats, Floats]:
         process = self.process(self.jumps)
         precision, _ = process.precision(intensity)
-        blocks = covariances_by_distance(factor, self.order)
-        own, next_ = next(blocks), next(blocks)
-        lifted = process.transition @ next_
-        covariance = own[1:] - lifted - lifted.transpose(0, 2, 1)
-        covariance += process.transition @ own[:-1] @ process.transition.transpose(0, 2, 1)
+        covariance = self._increment_covariance(process, factor)
         score = np.einsum("kij,kj->ki", precision, process.increments(states))
         whole = np.diagonal(precision, axis1=1, axis2=2)
         information = whole - np.diagonal(precision @ covariance @ precision, axis1=1, axis2=2)
         return score, np.where(information > RELIABLE * whole, information, 0.0)
 
+    def increment_energies(self) -> tuple[Floats, Floats]:
+        """Return the energy of the increment of each step and its degrees of freedom in the samples, both (n - 1,).
+
+        The energy is the squared increment in units of its prior covariance. The degrees of freedom are what the
+        samples take off the trace of that covariance, and the mean of the energy where the process is right. Both are
+        zero where rounding leaves nothing of them.
+        """
+        process = self.process(self.jumps)
+        precision, _ = process.precision(self.scaled_intensity)
+        increments = process.increments(self.states)
+        energy = np.einsum("ki,kij,kj->k", increments, precision, increments)
+        covariance = self._increment_covariance(process, self.factor)
+        freedom = self.order - np.einsum("kij,kji->k", precision, covariance)
+        known = freedom > RELIABLE * self.order
+        return np.where(known, energy, 0.0), np.where(known, freedom, 0.0)
+
+    def _increment_covariance(self, process: IntegratedProcess, factor: Floats) -> Floats:
+        """Return the posterior covariance of the increment of each step, (n - 1, order, order)."""
+        blocks = covariances_by_distance(factor, self.order)
+        own, next_ = next(blocks), next(blocks)
+        lifted = process.transition @ next_
+        covariance = own[1:] - lifted - lifted.transpose(0, 2, 1)
+        return np.asarray(covariance + process.transition @ own[:-1] @ process.transition.transpose(0, 2, 1))
+
     @property
     def _problem(self) -> tuple[_Problem, list[float]]:
         """Normal equations, and the standard deviation of each series in scaled time."""
         series = [_scaled(one, self.nodes, self.scale) for one in self.series]
-        problem = _Problem(self.nodes / self.scale, series, self.start, self.order, self.jumps)
+        problem = _Problem(self.nodes / self.scale, series, self.start, self.order, self.jumps, self.roughness)
         return problem, [
             sigma * self.scale**one.derivative for sigma, one in zip(self.sigmas, self.series, strict=True)
         ]
@@ -270,6 +308,7 @@ def smooth(
     start: float | None = None,
     jumps: Sequence[Jump] = (),
     orders: Sequence[int] = ORDERS,
+    roughness: Floats | None = None,
 ) -> SmoothedJoint:
     """Fit the smoothing spline of one joint.
 
@@ -283,11 +322,14 @@ def smooth(
         Jumps of the acceleration or the jerk, as `bayesid.recording.jumps` finds them.
     orders : sequence of int, optional
         Orders of the derivative that may be white noise, of which the marginal likelihood chooses one.
+    roughness : (n - 1,) array, optional
+        Factor on the variance of the process in each step, as `bayesid.recording.local_roughness` finds it.
     """
     nodes, scale = _nodes(np.concatenate([series.time for series in samples]))
     best = None
     for order in orders:
-        fit = _fit(samples, nodes, scale, start, order, tuple(jump for jump in jumps if jump.derivative < order))
+        own = tuple(jump for jump in jumps if jump.derivative < order)
+        fit = _fit(samples, nodes, scale, start, order, own, roughness)
         if best is not None and order > best.order and fit.log_likelihood < best.log_likelihood:
             break
         if best is None or fit.log_likelihood > best.log_likelihood:
@@ -303,8 +345,10 @@ def _fit(
     start: float | None,
     order: int,
     jumps: tuple[Jump, ...],
+    roughness: Floats | None,
 ) -> SmoothedJoint:
-    problem = _Problem(nodes / scale, [_scaled(series, nodes, scale) for series in samples], start, order, jumps)
+    scaled = [_scaled(series, nodes, scale) for series in samples]
+    problem = _Problem(nodes / scale, scaled, start, order, jumps, roughness)
     units = [scale**series.derivative for series in samples]
     guess = [math.log(problem.roughness() * 10.0)]
     guess += [
@@ -355,6 +399,7 @@ def _fit(
         series=tuple(samples),
         start=start,
         jumps=jumps,
+        roughness=roughness,
     )
 
 
@@ -383,9 +428,10 @@ class _Problem:
         start: float | None,
         order: int,
         jumps: Sequence[Jump],
+        roughness: Floats | None = None,
     ) -> None:
         self.series, self.count, self.order = series, len(nodes), order
-        self.process = IntegratedProcess(np.diff(nodes), order, jumps)
+        self.process = IntegratedProcess(np.diff(nodes), order, jumps, roughness)
         spread = max(float(np.abs(values).max()) for _, _, values in series)
         self.initial = np.full(order, 1.0 / (100.0 * (spread + 1e-6)) ** 2)
         self.initial_mean = np.zeros(order)
