@@ -75,7 +75,8 @@ def test_times_of_an_earlier_run_stand_beside_these(tmp_path: Path) -> None:
         replace(cost, commands=commands), tmp_path / "cost.pdf", full=True, before=tmp_path / "earlier-runs.csv"
     )
     text = PdfText.read(tmp_path / "cost.pdf")
-    assert "check 5.0 s then, 2.0 s now. The other 9 times lie within 10 %" in text
+    assert "check 5.0 2.0 −60" in text
+    assert "All that is not listed lies within 10 % of the run that wrote earlier-runs.csv" in text
     assert "start 0.5, load 1.5" in text
     assert broken_rules(tmp_path / "cost.pdf") == []
 

@@ -214,10 +214,10 @@ def _phases(document: Document, cost: Cost) -> None:
 
 
 def _compared(document: Document, cost: Cost, before: Path) -> None:
-    """Say which commands took another time in an earlier run."""
+    """Tabulate the times of an earlier run beside those of this one."""
     with before.open(encoding="utf-8", newline="") as stream:
         lines = [line for line in csv.DictReader(stream) if line["code"] == "warm"]
-    changed, same = [], 0
+    rows = []
     for kind, group in (("diagnose", cost.diagnoses), ("command", cost.commands)):
         for name, runs in group.items():
             earlier = [float(line["wall"]) for line in lines if (line["kind"], line["what"]) == (kind, name)]
@@ -225,14 +225,17 @@ def _compared(document: Document, cost: Cost, before: Path) -> None:
                 continue
             was, now = float(np.median(earlier)), middle(runs, lambda item: item.wall)
             if abs(now / was - 1.0) > CHANGED:
-                title = f"diagnose ({name})" if kind == "diagnose" else name
-                changed.append(f"{title} {was:.1f} s then, {now:.1f} s now")
-            else:
-                same += 1
-    said = "; ".join(changed) if changed else "nothing changed by more"
-    document.paragraph(
-        f"Files to report with compiled code kept, beside the run that wrote {before.name}: {said}. The other {same} "
-        f"times lie within {100.0 * CHANGED:.0f} % of those of that run."
+                change = f"{100.0 * (now / was - 1.0):+.0f}".replace("-", "−")
+                rows.append([f"diagnose ({name})" if kind == "diagnose" else name, f"{was:.1f}", f"{now:.1f}", change])
+    within = f"within {100.0 * CHANGED:.0f} % of the run that wrote {before.name}"
+    if not rows:
+        document.paragraph(f"All times to the report with compiled code kept lie {within}.")
+        return
+    document.table(
+        ["command", "then [s]", "now [s]", "change [%]"],
+        rows,
+        f"Files to report with compiled code kept, beside an earlier run. All that is not listed lies {within}.",
+        columns("lrrr"),
     )
 
 
