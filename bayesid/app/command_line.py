@@ -26,6 +26,7 @@ import typer
 import bayesid.app
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress
+from bayesid._math.memory import take_large_arrays_singly
 from bayesid.app.compilation_cache import keep_compiled
 
 if TYPE_CHECKING:
@@ -150,6 +151,7 @@ for _module in pkgutil.iter_modules(bayesid.app.__path__):
 
 def main() -> None:
     """Run the command line."""
+    take_large_arrays_singly()
     gc.set_threshold(SELDOM)
     atexit.register(gc.freeze)  # what the process leaves is not searched for cycles
     sys.exit(app())
