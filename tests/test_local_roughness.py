@@ -104,7 +104,7 @@ def quintic(time: float, length: float, ramp: float) -> tuple[float, float, floa
 
 
 @pytest.mark.parametrize("profile", [quintic, cycloid, septic])
-@pytest.mark.parametrize("sigma", [1e-5, 1e-4])
+@pytest.mark.parametrize("sigma", [pytest.param(1e-5, marks=pytest.mark.slow), 1e-4])
 def test_errors_of_moves_with_rests_are_covered(
     profile: Callable[..., tuple[float, float, float]], sigma: float
 ) -> None:
