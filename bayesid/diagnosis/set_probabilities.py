@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
@@ -87,23 +88,28 @@ class SetProbabilities:
     @property
     def nothing(self) -> float:
         """Probability that nothing is lacking."""
-        return float(sum(item.probability for item in self.sets if not item.names))
+        return _total(item for item in self.sets if not item.names)
 
     @property
     def unknown(self) -> float:
         """Probability that something generic is at work, whatever causes accompany it."""
-        return float(sum(item.probability for item in self.sets if item.generic is not None))
+        return _total(item for item in self.sets if item.generic is not None)
 
     def of_any(self, names: Collection[str]) -> float:
         """Return the probability that at least one of some candidates is at work, such as a class of equivalents."""
         wanted = set(names)
-        return float(sum(item.probability for item in self.sets if not wanted.isdisjoint(item.names)))
+        return _total(item for item in self.sets if not wanted.isdisjoint(item.names))
 
     @property
     def inclusion(self) -> dict[str, float]:
         """Probability of each candidate, generic ones included, to be at work, whatever accompanies it."""
-        found = dict.fromkeys((*self.causes, *self.generics), 0.0)
+        holding: dict[str, list[CauseSet]] = {name: [] for name in (*self.causes, *self.generics)}
         for item in self.sets:
             for name in item.names:
-                found[name] += item.probability
-        return found
+                holding[name].append(item)
+        return {name: _total(sets) for name, sets in holding.items()}
+
+
+def _total(sets: Iterable[CauseSet]) -> float:
+    """Return the probability of any of some sets, which rounding does not lift above one."""
+    return min(math.fsum(item.probability for item in sets), 1.0)
