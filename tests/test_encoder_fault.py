@@ -7,9 +7,11 @@ import pytest
 from scipy.stats import chi2
 
 from bayesid.diagnosis.encoder_fault import ENCODER_NOISE, encoder_test, noise_of, with_encoder_noise
+from bayesid.inference.noise_changes import leaving_out, relinearised, with_sensors
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.recording.smoothing import JointSamples
+from bayesid.simulation.sensors import Scaled
 
 SIGMA, TIME = 1e-6, np.arange(0.0, 120.0, 0.25)
 DRAWS = 400
@@ -93,3 +95,15 @@ def test_a_posterior_has_the_noise_of_its_joints(planar_case):
     assert encoder_test(quiet)[ENCODER_NOISE] > np.log(1e-4)
     again = with_encoder_noise(noisy, 3.0, z)
     assert encoder_test(again)[ENCODER_NOISE] > np.log(1e-4)
+
+
+def test_samples_that_are_left_out_stay_so_with_other_noise(planar_case):
+    """Outliers beside a second fault: the noise of sensors or encoders changes, or is linearised elsewhere."""
+    whole, z = planar_case.posterior, planar_case.posterior.starting_point()
+    gone = np.zeros_like(whole.whitenings[0].outputs)
+    gone[[3, 20], 1] = True
+    less = leaving_out(whole, [gone])
+    noisier = [replace(sensor, noise=Scaled(sensor.noise, (2.0,) * 3)) for sensor in whole.model.sensors]
+    for again in (relinearised(less, z), with_sensors(less, noisier, z), with_encoder_noise(less, 2.0, z)):
+        assert again.samples == whole.samples - 2
+        assert not again.residuals(z)[0, : len(gone)][gone].any()

@@ -269,3 +269,19 @@ def test_clean_data_have_a_chi_square_near_one_where_the_encoder_dominates():
     # the whitened residual of the accelerometer alone, as well
     white = refined.residuals(optimum.z)[0]
     assert abs((white[:, 3:] ** 2).mean() - 1.0) < 4.0 * np.sqrt(2.0 / white[:, 3:].size) + 13.0 / white[:, 3:].size
+
+
+def test_what_is_left_out_is_in_no_sum():
+    """The last samples left out: log determinant and scalars are those of the covariance of the others."""
+    noise = noise_model(CASES["plain"])
+    whole = build(noise, window=len(TIME))
+    gone = np.zeros_like(whole.outputs)
+    gone[-7:] = True
+    rest = whole.without(gone)
+    kept = dense(noise)[: -7 * len(noise.channels), : -7 * len(noise.channels)]
+    assert rest.samples == len(kept)
+    assert rest.log_sigma == pytest.approx(0.5 * np.linalg.slogdet(kept)[1], abs=1e-7)
+    matrix = operator(rest, len(TIME))
+    assert not matrix[:, -7 * len(noise.channels) :].any()
+    own = matrix[:, : len(kept)]
+    np.testing.assert_allclose(own @ kept @ own.T, np.eye(len(kept)), atol=1e-7)

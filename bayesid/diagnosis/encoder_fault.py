@@ -11,7 +11,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.noise_tests import chi2_log_sf
-from bayesid.inference.noise_changes import relinearised, with_manoeuvres
+from bayesid.inference.noise_changes import leaving_out, relinearised, with_manoeuvres
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.smoothing import JointSamples
@@ -112,6 +112,8 @@ def encoder_test(posterior: Posterior) -> dict[str, float]:
 def with_encoder_noise(posterior: Posterior, factor: float, z: Floats) -> Posterior:
     """Return the posterior with the encoders' noise times a factor, the joints' motion smoothed anew.
 
+    Samples that are left out stay so.
+
     Parameters
     ----------
     posterior : Posterior
@@ -123,4 +125,5 @@ def with_encoder_noise(posterior: Posterior, factor: float, z: Floats) -> Poster
         replace(item, motion=item.motion.with_noise(factor)) if isinstance(item.motion, MeasuredMotion) else item
         for item in posterior.manoeuvres
     ]
-    return relinearised(with_manoeuvres(posterior, manoeuvres), z)
+    again = with_manoeuvres(posterior, manoeuvres)
+    return relinearised(leaving_out(again, posterior.data.left_out), z)

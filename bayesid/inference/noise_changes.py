@@ -61,20 +61,20 @@ def with_sensors(
 
 def leaving_out(posterior: Posterior, masks: Sequence[NDArray[np.bool_]]) -> Posterior:
     """Return the posterior without the whitened scalars that masks (O, C), one per recording, mark."""
-    whitenings = [item.without(mask) for item, mask in zip(posterior.whitenings, masks, strict=True)]
-    data = _renoised(posterior.data, whitenings)
+    data = _renoised(posterior.data, _without(posterior.whitenings, masks))
     gone = tuple(np.logical_or(mask, old) for mask, old in zip(masks, posterior.data.left_out, strict=True))
     return replace(posterior, data=replace(data, left_out=gone))
 
 
 def with_manoeuvres(posterior: Posterior, manoeuvres: Sequence[Manoeuvre]) -> Posterior:
-    """Return the posterior of the same model and integration step given other manoeuvres."""
+    """Return the posterior of the same model and step given other manoeuvres, of which no sample is left out."""
     return Posterior.of(posterior.model, manoeuvres, step=posterior.step, flat_prior=posterior.flat_prior)
 
 
 def _whitened(posterior: Posterior, data: Data, z: Floats, windows: Sequence[int | None]) -> list[Whitening]:
+    """Return the whitenings of the noise at ``z``; what the data leave out stays left out."""
     grids = grids_of(data.model, data.manoeuvres, data.recorded, data.step)
-    return whiten(
+    whitenings = whiten(
         data.model,
         data.recorded,
         grids,
@@ -85,6 +85,11 @@ def _whitened(posterior: Posterior, data: Data, z: Floats, windows: Sequence[int
         z,
         windows,
     )
+    return _without(whitenings, data.left_out)
+
+
+def _without(whitenings: Sequence[Whitening], masks: Sequence[NDArray[np.bool_]]) -> list[Whitening]:
+    return [item.without(mask) if mask.any() else item for item, mask in zip(whitenings, masks, strict=True)]
 
 
 def _renoised(data: Data, whitenings: Sequence[Whitening]) -> Data:

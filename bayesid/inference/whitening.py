@@ -88,8 +88,8 @@ class Whitening(NamedTuple):
         Weights of the residual's rows in each block.
     start : (O,) integer array
         First row of the residual that enters each block.
-    log_sigma : float
-        Sum of the log standard deviations of all scalars before whitening.
+    log_sigmas : (O, C) array
+        Logarithm of each scalar's standard deviation given those before it; zero where there is none.
     samples : int
         Number of scalars.
     outputs : (O, C) array of bool
@@ -102,27 +102,30 @@ class Whitening(NamedTuple):
 
     weights: Floats
     start: Integers
-    log_sigma: float
+    log_sigmas: Floats
     samples: int
     outputs: NDArray[np.bool_]
     rows: Integers
     window: int
 
+    @property
+    def log_sigma(self) -> float:
+        """Sum of the log standard deviations of all scalars before whitening."""
+        return float(self.log_sigmas.sum())
+
     def without(self, left_out: NDArray[np.bool_]) -> Whitening:
         """Return the whitening without the scalars of a mask (O, C), whose samples lose their weight in the others too.
 
-        ``log_sigma`` keeps their share, since evidences are compared between fits that leave out the same samples.
+        The others are not whitened anew: what a sample that is left out told of its neighbours is lost with it.
         """
-        weights = self.weights.copy()
-        gone = {(int(self.rows[o]), int(c)) for o, c in zip(*np.nonzero(left_out), strict=True)}
-        for block, first in enumerate(self.start):
-            for offset in range(weights.shape[2]):
-                for channel in range(weights.shape[3]):
-                    if (int(first) + offset, channel) in gone:
-                        weights[block, :, offset, channel] = 0.0
-        weights[left_out] = 0.0
+        width = self.weights.shape[2]
+        gone = np.zeros((int(max(self.rows.max(), self.start.max() + width - 1)) + 1, left_out.shape[1]), dtype=bool)
+        gone[self.rows] = left_out
+        windows = gone[self.start[:, None] + np.arange(width)]
+        weights = np.where(windows[:, None] | left_out[:, :, None, None], 0.0, self.weights)
         outputs = self.outputs & ~left_out
-        return self._replace(weights=weights, outputs=outputs, samples=int(outputs.sum()))
+        log_sigmas = np.where(left_out, 0.0, self.log_sigmas)
+        return self._replace(weights=weights, log_sigmas=log_sigmas, outputs=outputs, samples=int(outputs.sum()))
 
 
 def apply(weights: Array, start: Array, residual: Array) -> Array:
@@ -200,7 +203,7 @@ def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: 
     weights = np.zeros((len(blocks), channels, width, channels))
     present = np.zeros((len(blocks), channels), dtype=bool)
     covariance = _Covariance(noise)
-    log_sigma = 0.0
+    log_sigmas = np.zeros(present.shape)
     for local, numbers in _alike(blocks, starts, window, channels):
         group = blocks[numbers[0]][1]
         rows = 1 + int(local.columns.max()) // channels
@@ -212,11 +215,11 @@ def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: 
             places = np.ix_(part, slots, range(rows))
             weights[places] = whitened.reshape(len(part), len(group), rows, channels)
             present[np.ix_(part, slots)] = True
-            log_sigma += logs
+            log_sigmas[np.ix_(part, slots)] = logs
     return Whitening(
         weights,
         np.array(starts, dtype=np.int32),
-        log_sigma,
+        log_sigmas,
         int(present.sum()),
         present,
         np.array([row for row, _ in blocks]),
@@ -275,8 +278,8 @@ def _alike(
     return list(found.values())
 
 
-def _given_earlier(raw: Floats, local: _Local, new: int) -> tuple[Floats, float]:
-    """Return the weights (B, new, n) that whiten the last scalars of windows given the others, and their log sigma.
+def _given_earlier(raw: Floats, local: _Local, new: int) -> tuple[Floats, Floats]:
+    """Return the weights (B, new, n) that whiten the last scalars of windows given the others, and their log sigmas.
 
     Parameters
     ----------
@@ -300,7 +303,7 @@ def _given_earlier(raw: Floats, local: _Local, new: int) -> tuple[Floats, float]
     factor = np.linalg.cholesky(left)
     identity = np.broadcast_to(np.eye(new), left.shape)
     rows = np.linalg.solve(factor, np.concatenate([-np.swapaxes(gain, 1, 2), identity], axis=2))
-    return rows @ combine, float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum())
+    return rows @ combine, np.log(np.diagonal(factor, axis1=1, axis2=2))
 
 
 def _is_coloured(noise: NoiseModel) -> bool:
