@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -103,7 +103,7 @@ def _understated(label: str, kind: Kind, fit: Fit) -> NoiseFault:
     energy = float((whole[..., slot][padded] ** 2).sum())
     degrees = float(padded.sum() - taken[..., slot][padded].sum())
     factor = float(np.sqrt(energy / degrees))
-    posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Scaled(s.noise, (factor,) * 3)))
+    posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Scaled(s.noise, (factor,) * kind.size)))
     return NoiseFault(
         label, (Quantity("factor", "1"),), np.array([factor]), np.array([factor / np.sqrt(2.0 * degrees)]), posterior
     )
@@ -120,46 +120,74 @@ def _encoders(fit: Fit) -> NoiseFault | None:
 
 
 def _coloured(label: str, kind: Kind, fit: Fit, least: float) -> NoiseFault | None:
-    slot = _slot(fit.posterior, kind)
-    whole, _ = _shaped(fit)
-    powers, angles, slow, interval = [], [], [], 1.0
-    for r, item in enumerate(fit.posterior.whitenings):
-        interval = float(np.median(np.diff(fit.posterior.data.measured(r, kind)[0])))
-        for c in range(slot.start, slot.stop):
-            own = whole[r, np.flatnonzero(item.outputs[:, c]), c]
-            spectrum = np.abs(np.fft.rfft(own)) ** 2 / len(own)
-            keep = slice(4, None)  # the slowest waves may have gone into the fit
-            powers.append(spectrum[keep])
-            slow.append((spectrum[1:4], 2.0 * np.pi * np.fft.rfftfreq(len(own))[1:4]))
-            angles.append(2.0 * np.pi * np.fft.rfftfreq(len(own))[keep])
-    longest = _longest(fit, kind)
-    power, angle = np.concatenate(powers), np.concatenate(angles)
+    spectra = _Spectra.of(fit, kind)
+    shortest, longest = 0.2 * float(spectra.interval.min()), _longest(fit, kind)
+
+    def density(x: Floats, part: NDArray[np.bool_]) -> Floats:
+        time = np.clip(np.exp(x[1]), shortest, longest)
+        rho = np.exp(-spectra.interval[part] / time)
+        level = np.exp(2.0 * x[0]) * spectra.relative[part]
+        return 1.0 + level * (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(spectra.angle[part]) + rho**2)
+
+    fast, slow = ~spectra.slow, spectra.slow
 
     def whittle(x: Floats) -> float:
-        level, rho = np.exp(2.0 * x[0]), np.exp(-interval / np.clip(np.exp(x[1]), 0.2 * interval, longest))
-        density = 1.0 + level * (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(angle) + rho**2)
-        return float((np.log(density) + power / density).sum())
+        expected = density(x, fast)
+        return float((np.log(expected) + spectra.power[fast] / expected).sum())
 
-    starts = [np.array([a, np.log(b * interval)]) for a in (-1.0, 0.5) for b in (3.0, 12.0)]
+    typical = float(np.median(spectra.interval))
+    starts = [np.array([a, np.log(b * typical)]) for a in (-1.0, 0.5) for b in (3.0, 12.0)]
     best = min((minimize(whittle, start, method="Nelder-Mead") for start in starts), key=lambda found: float(found.fun))
-    everything = float(power.sum()) - best.fun + _slow_gain(slow, best.x, interval, longest)
-    if everything < least:
+    expected, power = density(best.x, slow), spectra.power[slow]
+    slow_gain = float((power - power / expected - np.log(expected)).clip(min=0.0).sum())  # a fit may have taken some
+    if float(spectra.power[fast].sum()) - best.fun + slow_gain < least:
         return None
     steps = 0.1 * np.eye(2)
     curvature = np.array([(whittle(best.x + h) - 2.0 * best.fun + whittle(best.x - h)) / 0.01 for h in steps])
-    level, time = best.x[0], np.log(np.clip(np.exp(best.x[1]), 0.2 * interval, longest))
+    level, time = best.x[0], np.log(np.clip(np.exp(best.x[1]), shortest, longest))
     relative = 1.0 / np.sqrt(np.maximum(curvature, 1.0))
     return _coloured_at(label, kind, fit, np.array([level, time]), relative)
 
 
-def _slow_gain(slow: Sequence[tuple[Floats, Floats]], x: Floats, interval: float, longest: float) -> float:
-    """Return the gain of log likelihood by coloured noise in the slowest waves, of which a fit may have taken some."""
-    level, rho = np.exp(2.0 * x[0]), np.exp(-interval / np.clip(np.exp(x[1]), 0.2 * interval, longest))
-    total = 0.0
-    for power, angle in slow:
-        density = 1.0 + level * (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(angle) + rho**2)
-        total += float((power - power / density - np.log(density)).clip(min=0.0).sum())
-    return total
+@dataclass(frozen=True)
+class _Spectra:
+    """Periodograms of the whitened residual of one sensor, all recordings and axes one after the other.
+
+    Attributes
+    ----------
+    power : (n,) array
+        One on average where the noise is as declared.
+    angle : (n,) array
+        Angular frequency times the interval of the samples [rad].
+    interval : (n,) array
+        Interval of the samples [s].
+    relative : (n,) array
+        Variance of the first recording's noise, in which levels are stated, over that of this one.
+    slow : (n,) array of bool
+        Whether it is among the three slowest waves, some of which may have gone into the fit.
+    """
+
+    power: Floats
+    angle: Floats
+    interval: Floats
+    relative: Floats
+    slow: NDArray[np.bool_]
+
+    @staticmethod
+    def of(fit: Fit, kind: Kind) -> _Spectra:
+        slot, data = _slot(fit.posterior, kind), fit.posterior.data
+        whole, _ = _shaped(fit)
+        rows: list[tuple[Floats, ...]] = []
+        for r, item in enumerate(fit.posterior.whitenings):
+            interval = float(np.median(np.diff(data.measured(r, kind)[0])))
+            relative = (data.sigma(0, kind) / data.sigma(r, kind)) ** 2
+            for c in range(slot.start, slot.stop):
+                own = whole[r, np.flatnonzero(item.outputs[:, c]), c]
+                power = np.abs(np.fft.rfft(own)[1:]) ** 2 / len(own)
+                angle = 2.0 * np.pi * np.fft.rfftfreq(len(own))[1:]
+                same = np.ones_like(power)
+                rows.append((power, angle, interval * same, relative[c - slot.start] * same, np.arange(len(power)) < 3))
+        return _Spectra(*(np.concatenate(column) for column in zip(*rows, strict=True)))
 
 
 def _longest(fit: Fit, kind: Kind) -> float:
@@ -174,7 +202,7 @@ def _coloured_at(
 ) -> NoiseFault:
     """Coloured noise with the logarithms of its level, in sigma, and of its correlation time."""
     level, time = np.exp(logs[0]) * fit.posterior.data.sigma(0, kind), float(np.exp(logs[1]))
-    noise = Coloured((float(level[0]), float(level[1]), float(level[2])), time)
+    noise = Coloured(tuple(level.tolist()), time)
     posterior = _with_sensor(fit, kind, lambda s: replace(s, coloured=noise), like)
     mean = np.array([float(level.mean()), time])
     return NoiseFault(label, (Quantity("sigma", kind.unit), Quantity("time", "s")), mean, mean * relative, posterior)
@@ -251,8 +279,7 @@ def _quantisation(label: str, kind: Kind, fit: Fit) -> NoiseFault:
     step = lattice(fit.posterior, kind)
     if step is None:
         raise ValueError(f"{label}: the values lie on no lattice")
-    steps = (float(step[0]), float(step[1]), float(step[2]))
-    posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Quantised(s.noise, steps)))
+    posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Quantised(s.noise, tuple(step.tolist()))))
     return NoiseFault(label, (Quantity("step", kind.unit),), np.array([float(step.mean())]), np.zeros(1), posterior)
 
 
@@ -272,7 +299,7 @@ def _shaped(fit: Fit) -> tuple[Floats, Floats]:
 
 def _present(fit: Fit, slot: slice) -> NDArray[np.bool_]:
     recordings, outputs, _ = fit.posterior.residual_shape
-    mask = np.zeros((recordings, outputs, 3), dtype=bool)
+    mask = np.zeros((recordings, outputs, slot.stop - slot.start), dtype=bool)
     for r, item in enumerate(fit.posterior.whitenings):
         mask[r, : len(item.outputs)] = item.outputs[:, slot]
     return mask

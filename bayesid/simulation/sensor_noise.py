@@ -89,7 +89,7 @@ class Scaled:
     """Another noise times a factor per axis, for a data sheet that understates the noise."""
 
     noise: Noise
-    factor: tuple[float, float, float]
+    factor: tuple[float, ...]
 
     def sigma(self, interval: float) -> Floats:
         """Return the scaled standard deviation."""
@@ -101,7 +101,7 @@ class Quantised:
     """Another noise with rounding to a step per axis, which adds a twelfth of the squared step to the variance."""
 
     noise: Noise
-    step: tuple[float, float, float]
+    step: tuple[float, ...]
 
     def sigma(self, interval: float) -> Floats:
         """Return the standard deviation of noise and rounding."""
@@ -114,13 +114,13 @@ class Coloured:
 
     Parameters
     ----------
-    sigma : (3,) tuple of float
+    sigma : (size,) tuple of float
         Standard deviation per axis, in the unit of the sensor.
     time : float
         Correlation time [s].
     """
 
-    sigma: tuple[float, float, float]
+    sigma: tuple[float, ...]
     time: float
 
 
