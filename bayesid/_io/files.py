@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +42,24 @@ def write_text(file: str | Path, text: str) -> None:
 
 
 def write_json(file: str | Path, content: dict[str, Any]) -> None:
-    """Write JSON with arrays as lists, whole or not at all."""
-    write_text(file, json.dumps(content, indent=1, default=lambda value: np.asarray(value).tolist()))
+    """Write JSON with arrays as lists and numbers that are not finite as null, whole or not at all."""
+    write_text(file, json.dumps(_finite(content), indent=1, allow_nan=False))
+
+
+def _finite(value: Any) -> Any:
+    match value:
+        case dict():
+            return {key: _finite(item) for key, item in value.items()}
+        case list() | tuple():
+            return [_finite(item) for item in value]
+        case np.ndarray() | np.generic():
+            return _finite(value.tolist())
+        case float() if not math.isfinite(value):
+            return None
+        case _ if value is None or isinstance(value, (str, bool, int, float)):
+            return value
+        case _:  # an array of another library
+            return _finite(np.asarray(value))
 
 
 def create_folder(folder: Path) -> None:
@@ -68,13 +85,15 @@ _claimed: set[Path] = set()
 def claimed_folder(folder: Path) -> Iterator[None]:
     """Create a folder for results and keep other processes out of it; what a killed run left unfinished is removed.
 
-    The system ends the claim of a process that is killed. A block within another one of the same process is part of it.
+    A new folder in which nothing was written is removed again. The system ends the claim of a process that is killed. A
+    block within another one of the same process is part of it.
 
     Raises
     ------
     InputError
         If the folder cannot be created, or another process has claimed it.
     """
+    existed = folder.exists()
     create_folder(folder)
     key = folder.resolve()
     if key in _claimed or sys.platform == "win32":
@@ -90,6 +109,9 @@ def claimed_folder(folder: Path) -> Iterator[None]:
     finally:
         _claimed.discard(key)
         os.close(handle)
+        if not existed:
+            with suppress(OSError):  # something was written
+                folder.rmdir()
 
 
 def _lock(handle: int, folder: Path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +14,7 @@ from bayesid.app.options import Output, Samples, Seed, StudyFile
 if TYPE_CHECKING:
     from bayesid.app.schema import Study
     from bayesid.diagnosis import Diagnosis
+    from bayesid.simulation.model import Manoeuvre, Model
 
 __all__ = ["diagnose_study", "run"]
 
@@ -47,6 +48,8 @@ def diagnose_study(
 ) -> Iterator[str]:
     """Write diagnosis.json, unexplained.csv, posterior.nc of the extended model and report.pdf of a study.
 
+    The verdict is written before the extended model is sampled and the next manoeuvre designed.
+
     Parameters
     ----------
     study : Study
@@ -69,6 +72,28 @@ def diagnose_study(
     str
         Sentences to show.
     """
+    from bayesid._io.files import claimed_folder
+    from bayesid.app.study_to_model import load_manoeuvres, load_model
+
+    model = load_model(study)
+    manoeuvres = load_manoeuvres(study, model.robot)
+    with claimed_folder(output):
+        yield from _written(study, model, manoeuvres, output, seed, effective_samples, progress, keep, plan)
+    yield f"Wrote {output / 'report.pdf'}."
+
+
+def _written(
+    study: Study,
+    model: Model,
+    manoeuvres: Sequence[Manoeuvre],
+    output: Path,
+    seed: int,
+    effective_samples: float | None,
+    progress: Progress,
+    keep: Callable[[Diagnosis], object],
+    plan: bool,
+) -> Iterator[str]:
+    """Write the verdict, and then all results."""
     import numpy as np
 
     from bayesid._io.errors import InputError
@@ -77,7 +102,6 @@ def diagnose_study(
     from bayesid.app.fly_next import FILE, fly_next, write_motion
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_causes import cause_prior, stated_bounds
-    from bayesid.app.study_to_model import load_manoeuvres, load_model
     from bayesid.diagnosis import diagnose, identify_extended
     from bayesid.inference.posterior_file import write_netcdf
     from bayesid.report import diagnosis_report
@@ -86,8 +110,6 @@ def diagnose_study(
     from bayesid.report.sentences.next_steps import rival_pair
     from bayesid.report.verdict_record import record_sentence
 
-    model = load_model(study)
-    manoeuvres = load_manoeuvres(study, model.robot)
     knows = all(section.argument_of_latitude is not None for section in study.recordings)
     result = diagnose(
         model,
@@ -100,14 +122,23 @@ def diagnose_study(
     )
     keep(result)
     yield from diagnosis_sentences(result)
+    rivals = rival_pair(result) if plan else None
+    if effective_samples is not None or rivals:  # both take long: the verdict is not to be lost with them
+        with complete_folder(output) as folder:
+            result.unexplained.write(folder / "unexplained.csv")
+            write_json(folder / "diagnosis.json", result.to_dict())
     clock, identification = PhaseClock(), None
-    if effective_samples is not None and result.posterior.size:
+    if effective_samples is not None:
         sampling = part_of(progress, VERDICT, 1.0)
         sampling(0.0, "sampling the extended model")
-        identification = identify_extended(result, seed, effective_samples=effective_samples, progress=sampling)
+        try:
+            if result.posterior.size:
+                identification = identify_extended(result, seed, effective_samples=effective_samples, progress=sampling)
+        except InputError as error:  # no motion at the prior's centre of the extended model
+            yield f"The extended model was not sampled: {error}."
     clock.ends("sample")
     advice, designed = None, None
-    if plan and (rivals := rival_pair(result)):
+    if rivals:
         progress(1.0, "designing the next manoeuvre")
         try:
             designed = fly_next(study, rivals, seed, silent)
@@ -131,4 +162,3 @@ def diagnose_study(
         clock.ends("report")
         content = result.to_dict(identification)
         write_json(folder / "diagnosis.json", content | {"seconds": content["seconds"] | clock.seconds})
-    yield f"Wrote {output / 'report.pdf'}."
