@@ -33,7 +33,7 @@ from bayesid.diagnosis.probable_verdict import UNKNOWN, ProbableVerdict
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import SetProbabilities
 from bayesid.diagnosis.status import Status
-from bayesid.diagnosis.torque_reading import TorqueReading, Unread, torques_beside
+from bayesid.diagnosis.torque_reading import TorqueReading, Unread, torque_candidates, torques_beside
 from bayesid.diagnosis.verdict_sensitivity import VerdictSensitivity, verdict_sensitivity
 from bayesid.inference import Identification, identify
 from bayesid.inference.noise_changes import relinearised
@@ -199,6 +199,9 @@ def _diagnose(
 ) -> Diagnosis:
     rng, clock = np.random.default_rng(seed), PhaseClock()
     whole, model = model, model.without_torque
+    catalogue = _catalogue(model, manoeuvres, knows_latitude) if effects is None else list(effects)
+    on_torques = [] if whole.torque is None else torque_candidates(whole)
+    limits = bounds_by_label([*catalogue, *on_torques], whole, stated)
     at_rest = model.rate_sigma == 0.0
     posterior = Posterior.of(replace(model, rate_sigma=RATE_SIGMA, speed_errors=True) if at_rest else model, manoeuvres)
     refuse_wrong_units(posterior if whole.torque is None else Posterior.of(whole, manoeuvres))
@@ -218,11 +221,6 @@ def _diagnose(
     present = fit_present_model(engine, first.fit.z)
     before = Hypothesis(engine, present.fit)
     clock.ends("fit")
-    wheels = any(f"wheel_momentum.{axis}" in item.recording.channels for item in manoeuvres for axis in "xyz")
-    longest = max(float(item.recording.time[-1]) for item in manoeuvres)
-    possible = candidates(model, knows_latitude=knows_latitude, records_wheels=wheels, longest=longest)
-    catalogue = possible if effects is None else list(effects)
-    limits = bounds_by_label(catalogue, model, stated)
     weighed = weigh_causes(engine, before.fit, catalogue, limits, prior, rng, progress, held=present.held)
     progress(0.65, "fitting the most probable causes")
     weighed, fitted = with_left_over(weighed, catalogue)
@@ -246,7 +244,7 @@ def _diagnose(
     torques: TorqueReading | Unread | None = None
     if whole.torque is not None:
         progress(0.95, "reading the joint torques")
-        torques = torques_beside(verdict, after, whole, prior, rng)
+        torques = torques_beside(verdict, after, whole, prior, rng, limits)
     clock.ends("consequences")
     return Diagnosis(
         before,
@@ -264,6 +262,13 @@ def _diagnose(
         seed,
         clock.seconds,
     )
+
+
+def _catalogue(model: Model, manoeuvres: Sequence[Manoeuvre], knows_latitude: bool) -> list[Effect]:
+    """Return the candidates that could be at work in some recordings."""
+    wheels = any(f"wheel_momentum.{axis}" in item.recording.channels for item in manoeuvres for axis in "xyz")
+    longest = max(float(item.recording.time[-1]) for item in manoeuvres)
+    return candidates(model, knows_latitude=knows_latitude, records_wheels=wheels, longest=longest)
 
 
 def identify_extended(

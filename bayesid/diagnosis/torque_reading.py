@@ -8,7 +8,7 @@ causes of the motion, with an unknown torque of each joint as the candidate that
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,11 +34,11 @@ from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Quantity
-from bayesid.simulation.effects.physical_bound import bounds_by_label
+from bayesid.simulation.effects.physical_bound import PhysicalBound, bounds_by_label
 from bayesid.simulation.effects.register import known_effects
 from bayesid.simulation.model import Model
 
-__all__ = ["TorqueCause", "TorqueReading", "Unread", "read_torques", "torques_beside"]
+__all__ = ["TorqueCause", "TorqueReading", "Unread", "read_torques", "torque_candidates", "torques_beside"]
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,12 @@ class Unread:
 
 
 def torques_beside(
-    verdict: ProbableVerdict, hypothesis: Hypothesis, model: Model, prior: CausePrior, rng: np.random.Generator
+    verdict: ProbableVerdict,
+    hypothesis: Hypothesis,
+    model: Model,
+    prior: CausePrior,
+    rng: np.random.Generator,
+    bounds: Mapping[str, Sequence[PhysicalBound]] | None = None,
 ) -> TorqueReading | Unread:
     """Return what the joint torques say beside a verdict on the motion, see `read_torques`.
 
@@ -111,7 +116,7 @@ def torques_beside(
     if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED) or UNKNOWN in verdict.causes:
         return Unread("The motion shows something that has no name, and torques depend on the motion.")
     try:
-        return read_torques(hypothesis, model, prior, rng)
+        return read_torques(hypothesis, model, prior, rng, bounds)
     except InputError as error:
         return Unread(f"{error.problem[0].upper()}{error.problem[1:]}.")
 
@@ -162,7 +167,22 @@ class _TorqueFit:
         return float((left[..., torques] ** 2).sum()) / samples
 
 
-def read_torques(hypothesis: Hypothesis, model: Model, prior: CausePrior, rng: np.random.Generator) -> TorqueReading:
+def torque_candidates(model: Model) -> list[Effect]:
+    """Return every effect on the joint torques alone that the model does not have."""
+    present = {effect.label for effect in model.effects}
+    everywhere = [effect for kind in known_effects().values() for effect in kind.instances(model)]
+    return [
+        effect.attach(model.robot) for effect in everywhere if effect.uses("friction") and effect.label not in present
+    ]
+
+
+def read_torques(
+    hypothesis: Hypothesis,
+    model: Model,
+    prior: CausePrior,
+    rng: np.random.Generator,
+    bounds: Mapping[str, Sequence[PhysicalBound]] | None = None,
+) -> TorqueReading:
     """Weigh what acts on the joint torques.
 
     Parameters
@@ -175,6 +195,8 @@ def read_torques(hypothesis: Hypothesis, model: Model, prior: CausePrior, rng: n
         Prior of the number of causes, and of something generic.
     rng : Generator
         For the p-value.
+    bounds : mapping of str to sequence of PhysicalBound, optional
+        Largest plausible size of each candidate, by default what the effects state.
 
     Raises
     ------
@@ -182,13 +204,9 @@ def read_torques(hypothesis: Hypothesis, model: Model, prior: CausePrior, rng: n
         If a cause of the motion is not carried into the torques.
     """
     known = [effect for effect in model.effects if effect.uses("friction")]
-    present = {effect.label for effect in known}
-    everywhere = [effect for kind in known_effects().values() for effect in kind.instances(model)]
-    candidates = [
-        effect.attach(model.robot) for effect in everywhere if effect.uses("friction") and effect.label not in present
-    ]
+    candidates = torque_candidates(model)
     fitted = _TorqueFit.of(hypothesis, model, known, candidates)
-    bank = _bank(fitted, model, candidates)
+    bank = _bank(fitted, candidates, bounds_by_label(candidates, model) if bounds is None else bounds)
     evidence = SetEvidence(SignatureProducts.of(bank.signatures, fitted).gram(), bank.causes)
     alarm = EvidenceAlarm.of(evidence, rng)
     probabilities = enumerate_sets(evidence, prior)
@@ -210,9 +228,10 @@ def read_torques(hypothesis: Hypothesis, model: Model, prior: CausePrior, rng: n
     )
 
 
-def _bank(fitted: _TorqueFit, model: Model, candidates: Sequence[Effect]) -> SignatureBank:
+def _bank(
+    fitted: _TorqueFit, candidates: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
+) -> SignatureBank:
     """Return the signatures of the candidates, and of an unknown torque of each joint."""
-    bounds = bounds_by_label(candidates, model)
     sizes = [len(effect.in_amplitudes().parameters) for effect in candidates]
     parts = np.split(fitted.columns, np.cumsum(sizes)[:-1], axis=1)
     banks = []
