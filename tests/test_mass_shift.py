@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import jax.numpy as jnp
 import numpy as np
 import pinocchio as pin
@@ -9,9 +11,12 @@ import pytest
 
 from bayesid._io.errors import InputError
 from bayesid.diagnosis import Status, diagnose
+from bayesid.diagnosis.mass_shift_signatures import sample_intervals
+from bayesid.diagnosis.perturbed_fit import Engine
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
+from bayesid.report.sentences.next_steps import action_sentence
 from bayesid.robot.composite_tables import composite_rows
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.joint_state import JointState
@@ -221,27 +226,58 @@ def test_bounds_are_those_of_a_part_of_the_base():
     assert np.abs(MOMENTS[3:]).max() < second.largest
 
 
+def flights_with_jumps(instants, ends, noise):
+    """Recordings by Pinocchio of some lengths [s], in each of which the same part moves at an instant of its own."""
+    rng, moments = np.random.default_rng(8), 0.3 * MOMENTS
+    robot, recordings = Robot.from_urdf(SERVICER3), []
+    for index, (instant, end) in enumerate(zip(instants, ends, strict=True)):
+        motion = mj.smooth_motion(3, 40.0, 20 + index, amplitude=0.5, frequencies=(0.03, 0.06), ramp=10.0)
+        rate, accel, _ = stepwise(moments, 0.1, instant, motion, np.roll(RATE0, index))
+        rows = np.flatnonzero(end >= TIMES)
+        columns = {f"rate.{axis}": rate[:, i] for i, axis in enumerate("xyz")}
+        columns |= {f"accel.{axis}": accel[:, i] for i, axis in enumerate("xyz")}
+        columns = {name: value[rows] + noise * rng.normal(size=len(rows)) for name, value in columns.items()}
+        angles = np.array([motion(float(now))[0] for now in TIMES[rows]]) + 1e-6 * rng.normal(size=(len(rows), 3))
+        columns |= {f"position.{joint.name}": angles[:, i] for i, joint in enumerate(robot.joints)}
+        recordings.append(Recording(f"flight-{index + 1}", None, TIMES[rows], columns))
+    guess = robot.perturbed("base_link", 0.1, np.random.default_rng(1))
+    sensors = Sensor(Kind.RATE, White(noise)), Sensor(Kind.ACCEL, White(noise), position=POINT)
+    model = Model(guess, sensors, (BodyPrior("base_link", guess.link("base_link").inertial, 0.3),))
+    flights = [Manoeuvre(one, MeasuredMotion.from_recording(one, guess, sigma={0: 1e-6})) for one in recordings]
+    return model, flights, moments
+
+
+def test_intervals_are_those_of_the_samples_and_not_of_their_padding():
+    """One recording is four times as long as the others, whose grids are filled with copies of the last sample."""
+    model, flights, _ = flights_with_jumps((16.3, 5.0, 5.0), (40.0, 10.0, 10.0), 1e-5)
+    engine = Engine(Posterior.of(model, flights))
+    z = engine.posterior.starting_point()
+    fit = SimpleNamespace(operating=engine.operating(z, ()))
+    for steps, flight in zip(sample_intervals(fit), flights, strict=True):
+        np.testing.assert_allclose(steps, np.diff(flight.recording.time))
+
+
+@pytest.mark.slow
+def test_a_jump_is_found_beside_much_shorter_recordings():
+    """More than half of the samples' grid is padding, which once left the search for the instant without an end."""
+    model, flights, _ = flights_with_jumps((16.3, 4.2, 6.1), (40.0, 10.0, 10.0), 1e-5)
+    result = diagnose(model, flights, 1)
+    assert result.verdict.causes == ("mass-shift",)
+    (row,) = [row for row in result.to_dict()["candidates"] if row["name"] == "mass-shift"]
+    assert row["amplitude"]["flight-1.time"]["mean"] == pytest.approx(16.3, abs=0.6)
+    (own,) = [row for row in result.to_dict()["sets"] if row["causes"] == ["mass-shift"]]
+    assert own["refitted"]
+    assert "mass-shift:" in action_sentence(result)
+
+
 @pytest.mark.slow
 def test_a_jump_in_every_recording_is_named_and_measured_with_its_instants():
     """Three recordings by Pinocchio, in each of which the same part moves at an instant of its own.
 
     With one recording and every fortieth part of it alone among the forms, two jumps in three were left without a name.
     """
-    rng, instants, noise = np.random.default_rng(8), (11.2, 16.3, 29.7), 1e-5
-    moments, rows = 0.3 * MOMENTS, len(TIMES)
-    robot, recordings = Robot.from_urdf(SERVICER3), []
-    for index, instant in enumerate(instants):
-        motion = mj.smooth_motion(3, 40.0, 20 + index, amplitude=0.5, frequencies=(0.03, 0.06), ramp=10.0)
-        rate, accel, _ = stepwise(moments, 0.1, instant, motion, np.roll(RATE0, index))
-        columns = {f"rate.{axis}": rate[:, i] + noise * rng.normal(size=rows) for i, axis in enumerate("xyz")}
-        columns |= {f"accel.{axis}": accel[:, i] + noise * rng.normal(size=rows) for i, axis in enumerate("xyz")}
-        angles = np.array([motion(float(now))[0] for now in TIMES]) + 1e-6 * rng.normal(size=(rows, 3))
-        columns |= {f"position.{joint.name}": angles[:, i] for i, joint in enumerate(robot.joints)}
-        recordings.append(Recording(f"flight-{index + 1}", None, TIMES, columns))
-    guess = robot.perturbed("base_link", 0.1, np.random.default_rng(1))
-    sensors = Sensor(Kind.RATE, White(noise)), Sensor(Kind.ACCEL, White(noise), position=POINT)
-    model = Model(guess, sensors, (BodyPrior("base_link", guess.link("base_link").inertial, 0.3),))
-    flights = [Manoeuvre(one, MeasuredMotion.from_recording(one, guess, sigma={0: 1e-6})) for one in recordings]
+    instants = (11.2, 16.3, 29.7)
+    model, flights, moments = flights_with_jumps(instants, (40.0, 40.0, 40.0), 1e-5)
     result = diagnose(model, flights, 1)
     assert result.verdict.status is Status.EXPLAINED
     assert result.verdict.causes == ("mass-shift",)

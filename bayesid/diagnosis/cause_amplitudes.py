@@ -12,7 +12,7 @@ from bayesid.diagnosis.hypothesis import Hypothesis
 from bayesid.diagnosis.initial_rate_signatures import INITIAL_RATE
 from bayesid.simulation.effects.effect import Quantity
 
-__all__ = ["CauseAmplitude", "amplitudes_of", "effect_amplitude"]
+__all__ = ["CauseAmplitude", "amplitudes_of", "amplitudes_of_others", "effect_amplitude"]
 
 
 class CauseAmplitude(NamedTuple):
@@ -31,7 +31,7 @@ class CauseAmplitude(NamedTuple):
 def amplitudes_of(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:
     """Return the amplitudes of one cause of a hypothesis; of initial rates, one per axis and recording."""
     for index, effect in enumerate(hypothesis.fit.effects):
-        if label in (effect.label, effect.name):  # a jump's label holds its instants
+        if label == effect.candidate:
             mean, sd = effect_amplitude(hypothesis, index)
             return list(map(CauseAmplitude, effect.quantities, mean.tolist(), sd.tolist()))
     if label == INITIAL_RATE:
@@ -56,19 +56,31 @@ def _initial_rates(hypothesis: Hypothesis) -> list[CauseAmplitude]:
     return amplitudes
 
 
-def effect_amplitude(hypothesis: Hypothesis, index: int) -> tuple[Floats, Floats]:
-    """Return mean and standard deviation of what is reported of one effect of a fit, in the first recording."""
+def amplitudes_of_others(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:
+    """Return the amplitudes in all recordings but the first, as ``RECORDING.key``, of a cause that has some in each."""
+    names = [item.recording.name for item in hypothesis.fit.posterior.manoeuvres]
+    index = next((i for i, effect in enumerate(hypothesis.fit.effects) if label == effect.candidate), None)
+    if index is None or not hypothesis.fit.effects[index].per_recording:
+        return []
+    found = []
+    for recording, name in enumerate(names[1:], start=1):
+        mean, sd = effect_amplitude(hypothesis, index, recording)
+        for (key, unit), own_mean, own_sd in zip(hypothesis.fit.effects[index].quantities, mean, sd, strict=True):
+            found.append(CauseAmplitude(Quantity(f"{name}.{key}", unit), float(own_mean), float(own_sd)))
+    return found
+
+
+def effect_amplitude(hypothesis: Hypothesis, index: int, recording: int = 0) -> tuple[Floats, Floats]:
+    """Return mean and standard deviation of what is reported of one effect of a fit, in one recording."""
     fit = hypothesis.fit
     effect = fit.effects[index]
     if not effect.parameters:
         return np.zeros(0), np.zeros(0)
-    first = fit.own.shape[1] + sum(columns.shape[1] for columns in fit.added[:index])
     count = len(effect.parameters)
-    coordinates, covariance = (
-        fit.coordinates[index][:count],
-        fit.covariance[first : first + count, first : first + count],
-    )
-
+    before = recording * count if effect.per_recording else 0
+    first = fit.own.shape[1] + sum(columns.shape[1] for columns in fit.added[:index]) + before
+    coordinates = np.ravel(fit.coordinates[index])[before : before + count]
+    covariance = fit.covariance[first : first + count, first : first + count]
     slope = report_slopes(effect, coordinates)
     sd = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slope, covariance, slope), 0.0))
     return report_of(effect, coordinates), sd

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from bayesid.diagnosis.candidate_table import Candidate
-from bayesid.diagnosis.cause_amplitudes import amplitudes_of
+from bayesid.diagnosis.cause_amplitudes import amplitudes_of, amplitudes_of_others
 from bayesid.diagnosis.jump_instants import jump_instants
 from bayesid.diagnosis.probable_verdict import UNKNOWN
 from bayesid.diagnosis.torque_reading import TorqueReading, Unread
@@ -138,8 +138,11 @@ def _torques(found: TorqueReading | Unread | None) -> dict[str, Any] | None:
 
 
 def _fitted(result: Diagnosis, name: str) -> dict[str, Any]:
-    """Return what the extended model says of a named cause: its amplitudes, and of a jump the instants."""
-    found = amplitudes_of(result.after, name)
+    """Return what the extended model says of a named cause: its amplitudes, and of a jump the instants.
+
+    Of a cause with amplitudes in each recording the first recording's have plain keys.
+    """
+    found = amplitudes_of(result.after, name) + amplitudes_of_others(result.after, name)
     if name == MassShift.name:
         found += jump_instants(result.after)
     return {"amplitude": {item.quantity.name: quantity(item.mean, item.sd, item.quantity.unit) for item in found}}

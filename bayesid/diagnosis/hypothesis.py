@@ -30,4 +30,4 @@ class Hypothesis:
     def labels(self) -> tuple[str, ...]:
         """Names of its causes."""
         released = ("initial-rate",) if len(self.fit.released) else ()
-        return (*(effect.label for effect in self.fit.effects), *released, *(fault.label for fault in self.faults))
+        return (*(effect.candidate for effect in self.fit.effects), *released, *(fault.label for fault in self.faults))

@@ -9,7 +9,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.cause_amplitudes import CauseAmplitude
 from bayesid.diagnosis.hypothesis import Hypothesis
-from bayesid.diagnosis.mass_shift_signatures import jump_signatures
+from bayesid.diagnosis.mass_shift_signatures import jump_signatures, sample_intervals
 from bayesid.simulation.effects.effect import Quantity
 from bayesid.simulation.effects.mass_shift import MassShift
 
@@ -47,7 +47,7 @@ def jump_instants(hypothesis: Hypothesis) -> list[CauseAmplitude]:
     count = len(fit.posterior.manoeuvres)
     fitted = np.broadcast_to(jump.instants, count)
     times = np.asarray(fit.operating.sample.environment.time)
-    reach = np.full(count, FINER * float(np.median(np.diff(times, axis=1))) * POINTS)
+    reach = FINER * POINTS * np.array([np.median(steps) for steps in sample_intervals(fit)])
     found: dict[int, tuple[float, float]] = {}
     open_ones = [r for r in range(count) if 0.0 <= fitted[r] <= times[r].max()]
     while open_ones:

@@ -14,7 +14,7 @@ from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
-__all__ = ["jump_signatures", "mass_shift_signatures", "shift_instants", "shift_spread"]
+__all__ = ["jump_signatures", "mass_shift_signatures", "sample_intervals", "shift_instants", "shift_spread"]
 
 INSTANTS = 16
 """Instants of the grid in each recording."""
@@ -62,6 +62,12 @@ def mass_shift_signatures(
     ]
     forms = [(AmplitudeGroup(item.name, size, spread=spread),) for item in signatures]
     return SignatureBank(tuple(signatures), (CandidateCause(shift.label, forms[0], others=tuple(forms[1:])),))
+
+
+def sample_intervals(fit: Fit) -> list[Floats]:
+    """Return the intervals between the sampling times of each recording [s], without the copies that fill its grid."""
+    steps = np.diff(np.asarray(fit.operating.sample.environment.time), axis=1)
+    return [row[row > 0.0] for row in steps]
 
 
 def shift_spread(bounds: Sequence[PhysicalBound]) -> tuple[float, Floats]:

@@ -16,7 +16,7 @@ import numpy as np
 from bayesid.diagnosis.catalogue_signatures import group_names
 from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.linearisation import Linearisation
-from bayesid.diagnosis.mass_shift_signatures import jump_signatures, shift_instants, shift_spread
+from bayesid.diagnosis.mass_shift_signatures import jump_signatures, sample_intervals, shift_instants, shift_spread
 from bayesid.diagnosis.scale_integral import GroupSpectrum
 from bayesid.diagnosis.scale_prior import AmplitudeGroup
 from bayesid.diagnosis.set_probabilities import SetProbabilities
@@ -64,24 +64,24 @@ def with_tuned_shift(
         Other causes of the set in which the instants are sought.
     bounds : mapping of str to sequence of PhysicalBound
     """
-    times = np.asarray(point.fit.operating.sample.environment.time)
-    ends = times.max(axis=1)
+    ends = np.asarray(point.fit.operating.sample.environment.time).max(axis=1)
+    intervals = sample_intervals(point.fit)
+    finest = np.array([np.median(steps) for steps in intervals])
     grid = np.stack([shift_instants(float(end)) for end in ends])
     size, spread = shift_spread(bounds[shift.label])
     group = AmplitudeGroup(shift.label, size, spread=spread)
     chosen: list[float | None] = [None] * len(ends)
     reach = np.array([float(row[1] - row[0]) for row in grid])
-    choices, finest = [list(map(float, row)) for row in grid], float(np.median(np.diff(times, axis=1)))
+    choices = [list(map(float, row)) for row in grid]
     while True:
         chosen = _sought(point, shift, others, group, choices, chosen)
-        if reach.max() < finest or not any(instant is not None for instant in chosen):
+        if (reach < finest).all() or not any(instant is not None for instant in chosen):
             break
         choices = [_around(instant, wide, float(end)) for instant, wide, end in zip(chosen, reach, ends, strict=True)]
         reach = reach / POINTS
-    jumping = [instant for instant in chosen if instant is not None]
-    if not jumping:
+    samples = [len(steps) + 1 for steps, instant in zip(intervals, chosen, strict=True) if instant is not None]
+    if not samples:
         return point
-    samples = [times.shape[1] for _ in jumping]
     share = SHARE / (2.0 ** len(ends) - 1.0) / float(np.prod(samples, dtype=float))
     instants = tuple(np.inf if instant is None else instant for instant in chosen)
     columns = jump_signatures(point.engine, point.fit, np.array(instants)[:, None])[:, 0]

@@ -41,7 +41,7 @@ class CauseMark(NamedTuple):
 
 def cause_marks(hypothesis: Hypothesis, pose: Floats) -> list[CauseMark]:
     """Return a mark for every cause of a hypothesis, in the robot's pose (joints, 4, 4)."""
-    effects = {effect.label: effect for effect in hypothesis.fit.effects}
+    effects = {effect.candidate: effect for effect in hypothesis.fit.effects}
     robot = hypothesis.fit.posterior.model.robot
     marks = []
     for label in hypothesis.labels:

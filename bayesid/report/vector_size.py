@@ -64,7 +64,7 @@ def vector_size(hypothesis: Hypothesis, label: str) -> VectorSize | None:
     recording, the first recording's stand for all.
     """
     fit = hypothesis.fit
-    index = next((place for place, effect in enumerate(fit.effects) if effect.label == label), None)
+    index = next((place for place, effect in enumerate(fit.effects) if effect.candidate == label), None)
     if index is None:
         return None
     effect = fit.effects[index]

@@ -176,7 +176,7 @@ def alternative_sentences(result: Diagnosis) -> Iterator[str]:
 def cause_summary(hypothesis: Hypothesis, label: str) -> str:
     """Return what a cause of a hypothesis is, in one sentence."""
     for effect in hypothesis.fit.effects:
-        if effect.label == label:
+        if effect.candidate == label:
             return effect.summary
     if label == "initial-rate":
         return RELEASED

@@ -185,6 +185,16 @@ class Effect:
         return self.name
 
     @property
+    def candidate(self) -> str:
+        """Name of the candidate cause of which the effect is a form; several forms may share one."""
+        return self.label
+
+    @property
+    def entry(self) -> str:
+        """Text that makes the effect with its settings, though not its priors, in the ``effects`` of a study file."""
+        return self.label
+
+    @property
     def link(self) -> str | None:
         """Link to which `table` belongs; None if it changes several, for which joint torques are not computed."""
         return None

@@ -88,6 +88,11 @@ class MassShift(Effect):
         return f"{self.name}:{','.join(f'{instant:g}' for instant in self.instants)}"
 
     @property
+    def candidate(self) -> str:
+        """Name without instants, which the data give."""
+        return self.name
+
+    @property
     def link(self) -> str | None:
         """The base, in which the mass moves."""
         return self.base

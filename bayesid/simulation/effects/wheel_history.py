@@ -46,7 +46,7 @@ class WheelHistory(Placed):
     Parameters
     ----------
     place : str
-        Base axis, x, y or z.
+        Base axis, x, y or z, and after a comma the time of the last knot, if another than the default.
     end : float
         Time of the last knot [s], best the length of the longest recording.
     sigma : float
@@ -66,16 +66,22 @@ class WheelHistory(Placed):
     constant_names = ("end",)
 
     def __init__(self, place: str = "", end: float = 230.0, sigma: float = 1.0) -> None:
-        super().__init__(place)
-        if not end > 0.0:
-            raise InputError(f"{self.label}: the last knot is at {end:g} s", remedy="Give the recordings' length")
-        self.end = end
+        axis, _, stated = place.partition(",")
+        super().__init__(axis)
+        self.end = float(stated) if stated else end
+        if not 0.0 < self.end < np.inf:
+            raise InputError(f"{self.label}: the last knot is at {self.end:g} s", remedy="Give the recordings' length")
         self.parameters = tuple(Parameter(f"momentum.{knot}", "N m s", sigma) for knot in range(1, KNOTS + 1))
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
         """Return the effect about every base axis."""
         return [cls(axis) for axis in AXES]
+
+    @property
+    def entry(self) -> str:
+        """The label with the time of the last knot."""
+        return f"{self.label},{self.end:g}"
 
     def attach(self, robot: Robot) -> Self:
         """Return the effect after a check of its axis."""
