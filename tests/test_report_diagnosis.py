@@ -537,11 +537,11 @@ def test_the_parameters_are_those_given_and_of_both_fits(biased):
     assert changes[0].prior_sd == pytest.approx(given.mass * np.sinh(2.0 * spread), rel=0.1)
     rows = change_tables.change_rows(changes)
     for k, (row, item) in enumerate(zip(rows, changes, strict=True)):
-        assert row[2] == format_quantity(item.given, item.prior_sd)
-        assert row[3] == format_quantity(before.mean[k], before.sd[k])
-        assert row[4] == format_quantity(after.mean[k], after.sd[k])
-        assert float(row[5].replace("−", "-")) == pytest.approx(biased.gain.shift[k], abs=0.051)
-    assert [row[:4] for row in rows] == change_tables.change_rows(changes, named=False)
+        assert row[2:4] == [format_number(item.given, 4), format_number(item.prior_sd, 2)]
+        assert row[4] == format_quantity(before.mean[k], before.sd[k])
+        assert row[5] == format_quantity(after.mean[k], after.sd[k])
+        assert float(row[6].replace("−", "-")) == pytest.approx(biased.gain.shift[k], abs=0.051)
+    assert [row[:5] for row in rows] == change_tables.change_rows(changes, named=False)
 
 
 def test_those_that_move_most_stand_in_their_usual_order(biased):

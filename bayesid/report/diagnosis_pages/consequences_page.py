@@ -27,13 +27,13 @@ def add_consequences(document: Document, result: Diagnosis, changes: Sequence[Pa
     document.section("Consequences" if named else "Inertial parameters and the disturbance")
     if changes:
         document.table(
-            ["parameter", "unit", "given", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
+            ["parameter", "unit", "given", "prior sd", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
             change_tables.change_rows(changes, named),
             "Inertial parameters, ± sd: given with the prior's width, fitted without the named causes, fitted with "
             "them. A shift of many standard deviations of the fit without is the error that would have been believed."
             if named
             else "Inertial parameters, ± sd: given with the prior's width, and fitted with the present model.",
-            ["left", "left", *["right"] * (4 if named else 2)],
+            ["left", "left", *["right"] * (5 if named else 3)],
         )
     if changes:
         document.figure(

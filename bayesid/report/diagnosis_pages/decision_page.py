@@ -135,12 +135,12 @@ def _add_changes(document: Document, result: Diagnosis, changes: Sequence[Parame
     if not changes:
         return
     document.table(
-        ["parameter", "unit", "given", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
+        ["parameter", "unit", "given", "prior sd", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
         change_tables.change_rows(change_tables.most_moved(changes, MOVED), named),
         "The inertial parameters that move most: given, fitted without the named causes, fitted with them, ± sd."
         if named
         else "Inertial parameters: given, and fitted with the present model, ± sd. All are on a later page.",
-        ["left", "left", *["right"] * (4 if named else 2)],
+        ["left", "left", *["right"] * (5 if named else 3)],
     )
 
 

@@ -13,10 +13,11 @@ __all__ = ["change_rows", "error_rows", "most_moved"]
 
 
 def change_rows(changes: Sequence[ParameterChange], named: bool = True) -> Rows:
-    """Return parameter, unit, given, without, with, and shift in sd of without; only the fit where nothing is named."""
+    """Return parameter, unit, given, prior sd, without, with, and shift in sd; only the fit where nothing is named."""
     rows = []
     for item in changes:
-        start = [item.name, format_unit(item.unit), format_quantity(item.given, item.prior_sd)]
+        given = [format_number(item.given, 4), format_number(item.prior_sd, 2)]  # wide priors would round it away
+        start = [item.name, format_unit(item.unit), *given]
         without = format_quantity(item.without, item.without_sd)
         fitted = [format_quantity(item.fitted, item.fitted_sd), format_signed(item.shift)] if named else []
         rows.append([*start, without, *fitted])
