@@ -22,9 +22,9 @@ def abridged(texts: Sequence[str], most: int = NAMED, separator: str = ", ") -> 
     return separator.join(texts[:most]) + (f" and {more} more" if more > 0 else "")
 
 
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun, which takes an s unless the number is one: ``1 recording``, ``3 recordings``."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+def counted(number: int, noun: str, plural: str | None = None) -> str:
+    """Return a number with its noun, whose plural has an s unless stated: ``1 recording``, ``3 recordings``."""
+    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
 
 
 def ordinal(number: int) -> str:

@@ -42,6 +42,7 @@ def run(
     import bayesid
     from bayesid._io.files import claimed_folder, complete_folder, write_json
     from bayesid._io.store import content_key
+    from bayesid._io.words import counted
     from bayesid.app.fly_next import write_motion
     from bayesid.app.study_to_design import defining_files, load_problem, separating
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
@@ -54,7 +55,8 @@ def run(
     problem = load_problem(study)
     noise, assumed = assume_missing(encoder_noise(study, problem.plan.model.robot))
     yield (
-        f"{study.title}: {len(problem.criteria)} criteria, {problem.plan.family.size} parameters of "
+        f"{study.title}: {counted(len(problem.criteria), 'criterion', 'criteria')}, "
+        f"{problem.plan.family.size} parameters of "
         f"{problem.plan.family.name}, {problem.plan.family.duration:g} s."
     )
     if assumed:

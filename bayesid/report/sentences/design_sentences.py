@@ -74,11 +74,12 @@ def design_sentences(designs: Sequence[Design], best: Design) -> list[str]:
     """Return one sentence on each design and one on the best, for the terminal."""
     reference = reference_design(designs)
     scale = reference.predicted.geometric_mean
-    lines = [
-        f"{design.name}: standard deviations {design.predicted.geometric_mean / scale:.3g} "
-        f"times those of {reference.name}; {'go' if design.go else 'no go'} under the present uncertainty."
-        for design in designs
-    ]
+    lines = []
+    for design in designs:
+        ratio = design.predicted.geometric_mean / scale
+        size = "" if design is reference else f"standard deviations {ratio:.3g} times those of {reference.name}, and "
+        kept = "every limit is kept" if design.go else "some limit is not kept"
+        lines.append(f"{design.name}: {size}{kept} with 99 % probability under the present uncertainty of the robot.")
     return [*lines, *map(separation_sentence, filter(_separates, designs)), f"Best: {best.name}."]
 
 
