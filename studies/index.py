@@ -6,13 +6,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from bayesid._io.files import write_text
 from studies.common.goals import Verdict
-from studies.validation import BESIDE
+from studies.validation import BESIDE, SUBJECTS
 
 __all__ = ["index_text"]
 
@@ -33,9 +35,11 @@ def index_text(folder: Path) -> str:
     reports = sorted(folder.glob("*.pdf"))
     summaries = [(file, json.loads(file.with_suffix(".json").read_text())) for file in reports if _kept(file)]
     others = [f"- [{file.stem}]({file.name})" for file in reports if not _kept(file) and file.stem not in BESIDE]
-    parts = [HEAD, *_totals([summary for _, summary in summaries])]
+    untested = [asdict(goal) for subject in SUBJECTS for goal in subject.untested]
+    parts = [HEAD, *_totals([summary["goals"] for _, summary in summaries], untested)]
     for file, summary in summaries:
         parts += ["", *_entry(file, summary)]
+    parts += ["", "## Tested by no study", "", *_table(untested)]
     return "\n".join([*parts, *([OTHERS, *others] if others else []), ""])
 
 
@@ -43,14 +47,14 @@ def _kept(file: Path) -> bool:
     return file.with_suffix(".json").is_file()
 
 
-def _counts(summaries: list[dict[str, Any]]) -> list[str]:
-    found = [goal["verdict"] for summary in summaries for goal in summary["goals"]]
-    return [f"{found.count(verdict.value)} {verdict.value}" for verdict in Verdict if verdict.value in found]
+def _counts(goals: Iterable[Mapping[str, Any]]) -> str:
+    found = [goal["verdict"] for goal in goals]
+    return ", ".join(f"{found.count(verdict.value)} {verdict.value}" for verdict in Verdict if verdict.value in found)
 
 
-def _totals(summaries: list[dict[str, Any]]) -> Iterator[str]:
-    if summaries:
-        yield f"All {sum(len(summary['goals']) for summary in summaries)} goals: {', '.join(_counts(summaries))}."
+def _totals(judged: Sequence[Sequence[Mapping[str, Any]]], untested: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    goals = [*chain.from_iterable(judged), *untested]
+    yield f"All {len(goals)} goals: {_counts(goals)}."
 
 
 def _entry(file: Path, summary: dict[str, Any]) -> Iterator[str]:
@@ -61,11 +65,15 @@ def _entry(file: Path, summary: dict[str, Any]) -> Iterator[str]:
     yield f"**{summary['answer']}**"
     yield ""
     run = "full run" if summary["full"] else "not run in full"
-    yield f"Valid when {summary['valid']} {run.capitalize()}. Goals: {', '.join(_counts([summary]))}."
+    yield f"Valid when {summary['valid']} {run.capitalize()}. Goals: {_counts(summary['goals'])}."
     yield ""
+    yield from _table(summary["goals"])
+
+
+def _table(goals: Iterable[Mapping[str, Any]]) -> Iterator[str]:
     yield "| goal | reached | verdict |"
     yield "|---|---|---|"
-    for goal in summary["goals"]:
+    for goal in goals:
         yield "| " + " | ".join(goal[key].replace("|", "\\|") for key in ("text", "reached", "verdict")) + " |"
 
 

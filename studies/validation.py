@@ -165,7 +165,7 @@ def _where(goals: Sequence[Judged]) -> str:
 def _without(folder: Path, summaries: Mapping[str, Any]) -> str:
     names = [file.stem for file in sorted(folder.glob("*.pdf")) if file.stem not in (*summaries, *BESIDE)]
     if not names:
-        return "every report has a summary"
+        return "no report: each has a summary of its goals"
     return (
         f"{', '.join(names)}: reports without a summary, whose goals are on their first pages and are not counted here"
     )

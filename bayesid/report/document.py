@@ -58,13 +58,15 @@ _TEMPLATE = """\
 #show table: set text(size: 8.5pt)
 #show table: set par(justify: false, leading: 0.5em)
 #show table.cell.where(y: 0): strong
-#let decision(title, ..cells) = block(width: 100%, stroke: 1pt, radius: 3pt, inset: 9pt, breakable: false, {
+#let decision(title, picture, ..cells) = block(width: 100%, stroke: 1pt, radius: 3pt, inset: 9pt, breakable: false, {
   set text(size: 10pt)
   set par(justify: false, leading: 0.55em, spacing: 0.5em)
   par(leading: 0.5em, text(size: 12.5pt, weight: "bold", title))
   v(0.35em)
-  grid(columns: (auto, 1fr), column-gutter: 1em, row-gutter: 0.65em,
+  let entries = grid(columns: (auto, 1fr), column-gutter: 1em, row-gutter: 0.65em,
     ..cells.pos().chunks(2).map(pair => (text(fill: luma(35%), pair.at(0)), pair.at(1))).flatten())
+  if picture == none { entries }
+  else { grid(columns: (1fr, auto), column-gutter: 1em, align: (left, horizon), entries, picture) }
 })
 #let foot(small) = context {
   if counter(page).get().first() == 1 {
@@ -113,10 +115,15 @@ class Document:
         if texts:
             self._parts.append(f"#list({', '.join(literal(text) for text in texts)})\n")
 
-    def decision(self, title: str, entries: Sequence[tuple[str, str]]) -> None:
-        """Add a framed box with a title and rows of a name and its text."""
+    def decision(self, title: str, entries: Sequence[tuple[str, str]], picture: Figure | None = None) -> None:
+        """Add a framed box with a title, rows of a name and its text, and a picture in its own size beside them."""
         cells = "".join(f", {literal(text)}" for entry in entries for text in entry)
-        self._parts.append(f"#decision({literal(title)}{cells})\n")
+        image = "none" if picture is None else f"image({self._image(picture)})"
+        self._parts.append(f"#decision({literal(title)}, {image}{cells})\n")
+
+    def mentions(self, pattern: str) -> bool:
+        """Whether a regular expression occurs in what was added so far, figures aside."""
+        return any(re.search(pattern, part) for part in self._parts[1:])
 
     def foot(self, text: str) -> None:
         """Put a text in small print at the foot of the first page."""
@@ -176,12 +183,16 @@ class Document:
         """
         if not re.fullmatch(r"\d+(\.\d+)?%", width):
             raise InputError(f"width {width!r} is not a percentage", remedy='Give the width of a figure as "80%"')
-        self._figures.append(_svg(fig))
-        name = literal(f"figure-{len(self._figures)}.svg")
+        name = self._image(fig)
         place = "bottom" if floating else "none"
         self._parts.append(
             f"#figure(image({name}, width: {width}), kind: image, placement: {place}, caption: {literal(caption)})\n"
         )
+
+    def _image(self, fig: Figure) -> str:
+        """Keep a figure for the document and return the literal of its file's name."""
+        self._figures.append(_svg(fig))
+        return literal(f"figure-{len(self._figures)}.svg")
 
     def write(self, path: str | Path) -> None:
         """Set the document and write it as PDF, all or nothing."""

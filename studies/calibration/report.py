@@ -19,7 +19,9 @@ from studies.calibration.encoders import NEAR, Smoothed, smooth_share, smoothed_
 from studies.calibration.outcomes import Replicates
 from studies.calibration.replicate import LOG_LIKELIHOOD, Method
 from studies.calibration.uniformity import POINTS, coverage, holm, uniform_p_value
+from studies.common.ets7 import START, ets7
 from studies.common.goals import Goal, Verdict
+from studies.common.robot_outline import robot_outline
 from studies.common.tables import add_number_table
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study
 
@@ -73,7 +75,7 @@ def write_report(cases: Sequence[Replicates], file: Path, origin: str | None = N
         f"by Holm's method over all {len(corrected)} ranks of all cases. A goal fails at "
         f"{format_percent(FAMILYWISE, 1)} family-wise, and is not decided until all its replicates are made."
     )
-    add_setup(document, _setup(cases))
+    add_setup(document, _setup(cases), outline=robot_outline(ets7(), START))
     document.section("What went wrong")
     document.items(_failures(cases))
     document.section("What the ranks and intervals say")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import os
 import platform
 import subprocess
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
+from bayesid._io.words import counted
 from bayesid.app.report_origin import origin_text
 
 __all__ = ["MODELS", "processor", "study_origin"]
@@ -58,10 +60,10 @@ def _git(*words: str) -> str:
 
 
 def processor() -> str:
-    """Return the name of the processor."""
+    """Return the name of the processor and the number of its cores that are at hand."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
-        return platform.processor() or platform.machine()
+        lines = []
     names = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    return next(names, platform.machine())
+    return f"{next(names, platform.processor() or platform.machine())} with {counted(os.cpu_count() or 1, 'core')}"

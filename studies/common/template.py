@@ -1,7 +1,8 @@
 """Parts that make all studies' reports alike: first page, setup, the paper's statements, and what is written beside.
 
 A report is a `bayesid.report.Document` of two to four pages: `add_first_page`, `add_setup`, at most two figures and two
-tables of evidence, calibration and failures, `add_statements`; `write_study` adds where it comes from and writes it.
+tables of evidence, calibration and failures, `add_statements`; `write_study` adds the meanings of its terms and where
+it comes from, and writes it.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from matplotlib.figure import Figure
 
 from bayesid._io.files import complete_file, write_json
 from bayesid.report import Document
+from studies.common.glossary import add_glossary
 from studies.common.goals import Goal, add_goals
 
 __all__ = ["Finding", "Setup", "Statement", "Summary", "add_first_page", "add_setup", "add_statements"]
@@ -88,11 +90,18 @@ def add_first_page(document: Document, summary: Summary, figure: Figure | None =
     add_goals(document, summary.goals)
 
 
-def add_setup(document: Document, setup: Setup, picture: Figure | None = None, caption: str = "") -> None:
-    """Add the conditions in a box, and a picture of the robot if there is one."""
+def add_setup(
+    document: Document,
+    setup: Setup,
+    picture: Figure | None = None,
+    caption: str = "",
+    *,
+    outline: Figure | None = None,
+) -> None:
+    """Add the conditions in a box, with an outline of the robot in it or a picture of its motion below."""
     document.section("Setup")
     entries = [(name.capitalize(), text) for name, text in asdict(setup).items()]
-    document.decision("Conditions", entries)
+    document.decision("Conditions", entries, outline)
     if picture is not None:
         document.figure(picture, caption)
 
@@ -107,6 +116,8 @@ def add_statements(document: Document, statements: Sequence[Statement]) -> None:
 def write_study(document: Document, summary: Summary, output: Path, origin: str | None = None) -> None:
     """Write the report as PDF, with where it comes from at its foot, and beside it question, answer and goals as JSON.
 
+    The meanings of the terms that it uses are its last paragraph.
+
     Parameters
     ----------
     document : Document
@@ -116,6 +127,7 @@ def write_study(document: Document, summary: Summary, output: Path, origin: str 
     origin : str, optional
         Result of `studies.common.provenance.study_origin`.
     """
+    add_glossary(document)
     if origin is not None:
         document.foot(origin)
     document.write(output)

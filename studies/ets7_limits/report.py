@@ -9,10 +9,23 @@ import numpy as np
 from bayesid.report import Document
 from bayesid.report.numbers import format_number, format_percent, format_vector
 from studies.common import mission
-from studies.common.ets7 import ACCEL, ACCELEROMETER, BIAS, CORNER, ENCODER, EXCURSION, INTERVAL, RAMPS, RATE
+from studies.common.ets7 import (
+    ACCEL,
+    ACCELEROMETER,
+    BIAS,
+    CORNER,
+    ENCODER,
+    EXCURSION,
+    INTERVAL,
+    RAMPS,
+    RATE,
+    START,
+    ets7,
+)
 from studies.common.goals import Goal, Verdict
 from studies.common.manoeuvre_figure import manoeuvre_figure
 from studies.common.quantities import HEADINGS
+from studies.common.robot_outline import robot_outline
 from studies.common.tables import add_number_table
 from studies.common.template import (
     Finding,
@@ -119,7 +132,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         "Largest of the relative standard deviations of mass and moments of inertia against the time spent moving, "
         "with 10⁻⁵ rad/s, 10⁻⁵ m/s² and an unknown bias. The grey line is 1 %.",
     )
-    add_setup(document, _setup())
+    add_setup(document, _setup(), outline=robot_outline(ets7(), START))
     document.figure(
         manoeuvre_figure({"d-optimal manoeuvre": result.motion, "the flight's own": mission.flight_manoeuvre()}),
         "The two manoeuvres in MuJoCo: joints, speed of the tip with the rule dotted, and rotation of the base.",

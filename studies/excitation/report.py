@@ -13,10 +13,11 @@ from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent
 from studies.common import mission
-from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE
+from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, ets7
 from studies.common.goals import Goal, Verdict
 from studies.common.manoeuvre_figure import manoeuvre_figure
 from studies.common.quantities import HEADINGS, LABELS
+from studies.common.robot_outline import robot_outline
 from studies.common.tables import add_number_table
 from studies.common.template import (
     Finding,
@@ -164,7 +165,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         "Geometric mean of the ten standard deviations of each manoeuvre over that of the d-optimal one: how many "
         "times less it tells. Filled: arm known to 5 % of each link's mass; open: arm known exactly.",
     )
-    add_setup(document, _setup(result))
+    add_setup(document, _setup(result), outline=robot_outline(ets7(), START))
     _evidence(document, result)
     _saturation(document, result)
     _calibration(document, result)

@@ -16,9 +16,11 @@ from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_signed
 from studies.common.command import TRIALS, Command
+from studies.common.ets7 import START, ets7
 from studies.common.goals import Goal, Verdict
 from studies.common.monte_carlo import read_store, run_trials
 from studies.common.provenance import study_origin
+from studies.common.robot_outline import robot_outline
 from studies.common.tables import add_number_table
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 from studies.peers.contest import EFFECTIVE, LIMITS, NESTED, REFERENCE, attempt, tasks
@@ -107,7 +109,7 @@ def write_report(made: Made, file: Path, origin: str | None = None) -> None:
         "hollow: extrapolated from what was reached in the limit of time; triangle: at least, as less than a quarter "
         "was reached.",
     )
-    add_setup(document, _setup())
+    add_setup(document, _setup(), outline=robot_outline(ets7(), START))
     document.section("What went wrong")
     document.items(_failures(made))
     recipes = _recipe_rows(made)

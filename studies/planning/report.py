@@ -14,8 +14,9 @@ from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, 
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
 from bayesid.report.verdict_record import Share
 from studies.common import mission
-from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, TIP_RATE, TIP_SPEED
+from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, TIP_RATE, TIP_SPEED, ets7
 from studies.common.goals import Goal, Verdict
+from studies.common.robot_outline import robot_outline
 from studies.common.tables import add_number_table
 from studies.common.template import (
     Finding,
@@ -106,7 +107,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         "Miss of the end-effector, distance from its target and angle, over the drawn ships: share of the ships below "
         "a value. Solid: arm known to 5 %; dashed: arm known exactly.",
     )
-    add_setup(document, _setup(result))
+    add_setup(document, _setup(result), outline=robot_outline(ets7(), START))
     _failures(document, result)
     _evidence(document, result)
     add_statements(document, _statements(result))

@@ -12,10 +12,11 @@ from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
 from studies.common import mission
-from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE
+from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, ets7
 from studies.common.goals import Goal, Verdict
 from studies.common.manoeuvre_figure import manoeuvre_figure
 from studies.common.report_parts import columns
+from studies.common.robot_outline import robot_outline
 from studies.common.template import (
     Finding,
     Setup,
@@ -126,7 +127,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         f"linear theory with its standard deviation (bars). The grey line is {RIVALRY}, a probability of 0.9. The "
         "scale is linear between −1 and 1 and logarithmic beyond.",
     )
-    add_setup(document, _setup(result))
+    add_setup(document, _setup(result), outline=robot_outline(ets7(), START))
     document.figure(
         manoeuvre_figure(
             {

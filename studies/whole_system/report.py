@@ -16,9 +16,10 @@ from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import AFTER, COLOURS, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent
 from bayesid.robot.inertial_parameters import mass_com_inertia
-from studies.common.ets7 import ACCEL, ENCODER, RATE, TIP_SPEED
+from studies.common.ets7 import ACCEL, ENCODER, RATE, START, TIP_SPEED, ets7
 from studies.common.goals import Goal, Verdict
 from studies.common.report_parts import columns
+from studies.common.robot_outline import robot_outline
 from studies.common.template import (
     Finding,
     Setup,
@@ -111,7 +112,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         "Relative standard deviation of four masses after one manoeuvre with six joints: from the drawings, from "
         "motion, with joint torques (friction unknown), and with a known thrust in place of torques.",
     )
-    add_setup(document, _setup(result))
+    add_setup(document, _setup(result), outline=robot_outline(ets7(), START))
     _negatives(document, result)
     _evidence(document, result, output)
     add_statements(document, _statements(result))
