@@ -86,8 +86,8 @@ def test_the_fastest_peer_is_one_with_an_estimate():
         goals = {goal.text: goal.reached for goal in goals_of([own, *made])}
         return goals["5 times less time than the best peer, 39 unknowns"]
 
-    assert reached(cut, trial(39, Sampler.NUTS, 80.0, 4000.0)).startswith("8.0 (NUTS (NumPyro)); 1 others more than 6.0")
-    assert reached(cut).startswith("more than 6.0 (1 peers, none with an estimate)")
+    assert reached(cut, trial(39, Sampler.NUTS, 80.0, 4000.0)).startswith("8.0 (NUTS (NumPyro)); 1 other more than 6.0")
+    assert reached(cut).startswith("more than 6.0 (1 peer, none with an estimate)")
 
 
 def test_lines_of_recipes_are_counted_without_words():

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from bayesid._io.words import joined
+from bayesid._io.words import counted, joined
 from bayesid._math.arrays import Floats
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, TRUTH, styled, wide_figure
@@ -204,9 +204,9 @@ def _fastest(own: Mapping[str, Any], peers: Mapping[Sampler, Mapping[str, Any]])
     bounds = [ratio for name, ratio in ratios.items() if _is_bound(peers[name])]
     estimates = {name: ratio for name, ratio in ratios.items() if not _is_bound(peers[name])}
     if not estimates:
-        return f"more than {min(bounds):.1f} ({len(bounds)} peers, none with an estimate)"
+        return f"more than {min(bounds):.1f} ({counted(len(bounds), 'peer')}, none with an estimate)"
     best = min(estimates, key=lambda name: estimates[name])
-    beside = f"; {len(bounds)} others more than {min(bounds):.1f}" if bounds else ""
+    beside = f"; {counted(len(bounds), 'other')} more than {min(bounds):.1f}" if bounds else ""
     return f"{estimates[best]:.1f} ({best}){beside}"
 
 
