@@ -157,7 +157,7 @@ def write_report(made: Made, file: Path, origin: str | None = None) -> None:
             if "unknowns" in item["task"]
         ],
     )
-    write_study(document, summary, file, None if origin is None else f"{origin} With {packages}.")
+    write_study(document, summary, file, None if origin is None else f"{origin}. With {packages}.")
 
 
 def goals_of(made: Made) -> list[Goal]:
