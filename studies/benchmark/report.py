@@ -118,8 +118,8 @@ def write_report(runs: Sequence[Benchmark], output: Path, *, full: bool, origin:
     summary = Summary(
         "What does one simulation cost beside other simulators at the same accuracy, how does that depend on the "
         "problem, and what does an effective sample cost?",
-        f"One evaluation, of ETS-VII with {EVALUATED}, takes {_spread(1e6 * evaluations)} µs, {_spread(figures[0][1])} times less than "
-        f"Pinocchio step by step in Python and {_spread(figures[1][1])} times less than MuJoCo's rollouts in C.",
+        f"One evaluation, of ETS-VII with {EVALUATED}, takes {_spread(1e6 * evaluations)} µs, "
+        f"{_spread(figures[0][1])} times less than Pinocchio step by step in Python and {_spread(figures[1][1])} times less than MuJoCo's rollouts in C.",
         tuple(goals_of(figures)),
         f"run on {processor()}. Between the runs the time of an evaluation varies by a factor of "
         f"{_varies(evaluations)}, the ratios to the other simulators by {joined(map(_varies, ratios))}.",
@@ -183,8 +183,8 @@ def _simulations(document: Document, runs: Sequence[Benchmark]) -> None:
         ["simulator or case", "time [µs]", "ratio"],
         rows,
         f"Median of {len(runs)} runs (smallest to largest). Ratios: of other simulators to one evaluation of the log "
-        f"likelihood, that of ETS-VII with {EVALUATED}; of cases to the first with the same unit. Other simulators take steps short enough for an error "
-        "below 0.01 σ, where they reach it.",
+        f"likelihood, that of ETS-VII with {EVALUATED}; of cases to the first with the same unit. Other "
+        "simulators take steps short enough for an error below 0.01 σ, where they reach it.",
         columns("lrr"),
     )
 

@@ -102,7 +102,10 @@ def goals(result: Result) -> tuple[Goal, ...]:
 def _search_goals(result: Result) -> list[Goal]:
     """Return the goals of the searches from many starts."""
     wanted = f"{STARTS} starts"
-    largest = f"Largest factor over (26): {SEVERAL} followed searches from {wanted} or more within {format_percent(ALIKE)}"
+    largest = (
+        f"Largest factor over (26) that {wanted} find; {SEVERAL} followed searches within {format_percent(ALIKE)} of the "
+        "best known"
+    )
     robots = Goal(f"The same on {ROBOTS} robots", "one robot, ETS-VII", Verdict.NOT_TESTED)
     near = f"A thorough search by d-optimality within {format_percent(ALIKE)} of the best known, per parameter"
     crowd = result.crowds.get("d-optimal")

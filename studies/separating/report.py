@@ -257,8 +257,8 @@ def _evidence(document: Document, result: Result) -> None:
         rows,
         "λ is the energy of the hidden cause's signal in units of the noise, all other unknowns marginalised; λ(1−ρ²) "
         "is the part that the rival cannot imitate. The expected ln B adds what each prior costs. Preferred: flights "
-        f"with ln B above {RIVALRY}, a probability of {SURE:g}; directions: random directions of causes of the same size in "
-        f"which {format_percent(SURE)} of flights are expected above it, ln B being taken as normal.",
+        f"with ln B above {RIVALRY}, a probability of {SURE:g}; directions: random directions of causes of the same size "
+        f"in which {format_percent(SURE)} of flights are expected above it, ln B being taken as normal.",
         columns("llrrrrrrrr"),
     )
     document.figure(
