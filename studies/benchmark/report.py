@@ -119,7 +119,8 @@ def write_report(runs: Sequence[Benchmark], output: Path, *, full: bool, origin:
         "What does one simulation cost beside other simulators at the same accuracy, how does that depend on the "
         "problem, and what does an effective sample cost?",
         f"One evaluation, of ETS-VII with {EVALUATED}, takes {_spread(1e6 * evaluations)} µs, "
-        f"{_spread(figures[0][1])} times less than Pinocchio step by step in Python and {_spread(figures[1][1])} times less than MuJoCo's rollouts in C.",
+        f"{_spread(figures[0][1])} times less than Pinocchio step by step in Python and "
+        f"{_spread(figures[1][1])} times less than MuJoCo's rollouts in C.",
         tuple(goals_of(figures)),
         f"run on {processor()}. Between the runs the time of an evaluation varies by a factor of "
         f"{_varies(evaluations)}, the ratios to the other simulators by {joined(map(_varies, ratios))}.",

@@ -292,10 +292,11 @@ def _growth(document: Document, cost: Cost) -> None:
     document.paragraph(
         f"One evaluation, of ETS-VII with {EVALUATED}, has "
         f"{format_number(floor.operations / 1e6, 3)} million floating-point operations and, by the compiler's "
-        f"count, reads and writes {format_number(floor.traffic / 1e6, 3)} MB, most of it in caches. One core multiplies matrices at {format_number(floor.speed / 1e9, 3)} GFLOP/s and streams "
+        f"count, reads and writes {format_number(floor.traffic / 1e6, 3)} MB, most of it in caches. "
+        f"One core multiplies matrices at {format_number(floor.speed / 1e9, 3)} GFLOP/s and streams "
         f"{format_number(floor.bandwidth / 1e9, 3)} GB/s from memory. At that speed the operations alone would take "
-        f"{format_number(1e6 * floor.least, 2)} µs, of the {format_number(1e6 * floor.seconds, 3)} µs measured here: one "
-        f"evaluation is {format_number(floor.seconds / floor.least, 2)} times above that floor, as small matrices and "
+        f"{format_number(1e6 * floor.least, 2)} µs, of the {format_number(1e6 * floor.seconds, 3)} µs measured here: "
+        f"one evaluation is {format_number(floor.seconds / floor.least, 2)} times above that floor, as small matrices and "
         "short loops are."
     )
 

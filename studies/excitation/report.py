@@ -103,8 +103,8 @@ def _search_goals(result: Result) -> list[Goal]:
     """Return the goals of the searches from many starts."""
     wanted = f"{STARTS} starts"
     largest = (
-        f"Largest factor over (26) that {wanted} find; {SEVERAL} followed searches within {format_percent(ALIKE)} of the "
-        "best known"
+        f"Largest factor over (26) that {wanted} find; {SEVERAL} followed searches within {format_percent(ALIKE)} of "
+        "the best known"
     )
     robots = Goal(f"The same on {ROBOTS} robots", "one robot, ETS-VII", Verdict.NOT_TESTED)
     near = f"A thorough search by d-optimality within {format_percent(ALIKE)} of the best known, per parameter"

@@ -223,8 +223,8 @@ def _failures(document: Document, result: Result) -> None:
         texts.append(
             f"Hidden {HIDDEN[item.truth]}: the first manoeuvre alone shows the cause with ln B "
             f"{format_fixed(item.detected.mean(), 1)} against none. In random directions of the same size the "
-            f"expected ln B over the rival with the separating manoeuvre is {format_fixed(middle, 1)} in the median and "
-            f"{format_fixed(low, 1)} at the lowest tenth; in {_counts(_shown(result, item.truth, LAST))} directions it "
+            f"expected ln B over the rival with the separating manoeuvre is {format_fixed(middle, 1)} in the median "
+            f"and {format_fixed(low, 1)} at the lowest tenth; in {_counts(_shown(result, item.truth, LAST))} directions it "
             f"is above {RIVALRY} in {format_percent(SURE)} of flights or more."
         )
     texts.append(
@@ -257,8 +257,8 @@ def _evidence(document: Document, result: Result) -> None:
         rows,
         "λ is the energy of the hidden cause's signal in units of the noise, all other unknowns marginalised; λ(1−ρ²) "
         "is the part that the rival cannot imitate. The expected ln B adds what each prior costs. Preferred: flights "
-        f"with ln B above {RIVALRY}, a probability of {SURE:g}; directions: random directions of causes of the same size "
-        f"in which {format_percent(SURE)} of flights are expected above it, ln B being taken as normal.",
+        f"with ln B above {RIVALRY}, a probability of {SURE:g}; directions: random directions of causes of the same "
+        f"size in which {format_percent(SURE)} of flights are expected above it, ln B being taken as normal.",
         columns("llrrrrrrrr"),
     )
     document.figure(
