@@ -111,8 +111,8 @@ def write_report(cases: Sequence[Replicates], file: Path, origin: str | None = N
         f"P-values of ranks are exact and simultaneous over {len(POINTS)} points of their distribution, and corrected "
         f"by Holm's method over all {len(corrected)} ranks of all cases. P-values of coverage are by the standard "
         "error over replicates, whose numbers depend on one another, and corrected by Holm's method over all cases, "
-        f"all together and {len(LEVELS)} levels. A goal fails at {format_percent(FAMILYWISE, 1)} family-wise, and is not "
-        "decided until all its replicates are made."
+        f"all together and {len(LEVELS)} levels. A goal fails at {format_percent(FAMILYWISE, 1)} family-wise, and is "
+        "not decided until all its replicates are made."
     )
     add_setup(document, _setup(cases))
     document.section("What went wrong")

@@ -296,8 +296,8 @@ def _growth(document: Document, cost: Cost) -> None:
         f"One core multiplies matrices at {format_number(floor.speed / 1e9, 3)} GFLOP/s and streams "
         f"{format_number(floor.bandwidth / 1e9, 3)} GB/s from memory. At that speed the operations alone would take "
         f"{format_number(1e6 * floor.least, 2)} µs, of the {format_number(1e6 * floor.seconds, 3)} µs measured here: "
-        f"one evaluation is {format_number(floor.seconds / floor.least, 2)} times above that floor, as small matrices and "
-        "short loops are."
+        f"one evaluation is {format_number(floor.seconds / floor.least, 2)} times above that floor, as small matrices "
+        "and short loops are."
     )
 
 

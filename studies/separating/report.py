@@ -224,8 +224,8 @@ def _failures(document: Document, result: Result) -> None:
             f"Hidden {HIDDEN[item.truth]}: the first manoeuvre alone shows the cause with ln B "
             f"{format_fixed(item.detected.mean(), 1)} against none. In random directions of the same size the "
             f"expected ln B over the rival with the separating manoeuvre is {format_fixed(middle, 1)} in the median "
-            f"and {format_fixed(low, 1)} at the lowest tenth; in {_counts(_shown(result, item.truth, LAST))} directions it "
-            f"is above {RIVALRY} in {format_percent(SURE)} of flights or more."
+            f"and {format_fixed(low, 1)} at the lowest tenth; in {_counts(_shown(result, item.truth, LAST))} directions "
+            f"it is above {RIVALRY} in {format_percent(SURE)} of flights or more."
         )
     texts.append(
         "The whole diagnosis, which has the catalogue to choose from, was not run here: the models have these two "
