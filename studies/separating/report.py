@@ -219,12 +219,13 @@ def _failures(document: Document, result: Result) -> None:
     document.section("Calibration and failures")
     texts = []
     for item in result.realised:
+        shown = _counts(_shown(result, item.truth, LAST))
         low, middle = np.quantile([other.log_factor for other in result.directions[item.truth, LAST]], [0.1, 0.5])
         texts.append(
             f"Hidden {HIDDEN[item.truth]}: the first manoeuvre alone shows the cause with ln B "
             f"{format_fixed(item.detected.mean(), 1)} against none. In random directions of the same size the "
             f"expected ln B over the rival with the separating manoeuvre is {format_fixed(middle, 1)} in the median "
-            f"and {format_fixed(low, 1)} at the lowest tenth; in {_counts(_shown(result, item.truth, LAST))} directions "
+            f"and {format_fixed(low, 1)} at the lowest tenth; in {shown} directions "
             f"it is above {RIVALRY} in {format_percent(SURE)} of flights or more."
         )
     texts.append(
