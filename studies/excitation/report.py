@@ -106,8 +106,8 @@ def _search_goals(result: Result) -> list[Goal]:
         f"Largest factor over (26) that {wanted} find; {SEVERAL} followed searches within {format_percent(ALIKE)} of "
         "the best known"
     )
-    robots = Goal(f"The same on {ROBOTS} robots", "one robot, ETS-VII", Verdict.NOT_TESTED)
     near = f"A thorough search by d-optimality within {format_percent(ALIKE)} of the best known, per parameter"
+    robots = Goal(f"{near}, on {ROBOTS} robots", "one robot, ETS-VII", Verdict.NOT_TESTED)
     crowd = result.crowds.get("d-optimal")
     if crowd is None:
         found = f"{_largest(result.contest)} from {result.search.starts} starts; {wanted} were not run"

@@ -181,7 +181,7 @@ def goals_of(made: Made) -> list[Goal]:
         goals.append(Goal(text, reached, verdict))
         beyond = [name for name in _NESTED if unknowns > NESTED and name not in peers]
         if beyond:
-            text = f"the same against {joined(list(map(str, beyond)))}, {unknowns} unknowns"
+            text = f"{FASTER:g} times less time than {joined(map(str, beyond))}, {unknowns} unknowns"
             goals.append(Goal(text, "not run", Verdict.NOT_TESTED))
     for unknowns in sorted(CASES):
         error = _evidence_error(made, unknowns, Sampler.OURS)
