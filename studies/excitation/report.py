@@ -107,7 +107,8 @@ def _search_goals(result: Result) -> list[Goal]:
         "the best known"
     )
     near = f"A thorough search by d-optimality within {format_percent(ALIKE)} of the best known, per parameter"
-    robots = Goal(f"{near}, on {ROBOTS} robots", "one robot, ETS-VII", Verdict.NOT_TESTED)
+    within = f"On {ROBOTS} robots a search within {format_percent(ALIKE)} of the best of {wanted}, per parameter"
+    robots = Goal(within, "one robot, ETS-VII", Verdict.NOT_TESTED)
     crowd = result.crowds.get("d-optimal")
     if crowd is None:
         found = f"{_largest(result.contest)} from {result.search.starts} starts; {wanted} were not run"
