@@ -65,5 +65,7 @@ def test_goals_are_met_missed_or_open_over_all_runs(tmp_path: Path) -> None:
     verdicts = [goal.verdict for goal in goals_of(figures)]
     assert verdicts == [Verdict.PASS, Verdict.OPEN, Verdict.PASS, Verdict.FAIL, *[Verdict.PASS] * 3]
     write_report(runs, tmp_path / "benchmark.pdf", full=True)
-    assert "150 (100 to 200) µs" in PdfText.read(tmp_path / "benchmark.pdf")
+    text = PdfText.read(tmp_path / "benchmark.pdf")
+    assert "150 (100 to 200) µs" in text
+    assert "varies by a factor of 2, the ratios to the other simulators by 2 and 2" in text
     assert broken_rules(tmp_path / "benchmark.pdf") == []

@@ -11,9 +11,9 @@ import pytest
 from bayesid.diagnosis import Status
 from bayesid.report.verdict_record import Share, record_sentence, shipped_record
 from studies.blind_injections import Trial, plan, run, write_report
-from studies.blind_injections.goals import _least, _most, _rate, _scatter
+from studies.blind_injections.goals import _correlation, _coverage, _least, _most, _rate, _scatter, _stated, share_text
 from studies.blind_injections.record import record_of
-from studies.blind_injections.rows import confusion, rates, reliability, scores, statements
+from studies.blind_injections.rows import confusion, confusion_matrix, rates, reliability, scores, statements
 from studies.blind_injections.trials import Plan, read
 from studies.common.goals import Verdict
 from studies.common.monte_carlo import read_store
@@ -105,6 +105,17 @@ def test_stated_probabilities_are_compared_with_how_often_they_held():
     assert reliability(trials[-1:]) == []
 
 
+def test_every_stated_probability_has_its_range(committed):
+    """Sums of probabilities that rounding lifts above one are taken as one."""
+    assert max(trial.probability for trial in committed if trial.probability is not None) <= 1.0
+    *rows, every = reliability(committed)
+    for column in (1, 3):
+        assert sum(int(row[column]) for row in rows) == int(every[column])
+    header, rows = confusion_matrix(committed)
+    assert {len(row) for row in rows} == {len(header)}
+    assert sum(int(cell) for row in rows for cell in row[1:]) == len(committed)
+
+
 def test_trials_that_state_no_probabilities_are_left_out(tmp_path):
     file = tmp_path / "trials.jsonl"
     file.write_text('{"seed": 0}\n{"trial": 0, "task": {}, "result": {"case": "rate-bias", "seconds": 3.0}}\n')
@@ -169,6 +180,33 @@ def test_a_goal_is_decided_by_its_interval():
     rng = np.random.default_rng(1)
     assert _scatter("", rng.normal(size=4000)).verdict is Verdict.PASS
     assert _scatter("", 1.5 * rng.normal(size=4000)).verdict is Verdict.FAIL
+
+
+def test_explanations_of_outside_effects_are_held_against_what_they_state():
+    """By hand: 20 of 40 wrong where 0.1 % is stated, and 1 of 40 where half is; a share has a tenth of a per cent."""
+    aside = replace(stated(None, (), ()), kind="unknown", status="unknown", case="pulse-train", signal_to_noise=5.0)
+    wrong = replace(aside, status="explained", causes=("rate-bias",), probability=0.999)
+    assert _stated("", []).verdict is Verdict.NOT_TESTED
+    assert _stated("", [aside] * 9).verdict is Verdict.OPEN
+    assert _stated("", [wrong] * 20 + [aside] * 20).verdict is Verdict.FAIL
+    assert _stated("", [replace(wrong, probability=0.5)] + [aside] * 39).verdict is Verdict.PASS
+    assert _stated("", [replace(wrong, probability=0.98)] + [aside] * 39).verdict is Verdict.OPEN
+    assert share_text(5, 453) == "5 of 453 (0.4 to 2.6 %)"
+
+
+def test_torques_and_coverage_are_decided_by_their_intervals():
+    aside = replace(stated(None, (), ()), case="pulse-train")
+    found = [replace(aside, correlation=value) for value in np.linspace(0.5, 0.95, 10)]
+    assert _correlation("", 0.8, ("pulse-train",), []).verdict is Verdict.NOT_TESTED
+    assert _correlation("", 0.8, ("pulse-train",), found[:3]).verdict is Verdict.OPEN
+    assert _correlation("", 0.7, ("pulse-train",), found).verdict is Verdict.OPEN
+    assert _correlation("", 0.55, ("pulse-train",), found).verdict is Verdict.PASS  # second of ten: 0.55
+    assert _correlation("", 0.95, ("pulse-train",), found).verdict is Verdict.FAIL
+    rng = np.random.default_rng(1)
+    assert _coverage([]).verdict is Verdict.NOT_TESTED
+    assert _coverage(list(rng.normal(size=(3000, 3)))).verdict is Verdict.PASS
+    assert _coverage(list(rng.normal(size=(20, 3)))).verdict is Verdict.OPEN
+    assert _coverage(list(2.0 * rng.normal(size=(3000, 3)))).verdict is Verdict.FAIL
 
 
 @pytest.mark.usefixtures("slow")

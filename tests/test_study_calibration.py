@@ -11,10 +11,13 @@ from scipy import stats
 
 from studies.calibration import make, plan, read, write_report
 from studies.calibration.cases import REPLICATES, Case
+from studies.calibration.coverage_of_cases import ALL, interval_coverage
 from studies.calibration.encoders import _ratios, smooth_share
+from studies.calibration.outcomes import Replicates
 from studies.calibration.replicate import Method
 from studies.calibration.report import goals_of
 from studies.calibration.uniformity import POINTS, coverage, holm, uniform_p_value
+from studies.common.goals import Verdict
 from studies.common.monte_carlo import run_trials
 from tests.pdf_text import PdfText
 from tests.report_rules import broken_rules
@@ -55,6 +58,29 @@ def test_holm_and_coverage_by_hand():
     share, error = coverage(np.array([[0.3, 0.5], [0.9, 0.6], [0.01, 0.99]]), 0.5)
     assert share == pytest.approx(0.5)
     assert error == pytest.approx(0.5 / np.sqrt(3.0))
+
+
+def made_up(case, number, spread):
+    """Replicates of a case whose errors are so many times what is stated."""
+    errors = np.random.default_rng(7).normal(size=(number, 3))
+    ranks = stats.norm.cdf(spread * errors)
+    rows = [{f"base_link.com.{axis}": value for axis, value in zip("xyz", row, strict=True)} for row in ranks]
+    return Replicates(case, [{"ranks": {Method.IMPORTANCE: row}} for row in rows], [])
+
+
+def test_intervals_that_are_too_narrow_fail_and_what_was_not_run_is_not_tested():
+    def verdicts(made):
+        return {goal.text: goal.verdict for goal in goals_of(made)}
+
+    ninety = "90 % intervals hold that share of truths, in each case and in all"
+    right = [made_up(case, planned, 1.0) for case, planned in REPLICATES.items()]
+    assert verdicts([])[ninety] is Verdict.NOT_TESTED
+    assert verdicts(right)[ninety] is Verdict.PASS
+    assert verdicts(right[:2])[ninety] is Verdict.OPEN
+    assert verdicts([*right[:-1], made_up(right[-1].case, 100, 1.5)])[ninety] is Verdict.FAIL
+    assert verdicts(right)["ranks uniform, emcee: unknown arm and whole system"] is Verdict.NOT_TESTED
+    shares = interval_coverage(right)
+    assert shares[ALL, 0.9].share == pytest.approx(0.9, abs=4.0 * shares[ALL, 0.9].error)
 
 
 def test_smoothed_motions_are_stated_too_loosely_by_the_share_that_theory_gives():

@@ -64,6 +64,10 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
     write_report(cost, tmp_path / "cost.pdf", full=True)
     text = PdfText.read(tmp_path / "cost.pdf")
     assert "10 times above that floor" in text  # 200 µs over 6e5 operations at 3e10 a second
+    assert "5 s (nothing, leak, payload and link), missed by 2 of 4" in text
+    assert "3 of 9 goals are missed" in text
+    assert "The files of check, identify and design state no time by phase" in text
+    assert "1.50 s" in text
     assert broken_rules(tmp_path / "cost.pdf") == []
 
 

@@ -73,6 +73,21 @@ def test_the_goals_follow_from_the_trials():
     quick = trial(39, Sampler.STRETCH, 30.0, 4000.0)
     assert verdicts([*own, *slow, quick])[speed] is Verdict.FAIL
     assert verdicts([own[0], trial(39, REFERENCE, 90.0, 20000.0, -3.2)])[evidence] is Verdict.FAIL
+    assert verdicts([own[0], trial(39, REFERENCE, 90.0, 20000.0, -3.09)])[evidence] is Verdict.OPEN
+    assert found["5 times less time than dynesty and nautilus, 39 unknowns"] is Verdict.NOT_TESTED
+
+
+def test_the_fastest_peer_is_one_with_an_estimate():
+    """A bound, which the limit of time sets, stands beside it."""
+    own = trial(39, Sampler.OURS, 10.0, 5000.0, -3.0)
+    cut = trial(39, Sampler.DE, 60.0, 500.0)
+
+    def reached(*made):
+        goals = {goal.text: goal.reached for goal in goals_of([own, *made])}
+        return goals["5 times less time than the best peer, 39 unknowns"]
+
+    assert reached(cut, trial(39, Sampler.NUTS, 80.0, 4000.0)).startswith("8.0 (NUTS (NumPyro)); 1 other more than 6.0")
+    assert reached(cut).startswith("more than 6.0 (1 peer, none with an estimate)")
 
 
 def test_lines_of_recipes_are_counted_without_words():

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from bayesid.report.verdict_record import Share
 from bayesid.robot.joint_state import JointState
 from studies.common import mission
+from studies.common.goals import Verdict
 from studies.separating.analysis import expectations, flown, realise, references
-from studies.separating.linear_evidence import Linearised
+from studies.separating.linear_evidence import Expected, Linearised
+from studies.separating.report import LAST, RIVALRY, _decided, _shown
 from studies.separating.setting import TRUTHS
 
 DURATION = 40.0
@@ -45,6 +50,24 @@ def test_noncentralities_are_those_of_two_signals():
         return -0.5 * float(mean + np.linalg.slogdet(covariance)[1])
 
     assert found.log_factor == pytest.approx(evidence(first) - evidence(second))
+
+
+def test_flights_above_a_limit_follow_from_mean_and_deviation():
+    found = Expected(alone=9.0, apart=4.0, log_factor=2.2 + 2.0 * 1.2816)
+    assert found.exceeding(2.2) == pytest.approx(0.9, abs=1e-4)
+    assert Expected(9.0, 0.0, 1.0).exceeding(2.2) == 0.0
+
+
+def test_directions_count_where_flights_enough_are_above_the_limit():
+    """What the prior costs is included: the part that the rival cannot imitate alone would do in every direction."""
+    costly, cheap = Expected(60.0, 20.0, 2.5), Expected(60.0, 20.0, 10.0)
+    result = SimpleNamespace(directions={("thruster-leak", LAST): [costly] * 60 + [cheap] * 140})
+    assert min(costly.energy, cheap.energy) > RIVALRY
+    share = _shown(result, "thruster-leak", LAST)
+    assert (share.count, share.total) == (140, 200)
+    assert _decided(share) is Verdict.FAIL
+    assert _decided(Share(180, 200)) is Verdict.OPEN
+    assert _decided(Share(200, 200)) is Verdict.PASS
 
 
 def test_a_second_manoeuvre_shares_all_but_the_initial_rate():

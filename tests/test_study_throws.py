@@ -8,8 +8,9 @@ import pytest
 from bayesid import InputError
 from studies.common.goals import Verdict
 from studies.throws import run
+from studies.throws.body_result import BodyResult
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws
-from studies.throws.goals import goals_of, held_in_all
+from studies.throws.goals import _quick_fit, goals_of, held_in_all
 from studies.throws.report import write_report
 from tests.report_rules import broken_rules
 
@@ -72,6 +73,18 @@ def test_goals_without_a_diagnosis_are_not_tested(result):
 def test_the_report_is_written(result, tmp_path):
     write_report(result, tmp_path / "throws.pdf")
     assert broken_rules(tmp_path / "throws.pdf", full=False) == []
+
+
+@pytest.mark.parametrize(
+    ("error", "scatter", "verdict"), [(1.0, 0.1, Verdict.PASS), (1.8, 0.4, Verdict.OPEN), (3.0, 0.1, Verdict.FAIL)]
+)
+def test_differences_from_the_stated_moments_are_decided_by_their_scatter(error, scatter, verdict):
+    sizes = error + scatter * np.array([-1.0, 1.0, 0.0])
+    moments = 1.0 + 0.01 * np.tile(sizes[:, None], 3)
+    body = BodyResult("Empty", ("1", "2", "3"), moments, *[np.ones(3)] * 6)
+    assert body.mean_error == pytest.approx(error)
+    assert body.mean_error_sd == pytest.approx(scatter / np.sqrt(3.0))
+    assert _quick_fit(body).verdict is verdict
 
 
 def test_absent_measurements_are_named(tmp_path):

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_number, format_text
 from studies.benchmark.run import RUNS, Benchmark, run
+from studies.benchmark.timing import EVALUATED
 from studies.common.command import Command
 from studies.common.goals import Goal, Verdict
 from studies.common.provenance import processor, study_origin
@@ -102,18 +104,26 @@ def _spread(values: Floats) -> str:
     return f"{middle} ({low} to {high})"
 
 
+def _varies(values: Floats) -> str:
+    """Return the factor between the largest and the smallest value."""
+    return format_number(float(values.max() / values.min()), 2)
+
+
 def write_report(runs: Sequence[Benchmark], output: Path, *, full: bool, origin: str | None = None) -> None:
     """Write the report as PDF, and beside it its summary and the times of every run."""
     document = Document("Benchmark", "Cost of simulations and of effective samples")
     figures, first = figures_of_merit(runs), runs[0]
     evaluations = np.array([item.evaluation for item in runs])
+    ratios = [np.array([item.speedups[name] for item in runs]) for name in RIVALS]
     summary = Summary(
         "What does one simulation cost beside other simulators at the same accuracy, how does that depend on the "
         "problem, and what does an effective sample cost?",
-        f"One evaluation takes {_spread(1e6 * evaluations)} µs in batches, {_spread(figures[0][1])} times less than "
-        f"Pinocchio step by step in Python and {_spread(figures[1][1])} times less than MuJoCo's rollouts in C.",
+        f"One evaluation, of ETS-VII with {EVALUATED}, takes {_spread(1e6 * evaluations)} µs, "
+        f"{_spread(figures[0][1])} times less than Pinocchio step by step in Python and "
+        f"{_spread(figures[1][1])} times less than MuJoCo's rollouts in C.",
         tuple(goals_of(figures)),
-        f"run on {processor()}. Ratios depend on the machine and its load much less than times do.",
+        f"run on {processor()}. Between the runs the time of an evaluation varies by a factor of "
+        f"{_varies(evaluations)}, the ratios to the other simulators by {joined(map(_varies, ratios))}.",
         full,
     )
     caption = (
@@ -152,6 +162,9 @@ def _simulations(document: Document, runs: Sequence[Benchmark]) -> None:
         ]
         for k, rival in enumerate(runs[0].rivals)
     ]
+    rows.append(
+        ["one evaluation, as in the answer", _spread(np.array([1e6 * item.evaluation for item in runs])), "1 (1 to 1)"]
+    )
     cases: tuple[tuple[str, list[Mapping[Any, float]]], ...] = (
         ("links", [item.links for item in runs]),
         ("samples", [item.samples for item in runs]),
@@ -171,8 +184,8 @@ def _simulations(document: Document, runs: Sequence[Benchmark]) -> None:
         ["simulator or case", "time [µs]", "ratio"],
         rows,
         f"Median of {len(runs)} runs (smallest to largest). Ratios: of other simulators to one evaluation of the log "
-        "likelihood; of cases to the first with the same unit. Other simulators take steps short enough for an error "
-        "below 0.01 σ, where they reach it.",
+        f"likelihood, that of ETS-VII with {EVALUATED}; of cases to the first with the same unit. Other "
+        "simulators take steps short enough for an error below 0.01 σ, where they reach it.",
         columns("lrr"),
     )
 

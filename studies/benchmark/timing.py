@@ -12,14 +12,20 @@ import numpy as np
 
 from bayesid import Posterior, Robot
 from studies.benchmark.cases import DURATION, SIGMA, excitation
-from studies.common.ets7 import RADIUS
+from studies.common.ets7 import INTERVAL, RADIUS
 from studies.truth import stepwise
 from studies.truth.mujoco import TruthModel, rollout
 
-__all__ = ["Rival", "rivals", "seconds_per_evaluation"]
+__all__ = ["EVALUATED", "Rival", "rivals", "seconds_per_evaluation"]
 
 BATCH = 64
 """Number of simulations that are evaluated per call."""
+
+EVALUATED = (
+    f"one recording of {round(DURATION / INTERVAL) + 1} samples over {DURATION:g} s, joints known exactly, base and "
+    f"initial rate unknown, in batches of {BATCH} points"
+)
+"""What is evaluated where no other case is named, in words."""
 
 STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)
 """Steps tried for MuJoCo, longest first [s]."""

@@ -13,7 +13,8 @@ from bayesid._math.arrays import Floats
 from bayesid.report.numbers import format_signed
 from studies.blind_injections.trials import Trial
 
-__all__ = ["LEAST", "confusion", "errors", "rates", "reliability", "scores", "statements"]
+__all__ = ["LEAST", "confusion", "confusion_matrix", "errors", "rates", "reliability", "reliable_pairs", "scores"]
+__all__ += ["statements"]
 
 BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, np.inf)
 """Limits of the ranges of signal-to-noise ratio in the table."""
@@ -57,13 +58,20 @@ def _row(trials: Sequence[Trial]) -> list[str]:
 
 def reliability(trials: Iterable[Trial]) -> list[list[str]]:
     """Return how often the named causes were hidden, by their stated probability, with 95 % Wilson intervals."""
-    named = [(trial.probability, trial.holds) for trial in trials if trial.probability is not None]
-    rows = []
-    for low, high in pairwise(STATED):
-        within = [pair for pair in named if low <= pair[0] < high or pair[0] == high == STATED[-1]]
-        if within:
-            rows.append([f"{low:g} to {high:g}", *_reliable(within)])
+    groups = reliable_pairs(trials)
+    named = [pair for pairs in groups.values() for pair in pairs]
+    rows = [[f"{low:g} to {high:g}", *_reliable(pairs)] for (low, high), pairs in groups.items()]
     return [*rows, ["all", *_reliable(named)]] if named else rows
+
+
+def reliable_pairs(trials: Iterable[Trial]) -> dict[tuple[float, float], list[tuple[float, bool]]]:
+    """Return the stated probability of the named causes and whether they held, by the range of the probability."""
+    named = [(trial.probability, trial.holds) for trial in trials if trial.probability is not None]
+    ranges = {
+        (low, high): [pair for pair in named if low <= pair[0] < high or pair[0] == high == STATED[-1]]
+        for low, high in pairwise(STATED)
+    }
+    return {ends: pairs for ends, pairs in ranges.items() if pairs}
 
 
 def statements(trials: Iterable[Trial]) -> dict[str, list[tuple[float, bool]]]:
@@ -118,16 +126,29 @@ def _reliable(named: Sequence[tuple[float, bool]]) -> list[str]:
 
 def confusion(trials: Iterable[Trial]) -> list[list[str]]:
     """Return each hidden case with its answers and their numbers, all strengths and seeds together."""
+    return [
+        [case, ", ".join(f"{answer} ({count})" if count > 1 else answer for answer, count in answers.most_common())]
+        for case, answers in _answers(trials).items()
+    ]
+
+
+def confusion_matrix(trials: Iterable[Trial]) -> tuple[list[str], list[list[str]]]:
+    """Return the header and the rows of the matrix of counts: a row for each hidden case, a column for each answer."""
+    said = _answers(trials)
+    columns = sorted({answer for answers in said.values() for answer in answers})
+    rows = [[case, *(str(said[case][answer]) for answer in columns)] for case in sorted(said)]
+    return ["hidden", *columns], rows
+
+
+def _answers(trials: Iterable[Trial]) -> dict[str, Counter[str]]:
+    """Return the numbers of the answers to each hidden case."""
     said: dict[str, Counter[str]] = {}
     for trial in trials:
         answer = " + ".join(sorted(trial.causes)) or trial.status
         if trial.status == "ambiguous":
             answer += f" or {max(len(trial.sets) - 1, 1)} more"
         said.setdefault(trial.case, Counter())[answer] += 1
-    return [
-        [case, ", ".join(f"{answer} ({count})" if count > 1 else answer for answer, count in answers.most_common())]
-        for case, answers in said.items()
-    ]
+    return said
 
 
 def errors(trials: Sequence[Trial]) -> list[list[str]]:

@@ -240,9 +240,16 @@ def _weighed_trial(item: Plan, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _trial(content: Mapping[str, Any]) -> Trial:
-    """Return a trial from what JSON has of it."""
+    """Return a trial from what JSON has of it; earlier versions let rounding lift sums of probabilities above one."""
     tuples = {key: tuple(content[key]) for key in ("hidden", "accept", "causes", "amplitude_errors", "body_errors")}
-    return Trial(**{**content, **tuples, "sets": tuple(tuple(labels) for labels in content["sets"])})
+    probabilities = {name: min(value, 1.0) for name, value in content["probabilities"].items()}
+    singles = {key: _at_most_one(content[key]) for key in ("probability", "unknown", "nothing")}
+    sets = tuple(tuple(labels) for labels in content["sets"])
+    return Trial(**{**content, **tuples, **singles, "probabilities": probabilities, "sets": sets})
+
+
+def _at_most_one(value: float | None) -> float | None:
+    return None if value is None else min(value, 1.0)
 
 
 def make(item: Plan) -> Trial:

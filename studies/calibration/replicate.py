@@ -24,7 +24,7 @@ from bayesid.inference.mode import Optimum, maximise
 from studies.calibration.cases import REPLICATES, Case, model_of
 from studies.calibration.data import Truth, draw_truth, point, record
 
-__all__ = ["LOG_LIKELIHOOD", "Method", "Plan", "make", "plan"]
+__all__ = ["ARMS", "LOG_LIKELIHOOD", "Method", "Plan", "make", "plan"]
 
 DRAWS = 499
 """Number of posterior draws among which the truth is ranked."""

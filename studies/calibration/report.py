@@ -15,9 +15,10 @@ from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number, format_p_value, format_percent
 from studies.calibration.cases import ARM_SPREAD, BASE_SPREAD, DRAWINGS_SPREAD, INDEPENDENT, REPLICATES, Case
+from studies.calibration.coverage_of_cases import ALL, LEVELS, interval_coverage, pooled_coverage
 from studies.calibration.encoders import NEAR, Smoothed, smooth_share, smoothed_errors
 from studies.calibration.outcomes import Replicates
-from studies.calibration.replicate import LOG_LIKELIHOOD, Method
+from studies.calibration.replicate import ARMS, LOG_LIKELIHOOD, Method
 from studies.calibration.uniformity import POINTS, coverage, holm, uniform_p_value
 from studies.common.ets7 import START, ets7
 from studies.common.goals import Goal, Verdict
@@ -25,13 +26,13 @@ from studies.common.robot_outline import robot_outline
 from studies.common.tables import add_number_table
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study
 
-__all__ = ["FAMILYWISE", "LEVELS", "goals_of", "write_report"]
-
-LEVELS = (0.5, 0.9, 0.95)
-"""Levels of the intervals whose coverage is counted."""
+__all__ = ["FAMILYWISE", "goals_of", "write_report"]
 
 FAMILYWISE = 0.01
 """Probability that any rank of any case is called not uniform where all are."""
+
+SHORT = 2.0
+"""Standard errors below the stated share from which a coverage is named among what went wrong."""
 
 
 def goals_of(cases: Sequence[Replicates]) -> list[Goal]:
@@ -49,7 +50,45 @@ def goals_of(cases: Sequence[Replicates]) -> list[Goal]:
         p = corrected[case, name]
         verdict = Verdict.FAIL if p <= FAMILYWISE else Verdict.PASS if made >= planned else Verdict.OPEN
         goals.append(Goal(text, f"{made:,} made; smallest corrected p {format_p_value(p)} ({name})", verdict))
+    return [*goals, *_coverage_goals(cases), _emcee_goal(cases)]
+
+
+def _coverage_goals(cases: Sequence[Replicates]) -> list[Goal]:
+    """Return the goal on the coverage of the intervals of each level, in every case and in all together."""
+    found = interval_coverage(cases)
+    corrected = holm({key: item.p_value for key, item in found.items()})
+    complete = all(
+        any(item.case is case and len(item.results) >= planned for item in cases)
+        for case, planned in REPLICATES.items()
+    )
+    goals = []
+    for level in LEVELS:
+        text = f"{format_percent(level)} intervals hold that share of truths, in each case and in all"
+        mine = [key for key in found if key[1] == level]
+        if not mine:
+            goals.append(Goal(text, "none made", Verdict.NOT_TESTED))
+            continue
+        worst = min(mine, key=lambda key: found[key].p_value)
+        verdict = Verdict.FAIL if corrected[worst] <= FAMILYWISE else Verdict.PASS if complete else Verdict.OPEN
+        shown = f"all {found[ALL, level]}; smallest corrected p {format_p_value(corrected[worst])}"
+        goals.append(Goal(text, f"{shown} ({worst[0]}: {found[worst]})", verdict))
     return goals
+
+
+def _emcee_goal(cases: Sequence[Replicates]) -> Goal:
+    """Return the goal on emcee where the arm is unknown, which is judged like the others once it is run there."""
+    text = "ranks uniform, emcee: unknown arm and whole system"
+    p_values = {
+        (item.case, name): uniform_p_value(ranks)
+        for item in cases
+        if item.case in ARMS
+        for name, ranks in item.ranks(Method.EMCEE).items()
+    }
+    if not p_values:
+        return Goal(text, "none made", Verdict.NOT_TESTED)
+    least = min(holm(p_values).values())
+    verdict = Verdict.FAIL if least <= FAMILYWISE else Verdict.OPEN
+    return Goal(text, f"smallest corrected p {format_p_value(least)}", verdict)
 
 
 def corrected_p_values(cases: Sequence[Replicates]) -> dict[tuple[Case, str], float]:
@@ -72,8 +111,10 @@ def write_report(cases: Sequence[Replicates], file: Path, origin: str | None = N
     )
     document.paragraph(
         f"P-values of ranks are exact and simultaneous over {len(POINTS)} points of their distribution, and corrected "
-        f"by Holm's method over all {len(corrected)} ranks of all cases. A goal fails at "
-        f"{format_percent(FAMILYWISE, 1)} family-wise, and is not decided until all its replicates are made."
+        f"by Holm's method over all {len(corrected)} ranks of all cases. P-values of coverage are by the standard "
+        "error over replicates, whose numbers depend on one another, and corrected by Holm's method over all cases, "
+        f"all together and {len(LEVELS)} levels. A goal fails at {format_percent(FAMILYWISE, 1)} family-wise, and is "
+        "not decided until all its replicates are made."
     )
     add_setup(document, _setup(cases), outline=robot_outline(ets7(), START))
     document.section("What went wrong")
@@ -94,7 +135,7 @@ def write_report(cases: Sequence[Replicates], file: Path, origin: str | None = N
 
 def _summary(cases: Sequence[Replicates]) -> Summary:
     made, planned = sum(len(item.results) for item in cases), sum(REPLICATES.values())
-    share, error = _pooled([item.bodies() for item in cases if item.results], LEVELS[-1])
+    share, error = pooled_coverage([item.bodies() for item in cases if item.results], LEVELS[-1])
     wrong = [p for p in corrected_p_values(cases).values() if p <= FAMILYWISE]
     said = f"{len(wrong)} ranks contradict uniformity" if wrong else "no rank contradicts uniformity"
     return Summary(
@@ -175,7 +216,7 @@ def _findings(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], flo
     for title, chosen in (("the package's own data", False), ("data made by MuJoCo", True)):
         ranks = [item.bodies() for item in cases if (item.case in INDEPENDENT) is chosen and len(item.results)]
         if ranks:
-            shares = [_pooled(ranks, level) for level in LEVELS]
+            shares = [pooled_coverage(ranks, level) for level in LEVELS]
             words = ", ".join(f"{100.0 * s:.1f} ± {100.0 * e:.1f}" for s, e in shares)
             sentences.append(
                 f"On {title}, {words} % (with standard errors) of the bodies' true values lie within the "
@@ -196,12 +237,6 @@ def _findings(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], flo
     return sentences
 
 
-def _pooled(ranks: Sequence[Floats], level: float) -> tuple[float, float]:
-    """Return the coverage of replicates of several cases, each replicate with the same weight, and its error."""
-    shares = np.concatenate([(np.abs(2.0 * item - 1.0) < level).mean(axis=1) for item in ranks])
-    return float(shares.mean()), float(shares.std() / np.sqrt(len(shares)))
-
-
 def _failures(cases: Sequence[Replicates]) -> list[str]:
     errors = [f"{item.case}: {message}" for item in cases for message in item.failures]
     modes = sum(item.count("converged", False) for item in cases)
@@ -215,6 +250,17 @@ def _failures(cases: Sequence[Replicates]) -> list[str]:
         f"{sampled}. Replicates whose weights are not trusted (Pareto k-hat of {TRUSTED:g} and more): {untrusted}; "
         "they count like all others.",
     ]
+    short = [
+        f"{name} {item} at {format_percent(level)}"
+        for (name, level), item in interval_coverage(cases).items()
+        if level - item.share > SHORT * item.error
+    ]
+    if short:
+        sentences.insert(
+            0,
+            f"Intervals that hold the truth less often than they state, by more than {SHORT:g} standard errors before "
+            f"any correction for the number of cases: {', '.join(short)}.",
+        )
     if shifts:
         sentences.append(
             "The initial rate in a posterior is not the base's own, but the one that belongs to the joints as "
@@ -244,9 +290,8 @@ def _pooled_rows(cases: Sequence[Replicates]) -> list[list[str]]:
     for method in Method:
         ranks = [made for item in cases if len(made := item.bodies(method))]
         if ranks:
-            cells = [
-                f"{100.0 * share:.1f} ± {100.0 * error:.1f}" for share, error in (_pooled(ranks, v) for v in LEVELS)
-            ]
+            found = [pooled_coverage(ranks, level) for level in LEVELS]
+            cells = [f"{100.0 * share:.1f} ± {100.0 * error:.1f}" for share, error in found]
             rows.append([f"all cases: {method}", str(sum(map(len, ranks))), *cells, "-"])
     return rows
 

@@ -18,7 +18,7 @@ __all__ = ["MODELS", "processor", "study_origin"]
 ROOT = Path(__file__).resolve().parents[2]
 """Folder of the checkout."""
 
-COUNTS = ("starts", "repeats", "flights", "ships")
+COUNTS = ("starts", "searches", "repeats", "flights", "ships")
 """Options of single studies that say how much is repeated."""
 
 MODELS = ROOT / "bayesid" / "robot" / "models"

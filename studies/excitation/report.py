@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
-from bayesid.design import Search
+from bayesid.design import THOROUGH, Search
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent
@@ -62,6 +62,9 @@ STARTS, USUAL, ALIKE, PARAMETERS = 100, Search().starts, 0.02, 10
 """Number of starts that is wanted, that of a design by default, the difference per parameter that may remain between
 their best manoeuvres, and the number of the base's parameters."""
 
+SEVERAL, ROBOTS = 3, 3
+"""Number of followed searches that are to reach the best known, and of robots on which they are wanted."""
+
 
 def goals(result: Result) -> tuple[Goal, ...]:
     """Return the goals of the study with what was reached."""
@@ -74,15 +77,14 @@ def goals(result: Result) -> tuple[Goal, ...]:
     rows += _search_goals(result)
     for name, item in result.realised.items():
         away = np.abs(item.rms - 1.0)
-        allowed = WITHIN + 2.0 * item.rms_error
-        verdict = Verdict.FAIL if away.max() > allowed else Verdict.OPEN if away.max() > WITHIN else Verdict.PASS
+        low, high = away.max() - 2.0 * item.rms_error, away.max() + 2.0 * item.rms_error
+        verdict = Verdict.PASS if high <= WITHIN else Verdict.FAIL if low > WITHIN else Verdict.OPEN
         reached = (
-            f"{TITLES[name]}: {item.rms.min():.3f} to {item.rms.max():.3f} of the predicted sd over "
-            f"{len(item.errors)} flights, each ± {item.rms_error:.3f}; geometric mean {item.ratio:.3f}"
+            f"{item.rms.min():.3f} to {item.rms.max():.3f}, each ± {item.rms_error:.3f}, {len(item.errors)} flights; "
+            f"geometric mean {item.ratio:.3f}"
         )
-        rows.append(
-            Goal(f"Realised errors within {format_percent(WITHIN)} of predicted for every parameter", reached, verdict)
-        )
+        text = f"Realised over predicted sd within {format_percent(WITHIN)} of 1 for every parameter: {TITLES[name]}"
+        rows.append(Goal(text, reached, verdict))
     rows.append(
         Goal(
             "By every criterion, the manoeuvre designed for it is the best of all",
@@ -93,29 +95,53 @@ def goals(result: Result) -> tuple[Goal, ...]:
     kept = all(item.kept for own in contest.designs.values() for item in own.reached)
     finer = "on a grid eight times finer than the search's"
     rows.append(Goal("Every limit kept", finer if kept else f"broken {finer}", Verdict.of(kept)))
+    for text in ("One criterion with its gradient in 30 ms, compiled, one core", "Cold start of a search within 20 s"):
+        rows.append(Goal(text, "not measured here", Verdict.NOT_TESTED))
     return tuple(rows)
 
 
 def _search_goals(result: Result) -> list[Goal]:
     """Return the goals of the searches from many starts."""
-    factor, wanted = result.contest.factor("d-optimal", "paper-26", HEADLINE), f"{STARTS} starts"
-    largest = f"Largest factor over (26) that {wanted} find, and half of them within {format_percent(ALIKE)}"
+    wanted = f"{STARTS} starts"
+    largest = (
+        f"Largest factor over (26) that {wanted} find; {SEVERAL} followed searches within {format_percent(ALIKE)} of "
+        "the best known"
+    )
     near = f"A thorough search by d-optimality within {format_percent(ALIKE)} of the best known, per parameter"
+    within = f"On {ROBOTS} robots a search within {format_percent(ALIKE)} of the best of {wanted}, per parameter"
+    robots = Goal(within, "one robot, ETS-VII", Verdict.NOT_TESTED)
     crowd = result.crowds.get("d-optimal")
     if crowd is None:
-        found = f"{factor:.2f} times from {result.search.starts} starts; {wanted} were not run"
-        return [Goal(largest, found, Verdict.NOT_TESTED), Goal(near, f"{wanted} were not run", Verdict.NOT_TESTED)]
+        found = f"{_largest(result.contest)} from {result.search.starts} starts; {wanted} were not run"
+        missing = Goal(near, f"{wanted} were not run", Verdict.NOT_TESTED)
+        return [Goal(largest, found, Verdict.NOT_TESTED), missing, robots]
+    return [_largest_goal(largest, result, crowd), _near_goal(near, result, crowd), robots]
+
+
+def _largest(contest: Contest) -> str:
+    """Return the largest factor over (26) of any manoeuvre, and whose it is."""
+    factors = {name: contest.factor(name, "paper-26", HEADLINE) for name in contest.motions}
+    name = max(factors, key=lambda key: factors[key])
+    return f"{factors[name]:.2f} times ({TITLES[name]})"
+
+
+def _best_known(result: Result, crowd: Crowd) -> float:
+    """Return the smallest cost by d-optimality that anything found."""
+    repeated = [] if result.searches is None else [float(result.searches.costs.min())]
+    return min(crowd.cost, result.contest.designs["d-optimal"].found.cost, *repeated)
+
+
+def _largest_goal(text: str, result: Result, crowd: Crowd) -> Goal:
+    """Return whether several searches, each followed to its end, reach the best known: else more may be possible."""
+    repeated = [] if result.searches is None else result.searches.costs.tolist()
+    followed = np.array([crowd.cost, *repeated])
+    within = int((np.expm1((followed - _best_known(result, crowd)) / PARAMETERS) <= ALIKE).sum())
     count = len(crowd.costs)
-    half = _worse(crowd, count // 2)
-    return [
-        Goal(
-            largest,
-            f"{factor:.2f} times from {count} starts; the best of half of them is {format_percent(half, 2)} worse in "
-            "the mean",
-            Verdict.of(half <= ALIKE) if count >= STARTS else Verdict.OPEN,
-        ),
-        _near_goal(near, result, crowd),
-    ]
+    reached = (
+        f"{_largest(result.contest)} from {count} starts; {within} of {len(followed)} followed searches within "
+        f"{format_percent(ALIKE)} of the best known"
+    )
+    return Goal(text, reached, Verdict.PASS if within >= SEVERAL and count >= STARTS else Verdict.OPEN)
 
 
 def _near_goal(text: str, result: Result, crowd: Crowd) -> Goal:
@@ -123,7 +149,7 @@ def _near_goal(text: str, result: Result, crowd: Crowd) -> Goal:
     if result.searches is None:
         return Goal(text, "no search was repeated", Verdict.NOT_TESTED)
     costs = result.searches.costs
-    best = min(crowd.cost, costs.min(), result.contest.designs["d-optimal"].found.cost)
+    best = _best_known(result, crowd)
     worse = np.expm1((costs - best) / PARAMETERS)
     usual = np.expm1((crowd.expected(USUAL) - best) / PARAMETERS)
     within = int((worse <= ALIKE).sum())
@@ -132,11 +158,6 @@ def _near_goal(text: str, result: Result, crowd: Crowd) -> Goal:
         f"{format_percent(ALIKE)}; first descents from {USUAL} starts {format_percent(usual, 2)}"
     )
     return Goal(text, reached, Verdict.of(worse.mean() <= ALIKE) if len(crowd.costs) >= STARTS else Verdict.OPEN)
-
-
-def _worse(crowd: Crowd, count: int) -> float:
-    """Return by how much the best of ``count`` descents is worse than the best of all, per parameter, in the mean."""
-    return float(np.expm1((crowd.expected(count) - crowd.costs.min()) / PARAMETERS))
 
 
 def write_report(result: Result, output: Path, origin: str | None = None) -> None:
@@ -149,7 +170,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         answer=(
             "The manoeuvre with the smallest posterior volume (d-optimal) leaves standard deviations that are "
             f"{factors[HEADLINE]:.2f} times smaller in the geometric mean than the best condition number's with the "
-            f"{HEADLINE}, and {factors[IDEAL]:.2f} times with the {IDEAL}."
+            f"{HEADLINE}, and {factors[IDEAL]:.2f} times with the {IDEAL}; {_starts(result)}."
         ),
         goals=reached,
         valid=(
@@ -167,7 +188,6 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
     )
     add_setup(document, _setup(result), outline=robot_outline(ets7(), START))
     _evidence(document, result)
-    _saturation(document, result)
     _calibration(document, result)
     add_statements(document, _statements(result))
     tables = _write_tables(result, output)
@@ -198,9 +218,21 @@ def _setup(result: Result) -> Setup:
         replicates=(
             f"{result.search.starts} random starts and {result.search.exchanges} exchanges per criterion"
             f"{_crowds(result)}; "
-            f"{', '.join(f'{len(item.errors)} flights of {TITLES[name]}' for name, item in result.realised.items())}, "
+            f"{_flights(result)}, "
             "each with an arm, a bias and noise of its own."
         ),
+    )
+
+
+def _starts(result: Result) -> str:
+    """Return from how many random starts the two that are compared were searched, for a sentence."""
+    usual = result.search.starts
+    crowd = result.crowds.get("d-optimal")
+    own = usual if crowd is None else max(usual, len(crowd.costs))  # those of the usual search are among the crowd
+    own += 0 if result.searches is None else THOROUGH.starts * len(result.searches.costs)
+    return (
+        f"d-optimality was searched from {own} random starts, the condition number from {usual} and from the best of "
+        "the other criteria"
     )
 
 
@@ -210,6 +242,14 @@ def _crowds(result: Result) -> str:
         return ""
     parts = [f"{len(crowd.costs)} by {TITLES[name]}" for name, crowd in result.crowds.items()]
     return f", {' and '.join(parts)}, whose best the others began from, too"
+
+
+def _flights(result: Result) -> str:
+    """Return how many flights were made of which designs."""
+    counts = {len(item.errors) for item in result.realised.values()}
+    if len(counts) == 1 and len(result.realised) == len(result.contest.designs):
+        return f"{counts.pop()} flights of every design"
+    return ", ".join(f"{len(item.errors)} flights of {TITLES[name]}" for name, item in result.realised.items())
 
 
 def _evidence(document: Document, result: Result) -> None:
@@ -239,19 +279,24 @@ def _evidence(document: Document, result: Result) -> None:
         "Predicted posteriors, arm known to 5 % and exactly. Factor: geometric-mean sd of (26) as printed over that of "
         "the manoeuvre; worst: largest relative sd of mass and moments of inertia; and the sd of the base's mass.",
     )
+    _saturation(document, result)
+    _cloud(document, result)
     drawn = {TITLES[name]: contest.motions[name] for name in DRAWN if name in contest.motions}
     document.figure(
         manoeuvre_figure(drawn), "Joint positions, speed of the tip (the rule dotted) and rotation of the base."
     )
 
 
-def _calibration(document: Document, result: Result) -> None:
+def _cloud(document: Document, result: Result) -> None:
     document.figure(
         _cloud_figure(result),
         "Information (minus half the log-determinant of the covariance of the base's coordinates, arm known to 5 %) of "
         f"{len(result.cloud.motion)} random manoeuvres, each a random part of the largest that keeps the rule, against "
         "(26) in both readings and against the plain sum of the squared largest excursions (m² and rad²).",
     )
+
+
+def _calibration(document: Document, result: Result) -> None:
     document.section("Calibration and failures")
     rows = []
     for name, item in result.realised.items():
@@ -366,7 +411,7 @@ def _relative(name: str, crowd: Crowd, costs: Floats) -> Floats:
 
 @styled
 def _crowd_figure(result: Result) -> Figure:
-    figure = wide_figure(1.95)
+    figure = wide_figure(1.7)
     panels = figure.subplots(1, len(result.crowds))
     for axes, (name, crowd) in zip(panels, result.crowds.items(), strict=True):
         ordered, total = np.sort(crowd.costs), len(crowd.costs)
@@ -390,7 +435,7 @@ def _crowd_figure(result: Result) -> Figure:
 @styled
 def _cloud_figure(result: Result) -> Figure:
     cloud = result.cloud
-    figure = wide_figure(1.9)
+    figure = wide_figure(1.65)
     titles = ("(26) as printed", "(26) as intended", "sum of squared excursions")
     panels = figure.subplots(1, 3, sharey=True)
     for axes, title, values in zip(panels, titles, (cloud.printed, cloud.intended, cloud.motion), strict=True):

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bayesid._math.arrays import Floats
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import THOROUGH, Search, Store
 from bayesid.recording.joint_motion import Motion
@@ -21,7 +20,7 @@ from studies.separating.analysis import Realised, expectations, realise, referen
 from studies.separating.linear_evidence import Expected
 from studies.separating.manoeuvres import Designed, design_both, separating_problem
 
-__all__ = ["Result", "main", "run"]
+__all__ = ["FLIGHTS", "Result", "main", "run"]
 
 FLIGHTS = 400
 """Number of sets of flights for each cause in a full run."""
@@ -42,8 +41,8 @@ class Result:
         All manoeuvres, the ``first`` among them.
     expected : mapping of (truth, stage) to Expected
         Expectations of linear theory.
-    directions : mapping of (truth, stage) to (n,) array
-        Values lambda (1 - rho^2) / 2 of effects of the same size in random directions.
+    directions : mapping of (truth, stage) to sequence of Expected
+        Expectations for effects of the same size in random directions.
     realised : sequence of Realised
         Realised log Bayes factors, one for each truth.
     search : Search
@@ -54,7 +53,7 @@ class Result:
     designs: Mapping[str, Designed]
     motions: Mapping[str, Motion]
     expected: Mapping[tuple[str, str], Expected]
-    directions: Mapping[tuple[str, str], Floats]
+    directions: Mapping[tuple[str, str], Sequence[Expected]]
     realised: Sequence[Realised]
     search: Search
     full: bool

@@ -71,20 +71,21 @@ def joined(single: Mapping[str, Linearised], names: Sequence[str]) -> Linearised
 
 def expectations(
     known: Mapping[str, Reference], seed: int
-) -> tuple[dict[tuple[str, str], Expected], dict[tuple[str, str], Floats]]:
+) -> tuple[dict[tuple[str, str], Expected], dict[tuple[str, str], list[Expected]]]:
     """Expect the Bayes factors of all truths and stages, and for effects of the same size in random directions."""
     single = {name: Linearised.of(reference) for name, reference in known.items()}
     directions = np.random.default_rng(seed).normal(size=(DIRECTIONS, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-    expected, energies = {}, {}
+    expected: dict[tuple[str, str], Expected] = {}
+    turned: dict[tuple[str, str], list[Expected]] = {}
     for stage, names in STAGES.items():
         total = joined(single, names)
         for truth in RIVALS:
             hidden = amplitude(truth)
             expected[truth, stage] = total.expect(truth, hidden)
-            turned = np.pad(np.linalg.norm(hidden) * directions, ((0, 0), (len(hidden) - 3, 0)))
-            energies[truth, stage] = np.array([total.expect(truth, other).energy for other in turned])
-    return expected, energies
+            others = np.pad(np.linalg.norm(hidden) * directions, ((0, 0), (len(hidden) - 3, 0)))
+            turned[truth, stage] = [total.expect(truth, other) for other in others]
+    return expected, turned
 
 
 def flown(motion: Motion, truth: str, size: Floats, **options: Any) -> Truth:

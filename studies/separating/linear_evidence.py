@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 
 from bayesid import Manoeuvre
 from bayesid._math.arrays import Floats
@@ -37,6 +38,10 @@ class Expected:
     def sd(self) -> float:
         """Standard deviation of the log Bayes factor, from noise alone."""
         return float(np.sqrt(self.apart))
+
+    def exceeding(self, limit: float) -> float:
+        """Return the share of flights whose log Bayes factor exceeds a limit, taken as normal about its mean."""
+        return float(stats.norm.sf(limit, self.log_factor, self.sd)) if self.sd else float(self.log_factor > limit)
 
     @property
     def energy(self) -> float:

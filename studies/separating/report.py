@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
+from bayesid.report.verdict_record import Share
 from studies.common import mission
 from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, ets7
 from studies.common.goals import Goal, Verdict
@@ -28,17 +29,20 @@ from studies.common.template import (
     write_study,
     write_table,
 )
-from studies.separating import Result
+from studies.separating import FLIGHTS, Result
 from studies.separating.analysis import Realised
 from studies.separating.setting import DRIFT, RIVALS, SPREAD, STAGES, TRUTHS
 
 __all__ = ["factor_figure", "goals", "write_report"]
 
 RIVALRY = 2.2
-"""Log Bayes factor by which a cause must exceed its one rival for a probability of 0.9, from which it is named."""
+"""Log Bayes factor above which a cause is preferred to its one rival with a probability of 0.9 or more."""
 
 SURE = 0.9
 """Share of flights, and of directions, in which the factor is to be exceeded."""
+
+TICKS = (-10, -3, -1, 0, 1, 3, 10, 30, 100, 300)
+"""Ticks of log Bayes factors."""
 
 LAST = "first, separating"
 """Stage with the separating manoeuvre."""
@@ -53,10 +57,26 @@ NAMES = {"wheel-momentum": "wheel momentum", "thruster-leak": "leak"}
 """Short names of the two causes."""
 
 
-def _named(item: Realised, stage: str) -> str:
-    """Return in how many of the flights the true cause is named."""
+def _preferred(item: Realised, stage: str) -> Share:
+    """Return in how many of the flights the true cause is preferred with a probability of 0.9 or more."""
     values = item.factors[stage]
-    return f"{int((values > RIVALRY).sum())} of {len(values)}"
+    return Share(int((values > RIVALRY).sum()), len(values))
+
+
+def _counts(share: Share) -> str:
+    return f"{share.count} of {share.total}"
+
+
+def _shown(result: Result, truth: str, stage: str) -> Share:
+    """Return in how many of the random directions the factor is expected above the limit in enough flights."""
+    found = result.directions[truth, stage]
+    return Share(sum(item.exceeding(RIVALRY) >= SURE for item in found), len(found))
+
+
+def _decided(share: Share) -> Verdict:
+    """Return whether a share is at least what is wanted, by its exact 95 % interval."""
+    low, high = share.interval
+    return Verdict.PASS if low >= SURE else Verdict.FAIL if high < SURE else Verdict.OPEN
 
 
 def goals(result: Result) -> tuple[Goal, ...]:
@@ -65,20 +85,26 @@ def goals(result: Result) -> tuple[Goal, ...]:
     for item in result.realised:
         values = item.factors[LAST]
         text = f"Hidden {NAMES[item.truth]}: ln B over the rival above {RIVALRY} in {format_percent(SURE)} of flights"
-        reached = f"{_named(item, LAST)}, mean {format_fixed(values.mean(), 1)}"
-        rows.append(Goal(text, reached, Verdict.of((values > RIVALRY).mean() >= SURE)))
+        share = _preferred(item, LAST)
+        rows.append(Goal(text, f"{share}, mean {format_fixed(values.mean(), 1)}", _decided(share)))
+        text = f"Hidden {NAMES[item.truth]}: {FLIGHTS} sets of flights"
+        rows.append(Goal(text, f"{len(values)} made", Verdict.of(len(values) >= FLIGHTS)))
     for truth in RIVALS:
-        share = (result.directions[truth, LAST] > RIVALRY).mean()
+        share = _shown(result, truth, LAST)
+        percent = format_percent(SURE)
         text = (
-            f"Hidden {NAMES[truth]}, same size in random directions: expected above {RIVALRY} in "
-            f"{format_percent(SURE)} of them"
+            f"Hidden {NAMES[truth]}, same size in random directions: expected above {RIVALRY} in {percent} of flights, "
+            f"in {percent} of the directions"
         )
-        rows.append(Goal(text, format_percent(share, 3), Verdict.of(share >= SURE)))
+        rows.append(Goal(text, str(share), _decided(share)))
     for item in result.realised:
         gain = item.factors[LAST] - item.factors["first, d-optimal"]
         error = gain.std(ddof=1) / np.sqrt(len(gain))
         text = f"Hidden {NAMES[item.truth]}: the separating manoeuvre tells more than the d-optimal one"
-        reached = f"ln B {format_fixed(gain.mean(), 1)} ± {format_fixed(error, 1)} higher"
+        reached = (
+            f"ln B {format_fixed(abs(gain.mean()), 1)} ± {format_fixed(error, 1)} "
+            f"{'higher' if gain.mean() > 0.0 else 'lower'}"
+        )
         verdict = Verdict.OPEN if abs(gain.mean()) < 2.0 * error else Verdict.of(gain.mean() > 0.0)
         rows.append(Goal(text, reached, verdict))
     far = [
@@ -100,9 +126,9 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
     """Write the report as PDF, and its tables beside it."""
     document = Document("Telling two causes apart", "A manoeuvre designed to separate rivals, ETS-VII in MuJoCo")
     parts = [
-        f"a hidden {NAMES[item.truth]} is named in {_named(item, LAST)} flights "
-        f"({_named(item, 'first alone')} with the "
-        f"first manoeuvre alone, {_named(item, 'first, d-optimal')} with a d-optimal second one)"
+        f"a hidden {NAMES[item.truth]} is preferred to its rival with a probability of {SURE:g} or more in "
+        f"{_counts(_preferred(item, LAST))} flights ({_counts(_preferred(item, 'first alone'))} with the first "
+        f"manoeuvre alone, {_counts(_preferred(item, 'first, d-optimal'))} with a d-optimal second one)"
         for item in result.realised
     ]
     summary = Summary(
@@ -194,13 +220,14 @@ def _failures(document: Document, result: Result) -> None:
     document.section("Calibration and failures")
     texts = []
     for item in result.realised:
-        energies = result.directions[item.truth, LAST]
-        low, middle = np.quantile(energies, [0.1, 0.5])
+        shown = _counts(_shown(result, item.truth, LAST))
+        low, middle = np.quantile([other.log_factor for other in result.directions[item.truth, LAST]], [0.1, 0.5])
         texts.append(
             f"Hidden {HIDDEN[item.truth]}: the first manoeuvre alone shows the cause with ln B "
             f"{format_fixed(item.detected.mean(), 1)} against none. In random directions of the same size the "
-            f"expected λ(1−ρ²)/2 with the separating manoeuvre is {format_number(middle, 2)} in the median and "
-            f"{format_number(low, 2)} at the lowest tenth, where {RIVALRY} is needed."
+            f"expected ln B over the rival with the separating manoeuvre is {format_fixed(middle, 1)} in the median "
+            f"and {format_fixed(low, 1)} at the lowest tenth; in {shown} directions "
+            f"it is above {RIVALRY} in {format_percent(SURE)} of flights or more."
         )
     texts.append(
         "The whole diagnosis, which has the catalogue to choose from, was not run here: the models have these two "
@@ -223,23 +250,24 @@ def _evidence(document: Document, result: Result) -> None:
                 values.std(ddof=1),
                 expected.sd,
             ]
-            share = (result.directions[item.truth, stage] > RIVALRY).mean()
             numbers = [format_fixed(float(cell), 1) for cell in cells]
-            rows.append([NAMES[item.truth], stage, *numbers, _named(item, stage), format_percent(share, 3)])
-    titles = ["λ", "λ(1−ρ²)/2", "expected ln B", "mean ln B", "sd ln B", "expected sd", "named", "directions"]
+            shares = [_counts(_preferred(item, stage)), _counts(_shown(result, item.truth, stage))]
+            rows.append([NAMES[item.truth], stage, *numbers, *shares])
+    titles = ["λ", "λ(1−ρ²)/2", "expected ln B", "mean ln B", "sd ln B", "expected sd", "preferred", "directions"]
     document.table(
         ["hidden", "manoeuvres", *titles],
         rows,
         "λ is the energy of the hidden cause's signal in units of the noise, all other unknowns marginalised; λ(1−ρ²) "
-        "is the part that the rival cannot imitate. The expected ln B adds what each prior costs. Named: flights with "
-        f"ln B above {RIVALRY}; directions: share of random directions with λ(1−ρ²)/2 above it.",
+        "is the part that the rival cannot imitate. The expected ln B adds what each prior costs. Preferred: flights "
+        f"with ln B above {RIVALRY}, a probability of {SURE:g}; directions: random directions of causes of the same "
+        f"size in which {format_percent(SURE)} of flights are expected above it, ln B being taken as normal.",
         columns("llrrrrrrrr"),
     )
     document.figure(
         _direction_figure(result),
-        "Expected λ(1−ρ²)/2 of causes of the same size in random directions: share of the directions below "
-        "a value. The "
-        f"grey line is {RIVALRY}.",
+        "Expected ln B of causes of the same size in random directions, what each prior costs included: share of the "
+        f"directions below a value. The grey line is {RIVALRY}. The scale is linear between −1 and 1 and logarithmic "
+        "beyond.",
     )
 
 
@@ -275,9 +303,7 @@ def factor_figure(result: Result) -> Figure:
         axes.set_xticks(place, [stage.replace(", ", ",\n") for stage in STAGES])
         axes.set(title=f"hidden: {HIDDEN[item.truth]}", xlim=(-0.5, place[-1] + 0.5))
         axes.set_yscale("symlog", linthresh=1.0)
-        axes.set_yticks(
-            [-10, -3, -1, 0, 1, 3, 10, 30, 100, 300], ["−10", "−3", "−1", "0", "1", "3", "10", "30", "100", "300"]
-        )
+        axes.set_yticks(TICKS, [f"{tick:g}".replace("-", "−") for tick in TICKS])
         axes.grid(visible=False, axis="x")
         axes.legend(loc="upper left")
     figure.axes[0].set_ylabel("log Bayes factor")
@@ -289,11 +315,13 @@ def _direction_figure(result: Result) -> Figure:
     figure = wide_figure(2.3)
     for axes, truth in zip(figure.subplots(1, 2, sharey=True), RIVALS, strict=True):
         for index, stage in enumerate(STAGES):
-            values = np.sort(result.directions[truth, stage])
+            values = np.sort([item.log_factor for item in result.directions[truth, stage]])
             share = np.arange(1, len(values) + 1) / len(values)
             axes.plot(values, share, label=stage, **curve_style(index))
         axes.axvline(RIVALRY, color="#888888", linewidth=0.8)
-        axes.set(xscale="log", xlabel="λ(1−ρ²)/2", title=f"hidden: {NAMES[truth]}")
+        axes.set(xlabel="expected ln B", title=f"hidden: {NAMES[truth]}")
+        axes.set_xscale("symlog", linthresh=1.0)
+        axes.set_xticks(TICKS, [f"{tick:g}".replace("-", "−") for tick in TICKS])
     figure.axes[0].set_ylabel("share of directions")
     shared_legend(figure, figure.axes[0], len(STAGES))
     return figure

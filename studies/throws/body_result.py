@@ -53,6 +53,12 @@ class BodyResult:
         return float(np.abs(self.errors).mean())
 
     @property
+    def mean_error_sd(self) -> float:
+        """Standard error of `mean_error`, from how throws differ [%]."""
+        sizes = np.abs(self.errors).mean(axis=1)
+        return float(sizes.std(ddof=1) / np.sqrt(len(sizes)))
+
+    @property
     def largest_error(self) -> float:
         """Largest error of any moment in any throw [%]."""
         return float(np.abs(self.errors).max())

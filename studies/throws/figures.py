@@ -45,7 +45,7 @@ def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
 @styled
 def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
     """Draw the spectrum of what is left on the accelerometer, and the raw accelerometer against the wheel's orders."""
-    figure = wide_figure(1.15 * len(left))
+    figure = wide_figure(0.6 + 0.68 * len(left))
     panels = figure.subplots(len(left), 2, squeeze=False)
     for row, (body, own) in zip(panels, left.items(), strict=True):
         spectrum = np.array([own.spectrum[:, c] for c in range(3, 6)])
@@ -57,10 +57,10 @@ def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
                 ORDERS, np.sqrt((own.orders[:, :, c] ** 2).mean(axis=0)), linewidth=1, label=CHANNELS[c][-1]
             )
         row[1].axvline(own.turn[0], color="#888888", linewidth=0.8)
-        row[0].set_title(f"{body}: residual of samples")
-        row[1].set_title(f"{body}: raw readings, wheel at speed")
-        row[0].set_ylabel("[mm/s²]")
+        row[0].set_ylabel(f"{body}\n[mm/s²]")
         row[1].set_ylabel("[m/s²]")
+    panels[0][0].set_title("residual of samples")
+    panels[0][1].set_title("raw readings, wheel at speed")
     panels[-1][0].set_xlabel("frequency [Hz]")
     panels[-1][1].set_xlabel("frequency / that of the recorded wheel")
     handles, labels = panels[0][1].get_legend_handles_labels()

@@ -13,6 +13,7 @@ from bayesid.report.numbers import format_fixed, format_number, format_percent, 
 from studies.common.report_parts import columns
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study
 from studies.throws.bodies import BLOCK_SD, PLATE_SD
+from studies.throws.body_result import BodyResult
 from studies.throws.data import EXCLUDED, INTERVAL
 from studies.throws.diagnosis import SPREAD
 from studies.throws.figures import left_over_figure, throws_figure
@@ -47,13 +48,14 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
     files = write_tables(output, result)
     document.paragraph(f"Beside this report, in SI units: {', '.join(files)}.")
     credit = "Data: Blaha, Kuijper, Pop and Smeur, arXiv:2503.13137; no measurement is reproduced here."
-    write_study(document, summary, output, None if origin is None else f"{origin} {credit}")
+    write_study(document, summary, output, None if origin is None else f"{origin}. {credit}")
 
 
 def _summary(result: Result) -> Summary:
     count, total = held_in_all(result)
     errors = " and ".join(
-        f"{body.mean_error:.2f} % ({body.name}; rigid body: {result.plain.bodies[body.name].mean_error:.2f} %)"
+        f"{body.mean_error:.2f} % ({body.name}, stated to {_uncertain(body)} %; rigid body: "
+        f"{result.plain.bodies[body.name].mean_error:.2f} %)"
         for body in result.extended.bodies.values()
     )
     named = sum(bool(study.diagnosis.verdict.causes) for study in result.studies)
@@ -61,13 +63,20 @@ def _summary(result: Result) -> Summary:
     return Summary(
         question="How well does half a second of real flight tell the principal moments of inertia, do the intervals "
         "hold, and does the diagnosis say what a rigid body with its wheel lacks?",
-        answer=f"Single throws give principal moments with mean errors of {errors}, {count} of {total} of their 95 % "
-        f"intervals hold the stated moments{said}.",
+        answer=f"Principal moments of single throws differ from the stated moments, which are uncertain themselves, by "
+        f"{errors} in the mean, {count} of {total} of their 95 % intervals hold the stated moments{said}.",
         goals=tuple(goals_of(result)),
         valid="the wheel's momentum is recorded and one throw series on a box of known inertia gives its scale. Four "
         "choices were made while looking at these throws, so that this is no blind test.",
         full=bool(result.studies and result.wheels),
     )
+
+
+def _uncertain(body: BodyResult) -> str:
+    """Return the uncertainty of a body's stated moments [%], as a range where it differs."""
+    percent = 100.0 * body.truth_sd / body.truth
+    low, high = (format_number(float(end), 2) for end in (percent.min(), percent.max()))
+    return low if low == high else f"{low} to {high}"
 
 
 def _setup(result: Result) -> Setup:
