@@ -266,8 +266,8 @@ def _statements(result: BaseBody) -> list[Statement]:
             "Read, as in the report on sensors, as degrees per second and the same share of an accelerometer's peak: "
             f"one faster manoeuvre leaves, to first order at the truth, {format_percent(reading.mass, 2)} in the "
             f"mass and {format_percent(reading.moment, 2)} in the worst moment; 2 % take "
-            f"{format_number(np.ceil(reading.manoeuvres))} manoeuvres. The report on sensors has errors of drawn noise, "
-            "which differ from these by their Monte-Carlo errors. The paper prints no unit.",
+            f"{format_number(np.ceil(reading.manoeuvres))} manoeuvres. The report on sensors has these beside the "
+            "errors over drawn noise. The paper prints no unit.",
         ),
     ]
 
