@@ -1,5 +1,7 @@
 """The study of noise and sensors: treatments, closed forms, the linear method, and all of it where time allows."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -11,10 +13,11 @@ from studies.sensors import Effort, run
 from studies.sensors.draws import Draws
 from studies.sensors.integration import scalars
 from studies.sensors.linear import Estimator, Linear
-from studies.sensors.montecarlo import EQUAL, LIKELIHOOD, PAPER, PIECES, TREATMENTS, WEIGHTED, WHOLE, Spread
+from studies.sensors.montecarlo import EQUAL, EXACT, LIKELIHOOD, PAPER, PIECES, TREATMENTS, WEIGHTED, WHOLE, Spread
 from studies.sensors.regressor import Balance, attenuation, regress, solve_balance
-from studies.sensors.report import write_report
+from studies.sensors.report import _failing, write_report
 from studies.sensors.result import REALISTIC
+from studies.sensors.rows import equal_rms, percent
 from studies.sensors.setting import Noise, fly, levels, motion
 from studies.sensors.treatments import Differences, LowPass, Polynomial, SavitzkyGolay, SmoothingSpline, Wiener
 from studies.sensors.weights import as_read, constant, integral, integrated, integrated_whole
@@ -160,6 +163,30 @@ def test_linear_method_is_attenuated_as_predicted(free):
     predicted = attenuation(free, noise)
     assert predicted[0] < -0.5
     np.testing.assert_allclose(errors.mean(axis=0)[JUDGED], predicted[JUDGED], atol=0.02)
+
+
+def test_percentages_have_their_error_in_brackets_and_small_ones_a_power_of_ten():
+    assert percent(0.032, 0.0034) == "3.2(3)"
+    assert percent(-1.0e-5, 2.3e-4) == "−0.001(23)"
+    assert percent(1.653e-7, 1.794e-8) == "1.65(18) × 10⁻⁵"
+
+
+def test_errors_are_orders_of_magnitude_where_fits_diverge():
+    spread = Spread(np.tile([[0.13], [-0.13], [0.14]], 10), np.ones((3, 10)), np.ones(3))
+    for diverged, mass in ((True, "about 10"), (False, "13.3(3)")):
+        fits = {"level": {PAPER: SimpleNamespace(diverged=np.array([False, diverged]))}}
+        result = SimpleNamespace(accelerometers={"level": {PAPER: spread}}, refits=fits)
+        assert equal_rms(result, "level", PAPER) == (mass, mass)
+
+
+def test_the_cause_of_what_is_not_honest_is_named_only_where_exact_joints_are_honest():
+    rng = np.random.default_rng(0)
+    wide, right = (Spread(rng.normal(size=(400, 10)), np.full((400, 10), sd), np.ones(400)) for sd in (2.0, 1.0))
+    named, unknown = (
+        _failing(SimpleNamespace(joints={"level": {LIKELIHOOD: wide, EXACT: exact}}), "level") for exact in (right, wide)
+    )
+    assert "noise of the encoders" in named
+    assert "the cause is not known" in unknown
 
 
 @pytest.mark.usefixtures("slow")
