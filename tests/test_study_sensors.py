@@ -167,7 +167,7 @@ def test_linear_method_is_attenuated_as_predicted(free):
 
 def test_percentages_have_their_error_in_brackets_and_small_ones_a_power_of_ten():
     assert percent(0.032, 0.0034) == "3.2(3)"
-    assert percent(-1.0e-5, 2.3e-4) == "−0.001(23)"
+    assert percent(-2.0e-4, 1.2e-4) == "−0.020(12)"
     assert percent(1.653e-7, 1.794e-8) == "1.65(18) × 10⁻⁵"
 
 
