@@ -8,6 +8,7 @@ import pytest
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.base_body import paper
 from studies.common.ets7 import INTERVAL
+from studies.common.goals import Verdict
 from studies.common.quantities import JUDGED
 from studies.sensors import Effort, run
 from studies.sensors.draws import Draws
@@ -15,7 +16,7 @@ from studies.sensors.integration import scalars
 from studies.sensors.linear import Estimator, Linear
 from studies.sensors.montecarlo import EQUAL, EXACT, LIKELIHOOD, PAPER, PIECES, TREATMENTS, WEIGHTED, WHOLE, Spread
 from studies.sensors.regressor import Balance, attenuation, regress, solve_balance
-from studies.sensors.report import _failing, write_report
+from studies.sensors.report import _failing, _judged, write_report
 from studies.sensors.result import REALISTIC
 from studies.sensors.rows import equal_rms, percent
 from studies.sensors.setting import Noise, fly, levels, motion
@@ -179,12 +180,16 @@ def test_errors_are_orders_of_magnitude_where_fits_diverge():
         assert equal_rms(result, "level", PAPER) == (mass, mass)
 
 
+def test_a_ratio_is_judged_with_its_monte_carlo_error():
+    for ratio, verdict in ((0.66, Verdict.FAIL), (0.7, Verdict.OPEN), (0.8, Verdict.OPEN), (1.0, Verdict.PASS)):
+        assert _judged(np.array([1.0, ratio]), np.array([0.08, 0.08])) is verdict
+
+
 def test_the_cause_of_what_is_not_honest_is_named_only_where_exact_joints_are_honest():
     rng = np.random.default_rng(0)
     wide, right = (Spread(rng.normal(size=(400, 10)), np.full((400, 10), sd), np.ones(400)) for sd in (2.0, 1.0))
-    named, unknown = (
-        _failing(SimpleNamespace(joints={"level": {LIKELIHOOD: wide, EXACT: exact}}), "level") for exact in (right, wide)
-    )
+    results = [SimpleNamespace(joints={"level": {LIKELIHOOD: wide, EXACT: exact}}) for exact in (right, wide)]
+    named, unknown = (_failing(result, "level") for result in results)
     assert "noise of the encoders" in named
     assert "the cause is not known" in unknown
 

@@ -78,8 +78,8 @@ def _refuse_fast_turns(manoeuvres: Sequence[Manoeuvre]) -> None:
             row = int(np.argmax(np.abs(rate)))
             if abs(rate[row]) > FAST:
                 raise InputError(
-                    f"{rate[row]:.3g} rad/s at time {time[row]:g} s is a turn that no integration step follows to 1 % of "
-                    "the sensors' noise",
+                    f"{rate[row]:.3g} rad/s at time {time[row]:g} s is a turn that no integration step follows to 1 % "
+                    "of the sensors' noise",
                     file=recording.file or recording.name,
                     place=f"column {column}",
                     remedy="Give rates in rad/s, not in degrees or arcseconds per second",

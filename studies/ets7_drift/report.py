@@ -72,8 +72,8 @@ def write_report(cases: Mapping[str, Case], output: Path, *, full: bool, origin:
         "them predict the measured attitude, which was not used?",
         " ".join(_answer(name, case) for name, case in cases.items()),
         tuple(goal for name in KNOWN for goal in goals_of(name, cases.get(name))),
-        "the links are known exactly, where the paper knows them to 5 %, the wheels' momentum is constant and the noise "
-        "is white. Recordings are simulated; no flight telemetry of ETS-VII is public.",
+        "the links are known exactly, where the paper knows them to 5 %, the wheels' momentum is constant and the "
+        "noise is white. Recordings are simulated; no flight telemetry of ETS-VII is public.",
         full,
     )
     add_first_page(

@@ -100,8 +100,8 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         ),
         answer=(
             "With the arm known to 5 % of each link's mass no time and no rate sensor or accelerometer is enough: at "
-            f"least {format_percent(_least(result), 2)} are left, since motion alone takes the scale from the arm's mass. "
-            "Measured joint torques or a known thrust would give it (reports on the whole system and on base "
+            f"least {format_percent(_least(result), 2)} are left, since motion alone takes the scale from the arm's "
+            "mass. Measured joint torques or a known thrust would give it (reports on the whole system and on base "
             "parameters). With the arm known exactly, sensors of 10⁻⁵ rad/s and 10⁻⁵ m/s² need "
             f"{time_needed(usual[True, False], mission.DURATION)}; one manoeuvre of {mission.DURATION:g} s, the "
             f"shortest considered, leaves {format_percent(result.after['designed'].worst(True), 2)}."

@@ -91,8 +91,8 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
     done = len(made) + len(failures)
     summary = Summary(
         question="What do commands make of spoilt files, mistaken units and kills at random moments?",
-        answer=f"Of {sum(numbers.values())} spoilt files {numbers['faulty']} got an unclear answer, {numbers['refused']} "
-        f"were refused with a clear message and {numbers['accepted']} were accepted; "
+        answer=f"Of {sum(numbers.values())} spoilt files {numbers['faulty']} got an unclear answer, "
+        f"{numbers['refused']} were refused with a clear message and {numbers['accepted']} were accepted; "
         f"{sum(item['refused'] for item in units.values())} of {counted(len(units), 'mistaken unit')} "
         f"{'was' if len(units) == 1 else 'were'} refused; after {counted(kills, 'kill')} "
         f"{sum(item['same'] for item in killed.values())} of {counted(len(killed), 'command')} gave the answer of a "
@@ -129,7 +129,9 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
     if units:
         document.section("Mistaken units")
         said = [[unit, "yes" if item["refused"] else "no", _short(item["said"])] for unit, item in units.items()]
-        document.table(["unit", "refused", "what the command says"], said, "What the command check says of mistaken units.")
+        document.table(
+            ["unit", "refused", "what the command says"], said, "What the command check says of mistaken units."
+        )
     if around:
         document.section("Faults around a run")
         said = [[title, "yes" if item["refused"] else "no", _short(item["said"])] for title, item in around.items()]
@@ -141,8 +143,8 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
         "Hypothesis from a fixed seed; the command stops when all files are read. A file counts as refused where the "
         "exit status is 2, one message begins with Error, nothing is written, and no warning of Python is raised. "
         "Accepted files are those that are still valid, such as another number in a cell. A full disk is "
-        "/dev/full, and the second run finds a folder that another one has claimed. More failing effects of a user, and "
-        "a run that is killed while it writes, are in tests/test_faults.py."
+        "/dev/full, and the second run finds a folder that another one has claimed. More failing effects of a user, "
+        "and a run that is killed while it writes, are in tests/test_faults.py."
     )
     packages = ", ".join(f"{name} {version(name)}" for name in ("hypothesis", "jax", "numpy"))
     write_study(document, summary, file, None if origin is None else f"{origin} With {packages}.")

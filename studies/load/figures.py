@@ -30,8 +30,9 @@ def loop_figure(flights: dict[str, Flight]) -> Figure:
         steps = np.arange(1, len(flight.bodies) + 1)
         error = [abs(flight.error(step)[0]) for step in range(len(steps))]
         sd = [flight.relative(step)[0] for step in range(len(steps))]
-        left.plot(steps, 100.0 * np.array(sd), "-", color=COLOURS[index], label=f"sd, {TITLES[name]}")
-        left.plot(steps, 100.0 * np.array(error), "o", color=COLOURS[index], markersize=4, label=f"error, {TITLES[name]}")
+        colour = COLOURS[index]
+        left.plot(steps, 100.0 * np.array(sd), "-", color=colour, label=f"sd, {TITLES[name]}")
+        left.plot(steps, 100.0 * np.array(error), "o", color=colour, markersize=4, label=f"error, {TITLES[name]}")
     left.axhline(100.0 * GOAL, color="#888888", linestyle=":")
     left.text(0.55, 110.0 * GOAL, "wanted", fontsize=8, va="bottom")
     flown = next(iter(flights.values()))

@@ -125,8 +125,8 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         document,
         _setup(result),
         figures.robot_pose(ship(paper.TRUTH), motion, times),
-        "ETS-VII with the load at rest and in the middle of the paper's manoeuvre, which is flown without noise; the loop's "
-        "own manoeuvres are not drawn.",
+        "ETS-VII with the load at rest and in the middle of the paper's manoeuvre, which is flown without noise; the "
+        "loop's own manoeuvres are not drawn.",
     )
     _failures(document, result)
     _evidence(document, result)
@@ -192,8 +192,8 @@ def _failures(document: Document, result: Result) -> None:
     counts = joined(str(count) for count in dict.fromkeys(loop.samples))
     due = " or ".join(format_number(float(np.sqrt(2.0 / count)), 2) for count in dict.fromkeys(loop.samples))
     document.paragraph(
-        f"Chi-square per sample of the loop's fits, {counts} samples each: {ratio}. Due is 1 ± {due}, and a little less "
-        "where a fit has many unknowns."
+        f"Chi-square per sample of the loop's fits, {counts} samples each: {ratio}. Due is 1 ± {due}, and a little "
+        "less where a fit has many unknowns."
     )
 
 

@@ -141,14 +141,23 @@ def goals_of(result: Result) -> list[Goal]:
 
 def _honest(name: str, spreads: dict[str, Spread]) -> Goal:
     ratios = np.array([spread.honesty[JUDGED] for spread in spreads.values()])
+    errors = ratios * np.array([(spread.rms_error / spread.rms)[JUDGED] for spread in spreads.values()])
     inside = [level for level, row in zip(spreads, ratios, strict=True) if _is_honest(row)]
     outside = [level for level in spreads if level not in inside]
     reached = f"{format_range(ratios.ravel(), 2)}; {len(inside)} of {len(spreads)} levels"
     return Goal(
         f"actual over stated errors of mass and moments within {HONEST[0]:g} and {HONEST[1]:g} at every level: {name}",
         reached + (f"; not at {format_text('; '.join(outside))}" if outside else ""),
-        Verdict.of(not outside),
+        _judged(ratios, errors),
     )
+
+
+def _judged(ratios: np.ndarray, errors: np.ndarray) -> Verdict:
+    """Return whether ratios are within `HONEST`, given their Monte-Carlo errors."""
+    low, high = ratios - errors, ratios + errors
+    if ((high < HONEST[0]) | (low > HONEST[1])).any():
+        return Verdict.FAIL
+    return Verdict.PASS if _is_honest(low) and _is_honest(high) else Verdict.OPEN
 
 
 def _is_honest(ratios: np.ndarray) -> bool:
@@ -251,8 +260,8 @@ def _failing(result: Result, level: str) -> str:
     share = float((exact.rms[JUDGED] / spread.rms[JUDGED]).max())
     return (
         f"{text} With exact joints the ratio is {honesty_of(exact)} and the errors are {format_percent(share, 1)} of "
-        "these at most: what is not stated rightly is the noise of the encoders, as it is carried over by the smoother. "
-        "Why the smoother states it so is not known."
+        "these at most: what is not stated rightly is the noise of the encoders, as it is carried over by the "
+        "smoother. Why the smoother states it so is not known."
     )
 
 
@@ -360,7 +369,7 @@ def _averaged(exact: Spread, likelihood: Spread) -> str:
     stated = float(np.sqrt((exact.stated[:, JUDGED] ** 2).mean(axis=0)).max())
     fewest = np.ceil(max(1.0, (stated / PLANE) ** 2))
     return (
-        f"Noise averages: by the likelihood 2 % take {format_fixed(count, 0)} ± {format_fixed(error, 0)} such manoeuvres "
-        f"from the errors over {len(likelihood.errors)} sets of noise, and {fewest:.0f} from the standard deviations to "
-        f"first order ({format_percent(stated, 2)} in the worst), as in the report on the base body."
+        f"Noise averages: by the likelihood 2 % take {format_fixed(count, 0)} ± {format_fixed(error, 0)} such "
+        f"manoeuvres from the errors over {len(likelihood.errors)} sets of noise, and {fewest:.0f} from the standard "
+        f"deviations to first order ({format_percent(stated, 2)} in the worst), as in the report on the base body."
     )

@@ -155,11 +155,11 @@ def goals_of(result: Result) -> list[Goal]:
             )
         )
     texts = (
-        f"sampled posteriors are neither too narrow nor too wide for the true bodies (two-sided p at least {LEVEL:g} over "
-        "their number) and three methods agree",
+        f"sampled posteriors are neither too narrow nor too wide for the true bodies (two-sided p at least {LEVEL:g} "
+        "over their number) and three methods agree",
         f"squared distances over drawn systems are chi-square (Kolmogorov-Smirnov p at least {LEVEL:g})",
-        f"beyond the {format_percent(TAIL)} quantile, and below that of {format_percent(1.0 - TAIL)}, no more of them than "
-        f"chance allows (two-sided p at least {LEVEL:g})",
+        f"beyond the {format_percent(TAIL)} quantile, and below that of {format_percent(1.0 - TAIL)}, no more of them "
+        f"than chance allows (two-sided p at least {LEVEL:g})",
     )
     if result.coverage is None:
         return [*goals, *(Goal(text, "not run", Verdict.NOT_TESTED) for text in texts)]
