@@ -19,6 +19,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_model
 from bayesid.simulation.own_effects import check_own_effect
 from studies.faults.fuzz import Spoilt, answer_to, spoilt
+from studies.faults.surroundings import with_plugin
 from studies.truth.mujoco import Manoeuvres, write_study
 from studies.truth.urdf import SERVICER4
 
@@ -33,22 +34,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_study(folder, SERVICER4, np.random.default_rng(3), manoeuvres=manoeuvres, title="Servicer").file
 
 
-PLUGIN = '''
-import jax.numpy as jnp
-from bayesid import Effect, Parameter, Wrench, register
-
-
-@register
-class Mine(Effect):
-    """An effect of a user."""
-
-    name = "test-faulty"
-    parameters = (Parameter("x", "N m", 1e-3),)
-
-    def {hook}
-'''
-
-HOOKS = {
+FAILING = {
     "wrench NaN": (
         "wrench(self, v, i, s):\n        return Wrench(jnp.zeros(3), jnp.sqrt(-v[0]) + jnp.ones(3))",
         "finite",
@@ -79,13 +65,11 @@ HOOKS = {
 }
 
 
-@pytest.mark.parametrize("kind", HOOKS)
+@pytest.mark.parametrize("kind", FAILING)
 def test_a_faulty_plug_in_is_named(kind: str, study: Path, tmp_path: Path) -> None:
-    hook, word = HOOKS[kind]
+    hook, word = FAILING[kind]
     file = copy(study, tmp_path)
-    (tmp_path / "mine.py").write_text(PLUGIN.format(hook=hook))
-    text = file.read_text().replace('["gravity-gradient"]', '["gravity-gradient", "test-faulty"]')
-    file.write_text(text + '\nplugins = ["mine.py"]\n')
+    with_plugin(file, hook)
     status, output = run("check", file, "--output", tmp_path / "out")
     assert status == 2, output
     assert output.count(" Error: ") + output.startswith("Error: ") == 1

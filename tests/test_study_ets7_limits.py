@@ -52,10 +52,28 @@ def test_what_is_not_seen_sets_a_floor():
     assert information.worst(1e6) == pytest.approx(np.sqrt(0.5), rel=1e-4)
 
 
+def test_what_is_seen_faintly_sets_no_floor():
+    rows = 5.0 * np.eye(10)
+    rows[4] *= 1e-3
+    information = repeated(rows)
+    assert information.needed() == np.inf
+    assert not information.floored
+
+
+def test_a_floor_is_seen_while_more_repetitions_still_help():
+    rows = 5.0 * np.eye(10)
+    # mass and moment in one combination only, and faintly
+    rows[0, 0] = rows[0, 4] = 1e-3 / np.sqrt(2.0)
+    rows[4] = 0.0
+    information = repeated(rows)
+    assert information.worst(1e6) == pytest.approx(np.sqrt(0.75))
+    assert information.floored
+
+
 @pytest.mark.parametrize(
     ("repetitions", "floored", "words"),
     [
-        (1.0, False, "240 s"),
+        (1.0, False, "at most 240 s"),
         (6.0, False, "24 min"),
         (150.0, False, "10 h"),
         (np.inf, True, "never (2.3 %)"),

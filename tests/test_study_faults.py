@@ -7,6 +7,7 @@ import pytest
 
 from studies.faults import attempt, tasks, write_report
 from studies.faults.kills import content_of, half_written, kill_and_resume
+from studies.faults.surroundings import SURROUNDINGS
 from tests.pdf_text import PdfText
 
 
@@ -29,25 +30,38 @@ def test_what_differs_and_what_is_half_written_is_seen(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("title", SURROUNDINGS)
+def test_faults_around_a_run_get_one_clear_error(title):
+    found = attempt({"around": title}, np.random.default_rng(0))
+    assert found["refused"], found["said"]
+
+
+@pytest.mark.slow
 def test_spoilt_files_are_counted():
     found = attempt({"spoil": 3, "changes": 20}, np.random.default_rng(0))
-    assert sum(found["numbers"].values()) == 20
+    assert sum(sum(counts.values()) for counts in found["answers"].values()) == 20
     assert found["faults"] == []
 
 
 def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     killed = {"kill": "design", "kills": 2, "half_written": ["a.json"], "same": False, "message": "other files"}
+    answers = {"insert": {"refused": 4, "accepted": 2}, "cut off": {"faulty": 1}}
     made = [
-        {"spoil": 1, "numbers": {"refused": 7, "faulty": 1}, "faults": ["Spoilt: KeyError"]},
+        {"spoil": 1, "answers": answers, "faults": ["KeyError"]},
         {"unit": "acceleration in g", "refused": False, "said": ""},
+        {"around": "a full disk", "refused": True, "said": "Error: No space left"},
         killed,
     ]
     write_report(made, ["a trial broke"], tmp_path / "faults.pdf")
     text = PdfText.read(tmp_path / "faults.pdf")
+    assert text.row("No unclear answer to a spoilt file", "1 of 7; 4 refused, 2 accepted", "FAIL")
+    assert text.row("a full disk: one clear error", "refused", "PASS")
+    closed = "a folder that cannot be written: one clear error"
+    assert text.row(closed, "not tried; see tests/test_faults.py", "NOT TESTED")
     assert text.row("Nothing half written after a kill", "1 file after 2 kills", "FAIL")
     assert text.row("design: same answer after kills", "2 kills", "FAIL")
     assert text.row("loop: same answer after kills", "0 kills", "NOT TESTED")
-    for part in ("Spoilt: KeyError", "not refused", "other files", "a trial broke"):
+    for part in ("KeyError", "not refused", "other files", "a trial broke"):
         assert part in text
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,7 @@ def test_errors_and_used_limits_of_a_flight():
     assert own.error(-1)[0] == pytest.approx(0.02, abs=0.002)
     assert own.worst(-1)[1] == pytest.approx(0.01, rel=0.1)
     assert own.used["tip_speed"] == pytest.approx(0.06 / SAFE.tip_speed)
+    assert replace(own, chi2=[0.9], samples=[800]).chi2_errors() == pytest.approx([-2.0])
 
 
 @pytest.mark.usefixtures("slow")

@@ -1,20 +1,24 @@
 """The study of noise and sensors: treatments, closed forms, the linear method, and all of it where time allows."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.base_body import paper
 from studies.common.ets7 import INTERVAL
+from studies.common.goals import Verdict
 from studies.common.quantities import JUDGED
 from studies.sensors import Effort, run
 from studies.sensors.draws import Draws
 from studies.sensors.integration import scalars
 from studies.sensors.linear import Estimator, Linear
-from studies.sensors.montecarlo import EQUAL, LIKELIHOOD, PAPER, PIECES, TREATMENTS, WEIGHTED, WHOLE, Spread
+from studies.sensors.montecarlo import EQUAL, EXACT, LIKELIHOOD, PAPER, PIECES, TREATMENTS, WEIGHTED, WHOLE, Spread
 from studies.sensors.regressor import Balance, attenuation, regress, solve_balance
-from studies.sensors.report import write_report
+from studies.sensors.report import _failing, _judged, write_report
 from studies.sensors.result import REALISTIC
+from studies.sensors.rows import equal_rms, percent
 from studies.sensors.setting import Noise, fly, levels, motion
 from studies.sensors.treatments import Differences, LowPass, Polynomial, SavitzkyGolay, SmoothingSpline, Wiener
 from studies.sensors.weights import as_read, constant, integral, integrated, integrated_whole
@@ -160,6 +164,34 @@ def test_linear_method_is_attenuated_as_predicted(free):
     predicted = attenuation(free, noise)
     assert predicted[0] < -0.5
     np.testing.assert_allclose(errors.mean(axis=0)[JUDGED], predicted[JUDGED], atol=0.02)
+
+
+def test_percentages_have_their_error_in_brackets_and_small_ones_a_power_of_ten():
+    assert percent(0.032, 0.0034) == "3.2(3)"
+    assert percent(-2.0e-4, 1.2e-4) == "−0.020(12)"
+    assert percent(1.653e-7, 1.794e-8) == "1.65(18) × 10⁻⁵"
+
+
+def test_errors_are_orders_of_magnitude_where_fits_diverge():
+    spread = Spread(np.tile([[0.13], [-0.13], [0.14]], 10), np.ones((3, 10)), np.ones(3))
+    for diverged, mass in ((True, "about 10"), (False, "13.3(3)")):
+        fits = {"level": {PAPER: SimpleNamespace(diverged=np.array([False, diverged]))}}
+        result = SimpleNamespace(accelerometers={"level": {PAPER: spread}}, refits=fits)
+        assert equal_rms(result, "level", PAPER) == (mass, mass)
+
+
+def test_a_ratio_is_judged_with_its_monte_carlo_error():
+    for ratio, verdict in ((0.66, Verdict.FAIL), (0.7, Verdict.OPEN), (0.8, Verdict.OPEN), (1.0, Verdict.PASS)):
+        assert _judged(np.array([1.0, ratio]), np.array([0.08, 0.08])) is verdict
+
+
+def test_the_cause_of_what_is_not_honest_is_named_only_where_exact_joints_are_honest():
+    rng = np.random.default_rng(0)
+    wide, right = (Spread(rng.normal(size=(400, 10)), np.full((400, 10), sd), np.ones(400)) for sd in (2.0, 1.0))
+    results = [SimpleNamespace(joints={"level": {LIKELIHOOD: wide, EXACT: exact}}) for exact in (right, wide)]
+    named, unknown = (_failing(result, "level") for result in results)
+    assert "noise of the encoders" in named
+    assert "the cause is not known" in unknown
 
 
 @pytest.mark.usefixtures("slow")

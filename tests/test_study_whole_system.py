@@ -13,6 +13,8 @@ from studies.whole_system import run, write_report
 from studies.whole_system.coverage import Coverage
 from studies.whole_system.information import Information, Sensors
 from studies.whole_system.linear import linear_prior, regress
+from studies.whole_system.report import _well_sized
+from studies.whole_system.sampled import Sampled
 from studies.whole_system.setting import LOAD, bodies, drawn, spreads, true_robot
 from studies.whole_system.world import fly, record
 from tests.report_rules import broken_rules
@@ -113,10 +115,20 @@ def test_torques_and_thrust_bring_the_scale_and_the_report_is_written(tmp_path: 
     assert broken_rules(tmp_path / "report.pdf", full=False) == []
 
 
-def test_the_tail_of_the_distances_is_tested():
-    """By hand: of 40 distances three are beyond the 95 % quantile, as P(3 or more) = 0.32 allows; of ten five are."""
+def test_both_tails_of_the_distances_are_tested():
+    """By hand: of 40 distances three are beyond the 95 % quantile, as 2 P(3 or more) = 0.65 allows; of ten five are."""
     inside, outside = np.full(37, 80.0), np.full(3, 200.0)
     coverage = Coverage(np.concatenate([inside, outside]), np.zeros((40, 3)), 80)
-    assert coverage.far == 3
-    assert coverage.tail_p_value == pytest.approx(0.3233, abs=1e-4)
-    assert Coverage(np.repeat([80.0, 200.0], 5), np.zeros((10, 3)), 80).tail_p_value < 1e-4
+    assert (coverage.far, coverage.near) == (3, 0)
+    assert coverage.tail_p_value == pytest.approx(2.0 * 0.3233, abs=1e-4)
+    for unlikely in (200.0, 20.0):
+        assert Coverage(np.repeat([80.0, unlikely], 5), np.zeros((10, 3)), 80).tail_p_value < 1e-4
+
+
+def test_a_sampled_posterior_that_is_too_wide_fails_and_the_level_is_shared():
+    def case(p_value):
+        return Sampled("motion", None, 0.0, p_value, {})
+
+    assert _well_sized([case(0.03), case(0.5)])
+    assert not _well_sized([case(0.02), case(0.5)])
+    assert not _well_sized([case(0.04)])

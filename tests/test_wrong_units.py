@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -64,10 +65,21 @@ def test_accelerations_in_g_are_refused_whatever_the_base_weighs(study: Path, ma
         refuse_wrong_units(posterior_of(study, mass=mass, unit=1.0 / STANDARD_GRAVITY))
 
 
-def test_times_in_milliseconds_are_refused(study: Path) -> None:
-    SLIPS["time in milliseconds"](study.parent)
-    loaded = Study.load(study)
+@pytest.mark.parametrize(
+    ("slip", "message"),
+    [
+        ("time in milliseconds", r"column time: .* only if times are milliseconds\. Give times in seconds"),
+        ("time in minutes", r"column time: .* only if times are minutes\. Give times in seconds"),
+        (
+            "rate in arcseconds per second",
+            r"manoeuvre-1\.csv: column rate\..: .* rad/s at time .* Give rates in rad/s, not in degrees or arcseconds",
+        ),
+    ],
+)
+def test_the_column_in_another_unit_is_named(slip: str, message: str, study: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(study.parent, tmp_path / "study")
+    SLIPS[slip](folder)
+    loaded = Study.load(folder / study.name)
     model = load_model(loaded)
-    posterior = Posterior.of(model, load_manoeuvres(loaded, model.robot), window=0)
-    with pytest.raises(InputError, match=r"column time: .* only if times are milliseconds\. Give times in seconds"):
-        refuse_wrong_units(posterior)
+    with pytest.raises(InputError, match=message):
+        refuse_wrong_units(Posterior.of(model, load_manoeuvres(loaded, model.robot), window=0))

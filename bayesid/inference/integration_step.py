@@ -15,6 +15,7 @@ from bayesid.inference.data import attitudes_of, grids_of
 from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import Kind
 from bayesid.simulation.time_grid import pad_grids, rounded
 
 __all__ = ["choose_step", "integration_error", "simulate_padded"]
@@ -27,6 +28,9 @@ STEP_TOLERANCE = 0.01
 
 HOPELESS = 1.0 / 64.0
 """Part of the first step at which a simulation without finite readings is given up."""
+
+FAST = 1.0
+"""Recorded rate of the base from which on it is named where no step is short enough [rad/s]."""
 
 FEWEST_STEPS = 512
 """Smallest number of steps to which simulations of different steps are padded; larger numbers are powers of two."""
@@ -59,10 +63,27 @@ def choose_step(
             )
         grids = {step: finer}
         if step < 1e-4 * LONGEST_STEP:
+            _refuse_fast_turns(manoeuvres)
             raise InputError(
                 "no integration step reaches 1 % of the sensors' noise",
                 remedy="Check the units of joint motion and of the sensors' sigma",
             )
+
+
+def _refuse_fast_turns(manoeuvres: Sequence[Manoeuvre]) -> None:
+    """Name the first recording whose base turns so fast that its rates may be in another unit."""
+    for recording in (manoeuvre.recording for manoeuvre in manoeuvres):
+        for column in (name for name in Kind.RATE.columns if name in recording.channels):
+            time, rate = recording.series(column)
+            row = int(np.argmax(np.abs(rate)))
+            if abs(rate[row]) > FAST:
+                raise InputError(
+                    f"{rate[row]:.3g} rad/s at time {time[row]:g} s is a turn that no integration step follows to 1 % "
+                    "of the sensors' noise",
+                    file=recording.file or recording.name,
+                    place=f"column {column}",
+                    remedy="Give rates in rad/s, not in degrees or arcseconds per second",
+                )
 
 
 def integration_error(

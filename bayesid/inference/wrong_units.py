@@ -1,11 +1,13 @@
 """Refusal of recordings whose numbers cannot be in SI units, before anything is fitted.
 
 Readings are compared with those that the joints' motion should cause with the robot as it is given. A factor that no
-plausible error of the robot explains is refused. Two units are too near for that, and are refused where the data
-contradict seconds or m/s2 and agree with the other unit:
+plausible error of the robot explains is refused. Some units are too near for that or look like others, and are refused
+where the data contradict seconds or m/s2 and agree with the other unit:
 
 - Times in milliseconds make all motion a thousand times slower, and what acts on the base meanwhile hides the joints'
   share. No reading then follows the prediction, and all do once times are divided by a thousand.
+- Times in minutes make all motion sixty times faster, so that rates are sixty and accelerations 3600 times smaller than
+  predicted. The readings of several sensors agree once times are multiplied by sixty, which no other slip brings about.
 - Accelerations in g are 9.8 times too small, as those of a heavier base would be. But the acceleration that the base's
   turning adds at the accelerometer is known from the rates whatever the base weighs. Both units are fitted with
   noise that is a share of the readings, so that neither the declared noise nor a small cause that the model lacks
@@ -42,8 +44,8 @@ FOLLOWING = 0.8
 LOUD = 5.0
 """Root mean square of readings over their noise from which on they can be judged."""
 
-MILLISECOND = 1e-3
-"""Milliseconds in seconds."""
+TIMES = {"milliseconds": 1e-3, "minutes": 60.0}
+"""Units of time that users give by mistake [s]."""
 
 GRAVITY = 9.80665
 """Standard gravity [m/s2]."""
@@ -63,13 +65,13 @@ def refuse_wrong_units(posterior: Posterior) -> None:
     ------
     InputError
         If a joint leaves its limits, or the readings of a sensor are many times larger or smaller than predicted, or
-        times are in milliseconds, or accelerations are in g.
+        times are in milliseconds or minutes, or accelerations are in g.
     """
     for manoeuvre in posterior.manoeuvres:
         refuse_impossible_joints(manoeuvre.recording, posterior.model.robot)
     compared = _compared(posterior)
     for seen in compared:
-        _refuse_milliseconds(posterior, seen)
+        _refuse_times(posterior, seen)
     _refuse_gravities(posterior, compared)
     for manoeuvre, seen in zip(posterior.manoeuvres, compared, strict=True):
         for comparison in seen:
@@ -163,42 +165,52 @@ def _refuse_factor(recording: Recording, seen: _Comparison) -> None:
             f"the readings follow the joints' motion but are {1.0 / seen.factor:.3g} times smaller than what it causes",
             file=recording.file or recording.name,
             place=f"column {seen.column}",
-            remedy=f"Give them in {seen.unit}, joint positions in radians, or correct the robot",
+            remedy=f"Give them in {seen.unit}, joint positions in radians and times in seconds, or correct the robot",
         )
 
 
 @dataclass(frozen=True)
-class _Hastened:
-    """Motion of joints with times divided by a thousand."""
+class _OtherTimes:
+    """Motion of joints with times in another unit [s]."""
 
     motion: Motion
+    unit: float
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,)."""
-        slow = self.motion.evaluate(np.asarray(time) / MILLISECOND)
-        return JointState(slow.position, slow.velocity / MILLISECOND, slow.acceleration / MILLISECOND**2)
+        state = self.motion.evaluate(np.asarray(time) / self.unit)
+        return JointState(state.position, state.velocity / self.unit, state.acceleration / self.unit**2)
 
 
-def _refuse_milliseconds(posterior: Posterior, seen: Sequence[_Comparison]) -> None:
+def _refuse_times(posterior: Posterior, seen: Sequence[_Comparison]) -> None:
     loud = [comparison for comparison in seen if comparison.kind is not None and comparison.loud]
-    if not loud or not all(np.isnan(comparison.factor) for comparison in loud):
+    name = _suspected([comparison.factor for comparison in loud])
+    if name is None:
         return
-    manoeuvre = posterior.manoeuvres[loud[0].index]
+    unit, manoeuvre = TIMES[name], posterior.manoeuvres[loud[0].index]
     recording = manoeuvre.recording
-    shorter = Recording(recording.name, recording.file, MILLISECOND * recording.time, recording.channels)
-    hastened = replace(manoeuvre, recording=shorter, motion=_Hastened(manoeuvre.motion))
+    timed = Recording(recording.name, recording.file, unit * recording.time, recording.channels)
+    other = replace(manoeuvre, recording=timed, motion=_OtherTimes(manoeuvre.motion, unit))
     try:
-        other = Posterior.of(posterior.model, [hastened], step=MILLISECOND * posterior.step, window=0)
-        again = {comparison.column: comparison.factor for comparison in _compared(other)[0]}
+        posterior = Posterior.of(posterior.model, [other], step=unit * posterior.step, window=0)
+        again = {comparison.column: comparison.factor for comparison in _compared(posterior)[0]}
     except InputError:  # no motion in so short a time: seconds it is
         return
     if all(1.0 / WRONG_UNIT < again[comparison.column] < WRONG_UNIT for comparison in loud):
         raise InputError(
-            "the readings follow the joints' motion only if times are milliseconds",
+            f"the readings follow the joints' motion only if times are {name}",
             file=recording.file or recording.name,
             place="column time",
             remedy="Give times in seconds",
         )
+
+
+def _suspected(factors: Sequence[float]) -> str | None:
+    """Return the unit of time that may explain measured over predicted readings, one of `TIMES`."""
+    if factors and np.isnan(factors).all():
+        return "milliseconds"
+    # of one sensor alone other slips, such as joint positions in degrees, say the same
+    return "minutes" if len(factors) > 1 and (np.abs(factors) < 1.0 / WRONG_UNIT).all() else None
 
 
 def _refuse_gravities(posterior: Posterior, compared: Sequence[Sequence[_Comparison]]) -> None:

@@ -42,6 +42,9 @@ WANTED = 0.01
 LEVEL = 0.95
 """Level of the region of the sampled posterior that should hold the truth."""
 
+WAY_OUT = "measured joint torques or a known thrust would (reports on the whole system and on base parameters)"
+"""What gives masses their scale where motion cannot."""
+
 
 def write_report(result: BaseBody, output: Path, origin: str | None = None) -> None:
     """Write the report as PDF, and beside it its summary and its further tables."""
@@ -51,13 +54,13 @@ def write_report(result: BaseBody, output: Path, origin: str | None = None) -> N
     summary = Summary(
         "How well does one manoeuvre of the arm identify mass, centre of mass and inertia of the base, with realistic "
         "sensors, at the speed that the flight's rule permits?",
-        f"At the permitted speed the mass of the base gets a standard deviation of "
+        f"At the permitted speed the mass of the base gets, to first order at the truth, a standard deviation of "
         f"{format_percent(permitted[MASS], 2)} if the arm is known exactly ({format_percent(faster[MASS], 2)} if flown "
         f"{format_fixed(result.slowness, 1)} times faster), and of {format_percent(known[MASS], 2)} if the "
-        "arm is known to 5 %, which no sensor mends.",
+        f"arm is known to 5 %, which no rate sensor, attitude sensor or accelerometer mends; {WAY_OUT}.",
         tuple(goals_of(result)),
         "the posture, period and joint zeros that the paper does not print are as assumed here, noise is white and the "
-        "arm's error is independent from link to link.",
+        "arm's error is independent from link to link. Sampled posteriors are of the faster manoeuvre alone.",
         bool(result.sampled),
     )
     add_first_page(
@@ -89,7 +92,7 @@ def goals_of(result: BaseBody) -> list[Goal]:
         ),
         *(
             Goal(
-                f"sd of the mass at most {format_percent(WANTED)} at the permitted speed, arm "
+                f"sd of the mass, to first order, at most {format_percent(WANTED)} at the permitted speed, arm "
                 f"{'exact' if arm == 'exact' else 'known to 5 %'}",
                 format_percent(float(width := result.precision[f"permitted, arm {arm}"][MASS]), 2),
                 Verdict.of(width <= WANTED),
@@ -108,8 +111,9 @@ def _held(result: BaseBody, arm: str) -> Goal:
     """Return the goal on the truth in the sampled posterior, and on the agreement of the three methods."""
     limit = float(stats.chi2.ppf(LEVEL, 10))
     text = (
-        f"arm {'exact' if arm == 'exact' else 'known to 5 %'}: emcee, importance sampling and mode agree, and the "
-        f"{format_percent(LEVEL)} region holds the truth (squared distance at most {format_fixed(limit, 1)})"
+        f"faster manoeuvre, arm {'exact' if arm == 'exact' else 'known to 5 %'}: emcee, importance sampling and "
+        f"mode agree, and the {format_percent(LEVEL)} region holds the truth (squared distance at most "
+        f"{format_fixed(limit, 1)})"
     )
     if arm not in result.sampled:
         return Goal(text, "not run", Verdict.NOT_TESTED)
@@ -159,7 +163,9 @@ def _negatives(document: Document, result: BaseBody) -> None:
         f"gravity gradient included. Arm links known to 5 % leave the base's mass at "
         f"{format_percent(float(result.precision['permitted, arm 5 %'][MASS]), 2)}, and the best accelerometer of "
         f"section 4.3 ({format_number(GRADES[-1])} m/s²) at "
-        f"{format_percent(float(result.grades['5 %'][-1, MASS]), 2)}.",
+        f"{format_percent(float(result.grades['5 %'][-1, MASS]), 2)} (faster manoeuvre). Measured "
+        "joint torques, a known thrust or one known body would give the scale too (reports on the whole system and on "
+        "base parameters).",
         "The poorly exciting manoeuvre, whose rate about z peaks at "
         f"{format_fixed(1e3 * float(poor.peak[2]), 2)} mrad/s, costs nothing without noise; with noise izz is "
         f"{format_fixed(float(loss[6]), 1)} and ixy {format_fixed(float(loss[7]), 1)} times more uncertain.",
@@ -258,9 +264,10 @@ def _statements(result: BaseBody) -> list[Statement]:
             "Noise of sigma 0.04 leaves an error of about 2 % in three dimensions too (4.3).",
             Finding.CONFIRMED if max(reading.mass, reading.moment) <= CLAIM else Finding.REFUTED,
             "Read, as in the report on sensors, as degrees per second and the same share of an accelerometer's peak: "
-            f"one faster manoeuvre leaves {format_percent(reading.mass, 2)} in the mass and "
-            f"{format_percent(reading.moment, 2)} in the worst moment; 2 % take "
-            f"{format_number(np.ceil(reading.manoeuvres))} manoeuvres. The paper prints no unit.",
+            f"one faster manoeuvre leaves, to first order at the truth, {format_percent(reading.mass, 2)} in the "
+            f"mass and {format_percent(reading.moment, 2)} in the worst moment; 2 % take "
+            f"{format_number(np.ceil(reading.manoeuvres))} manoeuvres. The report on sensors has these beside the "
+            "errors over drawn noise. The paper prints no unit.",
         ),
     ]
 

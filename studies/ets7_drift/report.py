@@ -72,8 +72,8 @@ def write_report(cases: Mapping[str, Case], output: Path, *, full: bool, origin:
         "them predict the measured attitude, which was not used?",
         " ".join(_answer(name, case) for name, case in cases.items()),
         tuple(goal for name in KNOWN for goal in goals_of(name, cases.get(name))),
-        "the wheels' momentum is constant, the links are known exactly and the noise is white. Recordings are "
-        "simulated; no flight telemetry of ETS-VII is public.",
+        "the links are known exactly, where the paper knows them to 5 %, the wheels' momentum is constant and the "
+        "noise is white. Recordings are simulated; no flight telemetry of ETS-VII is public.",
         full,
     )
     add_first_page(
@@ -85,7 +85,13 @@ def write_report(cases: Mapping[str, Case], output: Path, *, full: bool, origin:
         "Below: error of the predicted attitude, with the 95 % band predicted from what the rates leave unknown and "
         "the attitude's noise.",
     )
-    add_setup(document, _setup(shown), figures.robot_pose(ets7(), MOTION, np.array([0.0, 100.0])), "ETS-VII at rest.")
+    rests = np.array([0.0, 100.0])
+    add_setup(
+        document,
+        _setup(shown),
+        figures.robot_pose(ets7(), MOTION, rests),
+        f"ETS-VII with the joints at rest, before the manoeuvre and between its two turns ({rests[1]:g} s).",
+    )
     document.section("What fails, and how sure the answer is")
     document.items([text for name, case in cases.items() for text in _negatives(name, case)])
     _evidence(document, cases, output)
@@ -308,7 +314,7 @@ def _statements(cases: Mapping[str, Case]) -> list[Statement]:
 @styled
 def attitude_figure(attitude: Attitude) -> Figure:
     """Draw the paper's figure 2 for one recording, and beneath it the error of the prediction with its band."""
-    figure = wide_figure(3.7)
+    figure = wide_figure(3.1)
     panels = figure.subplots(2, 3, sharex=True, sharey="row")
     dots = {"color": AFTER, "linestyle": "", "marker": ".", "markersize": 3.5, "label": "predicted, with the causes"}
     for axis, (above, below) in enumerate(panels.T):

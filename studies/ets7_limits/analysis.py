@@ -53,7 +53,7 @@ class Answer:
     floor : float
         Largest relative standard deviation after the longest time.
     floored : bool
-        Whether more time no longer helps then.
+        Whether no time is enough.
     """
 
     once: float

@@ -30,6 +30,9 @@ ABSENT = 1e3
 LONGEST = 1e6
 """Largest number of repetitions, which take years of moving without a pause."""
 
+TARGET = 0.01
+"""Relative standard deviation to reach."""
+
 
 @dataclass(frozen=True)
 class Grade:
@@ -73,7 +76,7 @@ class Repeated:
         """Return the largest relative standard deviation of the base's mass and three moments of inertia."""
         return float((self.sd(repetitions)[JUDGED] / self.prior.values[JUDGED]).max())
 
-    def needed(self, target: float = 0.01) -> float:
+    def needed(self, target: float = TARGET) -> float:
         """Return how many repetitions, at least one, reach the target; infinite where `LONGEST` is not enough."""
         if self.worst(1.0) <= target:
             return 1.0
@@ -83,8 +86,13 @@ class Repeated:
 
     @property
     def floored(self) -> bool:
-        """Whether more repetitions no longer help in the end."""
-        return self.worst(LONGEST) > 0.9 * self.worst(0.01 * LONGEST)
+        """Whether no number of repetitions reaches `TARGET`.
+
+        In the end the variance is v + c / n after n repetitions; v is extrapolated from far more than `LONGEST`.
+        """
+        first, last = LONGEST, 100.0 * LONGEST
+        limit = (last * self.worst(last) ** 2 - first * self.worst(first) ** 2) / (last - first)
+        return limit > TARGET**2
 
 
 @dataclass

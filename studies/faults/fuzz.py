@@ -19,7 +19,7 @@ from bayesid.app.command_line import app
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 
-__all__ = ["Answer", "Spoilt", "answer_to", "spoilt"]
+__all__ = ["KINDS", "Answer", "Spoilt", "answer_to", "spoilt"]
 
 JUNK = (
     *("nan", "inf", "-inf", "-1.0", "0", "0.0", "1e-300", "1e300", "1e400", "9" * 400, "-0.0", "1_000", "0x10", "1,5"),
@@ -74,6 +74,7 @@ class Spoilt:
 
 
 KINDS = ("replace a value", "insert", "cut off", "drop a line", "repeat a line", "another byte")
+"""Changes of a file."""
 
 
 def _word(content: bytes, at: int) -> tuple[int, int]:

@@ -17,7 +17,10 @@ from studies.common.monte_carlo import read_store, run_trials
 from studies.common.provenance import study_origin
 from studies.common.tables import add_number_table
 from studies.common.template import Summary, add_first_page, write_study
+from studies.faults.figure import OUTCOMES, answer_figure
+from studies.faults.fuzz import KINDS
 from studies.faults.kills import COMMANDS
+from studies.faults.surroundings import SURROUNDINGS
 from studies.faults.trials import attempt, tasks
 from studies.faults.units import SLIPS
 
@@ -26,10 +29,13 @@ __all__ = ["main", "write_report"]
 Made = Mapping[str, Any]
 """A task with its result."""
 
+NAMED = re.compile(r"\.(csv|toml|urdf): ")
+"""File in a message, with what follows on the place in it."""
+
 COMMAND = Command(
     "faults",
     "What commands make of spoilt files, mistaken units and kills at random moments.",
-    full="1,000 spoilt files, ten mistaken units, and kills of every command that takes long",
+    full="1,000 spoilt files, ten mistaken units, faults around a run, and kills of every command that takes long",
     seed=1,
     extra={**TRIALS, "--made": {"action": "store_true", "help": "report the trials made so far, make no more"}},
 )
@@ -74,26 +80,34 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
     spoilt = [item for item in made if "spoil" in item]
     units = {item["unit"]: item for item in made if "unit" in item}
     killed = {item["kill"]: item for item in made if "kill" in item}
-    numbers = {key: sum(item["numbers"].get(key, 0) for item in spoilt) for key in ("refused", "accepted", "faulty")}
+    around = {item["around"]: item for item in made if "around" in item}
+    answers = {
+        kind: {key: sum(item["answers"].get(kind, {}).get(key, 0) for item in spoilt) for key in OUTCOMES}
+        for kind in KINDS
+    }
+    numbers = {key: sum(counts[key] for counts in answers.values()) for key in OUTCOMES}
     document = Document("Faults", "Spoilt files, mistaken units, kills at random moments")
     planned, kills = len(tasks(full=True)), sum(item["kills"] for item in killed.values())
     done = len(made) + len(failures)
     summary = Summary(
         question="What do commands make of spoilt files, mistaken units and kills at random moments?",
-        answer=f"Of {sum(numbers.values())} spoilt files {numbers['faulty']} got an unclear answer; "
+        answer=f"Of {sum(numbers.values())} spoilt files {numbers['faulty']} got an unclear answer, "
+        f"{numbers['refused']} were refused with a clear message and {numbers['accepted']} were accepted; "
         f"{sum(item['refused'] for item in units.values())} of {counted(len(units), 'mistaken unit')} "
         f"{'was' if len(units) == 1 else 'were'} refused; after {counted(kills, 'kill')} "
         f"{sum(item['same'] for item in killed.values())} of {counted(len(killed), 'command')} gave the answer of a "
         "run left alone.",
-        goals=tuple(_goals(numbers, units, killed)),
+        goals=tuple(_goals(numbers, units, killed, around)),
         valid=f"files are those of a robot with three joints and one recording of 40 s; {done} of the {planned} trials "
         "of the full study were made.",
         full=done >= planned,
     )
-    add_first_page(document, summary)
+    figure = answer_figure(answers) if spoilt else None
+    add_first_page(document, summary, figure, "What became of the spoilt files, by kind of change.")
     document.section("What went wrong")
     wrong = [text for item in spoilt for text in item["faults"]]
     wrong += [f"{unit}: {item['said'] or 'not refused'}" for unit, item in units.items() if not item["refused"]]
+    wrong += [f"{title}: {item['said'] or 'not refused'}" for title, item in around.items() if not item["refused"]]
     wrong += [f"{name} after kills: {item['message']}" for name, item in killed.items() if not item["same"]]
     wrong += [f"A trial failed: {text}" for text in failures]
     document.items([_short(text) for text in wrong])
@@ -110,22 +124,38 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
         for name, item in killed.items()
     ]
     if rows:
-        add_number_table(document, ["command", "kills while it ran", "files half written", "same answer"], rows)
+        header = ["command", "kills while it ran", "files half written", "same answer"]
+        add_number_table(document, header, rows, "Kills of every command, and what became of its results.")
     if units:
         document.section("Mistaken units")
         said = [[unit, "yes" if item["refused"] else "no", _short(item["said"])] for unit, item in units.items()]
-        document.table(["unit", "refused", "what the command says"], said)
+        document.table(
+            ["unit", "refused", "what the command says"], said, "What the command check says of mistaken units."
+        )
+    if around:
+        document.section("Faults around a run")
+        said = [[title, "yes" if item["refused"] else "no", _short(item["said"])] for title, item in around.items()]
+        document.table(["fault", "refused", "what the command says"], said, "What commands say of faults around a run.")
     document.section("Conditions")
     document.paragraph(
         "Files are those of a robot with three joints and one recording of 40 s, made by MuJoCo. A spoilt file has one "
         "value replaced, text inserted, the end cut off, a line dropped or repeated, or a byte changed, drawn by "
         "Hypothesis from a fixed seed; the command stops when all files are read. A file counts as refused where the "
         "exit status is 2, one message begins with Error, nothing is written, and no warning of Python is raised. "
-        "Accepted files are those that are still valid, such as another number in a cell. A full disk, a closed "
-        "folder, two runs into one folder, and effects of a user's own that fail are in tests/test_faults.py."
+        "Accepted files are those that are still valid, such as another number in a cell. A full disk is "
+        "/dev/full, and the second run finds a folder that another one has claimed. More failing effects of a user, "
+        "and a run that is killed while it writes, are in tests/test_faults.py."
     )
     packages = ", ".join(f"{name} {version(name)}" for name in ("hypothesis", "jax", "numpy"))
     write_study(document, summary, file, None if origin is None else f"{origin} With {packages}.")
+
+
+def _refused(title: str, item: Made | None) -> Goal:
+    """Return the goal on one fault around a run."""
+    text = f"{title}: one clear error"
+    if item is None:
+        return Goal(text, "not tried; see tests/test_faults.py", Verdict.NOT_TESTED)
+    return Goal(text, "refused" if item["refused"] else "not refused", Verdict.of(item["refused"]))
 
 
 def _short(said: str) -> str:
@@ -133,17 +163,25 @@ def _short(said: str) -> str:
     return re.sub(r"/\S*/", "", said)[:300]
 
 
-def _goals(numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mapping[str, Made]) -> list[Goal]:
+def _goals(
+    numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mapping[str, Made], around: Mapping[str, Made]
+) -> list[Goal]:
     """Return each goal, what was reached, and whether that passes."""
     total, kills = sum(numbers.values()), sum(item["kills"] for item in killed.values())
     broken = [name for item in killed.values() for name in item["half_written"]]
     refused = sum(item["refused"] for item in units.values())
+    named = sum(item["refused"] and bool(NAMED.search(item["said"])) for item in units.values())
     answers = {name: killed.get(name, {"kills": 0, "same": False}) for name in COMMANDS}
     goals = [
-        ("No unclear answer to a spoilt file", f"{numbers['faulty']} of {total}", not numbers["faulty"], total > 0),
+        (
+            "No unclear answer to a spoilt file",
+            f"{numbers['faulty']} of {total}; {numbers['refused']} refused, {numbers['accepted']} accepted",
+            not numbers["faulty"],
+            total > 0,
+        ),
         (
             "No wrong unit in silence",
-            f"{refused} of {len(units)} refused",
+            f"{refused} of {len(units)} refused, {named} with file and place",
             refused == len(units),
             len(units) == len(SLIPS),
         ),
@@ -158,4 +196,12 @@ def _goals(numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mappin
             for name, item in answers.items()
         ),
     ]
-    return [Goal(goal, reached, Verdict.of(passed if tested else None)) for goal, reached, passed, tested in goals]
+    return [
+        *(Goal(goal, reached, Verdict.of(passed if tested else None)) for goal, reached, passed, tested in goals),
+        *(_refused(title, around.get(title)) for title in SURROUNDINGS),
+        Goal(
+            "a cache of another version: no effect",
+            "not tried; a damaged file of it: tests/test_kept_jit.py",
+            Verdict.NOT_TESTED,
+        ),
+    ]

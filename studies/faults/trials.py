@@ -1,4 +1,4 @@
-"""The trials of the study: files spoilt, units mistaken, commands killed."""
+"""The trials of the study: files spoilt, units mistaken, commands killed, and faults around a run."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import seed as seeded
 
 from bayesid.app.compilation_cache import keep_compiled
-from studies.faults.fuzz import Spoilt, answer_to, spoilt
+from studies.faults.fuzz import KINDS, Spoilt, answer_to, spoilt
 from studies.faults.kills import COMMANDS, kill_and_resume
+from studies.faults.surroundings import SURROUNDINGS, answer_amid
 from studies.faults.units import SLIPS, refused
 from studies.truth.mujoco import Manoeuvres, write_study
 from studies.truth.urdf import SERVICER3
@@ -33,7 +34,8 @@ def tasks(full: bool) -> list[Task]:
     killing = [{"kill": name, "kills": 8 if name == "campaign" else 3} for name in COMMANDS]
     if not full:
         return [*spoiling, killing[0]]
-    return [*spoiling, *killing, *({"unit": slip} for slip in SLIPS)]
+    around = [{"around": title} for title in SURROUNDINGS]
+    return [*spoiling, *killing, *({"unit": slip} for slip in SLIPS), *around]
 
 
 def attempt(task: Task, rng: np.random.Generator) -> dict[str, Any]:
@@ -48,12 +50,15 @@ def attempt(task: Task, rng: np.random.Generator) -> dict[str, Any]:
         if "unit" in task:
             clear, said = refused(study, task["unit"], folder)
             return {"refused": clear, "said": said}
+        if "around" in task:
+            clear, said = answer_amid(study, task["around"], folder)
+            return {"refused": clear, "said": said}
         return asdict(kill_and_resume(task["kill"], study.parent, rng, task["kills"]))
 
 
 def _spoil(seed: int, changes: int, study: Path, folder: Path) -> dict[str, Any]:
-    """Spoil a file so many times, and return the numbers of the answers and what was wrong with any."""
-    numbers: Counter[str] = Counter()
+    """Spoil a file so many times, and return the numbers of answers by kind of change and what was wrong with any."""
+    answers: dict[str, Counter[str]] = {kind: Counter() for kind in KINDS}
     faults: list[str] = []
 
     @seeded(seed)
@@ -67,11 +72,11 @@ def _spoil(seed: int, changes: int, study: Path, folder: Path) -> dict[str, Any]
     @given(spoilt())
     def spoil(change: Spoilt) -> None:
         answer = answer_to(study, change, folder)
-        numbers["faulty" if answer.fault else "accepted" if answer.accepted else "refused"] += 1
+        answers[change.kind]["faulty" if answer.fault else "accepted" if answer.accepted else "refused"] += 1
         if answer.fault:
             faults.append(f"{change}: {answer.fault}")
 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         spoil()
-    return {"numbers": dict(numbers), "faults": faults}
+    return {"answers": {kind: dict(counts) for kind, counts in answers.items()}, "faults": faults}

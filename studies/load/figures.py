@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
+from bayesid.report.figures.figure_style import AFTER, BEFORE, COLOURS, shared_legend, styled, wide_figure
 from studies.common.quantities import LABELS
 from studies.load import paper
 from studies.load.noise_free import Iteration
@@ -30,19 +30,20 @@ def loop_figure(flights: dict[str, Flight]) -> Figure:
         steps = np.arange(1, len(flight.bodies) + 1)
         error = [abs(flight.error(step)[0]) for step in range(len(steps))]
         sd = [flight.relative(step)[0] for step in range(len(steps))]
-        left.plot(steps, sd, "-", color=COLOURS[index], label=f"sd, {TITLES[name]}")
-        left.plot(steps, error, "o", color=COLOURS[index], markersize=4, label=f"error, {TITLES[name]}")
-    left.axhline(GOAL, color="#888888", linestyle=":")
-    left.text(0.55, 1.1 * GOAL, "wanted", fontsize=8, va="bottom")
+        colour = COLOURS[index]
+        left.plot(steps, 100.0 * np.array(sd), "-", color=colour, label=f"sd, {TITLES[name]}")
+        left.plot(steps, 100.0 * np.array(error), "o", color=colour, markersize=4, label=f"error, {TITLES[name]}")
+    left.axhline(100.0 * GOAL, color="#888888", linestyle=":")
+    left.text(0.55, 110.0 * GOAL, "wanted", fontsize=8, va="bottom")
     flown = next(iter(flights.values()))
     steps = np.arange(1, len(flown.bodies) + 1)
-    left.set(yscale="log", xlabel="manoeuvre", ylabel="of the load's mass", xlim=(0.5, steps[-1] + 0.5))
+    left.set(yscale="log", xlabel="manoeuvre", ylabel="error or sd of the mass [%]", xlim=(0.5, steps[-1] + 0.5))
     left.set_xticks(steps)
     for index, name in enumerate(LIMITED):
-        part = np.array([row[name] for row in flown.largest]) / getattr(SAFE, name)
+        part = 100.0 * np.array([row[name] for row in flown.largest]) / getattr(SAFE, name)
         right.bar(steps + 0.25 * (index - 1), part, 0.22, color=COLOURS[index + 2], label=LIMIT_TITLES[name])
-    right.axhline(1.0, color="black", linewidth=0.8)
-    right.set(xlabel="manoeuvre", ylabel="used of the limit, in MuJoCo", ylim=(0.0, 1.45))
+    right.axhline(100.0, color="black", linewidth=0.8)
+    right.set(xlabel="manoeuvre", ylabel="share of the limit [%]", ylim=(0.0, 145.0))
     right.set_xticks(steps)
     right.legend(loc="upper left", ncols=2)
     shared_legend(figure, left, 4, place="outside lower center")
@@ -56,7 +57,7 @@ def error_figure(iterations: list[Iteration]) -> Figure:
     axes = figure.subplots()
     place = np.arange(len(LABELS))
     series = {"paper": list(paper.RESULTS), "here, no noise": [item.estimate for item in iterations]}
-    for colour, (name, estimates) in zip(COLOURS, series.items(), strict=False):
+    for colour, (name, estimates) in zip((BEFORE, AFTER), series.items(), strict=True):
         for number, estimate in enumerate(estimates):
             error = np.abs(paper.errors(estimate))
             error[error == 0.0] = np.nan  # printed exactly

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
-from bayesid._io.words import counted
+from bayesid._io.words import counted, joined
 from bayesid.report import Document, figures, format_quantity
-from bayesid.report.numbers import format_fixed, format_number, format_percent
+from bayesid.report.numbers import format_fixed, format_number, format_percent, format_signed
 from studies.common import mission
 from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE
 from studies.common.goals import Goal, Verdict
@@ -115,9 +115,9 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         document,
         summary,
         loop_figure(_flights(result)),
-        "Left: error and standard deviation of the load's mass over 370 kg after every manoeuvre. Right: largest tip "
-        "speed, tip rate and rotation of the base over their limits, as MuJoCo flew them; the loop plans them for 99 % "
-        "of what it holds possible.",
+        "Left: error and standard deviation (sd) of the load's mass over 370 kg after every manoeuvre. Right: largest "
+        "tip speed, tip rate and rotation of the base over their limits, as MuJoCo flew them; the loop plans them for "
+        "99 % of what it holds possible.",
     )
     motion = excitation().motion(result.iterations[-1].parameters)
     times = np.array([0.0, 0.5 * mission.DURATION])
@@ -125,7 +125,8 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         document,
         _setup(result),
         figures.robot_pose(ship(paper.TRUTH), motion, times),
-        "ETS-VII with the load at rest and in the middle of the paper's manoeuvre.",
+        "ETS-VII with the load at rest and in the middle of the paper's manoeuvre, which is flown without noise; the "
+        "loop's own manoeuvres are not drawn.",
     )
     _failures(document, result)
     _evidence(document, result)
@@ -184,8 +185,16 @@ def _failures(document: Document, result: Result) -> None:
         f"{review['status']}{''.join(f' ({cause})' for cause in review['causes'])}" for review in loop.reviews
     )
     document.paragraph(f"Diagnoses of all recordings so far, after each manoeuvre: {verdicts}.")
-    ratio = ", ".join(format_fixed(value, 2) for value in loop.chi2)
-    document.paragraph(f"Chi-square per sample of the loop's fits: {ratio}.")
+    ratio = ", ".join(
+        f"{format_fixed(value, 2)} ({format_signed(away)} sd)"
+        for value, away in zip(loop.chi2, loop.chi2_errors(), strict=True)
+    )
+    counts = joined(str(count) for count in dict.fromkeys(loop.samples))
+    due = " or ".join(format_number(float(np.sqrt(2.0 / count)), 2) for count in dict.fromkeys(loop.samples))
+    document.paragraph(
+        f"Chi-square per sample of the loop's fits, {counts} samples each: {ratio}. Due is 1 ± {due}, and a little "
+        "less where a fit has many unknowns."
+    )
 
 
 def _evidence(document: Document, result: Result) -> None:

@@ -57,6 +57,8 @@ class Flight:
         Largest values of the limited quantities in MuJoCo, by limit.
     reviews : list of dict
         Entry of every step's diagnosis in the loop's history; empty where the steps are not diagnosed.
+    samples : list of int
+        Number of samples of every fit.
     """
 
     status: str
@@ -65,6 +67,7 @@ class Flight:
     chi2: list[float]
     largest: list[dict[str, float]]
     reviews: list[dict[str, Any]] = field(default_factory=list)
+    samples: list[int] = field(default_factory=list)
 
     def error(self, step: int) -> Floats:
         """Return the posterior mean less the truth over `paper.SCALE`, shape (10,)."""
@@ -73,6 +76,10 @@ class Flight:
     def relative(self, step: int) -> Floats:
         """Return the posterior standard deviations over `paper.SCALE`, shape (10,)."""
         return self.bodies[step].sd / paper.SCALE
+
+    def chi2_errors(self) -> list[float]:
+        """Return by how much each chi-square per sample is off one, in the standard deviation that is due."""
+        return [(value - 1.0) / np.sqrt(2.0 / count) for value, count in zip(self.chi2, self.samples, strict=True)]
 
     def distance(self, step: int) -> float:
         """Return the squared Mahalanobis distance of the truth from the posterior mean; ten on average."""
@@ -125,6 +132,7 @@ def fly_loop(folder: Path, *, seed: int, search: Search, progress: Progress = si
         chi2=[step["identification"]["chi2"] / step["identification"]["samples"] for step in done],
         largest=[_largest(spacecraft, folder / f"step-{step['step']}-plan.csv") for step in done],
         reviews=[step["diagnosis"] for step in done],
+        samples=[step["identification"]["samples"] for step in done],
     )
 
 

@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 
 from bayesid.design.pose_region import CONTENT
 from bayesid.report import Document, figures
-from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
+from bayesid.report.figures.figure_style import AFTER, BEFORE, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
 from bayesid.report.verdict_record import Share
 from studies.common import mission
@@ -150,11 +150,12 @@ def _failures(document: Document, result: Result) -> None:
     texts = []
     for row, own in result.rows.items():
         mean, error = own.distance.mean(), own.distance.std(ddof=1) / np.sqrt(len(own.distance))
-        outside = int((~own.held[:, 1, 1, 0]).sum())
+        missed = {text: int((~own.held[:, 1, body, kind]).sum()) for (body, kind), text in REGIONS.items()}
+        worst = max(missed, key=lambda text: missed[text])
         texts.append(
             f"{row.capitalize()}: the squared distance of the true base from the identified one is "
             f"{format_fixed(float(mean), 1)} ± {format_fixed(float(error), 1)} where 10 are expected; after "
-            f"identification {outside} of {len(own.held)} regions of the end-effector's position do not hold the "
+            f"identification the regions of the {worst} hold least: {missed[worst]} of {len(own.held)} do not hold the "
             f"flown one, where {format_fixed((1.0 - CONTENT) * len(own.held), 1)} are due."
         )
     texts.append(
@@ -197,9 +198,9 @@ def _evidence(document: Document, result: Result) -> None:
         words=2,
     )
     first, again = result.example
-    for trip, title in ((first, STAGES[0]), (again, STAGES[1])):
+    for trip, title, colour in ((first, STAGES[0], BEFORE), (again, STAGES[1], AFTER)):
         document.figure(
-            figures.final_positions({title: trip.predicted["tip"]}, trip.flown["tip"][0]),
+            figures.final_positions({title: trip.predicted["tip"]}, trip.flown["tip"][0], (colour,)),
             f"One ship, planned with the {title}: draws of the end-effector's final position and the outline of their "
             "95 % ellipsoid, counted from where it truly ended.",
         )
@@ -246,7 +247,7 @@ def _miss_figure(result: Result) -> Figure:
                 values = np.sort(own.miss[:, stage, kind])
                 share = np.arange(1, len(values) + 1) / len(values)
                 label = title if row == HEADLINE else None
-                axes.plot(values, share, line, color=COLOURS[stage], label=label)
+                axes.plot(values, share, line, color=(BEFORE, AFTER)[stage], label=label)
         axes.set(xscale="log", xlabel=f"miss [{unit}]")
     panels[0].set_ylabel("share of ships")
     shared_legend(figure, panels[0], len(STAGES))

@@ -47,7 +47,7 @@ EXACT = "exact"
 LIKELIHOOD = "likelihood"
 """The package's likelihood, which holds the uncertainty of the smoothed joints."""
 
-WITHOUT_JUNCTIONS = "likelihood, junctions left out"
+WITHOUT_JUNCTIONS = "likelihood without junctions"
 """The same without the base's samples near the junctions of (27)."""
 
 PAPER = "the paper's procedure"

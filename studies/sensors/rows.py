@@ -9,25 +9,35 @@ import numpy as np
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report.numbers import format_fixed, format_number, format_range
 from studies.common.quantities import JUDGED, MASS
-from studies.sensors.montecarlo import Spread
+from studies.sensors.montecarlo import PAPER, Spread
 from studies.sensors.result import Result
 
-__all__ = ["estimate_rows", "honesty_of", "linear_rows", "percent", "refit_rows", "rms_of", "rms_pair"]
-__all__ += ["treatment_rows"]
+__all__ = ["diverging", "equal_rms", "estimate_rows", "honesty_of", "linear_rows", "percent", "refit_rows", "rms_of"]
+__all__ += ["rms_pair", "treatment_rows"]
 
-FINEST = 7
-"""Largest number of decimals of a percentage."""
+PLAIN = 0.01
+"""Size of a percentage below which it is written with its power of ten, as `format_number` does."""
 
 
 def percent(value: float, error: float) -> str:
-    """Return a fraction in percent with its Monte-Carlo error in units of the last digits: ``3.22(35)``."""
+    """Return a fraction in percent with its Monte-Carlo error in units of the last digits, ``3.2(3)``.
+
+    Small ones have their power of ten, ``1.65(18) × 10⁻⁵``.
+    """
     value, error = 100.0 * float(value), 100.0 * float(error)
     if not (np.isfinite(value) and np.isfinite(error) and error > 0.0):
         return format_number(value, 3)
-    # the error keeps one digit from 2 on, else two
-    decimals = min(max(0, -int(np.floor(np.log10(error / 2.0)))), FINEST)
-    digits = f"{error * 10.0**decimals:.0f}"
-    return format_fixed(value, decimals) + ("" if digits == "0" else f"({digits})")
+    if max(abs(value), error) < PLAIN:
+        power = int(np.floor(np.log10(max(abs(value), error))))
+        scaled = _bracketed(value / 10.0**power, error / 10.0**power)
+        return f"{scaled} × {format_number(10.0**power).removeprefix('1 × ')}"
+    return _bracketed(value, error)
+
+
+def _bracketed(value: float, error: float) -> str:
+    """Return a number with its error in units of the last digits, one digit from 2 on, else two."""
+    decimals = max(0, -int(np.floor(np.log10(error / 2.0))))
+    return f"{format_fixed(value, decimals)}({error * 10.0**decimals:.0f})"
 
 
 def rms_of(spread: Spread, index: int) -> str:
@@ -38,6 +48,34 @@ def rms_of(spread: Spread, index: int) -> str:
 def rms_pair(spread: Spread) -> str:
     """Return the root mean square errors of the mass and of the worst moment in percent."""
     return f"{rms_of(spread, MASS)}; {rms_of(spread, spread.worst())}"
+
+
+def diverging(result: Result, level: str) -> bool:
+    """Return whether any nonlinear fit by the paper's procedure diverges at a level of noise."""
+    fits = result.refits.get(level, {}).get(PAPER)
+    return fits is not None and bool(fits.diverged.any())
+
+
+def equal_rms(result: Result, level: str, name: str) -> tuple[str, str]:
+    """Return the errors of mass and worst moment with equal weights as in (21), in percent.
+
+    Parameters
+    ----------
+    result : Result
+    level : str
+        Level of noise; where fits diverge at it, errors are orders of magnitude only.
+    name : str
+        `PAPER` or `EQUAL`.
+    """
+    spread = result.accelerometers[level][name]
+    mass, moment = MASS, spread.worst()
+    if diverging(result, level):
+        return _about(spread.rms[mass]), _about(spread.rms[moment])
+    return rms_of(spread, mass), rms_of(spread, moment)
+
+
+def _about(ratio: float) -> str:
+    return f"about {format_number(100.0 * float(ratio), 1)}"
 
 
 def honesty_of(spread: Spread) -> str:

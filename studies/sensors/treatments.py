@@ -114,7 +114,7 @@ class Polynomial:
     @property
     def title(self) -> str:
         """Name of the treatment in the report."""
-        return "polynomials, piecewise" if self.breaks else "polynomial"
+        return "piecewise polynomials" if self.breaks else "polynomial"
 
     def __call__(self, time: Floats, values: Floats, sigma: float) -> Floats:
         """Return values and two derivatives, shape (3, T, n)."""
@@ -139,7 +139,7 @@ def _polynomial(time: Floats, values: Floats) -> Floats:
 class SmoothingSpline:
     """Cubic smoothing spline, its strength by generalised cross-validation (SciPy's ``make_smoothing_spline``)."""
 
-    title: str = "smoothing spline, GCV"
+    title: str = "smoothing spline (GCV)"
 
     def __call__(self, time: Floats, values: Floats, sigma: float) -> Floats:
         """Return values and two derivatives, shape (3, T, n)."""

@@ -24,7 +24,7 @@ from studies.whole_system.world import fly, record
 __all__ = ["SCORED", "TAIL", "Coverage", "covered"]
 
 TAIL = 0.95
-"""Quantile of the distances beyond which their number is tested."""
+"""Quantile of the distances beyond which their number is tested, as it is below one minus this."""
 
 SCORED = ("base", "load", "whole system")
 """Groups of bodies whose masses are scored."""
@@ -59,9 +59,15 @@ class Coverage:
         return int((self.distances > stats.chi2(self.unknowns).ppf(TAIL)).sum())
 
     @property
+    def near(self) -> int:
+        """Number of distances below the quantile of one minus `TAIL`, where too wide a posterior shows first."""
+        return int((self.distances < stats.chi2(self.unknowns).ppf(1.0 - TAIL)).sum())
+
+    @property
     def tail_p_value(self) -> float:
-        """P-value of so many distances or more beyond the `TAIL` quantile."""
-        return float(stats.binom.sf(self.far - 1, len(self.distances), 1.0 - TAIL))
+        """P-value of so many distances or more in either tail: twice the smaller of both, at most one."""
+        chances = stats.binom.sf(np.array([self.far, self.near]) - 1, len(self.distances), 1.0 - TAIL)
+        return min(1.0, 2.0 * float(chances.min()))
 
 
 def covered(

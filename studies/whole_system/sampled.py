@@ -31,7 +31,7 @@ class Sampled:
     distance : float
         Squared Mahalanobis distance of the true bodies from the mean, in coordinates linear in the parameters.
     p_value : float
-        Probability of a larger distance under a normal posterior.
+        Twice the probability of a larger distance under a normal posterior, or of a smaller one if that is less.
     truth : mapping of str to (10,) array
         True mass, centre of mass and inertia about it of every body.
     """
@@ -67,7 +67,8 @@ def sampled(
     true = posterior.unknowns.to_linear(true_point(posterior, truth)[None])[0, :count]
     distance = float(squared_distances(true - linear.mean(axis=0), np.cov(linear.T)))
     described = {name: mass_com_inertia(truth.link(name).inertial.vector) for name in bodies(truth)}
-    return Sampled(title, result, distance, float(stats.chi2.sf(distance, count)), described)
+    p_value = 2.0 * min(stats.chi2.sf(distance, count), stats.chi2.cdf(distance, count))
+    return Sampled(title, result, distance, float(p_value), described)
 
 
 def true_point(posterior: Posterior, truth: Robot) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from bayesid._math.arrays import Floats
 from bayesid.design.pose_region import Pose, Region
 from bayesid.design.pose_trajectory import PoseTrajectory
-from bayesid.report.figures.figure_style import curve_style, ellipse_outline, styled, wide_figure
+from bayesid.report.figures.figure_style import COLOURS, TRUTH, curve_style, ellipse_outline, styled, wide_figure
 
 __all__ = ["final_positions", "trajectory_bands"]
 
@@ -51,7 +51,9 @@ def trajectory_bands(trajectory: PoseTrajectory) -> Figure:
 
 
 @styled
-def final_positions(poses: Mapping[str, Pose], truth: Floats | None = None) -> Figure:
+def final_positions(
+    poses: Mapping[str, Pose], truth: Floats | None = None, colours: Sequence[str] = COLOURS
+) -> Figure:
     """Draw samples of the final position in three planes, with the projection of the 95 % ellipsoid.
 
     Parameters
@@ -61,19 +63,21 @@ def final_positions(poses: Mapping[str, Pose], truth: Floats | None = None) -> F
     truth : (3,) array, optional
         True position [m], from which offsets are counted; where it is left out, they are counted from the first
         pose's mean.
+    colours : sequence of str
+        Colours of the poses.
     """
     figure = wide_figure(2.4)
     panels = figure.subplots(1, 3)
     origin = next(iter(poses.values())).millimetres.mean if truth is None else 1e3 * truth
-    for number, (name, pose) in enumerate(poses.items()):
+    for colour, (name, pose) in zip(colours, poses.items(), strict=False):
         draws, region = 1e3 * pose.position - origin, pose.millimetres
         moved = replace(region, mean=region.mean - origin)
         for axes, plane in zip(panels, PLANES, strict=True):
-            _shadow(axes, draws[:, plane], moved, plane, name if plane == PLANES[0] else None, number)
+            _shadow(axes, draws[:, plane], moved, plane, name if plane == PLANES[0] else None, colour)
     for axes, (first, second) in zip(panels, PLANES, strict=True):
         if truth is not None:
             label = "truth" if (first, second) == PLANES[0] else None
-            axes.plot(0.0, 0.0, "+", color="black", markersize=8, markeredgewidth=1.2, label=label, zorder=5)
+            axes.plot(0.0, 0.0, "+", color=TRUTH, markersize=9, markeredgewidth=1.6, label=label, zorder=5)
         axes.set_xlabel(f"{'xyz'[first]} [mm]")
         axes.set_ylabel(f"{'xyz'[second]} [mm]")
         axes.set_aspect("equal", adjustable="datalim")
@@ -83,10 +87,9 @@ def final_positions(poses: Mapping[str, Pose], truth: Floats | None = None) -> F
     return figure
 
 
-def _shadow(axes: Axes, draws: Floats, region: Region, plane: tuple[int, int], name: str | None, number: int) -> None:
+def _shadow(axes: Axes, draws: Floats, region: Region, plane: tuple[int, int], name: str | None, colour: str) -> None:
     """Draw the samples and the projection of the ellipsoid onto a plane."""
-    style = curve_style(number)
     covariance = region.covariance[np.ix_(plane, plane)]
     outline = ellipse_outline(covariance, region.reach) + region.mean[list(plane)][:, None]
-    axes.plot(draws[:, 0], draws[:, 1], ".", color=style["color"], markersize=1.5, alpha=0.35, markeredgewidth=0.0)
-    axes.plot(outline[0], outline[1], label=name, **style)
+    axes.plot(draws[:, 0], draws[:, 1], ".", color=colour, markersize=1.5, alpha=0.35, markeredgewidth=0.0)
+    axes.plot(outline[0], outline[1], label=name, color=colour)

@@ -1,0 +1,113 @@
+"""Faults around a run: a full disk, a closed folder, two runs into one folder, and failing effects of a user."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from bayesid.app.command_line import app
+
+__all__ = ["HOOKS", "PLUGIN", "SURROUNDINGS", "answer_amid", "with_plugin"]
+
+PLUGIN = '''
+import jax.numpy as jnp
+from bayesid import Effect, Parameter, Wrench, register
+
+
+@register
+class Mine(Effect):
+    """An effect of a user."""
+
+    name = "test-faulty"
+    parameters = (Parameter("x", "N m", 1e-3),)
+
+    def {hook}
+'''
+"""File of a user's effect, but for the method that fails."""
+
+HOOKS = {
+    "an effect that returns NaN": (
+        "wrench(self, v, i, s):\n        return Wrench(jnp.zeros(3), jnp.sqrt(-v[0]) + jnp.ones(3))"
+    ),
+    "an effect of a wrong shape": "wrench(self, v, i, s):\n        return Wrench(jnp.zeros(3), v)",
+    "an effect that raises": "wrench(self, v, i, s):\n        return Wrench(i.force, v)",
+}
+"""Failing methods of an effect, by what they stand for."""
+
+
+def with_plugin(study: Path, hook: str) -> None:
+    """Add an effect of a user with one method to a study, in its folder."""
+    (study.parent / "mine.py").write_text(PLUGIN.format(hook=hook))
+    text = study.read_text().replace('["gravity-gradient"]', '["gravity-gradient", "test-faulty"]')
+    study.write_text(text + '\nplugins = ["mine.py"]\n')
+
+
+def _full(study: Path, folder: Path) -> list[str]:
+    recording = min(study.parent.glob("*.csv"))
+    return ["init", str(study.parent / "robot.urdf"), str(recording), "--output", "/dev/full"]
+
+
+def _closed(study: Path, folder: Path) -> list[str]:
+    closed = Path("/sys")  # root may write wherever a disk lets it
+    if os.geteuid() != 0:
+        closed = folder / "closed"
+        closed.mkdir(mode=0o500)
+    return ["check", str(study), "--output", str(closed / "out")]
+
+
+def _check(study: Path, folder: Path) -> list[str]:
+    return ["check", str(study), "--output", str(folder / "out")]
+
+
+def _plugin(hook: str) -> Callable[[Path, Path], list[str]]:
+    def arguments(study: Path, folder: Path) -> list[str]:
+        with_plugin(study, hook)
+        return _check(study, folder)
+
+    return arguments
+
+
+TWICE = "two runs into one folder"
+"""Title of the case whose folder is claimed meanwhile."""
+
+SURROUNDINGS: Mapping[str, Callable[[Path, Path], list[str]]] = {
+    "a full disk": _full,
+    "a folder that cannot be written": _closed,
+    TWICE: _check,
+    **{title: _plugin(hook) for title, hook in HOOKS.items()},
+}
+"""Functions of a study and of a folder that prepare a fault and return the command, by what they stand for."""
+
+
+def answer_amid(study: Path, title: str, folder: Path) -> tuple[bool, str]:
+    """Return whether a command refuses one of `SURROUNDINGS` with one clear message, and what it says."""
+    copied = Path(shutil.copytree(study.parent, folder / "study")) / study.name
+    arguments = SURROUNDINGS[title](copied, folder)
+    if title == TWICE:
+        with _claimed(folder / "out"):
+            return _answer(arguments)
+    return _answer(arguments)
+
+
+def _answer(arguments: list[str]) -> tuple[bool, str]:
+    done = CliRunner().invoke(app, arguments)
+    said = " ".join(done.output.split())
+    return done.exit_code == 2 and said.startswith("Error: ") and said.count("Error: ") == 1, said
+
+
+@contextmanager
+def _claimed(folder: Path) -> Iterator[None]:
+    """Claim a folder as a run in another process does."""
+    folder.mkdir()
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(handle)
