@@ -305,7 +305,7 @@ def test_every_command_is_one_file_and_shows_its_first_sentence():
 
 def test_an_output_that_is_a_file_is_an_error(study: Path, tmp_path: Path):
     (tmp_path / "out").write_text("")
-    for command in ("check", "identify"):
+    for command in ("check", "identify", "diagnose"):
         status, text = run(command, study, "--output", tmp_path / "out")
         assert status == 2, text
         assert "cannot create the folder" in text

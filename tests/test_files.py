@@ -44,7 +44,12 @@ def test_a_folder_that_fails_half_way_gets_nothing(tmp_path: Path):
 
     with pytest.raises(RuntimeError, match="killed"):
         fail()
-    assert not list((tmp_path / "out").iterdir())
+    assert not (tmp_path / "out").exists()
+
+
+def test_json_holds_null_in_place_of_numbers_that_are_not_finite(tmp_path: Path):
+    write_json(tmp_path / "a.json", {"lists": [[np.inf, 1.0], (np.nan,)], "array": np.array([2.0, -np.inf])})
+    assert json.loads((tmp_path / "a.json").read_text()) == {"lists": [[None, 1.0], [None]], "array": [2.0, None]}
 
 
 def test_json_holds_arrays_as_lists(tmp_path: Path):

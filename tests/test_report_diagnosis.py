@@ -1,13 +1,18 @@
 """Reports of diagnoses: sentences and tables hold the result's numbers, figures draw its data, pages show both."""
 
+import json
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import bayesid.diagnosis
+from bayesid.app.diagnose_command import diagnose_study
+from bayesid.app.schema import Study
 from bayesid.diagnosis import (
     Candidate,
     CauseSet,
@@ -37,7 +42,7 @@ from bayesid.report.figures.diagnosis_figures import torque_amplitudes
 from bayesid.report.figures.residual_figures import NOISE_BAND
 from bayesid.report.given_values import parameter_changes
 from bayesid.report.inseparable_causes import cause_cosines, inseparable_pairs
-from bayesid.report.numbers import format_probability, format_quantity, format_text
+from bayesid.report.numbers import format_number, format_probability, format_quantity, format_text
 from bayesid.report.sentences import diagnosis_sentences as sentences
 from bayesid.report.sentences.amplitude_words import amplitude_text
 from bayesid.report.sentences.conditions import conditions_text
@@ -858,3 +863,18 @@ def test_the_identification_follows_the_diagnosis(biased, tmp_path, monkeypatch)
     assert "How the verdict was reached" in text
     assert "The extended model, sampled" in text
     assert "Assumptions" not in text
+
+
+def test_the_verdict_outlives_an_interrupted_sampling(biased, tmp_path, monkeypatch):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(bayesid.diagnosis, "diagnose", lambda *_, **__: biased)
+    monkeypatch.setattr(bayesid.diagnosis, "identify_extended", interrupt)
+    study = Study.load(Path(bayesid.__file__).parent / "app" / "demonstration_data" / "study.toml")
+    with pytest.raises(KeyboardInterrupt):
+        list(diagnose_study(study, tmp_path / "out", 0, 100.0))
+    content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
+    assert content["causes"] == ["accel-bias"]
+    assert content["identification"] is None
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == ["diagnosis.json", "unexplained.csv"]

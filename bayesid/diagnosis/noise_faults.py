@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,7 +178,7 @@ class _Spectra:
     def of(fit: Fit, kind: Kind) -> _Spectra:
         slot, data = _slot(fit.posterior, kind), fit.posterior.data
         whole, _ = _shaped(fit)
-        rows: list[tuple[Floats, ...]] = []
+        rows: list[tuple[NDArray[Any], ...]] = []
         for r, item in enumerate(fit.posterior.whitenings):
             interval = float(np.median(np.diff(data.measured(r, kind)[0])))
             relative = (data.sigma(0, kind) / data.sigma(r, kind)) ** 2

@@ -41,7 +41,7 @@ def _addition(result: Diagnosis) -> str:
     causes = result.verdict.causes
     faults = [fault.label for fault in result.after.faults]
     steps = []
-    if effects := [effect.entry for effect in result.after.fit.effects]:
+    if effects := [effect.entry for effect in result.after.fit.effects if effect.candidate in causes]:
         steps.append(f"add {joined(effects)} to the model's effects")
     if INITIAL_RATE in causes:
         steps.append("let the initial rates be unknown")
