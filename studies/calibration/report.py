@@ -63,7 +63,7 @@ def _coverage_goals(cases: Sequence[Replicates]) -> list[Goal]:
     )
     goals = []
     for level in LEVELS:
-        text = f"{format_percent(level)} intervals hold that share of truths, in each case and in all"
+        text = f"{format_percent(level)} intervals hold that share of truths in every case"
         mine = [key for key in found if key[1] == level]
         if not mine:
             goals.append(Goal(text, "none made", Verdict.NOT_TESTED))
@@ -314,7 +314,7 @@ def ecdf_figure(cases: Sequence[Replicates], family: int) -> Figure:
     """Draw the differences of all ranks' distributions from the uniform one, a panel for each case."""
     shown = [item for item in cases if item.results]
     rows = int(np.ceil(len(shown) / 3))
-    figure = wide_figure(1.2 * rows)
+    figure = wide_figure(0.85 * rows)
     panels = figure.subplots(rows, 3, squeeze=False, sharex=True)
     for axes, item in zip(panels.ravel(), shown, strict=False):
         count = len(item.results)
