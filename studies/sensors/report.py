@@ -10,7 +10,7 @@ import numpy as np
 from bayesid._io.words import joined
 from bayesid.report import Document
 from bayesid.report.figures import robot_pose
-from bayesid.report.numbers import format_fixed, format_number, format_percent, format_range, format_text
+from bayesid.report.numbers import format_fixed, format_percent, format_range, format_text
 from studies.base_body import paper
 from studies.common.ets7 import ACCELEROMETER, INTERVAL, TIP_SPEED, ets7, tip_speed
 from studies.common.goals import Goal, Verdict
