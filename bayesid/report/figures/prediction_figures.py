@@ -51,9 +51,7 @@ def trajectory_bands(trajectory: PoseTrajectory) -> Figure:
 
 
 @styled
-def final_positions(
-    poses: Mapping[str, Pose], truth: Floats | None = None, colours: Sequence[str] = COLOURS
-) -> Figure:
+def final_positions(poses: Mapping[str, Pose], truth: Floats | None = None, colours: Sequence[str] = COLOURS) -> Figure:
     """Draw samples of the final position in three planes, with the projection of the 95 % ellipsoid.
 
     Parameters
