@@ -18,7 +18,7 @@ from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind
 from bayesid.simulation.time_grid import pad_grids, rounded
 
-__all__ = ["choose_step", "integration_error", "simulate_padded"]
+__all__ = ["choose_step", "integration_error", "refuse_fast_turns", "simulate_padded"]
 
 LONGEST_STEP = 2.0
 """Longest integration step, from which the search starts [s]."""
@@ -63,14 +63,14 @@ def choose_step(
             )
         grids = {step: finer}
         if step < 1e-4 * LONGEST_STEP:
-            _refuse_fast_turns(manoeuvres)
+            refuse_fast_turns(manoeuvres)
             raise InputError(
                 "no integration step reaches 1 % of the sensors' noise",
                 remedy="Check the units of joint motion and of the sensors' sigma",
             )
 
 
-def _refuse_fast_turns(manoeuvres: Sequence[Manoeuvre]) -> None:
+def refuse_fast_turns(manoeuvres: Sequence[Manoeuvre]) -> None:
     """Name the first recording whose base turns so fast that its rates may be in another unit."""
     for recording in (manoeuvre.recording for manoeuvre in manoeuvres):
         for column in (name for name in Kind.RATE.columns if name in recording.channels):

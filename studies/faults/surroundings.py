@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -98,7 +99,7 @@ def answer_amid(study: Path, title: str, folder: Path) -> tuple[bool, str]:
 def _answer(arguments: list[str]) -> tuple[bool, str]:
     done = CliRunner().invoke(app, arguments)
     said = " ".join(done.output.split())
-    return done.exit_code == 2 and said.startswith("Error: ") and said.count("Error: ") == 1, said
+    return done.exit_code == 2 and len(re.findall(r"(?:^|\s)Error: ", said)) == 1, said
 
 
 @contextmanager
