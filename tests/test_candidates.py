@@ -14,6 +14,7 @@ from bayesid.report.sentences.next_experiment import advice
 from bayesid.report.tables.diagnosis_tables import candidate_rows
 from bayesid.simulation.effects import Effect, Parameter, Wrench, create, known_effects, register
 from bayesid.simulation.effects.register import _REGISTER
+from bayesid.simulation.orbit import Orbit
 
 # an effect of one class, with values for each recording ---------------------------------------------------------------
 
@@ -64,6 +65,15 @@ def test_an_effect_joins_the_catalogue_and_the_candidates_by_its_class_alone(res
     assert restless in [effect.label for effect in candidates(model)]
     assert restless not in [effect.label for effect in candidates(replace(model, orbit=None, effects=()))]
     assert restless not in [effect.label for effect in candidates(model.extend(RestlessTorque()))]
+
+
+def test_in_an_eccentric_orbit_every_environment_is_a_candidate_only_where_its_place_is_known(planar_case):
+    model = replace(planar_case.posterior.model, effects=())
+    for eccentricity, known in ((0.0, True), (0.1, False)):
+        placed = replace(model, orbit=Orbit(7.5e6, eccentricity))
+        labels = [effect.label for effect in candidates(placed, knows_latitude=False)]
+        assert ("aerodynamic-drag" in labels) == known
+        assert "thruster-leak" in labels
 
 
 def test_it_joins_the_simulation(result):

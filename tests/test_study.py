@@ -10,6 +10,9 @@ from pydantic import ValidationError
 
 from bayesid._io.errors import InputError
 from bayesid.app.schema import AccelSensor, AttitudeSensor, RateSensor, Study
+from bayesid.app.study_to_model import load_manoeuvres
+from bayesid.robot.robot import Robot
+from tests.conftest import PLANAR
 
 EXAMPLES = Path(__file__).parents[2] / "shared" / "examples"
 
@@ -465,3 +468,26 @@ def test_the_examples_load(case):
     assert [recording.file.is_file() for recording in study.recordings] == [True] * 3
     np.testing.assert_array_equal(study.sensors.rate.noise.sigma(0.5), [1e-5] * 3)
     assert study.sensors.encoder.sigma_of("position", "joint1") == 1e-6
+
+
+PLACED = {
+    "eccentric": ({}, "'gravity-gradient' depends on where on the orbit"),
+    "dipole": (
+        {"= 0.01\ninc": "= 0.0\ninc", '"gravity-gradient"': '"magnetic-dipole"'},
+        "'magnetic-dipole' depends on where on the orbit",
+    ),
+    "circular": ({"= 0.01\ninc": "= 0.0\ninc"}, "there is no such file"),
+}
+
+
+@pytest.mark.parametrize(("changes", "message"), PLACED.values(), ids=PLACED)
+def test_the_place_on_the_orbit_is_required_where_an_effect_depends_on_it(tmp_path, changes, message):
+    text = COMPLETE
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    study = Study.load(write(tmp_path, text))
+    with pytest.raises(InputError, match=message) as caught:
+        load_manoeuvres(study, Robot.from_urdf(PLANAR))
+    asked = message != "there is no such file"
+    assert caught.value.place == ("recordings #2.argument_of_latitude" if asked else None)

@@ -19,7 +19,7 @@ from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
-from bayesid.simulation.effects import AccelBias, Effect, RateBias, create
+from bayesid.simulation.effects import AccelBias, Effect, RateBias, create, known_effects
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
 from bayesid.simulation.orbit import Orbit
@@ -133,7 +133,23 @@ def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:
     """Read all recordings of a study, and return them as manoeuvres with smoothed joint motion."""
     if not study.recordings:
         raise InputError("no [[recordings]]", file=study.file, remedy="Name at least one recording")
+    _check_latitudes(study)
     return [load_manoeuvre(study, section, robot) for section in study.recordings]
+
+
+def _check_latitudes(study: Study) -> None:
+    """Refuse recordings that do not say where on the orbit they were made if an effect of the model depends on it."""
+    orbit, known = _orbit(study), known_effects()
+    names = [label.partition(":")[0] for label in study.model.effects]
+    placed = [name for name in names if name in known and known[name].uses_latitude(orbit)]
+    for number, section in enumerate(study.recordings, start=1):
+        if placed and section.argument_of_latitude is None:
+            raise InputError(
+                f"the key is missing, and {placed[0]!r} depends on where on the orbit the recording was made",
+                file=study.file,
+                place=f"recordings #{number}.argument_of_latitude",
+                remedy="Give the argument of latitude at time 0 [rad], or leave the effect out",
+            )
 
 
 def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:

@@ -37,7 +37,7 @@ def candidates(
     found = [
         (_over(effect, longest) if isinstance(effect, WheelHistory) else effect).attach(model.robot)
         for kind in known_effects().values()
-        if (knows_latitude or not kind.needs_latitude) and not (records_wheels and kind is WheelHistory)
+        if (knows_latitude or not kind.uses_latitude(model.orbit)) and not (records_wheels and kind is WheelHistory)
         for effect in kind.instances(model)
         if effect.label not in present
     ]
