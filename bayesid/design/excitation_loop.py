@@ -41,6 +41,7 @@ from bayesid.design.trajectory_search import Search
 from bayesid.design.visible_directions import with_visible_directions
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
+from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_joints
@@ -194,10 +195,9 @@ class Loop:
     def _check(self, recording: Recording) -> None:
         """Refuse a recording that does not allow an identification, before it is written."""
         model = self.problem.plan.model
-        flown(self.problem.plan, recording, self.encoder)
+        manoeuvre = flown(self.problem.plan, recording, self.encoder)
         refuse_impossible_joints(recording, model.robot)
-        for sensor in model.sensors:
-            recording.vector(sensor.kind.value, sensor.kind.axes)
+        RecordedSamples.of(model, manoeuvre)
 
     def _identify(self, history: History, number: int, model: Model) -> None:
         """Identify the bodies from the recording of a step unless it is done already."""
