@@ -361,6 +361,11 @@ WRONG = {
         "./manoeuvre-1.csv",
         "recordings #2.file: 'manoeuvre-1.csv' is listed twice",
     ),
+    "name twice": (
+        "../other/manoeuvre-2.parquet",
+        "../other/manoeuvre-1.parquet",
+        "recordings #2.file: the name 'manoeuvre-1' is that of two files, '",
+    ),
     "spread of": (
         "{load = 0.5}",
         "{laod = 0.5}",
