@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from bayesid._io.errors import InputError
 from bayesid.app.schema import AccelSensor, AttitudeSensor, RateSensor, Study
 from bayesid.app.study_to_model import load_manoeuvres
+from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from tests.conftest import PLANAR
 
@@ -496,3 +497,22 @@ def test_the_place_on_the_orbit_is_required_where_an_effect_depends_on_it(tmp_pa
         load_manoeuvres(study, Robot.from_urdf(PLANAR))
     asked = message != "there is no such file"
     assert caught.value.place == ("recordings #2.argument_of_latitude" if asked else None)
+
+
+MISNAMED = {
+    "start": ("start = {jont1 = 0.1}", "recordings #1.start.jont1"),
+    "position": ("[sensors.encoder]\nsigma = {joint1 = 1e-6, jont1 = 1e-6}", "sensors.encoder.sigma.jont1"),
+    "velocity": ("[sensors.encoder]\nvelocity_sigma = {jont1 = 1e-6}", "sensors.encoder.velocity_sigma.jont1"),
+}
+
+
+@pytest.mark.parametrize(("text", "place"), MISNAMED.values(), ids=MISNAMED)
+def test_a_joint_that_the_robot_lacks_is_named(tmp_path, text, place):
+    time = np.arange(10.0)
+    Recording("m", None, time, {f"position.joint{k}": 0.01 * time for k in (1, 2)}).write(tmp_path / "m.csv")
+    recorded = f'{SHORTEST}[[recordings]]\nfile = "m.csv"\nattitude = [0, 0, 0, 1]\n'
+    assert len(load_manoeuvres(Study.load(write(tmp_path, recorded)), Robot.from_urdf(PLANAR))) == 1
+    file = write(tmp_path, recorded + text)
+    with pytest.raises(InputError) as caught:
+        load_manoeuvres(Study.load(file), Robot.from_urdf(PLANAR))
+    assert str(caught.value) == f"{file}: {place}: the robot has no moving joint 'jont1'. Did you mean 'joint1'?"

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid.app.named_joints import named_joint
 from bayesid.app.schema import OtherSensor, RecordingSection, Study
 from bayesid.app.study_to_encoders import encoder_noise
 from bayesid.app.user_files import run_user_file
@@ -156,6 +157,9 @@ def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Man
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
     recording = Recording.read(section.file)
     refuse_impossible_joints(recording, robot)  # before they are smoothed and simulated
+    for name in section.start:
+        number = study.recordings.index(section) + 1
+        named_joint(name, robot, f"recordings #{number}.start.{name}", study.file)
     motion = MeasuredMotion.from_recording(recording, robot, sigma=encoder_noise(study, robot), start=section.start)
     return Manoeuvre(
         recording=recording,
