@@ -10,10 +10,12 @@ import pytest
 from bayesid._io.errors import InputError
 from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.recording.joint_motion import Excitation, MeasuredMotion, sample_joints
+from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre
 from studies.truth.urdf import BRANCHED
+from tests.conftest import PLANAR
 
 EXCITATION = Excitation([0.3, -0.5], [0.6, 0.2], 0.25, periods=2, ramp=10.0, start=[0.1, 0.0])
 
@@ -135,12 +137,49 @@ def test_joints_that_do_not_match_the_robot(drop, add, message):
     assert "Record every moving joint of the robot" in str(caught.value)
 
 
-# the extent of a motion ------------------------------------------------------------------------------------------------
+# impossible motion ----------------------------------------------------------------------------------------------------
+
+OFTEN = np.arange(0.0, 60.0, 0.01)
+SLOW = 0.3 * np.sin(0.1 * OFTEN)
+
+
+@pytest.fixture
+def slow_arm(tmp_path) -> Robot:
+    """The planar robot with joints of at most 0.05 rad/s."""
+    text = PLANAR.read_text(encoding="utf-8")
+    assert text.count('velocity="1"') == 2
+    (tmp_path / "slow.urdf").write_text(text.replace('velocity="1"', 'velocity="0.05"'), encoding="utf-8")
+    return Robot.from_urdf(tmp_path / "slow.urdf")
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda q: q + 1e-3 * np.random.default_rng(0).normal(size=q.shape),
+        lambda q: 1e-3 * np.round(q / 1e-3),
+    ],
+    ids=["noise", "steps"],
+)
+def test_a_coarse_encoder_is_not_taken_for_an_impossible_speed(read, slow_arm):
+    channels = {"position.joint1": read(SLOW), "position.joint2": read(0.5 * SLOW)}
+    refuse_impossible_joints(Recording("coarse", None, OFTEN, channels), slow_arm)
+
+
+@pytest.mark.parametrize(
+    "spoilt", [np.degrees(0.03 * np.sin(0.3 * OFTEN)), SLOW + (OFTEN == 30.0)], ids=["degrees", "spike"]
+)
+def test_an_impossible_speed_is_seen_however_often_the_encoder_is_read(spoilt, slow_arm):
+    channels = {"position.joint1": SLOW, "position.joint2": spoilt}
+    with pytest.raises(InputError, match=r"column position.joint2: the joint moves at [\d.]+ rad/s .* radians"):
+        refuse_impossible_joints(Recording("fast", None, OFTEN, channels), slow_arm)
+
+
+# the extent of a motion ----------------------------------------------------------------------------------------------
 
 
 def kept(values: np.ndarray, first: float, last: float) -> np.ndarray:
     """The samples from a time to another."""
-    return np.where((TIME >= first) & (TIME <= last), values, np.nan)
+    return np.where((first <= TIME) & (last >= TIME), values, np.nan)
 
 
 EXTENTS = {
