@@ -117,3 +117,12 @@ def test_a_flexible_joint_has_one_stiffness_whatever_the_posture_at_the_start(jo
     bent = truth(flexible=[mj.Flexibility(joint, 1.5)])
     carried = simulated(Recorded(), JointFlexibility(joint), (1.5, 0.02), mass=HEAVY)
     assert share(bent, simulated(Recorded()), carried) < 0.15
+
+
+def test_a_flexible_joint_is_bent_in_recordings_of_any_length():
+    """In half a second the deflection is that of a recording of four seconds, but for the finer instants."""
+    whole, short = np.linspace(0.0, 4.0, 33), np.linspace(0.0, 0.5, 5)
+    carrier, effect = robot(), JointFlexibility("joint2")
+    long_table = effect.table(carrier, Recorded(delay=-17.0), whole)[: len(short)]
+    short_table = effect.table(carrier, Recorded(delay=-17.0), short)
+    np.testing.assert_allclose(short_table[..., 0], long_table[..., 0], atol=0.02 * np.abs(long_table[..., 0]).max())

@@ -221,12 +221,15 @@ class _JointCompliance(JointFlexibility):
 KNOTS = 0.5
 """Interval between the instants at which a joint's torque is computed [s]."""
 
+DEGREE = 5
+"""Of the spline through the torques, whose derivatives up to the fourth are taken."""
+
 
 class _Deflection:
     """Negative torque through a joint divided by the inertia beyond it at zero [1/s2], as a function of time."""
 
     def __init__(self, robot: Robot, motion: Motion, index: int, end: float) -> None:
-        knots = np.linspace(0.0, end, int(np.ceil(end / KNOTS)) + 1)
+        knots = np.linspace(0.0, end, max(int(np.ceil(end / KNOTS)), DEGREE) + 1)
         model = _loaded(robot)
         data = model.createData()
         state = motion.evaluate(knots)
@@ -242,7 +245,7 @@ class _Deflection:
         base = -np.linalg.solve(mass[:, :6, :6], mass[:, :6, 6:] @ acceleration + drift[:, :6, None])
         torque = mass[:, 6 + index, None] @ np.concatenate([base, acceleration], axis=1)
         ratio = -(torque[:, 0, 0] + drift[:, 6 + index]) / beyond
-        self.spline = make_interp_spline(knots, ratio, k=5)
+        self.spline = make_interp_spline(knots, ratio, k=DEGREE)
         self.span = (knots[0], knots[-1])
 
     def derivative(self, time: Floats, order: int) -> Floats:
