@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -45,7 +45,7 @@ OFFSET_STEP = 0.02
 class EncoderOffset(DisplacedMotion, OnJoint):
     """Constant error of a joint's recorded position: recorded = true + offset.
 
-    The prior of 0.02 rad is about one degree.
+    The prior of 0.02 rad is about one degree; that of a slide is 0.02 m.
     """
 
     name = "encoder-offset"
@@ -59,11 +59,18 @@ class EncoderOffset(DisplacedMotion, OnJoint):
         super().__init__(place)
         self.parameters = (Parameter("offset", "rad", sigma),)
 
+    def attach(self, robot: Robot) -> Self:
+        """Return the effect with the unit of its joint's position."""
+        changed = self.copied()
+        unit = robot.joints[self.index_in(robot)].unit
+        changed.parameters = tuple(parameter._replace(unit=unit) for parameter in self.parameters)
+        return changed
+
     def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
-        """Return an error of the zero that the eye would see; that of a slide is in metres."""
+        """Return an error of the zero that the eye would see."""
         if model.robot.joints[self.index_in(model.robot)].kind == "prismatic":
             reason = f"A slide whose zero is wrong by more than {LARGEST_OFFSET_OF_SLIDE:g} m is seen with the eye."
-            return (PhysicalBound("rad", LARGEST_OFFSET_OF_SLIDE, reason),)
+            return (PhysicalBound("m", LARGEST_OFFSET_OF_SLIDE, reason),)
         reason = f"A joint whose zero is wrong by more than {LARGEST_OFFSET:g} rad, six degrees, is seen with the eye."
         return (PhysicalBound("rad", LARGEST_OFFSET, reason),)
 
