@@ -140,7 +140,11 @@ argument_of_latitude = 0.3
     study.write_text(STUDY.replace("[design]", "[design]\nattitude = [0, 0, 1, 0]") + recording)
     problem = load_loop_problem(Study.load(study))
     assert problem.plan.attitude.tolist() == [0.0, 0.0, 1.0, 0.0]
-    assert problem.plan.argument_of_latitude == 0.0
+    assert problem.plan.argument_of_latitude == 0.3
+    study.write_text(STUDY.replace("[design]", "[design]\nargument_of_latitude = 1.5") + recording)
+    problem = load_loop_problem(Study.load(study))
+    assert problem.plan.attitude.tolist() == [0.0, 1.0, 0.0, 0.0]
+    assert problem.plan.argument_of_latitude == 1.5
 
 
 def test_joints_recorded_by_speed_start_where_the_plan_does(study: Path):

@@ -97,7 +97,7 @@ def load_problem(study: Study) -> Problem:
 def load_loop_problem(study: Study) -> Problem:
     """Return the design problem for the loop, which plans by the first criterion named, by default D-optimal.
 
-    Where ``[design]`` does not state the base's initial state, it is that of the first of the ``[[recordings]]``, whose
+    What ``[design]`` does not state of the base's initial state is that of the first of the ``[[recordings]]``, whose
     file is not read.
 
     Raises
@@ -108,10 +108,9 @@ def load_loop_problem(study: Study) -> Problem:
     section = study.design or DesignSection()
     named = section.criteria or (DOptimal.name,)
     update: dict[str, Any] = {"criteria": named[:1]}
-    if study.recordings and not section.model_fields_set.intersection(BASE_AT_START):
-        first = study.recordings[0]
-        update |= {key: getattr(first, key) for key in BASE_AT_START}
-        update["argument_of_latitude"] = first.argument_of_latitude or 0.0
+    if study.recordings:
+        unsaid = set(BASE_AT_START) - section.model_fields_set
+        update |= study.recordings[0].model_dump(include=unsaid, exclude_none=True)
     return load_problem(study.model_copy(update={"design": section.model_copy(update=update)}))
 
 
