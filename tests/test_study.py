@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from bayesid._io.errors import InputError
 from bayesid.app.schema import AccelSensor, AttitudeSensor, RateSensor, Study
-from bayesid.app.study_to_model import load_manoeuvres
+from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from tests.conftest import PLANAR
@@ -516,3 +516,18 @@ def test_a_joint_that_the_robot_lacks_is_named(tmp_path, text, place):
     with pytest.raises(InputError) as caught:
         load_manoeuvres(Study.load(file), Robot.from_urdf(PLANAR))
     assert str(caught.value) == f"{file}: {place}: the robot has no moving joint 'jont1'. Did you mean 'joint1'?"
+
+
+@pytest.mark.parametrize(
+    ("model", "sigma"),
+    [
+        ("", 3e-4),
+        ('[model]\neffects = ["rate-bias"]', 3e-4),
+        ('[model]\neffects = ["rate-bias"]\npriors = {rate-bias = {x = 5e-4, y = 5e-4, z = 5e-4}}', 5e-4),
+    ],
+)
+def test_the_sigma_of_a_bias_holds_whether_the_effects_name_it_or_not(tmp_path, model, sigma):
+    text = SHORTEST.replace("robot.urdf", str(PLANAR)).replace("sigma = 1e-5", "sigma = 1e-5\nbias_sigma = 3e-4")
+    (bias,) = load_model(Study.load(write(tmp_path, text + model))).effects
+    assert bias.label == "rate-bias"
+    assert [parameter.sigma for parameter in bias.parameters] == [sigma] * 3

@@ -229,11 +229,14 @@ def _torque(study: Study, robot: Robot) -> TorqueSensor | None:
 
 
 def _effects(study: Study) -> tuple[Effect, ...]:
-    effects = [create(label) for label in study.model.effects]
-    # a sensor with a bias_sigma in the study has a bias in the model
-    for section, kind in ((study.sensors.rate, RateBias), (study.sensors.accel, AccelBias)):
-        if section is not None and section.bias_sigma is not None and kind.name not in study.model.effects:
-            effects.append(kind(section.bias_sigma))
+    # a sensor with a bias_sigma in the study has a bias in the model, whether the effects name it or not
+    biases: dict[str, Effect] = {
+        kind.name: kind(section.bias_sigma)
+        for section, kind in ((study.sensors.rate, RateBias), (study.sensors.accel, AccelBias))
+        if section is not None and section.bias_sigma is not None
+    }
+    effects = [biases.pop(label) if label in biases else create(label) for label in study.model.effects]
+    effects += biases.values()
     known = [effect.label for effect in effects]
     for label in study.model.priors:
         if label not in known:
