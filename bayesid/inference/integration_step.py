@@ -13,8 +13,10 @@ from bayesid.inference import compiled
 from bayesid.inference.compiled import Numbers, Simulated, Structure
 from bayesid.inference.data import attitudes_of, grids_of
 from bayesid.inference.recorded_samples import RecordedSamples
+from bayesid.recording.recording import Recording
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.sensors import Kind
 from bayesid.simulation.time_grid import pad_grids, rounded
 
 __all__ = ["choose_step", "integration_error", "simulate_padded"]
@@ -59,10 +61,33 @@ def choose_step(
             )
         grids = {step: finer}
         if step < 1e-4 * LONGEST_STEP:
-            raise InputError(
-                "no integration step reaches 1 % of the sensors' noise",
-                remedy="Check the units of joint motion and of the sensors' sigma",
-            )
+            raise _without_step(model, manoeuvres)
+
+
+def _without_step(model: Model, manoeuvres: Sequence[Manoeuvre]) -> InputError:
+    """Return the error where no step is short enough, with the recorded column of the fastest motion."""
+    problem = "no integration step reaches 1 % of the sensors' noise"
+    remedy = "Check the units of joint motion, of the rate and of the sensors' sigma"
+    found: list[tuple[float, str, Recording, str]] = []
+    for manoeuvre in manoeuvres:
+        recording = manoeuvre.recording
+        for column in Kind.RATE.columns:
+            if column in recording.channels:
+                rate = float(np.nanmax(np.abs(recording.channels[column])))
+                found.append((rate, Kind.RATE.unit, recording, column))
+        speeds = np.abs(manoeuvre.motion.evaluate(recording.time).velocity).max(axis=0)
+        for joint, speed in zip(model.robot.joints, speeds, strict=True):
+            family = "position" if f"position.{joint.name}" in recording.channels else "velocity"
+            found.append((float(speed), f"{joint.unit}/s", recording, f"{family}.{joint.name}"))
+    if not found:
+        return InputError(problem, remedy=remedy)
+    speed, unit, recording, column = max(found, key=lambda item: item[0])
+    return InputError(
+        f"{problem}; the fastest motion recorded is {speed:.3g} {unit}",
+        file=recording.file or recording.name,
+        place=f"column '{column}'",
+        remedy=remedy,
+    )
 
 
 def integration_error(
