@@ -8,12 +8,23 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from bayesid._io.errors import InputError
 from bayesid.diagnosis import Diagnosis, candidates, diagnose
 from bayesid.inference.posterior import Posterior
 from bayesid.report.sentences.next_experiment import advice
 from bayesid.report.tables.diagnosis_tables import candidate_rows
-from bayesid.simulation.effects import Effect, Parameter, Wrench, create, known_effects, register
+from bayesid.simulation.effects import (
+    Effect,
+    FlexibleAppendage,
+    Parameter,
+    Prior,
+    Wrench,
+    create,
+    known_effects,
+    register,
+)
 from bayesid.simulation.effects.register import _REGISTER
+from bayesid.simulation.orbit import Orbit
 
 # an effect of one class, with values for each recording ---------------------------------------------------------------
 
@@ -64,6 +75,54 @@ def test_an_effect_joins_the_catalogue_and_the_candidates_by_its_class_alone(res
     assert restless in [effect.label for effect in candidates(model)]
     assert restless not in [effect.label for effect in candidates(replace(model, orbit=None, effects=()))]
     assert restless not in [effect.label for effect in candidates(model.extend(RestlessTorque()))]
+
+
+def test_in_an_eccentric_orbit_every_environment_is_a_candidate_only_where_its_place_is_known(planar_case):
+    model = replace(planar_case.posterior.model, effects=())
+    for eccentricity, known in ((0.0, True), (0.1, False)):
+        placed = replace(model, orbit=Orbit(7.5e6, eccentricity))
+        labels = [effect.label for effect in candidates(placed, knows_latitude=False)]
+        assert ("aerodynamic-drag" in labels) == known
+        assert "thruster-leak" in labels
+
+
+class Breath(Effect):
+    """A force of a size that is log-normal, of which no form in amplitudes is given."""
+
+    name = "breath"
+    parameters = (Parameter("force", "N", 1.0, 1e-3, Prior.LOG_NORMAL),)
+    absent = np.zeros(1)
+
+
+class Whip(Effect):
+    """A vibration that is neither an appendage nor fuel."""
+
+    name = "whip"
+    parameters = (Parameter("size", "kg", 1.0),)
+    modes_count = 1
+
+
+class OwnAppendage(FlexibleAppendage):
+    """An appendage of the user's own."""
+
+    name = "own-appendage"
+
+
+@pytest.mark.parametrize(
+    ("kind", "message"),
+    [
+        (Breath, r"test_candidates.py: effect 'breath': it is not linear in force, .* Override in_amplitudes"),
+        (Whip, r"test_candidates.py: effect 'whip': a vibration of one's own has no bounds"),
+        (OwnAppendage, None),
+    ],
+)
+def test_what_could_not_be_weighed_is_no_candidate_and_is_named(kind, message, planar_case, monkeypatch):
+    monkeypatch.setitem(_REGISTER, kind.name, kind)
+    if message is None:
+        assert kind.name in [effect.label for effect in candidates(planar_case.posterior.model)]
+        return
+    with pytest.raises(InputError, match=message):
+        candidates(planar_case.posterior.model)
 
 
 def test_it_joins_the_simulation(result):

@@ -84,6 +84,19 @@ def test_identify_writes_what_the_contract_names(study: Path, tmp_path: Path) ->
             assert format_quantity(item["mean"], item["sd"]) in report
 
 
+def test_what_is_not_a_body_is_identified_where_no_body_is_unknown(study: Path, tmp_path: Path) -> None:
+    file = copy(study, tmp_path)
+    edit(file, lambda text: text.replace('bodies = ["base_link"]', "bodies = []"))
+    status, output = run("identify", file, "--output", tmp_path / "out", "--samples", 100)
+    assert status == 0, output
+    content = json.loads((tmp_path / "out" / "identification.json").read_text())
+    assert content["covariance"] == {"names": [], "matrix": []}
+    assert content["bodies"] == {}
+    report = PdfText.read(tmp_path / "out" / "report.pdf")
+    assert "initial rate" in report
+    assert "Posterior correlations" not in report
+
+
 def test_check_and_simulate(study: Path, tmp_path: Path) -> None:
     status, output = run("check", study, "--output", tmp_path / "check")
     assert status == 0, output

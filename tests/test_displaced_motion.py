@@ -13,13 +13,13 @@ from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Load, Robot
-from bayesid.simulation.effects import Effect, EncoderOffset, JointFlexibility, JointLatency
+from bayesid.simulation.effects import Effect, EncoderOffset, JointFlexibility, JointLatency, Parameter
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Kind, Sensor, White
 from bayesid.simulation.simulator import ModelConstants, Simulator, Values
 from bayesid.simulation.time_grid import build_grid, pad_grids
 from studies.truth import mujoco as mj
-from studies.truth.urdf import link_body
+from studies.truth.urdf import BRANCHED, link_body
 
 SERVICER = Path(__file__).resolve().parents[1] / "studies" / "truth" / "robots" / "servicer3.urdf"
 POINT = (0.2, -0.1, 0.3)
@@ -106,6 +106,17 @@ def test_an_encoder_offset_displaces_the_unknown_load():
     assert share(truth(), simulated(shown), simulated(shown, EncoderOffset("joint2"), (0.02,))) < 1e-4
 
 
+def test_the_offset_of_a_slide_is_in_metres():
+    carrier = Robot.from_urdf(BRANCHED)
+    model = Model(carrier, (Sensor(Kind.RATE, White(1e-5)),), (), effects=(EncoderOffset("slide", 0.01),))
+    (effect,) = model.effects
+    assert effect.parameters == (Parameter("offset", "m", 0.01),)
+    assert [bound.unit for bound in effect.physical_bounds(model)] == ["m"]
+    units = {item.label: item.amplitude_units for item in EncoderOffset.instances(model)}
+    assert units["encoder-offset:slide"] == ("m",)
+    assert all(unit == ("rad",) for label, unit in units.items() if label != "encoder-offset:slide")
+
+
 def test_a_late_joint_record_displaces_the_unknown_load():
     shown = Recorded(delay=0.2)
     assert share(truth(), simulated(shown), simulated(shown, JointLatency(), (0.2,))) < 1e-3
@@ -117,3 +128,12 @@ def test_a_flexible_joint_has_one_stiffness_whatever_the_posture_at_the_start(jo
     bent = truth(flexible=[mj.Flexibility(joint, 1.5)])
     carried = simulated(Recorded(), JointFlexibility(joint), (1.5, 0.02), mass=HEAVY)
     assert share(bent, simulated(Recorded()), carried) < 0.15
+
+
+def test_a_flexible_joint_is_bent_in_recordings_of_any_length():
+    """In half a second the deflection is that of a recording of four seconds, but for the finer instants."""
+    whole, short = np.linspace(0.0, 4.0, 33), np.linspace(0.0, 0.5, 5)
+    carrier, effect = robot(), JointFlexibility("joint2")
+    long_table = effect.table(carrier, Recorded(delay=-17.0), whole)[: len(short)]
+    short_table = effect.table(carrier, Recorded(delay=-17.0), short)
+    np.testing.assert_allclose(short_table[..., 0], long_table[..., 0], atol=0.02 * np.abs(long_table[..., 0]).max())

@@ -173,6 +173,15 @@ def test_a_constant_wheel_is_the_same_as_effect_and_as_recording(formula_motion)
     assert np.abs(effect.rate - expected.rate).max() < 1e-9
 
 
+def test_two_samples_of_a_wheels_momentum_are_joined_by_a_line():
+    first, second = np.array([0.1, -0.2, 0.3]), np.array([0.5, 0.2, 0.1])
+    actions = Actions(np.zeros(0), np.zeros((0, 6)), np.array([2.0, 6.0]), np.stack([first, second]))
+    momentum, torque = actions.wheels(np.array([0.0, 2.0, 3.0, 6.0, 9.0]))
+    np.testing.assert_allclose(momentum, [first, first, 0.75 * first + 0.25 * second, second, second], atol=1e-15)
+    slope = (second - first) / 4.0
+    np.testing.assert_allclose(torque, [0.0 * slope, slope, slope, slope, 0.0 * slope], atol=1e-15)
+
+
 def test_a_curved_wheel_momentum_is_interpolated(formula_motion):
     """Sampled at 2 Hz; the interpolant of a sine of 0.05 Hz errs by less than 1e-3 of its amplitude."""
     urdf = ROBOTS["planar"]

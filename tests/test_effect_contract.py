@@ -447,7 +447,7 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "is_body": check_is_body,
     "body_tables": check_body_tables,
 }
-FRAMEWORK = {"uses", "constants", "bound", "amplitude_units"}
+FRAMEWORK = {"uses", "uses_latitude", "constants", "bound", "amplitude_units"}
 """What the simulation asks of an effect and no effect overrides."""
 
 

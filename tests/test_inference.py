@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,6 +14,7 @@ from scipy.stats import chi2 as chi2_distribution
 from scipy.stats import kstest, norm
 
 from bayesid._io.errors import InputError
+from bayesid.inference import integration_step
 from bayesid.inference.ensemble import BLOCK, LaplaceMove, autocorrelation_time, sample
 from bayesid.inference.identification import identify
 from bayesid.inference.importance import importance_sample
@@ -282,6 +284,18 @@ def test_another_runs_file_is_refused(change, chain, tmp_path, monkeypatch):
 
 
 # a robot --------------------------------------------------------------------------------------------------------------
+
+
+def test_where_no_step_is_short_enough_the_fastest_motion_is_named(planar_case, monkeypatch):
+    posterior = planar_case.posterior
+    recorded = posterior.manoeuvres[0].recording
+    spun = {**recorded.channels, "rate.y": np.degrees(recorded.channels["rate.y"])}
+    manoeuvre = replace(posterior.manoeuvres[0], recording=replace(recorded, channels=spun))
+    monkeypatch.setattr(integration_step, "grids_of", lambda *given: ())
+    monkeypatch.setattr(integration_step, "_error", lambda *given: 1.0)
+    given = posterior.data.recorded, posterior.structure, posterior.numbers, posterior.starting_point()
+    with pytest.raises(InputError, match=r"planar: column 'rate\.y': no integration step .* recorded is [\d.]+ rad/s"):
+        integration_step.choose_step(posterior.model, [manoeuvre], *given)
 
 
 @pytest.mark.slow

@@ -140,7 +140,11 @@ argument_of_latitude = 0.3
     study.write_text(STUDY.replace("[design]", "[design]\nattitude = [0, 0, 1, 0]") + recording)
     problem = load_loop_problem(Study.load(study))
     assert problem.plan.attitude.tolist() == [0.0, 0.0, 1.0, 0.0]
-    assert problem.plan.argument_of_latitude == 0.0
+    assert problem.plan.argument_of_latitude == 0.3
+    study.write_text(STUDY.replace("[design]", "[design]\nargument_of_latitude = 1.5") + recording)
+    problem = load_loop_problem(Study.load(study))
+    assert problem.plan.attitude.tolist() == [0.0, 1.0, 0.0, 0.0]
+    assert problem.plan.argument_of_latitude == 1.5
 
 
 def test_joints_recorded_by_speed_start_where_the_plan_does(study: Path):
@@ -151,6 +155,25 @@ def test_joints_recorded_by_speed_start_where_the_plan_does(study: Path):
     position = flown(plan, speeds, {1: 1e-5}).motion.evaluate(time).position
     np.testing.assert_allclose(position[0], [0.4, 0.0], atol=1e-9)
     np.testing.assert_allclose(position, np.tile([0.4, 0.0], (len(time), 1)), atol=0.01)  # a smoother of noisy speeds
+
+
+STAR = "[sensors.attitude]\nsigma = 1e-4\n[unknowns]"
+READ, PLANNED = [0.6, 0.0, 0.0, 0.8], [0.0, 0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("sensors", "first", "attitude", "sigma"),
+    [(STAR, 0.0, READ, 1e-3), (STAR, 0.5, PLANNED, 0.0), ("[unknowns]", 0.0, PLANNED, 0.0)],
+    ids=["declared", "declared, and read later", "not declared"],
+)
+def test_a_flight_starts_as_its_star_sensor_says_or_as_planned(study: Path, sensors, first, attitude, sigma):
+    study.write_text(STUDY.replace("[unknowns]", sensors))
+    time = np.arange(0.0, 10.1, 0.5)
+    channels = {f"position.joint{k}": 0.0 * time for k in (1, 2)}
+    channels |= {f"attitude.{axis}": np.where(time < first, np.nan, READ[k]) for k, axis in enumerate("xyzw")}
+    manoeuvre = flown(load_loop_problem(Study.load(study)).plan, Recording("step-1", None, time, channels), {0: 1e-6})
+    np.testing.assert_allclose(manoeuvre.attitude, attitude, atol=1e-12)
+    assert manoeuvre.attitude_sigma == pytest.approx(sigma)
 
 
 def test_without_a_spacecraft_the_plan_is_written_and_the_command_waits(study, tmp_path, monkeypatch):

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bayesid._io.errors import InputError
+from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.recording.joint_motion import Excitation, MeasuredMotion, sample_joints
+from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
+from bayesid.simulation.model import Manoeuvre
 from studies.truth.urdf import BRANCHED
+from tests.conftest import PLANAR
 
 EXCITATION = Excitation([0.3, -0.5], [0.6, 0.2], 0.25, periods=2, ramp=10.0, start=[0.1, 0.0])
 
@@ -129,6 +135,84 @@ def test_joints_that_do_not_match_the_robot(drop, add, message):
     with pytest.raises(InputError, match=message) as caught:
         MeasuredMotion.from_recording(recording(channels), Robot.from_urdf(BRANCHED), sigma={0: 1e-6})
     assert "Record every moving joint of the robot" in str(caught.value)
+
+
+# impossible motion ----------------------------------------------------------------------------------------------------
+
+OFTEN = np.arange(0.0, 60.0, 0.01)
+SLOW = 0.3 * np.sin(0.1 * OFTEN)
+
+
+@pytest.fixture
+def slow_arm(tmp_path) -> Robot:
+    """The planar robot with joints of at most 0.05 rad/s."""
+    text = PLANAR.read_text(encoding="utf-8")
+    assert text.count('velocity="1"') == 2
+    (tmp_path / "slow.urdf").write_text(text.replace('velocity="1"', 'velocity="0.05"'), encoding="utf-8")
+    return Robot.from_urdf(tmp_path / "slow.urdf")
+
+
+@pytest.mark.parametrize(
+    "read",
+    [
+        lambda q: q + 1e-3 * np.random.default_rng(0).normal(size=q.shape),
+        lambda q: 1e-3 * np.round(q / 1e-3),
+    ],
+    ids=["noise", "steps"],
+)
+def test_a_coarse_encoder_is_not_taken_for_an_impossible_speed(read, slow_arm):
+    channels = {"position.joint1": read(SLOW), "position.joint2": read(0.5 * SLOW)}
+    refuse_impossible_joints(Recording("coarse", None, OFTEN, channels), slow_arm)
+
+
+@pytest.mark.parametrize(
+    "spoilt", [np.degrees(0.03 * np.sin(0.3 * OFTEN)), SLOW + (OFTEN == 30.0)], ids=["degrees", "spike"]
+)
+def test_an_impossible_speed_is_seen_however_often_the_encoder_is_read(spoilt, slow_arm):
+    channels = {"position.joint1": SLOW, "position.joint2": spoilt}
+    with pytest.raises(InputError, match=r"column position.joint2: the joint moves at [\d.]+ rad/s .* radians"):
+        refuse_impossible_joints(Recording("fast", None, OFTEN, channels), slow_arm)
+
+
+# the extent of a motion ----------------------------------------------------------------------------------------------
+
+
+def kept(values: np.ndarray, first: float, last: float) -> np.ndarray:
+    """The samples from a time to another."""
+    return np.where((first <= TIME) & (last >= TIME), values, np.nan)
+
+
+EXTENTS = {
+    "whole": (lambda q: q, 29.5, True),
+    "three intervals short": (lambda q: kept(q, 1.5, 28.0), 29.5, True),
+    "gap": (lambda q: np.where((TIME > 5.0) & (TIME < 20.0), np.nan, q), 29.5, True),
+    "constant": (lambda q: kept(0.4 + 0.0 * q, 5.0, 15.0), 29.5, True),
+    "ends early": (lambda q: kept(q, 0.0, 20.0), 22.0, False),
+    "ends early, as the sensors do": (lambda q: kept(q, 0.0, 20.0), 21.5, True),
+    "begins late": (lambda q: kept(q, 2.0, 29.5), 29.5, False),
+}
+
+
+@pytest.mark.parametrize(("change", "end", "allowed"), EXTENTS.values(), ids=EXTENTS)
+def test_a_motion_is_extended_by_a_few_samples_at_most(change, end, allowed):
+    channels = {"position.joint1": 0.3 * np.sin(0.3 * TIME), "position.joint2": change(0.3 * np.sin(0.3 * TIME))}
+    motion = MeasuredMotion.from_recording(recording(channels), Robot.shipped("planar"), sigma={0: 1e-6})
+    if allowed:
+        motion.check_extent(end, "test")
+        return
+    with pytest.raises(InputError, match=r"test: joint 'joint2': its samples are from [02] s to [\d.]+ s") as caught:
+        motion.check_extent(end, "test")
+    assert f"needed from 0 s to {end:g} s" in caught.value.problem
+
+
+def test_a_recording_whose_joints_end_long_before_its_sensors_is_refused(planar_case, noisy):
+    given = noisy(np.random.default_rng(0))
+    short = np.where(given.time > 30.0, np.nan, given.channels["position.joint2"])
+    cut = replace(given, channels={**given.channels, "position.joint2": short})
+    model = planar_case.posterior.model
+    manoeuvre = Manoeuvre(cut, MeasuredMotion.from_recording(cut, model.robot, sigma={0: 1e-6}))
+    with pytest.raises(InputError, match=r"planar: joint 'joint2': its samples are from 0 s to 30 s"):
+        RecordedSamples.of(model, manoeuvre)
 
 
 def test_sample_joints_is_what_a_recording_holds():

@@ -156,6 +156,21 @@ def plan(tmp_path: Path, motion: mj.Motion) -> Path:
     return tmp_path / "study.toml"
 
 
+def test_simulate_reads_a_plan(plan: Path, tmp_path: Path) -> None:
+    """A plan holds the joint motion only; the readings that are written are those of the model, with noise."""
+    status, text = run("simulate", plan, "--output", tmp_path / "out")
+    assert status == 0, text
+    flown = Recording.read(tmp_path / "out" / "plan.csv")
+    assert {"rate.x", "rate.y", "rate.z", "position.joint1"} <= set(flown.channels)
+    _, rate = flown.vector("rate")
+    assert 1e-4 < np.abs(rate).max() < 1.0
+    status, text = run("simulate", plan, "--output", tmp_path / "exact", "--no-noise")
+    assert status == 0, text
+    _, exact = Recording.read(tmp_path / "exact" / "plan.csv").vector("rate")
+    assert (rate - exact).std() == pytest.approx(1e-5, rel=0.3)
+    assert "without noise and, drawn as measured, as they are written" in PdfText.read(tmp_path / "out" / "report.pdf")
+
+
 def test_predict_writes_a_pose_with_its_region(plan: Path, tmp_path: Path) -> None:
     output = tmp_path / "out"
     status, text = run("predict", plan, "--output", output, "--draws", 40)

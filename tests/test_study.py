@@ -10,6 +10,10 @@ from pydantic import ValidationError
 
 from bayesid._io.errors import InputError
 from bayesid.app.schema import AccelSensor, AttitudeSensor, RateSensor, Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
+from bayesid.recording.recording import Recording
+from bayesid.robot.robot import Robot
+from tests.conftest import PLANAR
 
 EXAMPLES = Path(__file__).parents[2] / "shared" / "examples"
 
@@ -358,6 +362,11 @@ WRONG = {
         "./manoeuvre-1.csv",
         "recordings #2.file: 'manoeuvre-1.csv' is listed twice",
     ),
+    "name twice": (
+        "../other/manoeuvre-2.parquet",
+        "../other/manoeuvre-1.parquet",
+        "recordings #2.file: the name 'manoeuvre-1' is that of two files, '",
+    ),
     "spread of": (
         "{load = 0.5}",
         "{laod = 0.5}",
@@ -465,3 +474,60 @@ def test_the_examples_load(case):
     assert [recording.file.is_file() for recording in study.recordings] == [True] * 3
     np.testing.assert_array_equal(study.sensors.rate.noise.sigma(0.5), [1e-5] * 3)
     assert study.sensors.encoder.sigma_of("position", "joint1") == 1e-6
+
+
+PLACED = {
+    "eccentric": ({}, "'gravity-gradient' depends on where on the orbit"),
+    "dipole": (
+        {"= 0.01\ninc": "= 0.0\ninc", '"gravity-gradient"': '"magnetic-dipole"'},
+        "'magnetic-dipole' depends on where on the orbit",
+    ),
+    "circular": ({"= 0.01\ninc": "= 0.0\ninc"}, "there is no such file"),
+}
+
+
+@pytest.mark.parametrize(("changes", "message"), PLACED.values(), ids=PLACED)
+def test_the_place_on_the_orbit_is_required_where_an_effect_depends_on_it(tmp_path, changes, message):
+    text = COMPLETE
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    study = Study.load(write(tmp_path, text))
+    with pytest.raises(InputError, match=message) as caught:
+        load_manoeuvres(study, Robot.from_urdf(PLANAR))
+    asked = message != "there is no such file"
+    assert caught.value.place == ("recordings #2.argument_of_latitude" if asked else None)
+
+
+MISNAMED = {
+    "start": ("start = {jont1 = 0.1}", "recordings #1.start.jont1"),
+    "position": ("[sensors.encoder]\nsigma = {joint1 = 1e-6, jont1 = 1e-6}", "sensors.encoder.sigma.jont1"),
+    "velocity": ("[sensors.encoder]\nvelocity_sigma = {jont1 = 1e-6}", "sensors.encoder.velocity_sigma.jont1"),
+}
+
+
+@pytest.mark.parametrize(("text", "place"), MISNAMED.values(), ids=MISNAMED)
+def test_a_joint_that_the_robot_lacks_is_named(tmp_path, text, place):
+    time = np.arange(10.0)
+    Recording("m", None, time, {f"position.joint{k}": 0.01 * time for k in (1, 2)}).write(tmp_path / "m.csv")
+    recorded = f'{SHORTEST}[[recordings]]\nfile = "m.csv"\nattitude = [0, 0, 0, 1]\n'
+    assert len(load_manoeuvres(Study.load(write(tmp_path, recorded)), Robot.from_urdf(PLANAR))) == 1
+    file = write(tmp_path, recorded + text)
+    with pytest.raises(InputError) as caught:
+        load_manoeuvres(Study.load(file), Robot.from_urdf(PLANAR))
+    assert str(caught.value) == f"{file}: {place}: the robot has no moving joint 'jont1'. Did you mean 'joint1'?"
+
+
+@pytest.mark.parametrize(
+    ("model", "sigma"),
+    [
+        ("", 3e-4),
+        ('[model]\neffects = ["rate-bias"]', 3e-4),
+        ('[model]\neffects = ["rate-bias"]\npriors = {rate-bias = {x = 5e-4, y = 5e-4, z = 5e-4}}', 5e-4),
+    ],
+)
+def test_the_sigma_of_a_bias_holds_whether_the_effects_name_it_or_not(tmp_path, model, sigma):
+    text = SHORTEST.replace("robot.urdf", str(PLANAR)).replace("sigma = 1e-5", "sigma = 1e-5\nbias_sigma = 3e-4")
+    (bias,) = load_model(Study.load(write(tmp_path, text + model))).effects
+    assert bias.label == "rate-bias"
+    assert [parameter.sigma for parameter in bias.parameters] == [sigma] * 3

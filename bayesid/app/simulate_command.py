@@ -26,14 +26,22 @@ def run(
     import numpy as np
 
     from bayesid._io.files import complete_folder, write_json
-    from bayesid.app.study_to_model import load_posterior
+    from bayesid.app.planned_motion import lacking_sensors, planned_manoeuvres
+    from bayesid.app.study_to_model import load_manoeuvres, load_model
+    from bayesid.inference.posterior import Posterior
     from bayesid.inference.predicted_readings import integration_error_at
     from bayesid.inference.simulated_recordings import simulate_recordings
     from bayesid.inference.wrong_units import refuse_wrong_units
     from bayesid.report import simulation_report
 
-    posterior = load_posterior(study)
-    refuse_wrong_units(posterior)
+    model = load_model(study)
+    manoeuvres = load_manoeuvres(study, model.robot)
+    planned = bool(lacking_sensors(model, manoeuvres))
+    if planned:
+        manoeuvres, _ = planned_manoeuvres(study, model, manoeuvres)
+    posterior = Posterior.of(model, manoeuvres)
+    if not planned:
+        refuse_wrong_units(posterior)
     recordings = simulate_recordings(posterior, np.random.default_rng(seed) if noise else None)
     error = integration_error_at(posterior, posterior.starting_point())
     with complete_folder(output) as folder:
@@ -57,6 +65,6 @@ def run(
             "integration": {"step": posterior.step, "error_in_sigma": error},
         }
         write_json(folder / "simulation.json", content)
-        simulation_report(posterior, recordings, study.title, folder / "report.pdf")
+        simulation_report(posterior, recordings, study.title, folder / "report.pdf", planned=planned)
     yield f"Simulated {len(recordings)} recordings; integration step {posterior.step:g} s, error {error:.2g} sigma."
     yield f"Wrote {output / 'report.pdf'}."

@@ -12,8 +12,8 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.app.named_joints import named_joint
 from bayesid.app.schema import DesignSection, Study
-from bayesid.app.schema.validation_messages import suggest
 from bayesid.app.study_to_model import load_model
 from bayesid.design.criteria import (
     AOptimal,
@@ -97,7 +97,7 @@ def load_problem(study: Study) -> Problem:
 def load_loop_problem(study: Study) -> Problem:
     """Return the design problem for the loop, which plans by the first criterion named, by default D-optimal.
 
-    Where ``[design]`` does not state the base's initial state, it is that of the first of the ``[[recordings]]``, whose
+    What ``[design]`` does not state of the base's initial state is that of the first of the ``[[recordings]]``, whose
     file is not read.
 
     Raises
@@ -108,10 +108,9 @@ def load_loop_problem(study: Study) -> Problem:
     section = study.design or DesignSection()
     named = section.criteria or (DOptimal.name,)
     update: dict[str, Any] = {"criteria": named[:1]}
-    if study.recordings and not section.model_fields_set.intersection(BASE_AT_START):
-        first = study.recordings[0]
-        update |= {key: getattr(first, key) for key in BASE_AT_START}
-        update["argument_of_latitude"] = first.argument_of_latitude or 0.0
+    if study.recordings:
+        unsaid = set(BASE_AT_START) - section.model_fields_set
+        update |= study.recordings[0].model_dump(include=unsaid, exclude_none=True)
     return load_problem(study.model_copy(update={"design": section.model_copy(update=update)}))
 
 
@@ -164,7 +163,7 @@ def _criterion(name: str, section: DesignSection) -> Criterion:
 def _family(robot: Robot, section: DesignSection, tip: Tip) -> TrajectoryFamily:
     names = [joint.name for joint in robot.joints]
     moving = [
-        _joint_index(name, names, f"design.joints #{number}")
+        named_joint(name, robot, f"design.joints #{number}")
         for number, name in enumerate(names if section.joints is None else section.joints, start=1)
     ]
     if not moving:
@@ -180,20 +179,11 @@ def _family(robot: Robot, section: DesignSection, tip: Tip) -> TrajectoryFamily:
     return PaperExcitation(posture, section.duration, swinging)
 
 
-def _joint_index(name: str, names: list[str], place: str) -> int:
-    if name not in names:
-        hint = suggest(name, names)
-        raise InputError(
-            f"the robot has no moving joint '{name}'", place=place, remedy=hint or f"Choose one of {', '.join(names)}"
-        )
-    return names.index(name)
-
-
 def _start(robot: Robot, section: DesignSection) -> Floats:
     """Return the positions of all joints before and after the manoeuvre, shape (joints,) [rad or m]."""
     start = np.array([np.clip(0.0, joint.lower, joint.upper) for joint in robot.joints])
     for name, value in section.start.items():
-        index = _joint_index(name, [joint.name for joint in robot.joints], f"design.start.{name}")
+        index = named_joint(name, robot, f"design.start.{name}")
         joint = robot.joints[index]
         if not joint.lower <= value <= joint.upper:
             raise InputError(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal
 
+from bayesid.app.named_joints import named_joint
 from bayesid.app.schema import Study
 from bayesid.robot.robot import Robot
 
@@ -17,10 +19,21 @@ JointNoise = dict[int, dict[str, float | None]]
 
 
 def encoder_noise(study: Study, robot: Robot) -> JointNoise:
-    """Return the noise per sample of all joints of a robot."""
+    """Return the noise per sample of all joints of a robot.
+
+    Raises
+    ------
+    InputError
+        If the study states the noise of a joint that the robot lacks.
+    """
+    encoder = study.sensors.encoder
+    for key in ("sigma", "velocity_sigma", "acceleration_sigma"):
+        given = getattr(encoder, key)
+        for name in given if isinstance(given, Mapping) else ():
+            named_joint(name, robot, f"sensors.encoder.{key}.{name}", study.file)
     families: tuple[Literal["position", "velocity", "acceleration"], ...] = ("position", "velocity", "acceleration")
     return {
-        derivative: {joint.name: study.sensors.encoder.sigma_of(family, joint.name) for joint in robot.joints}
+        derivative: {joint.name: encoder.sigma_of(family, joint.name) for joint in robot.joints}
         for derivative, family in enumerate(families)
     }
 

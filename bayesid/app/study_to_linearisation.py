@@ -6,22 +6,20 @@ Planned motion without readings gives a prediction.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from bayesid.app.planned_motion import lacking_sensors, planned_manoeuvres
 from bayesid.app.schema import Study
-from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
+from bayesid.app.study_to_encoders import ASSUMED
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.design.predicted_posterior import planned_posterior
-from bayesid.identifiability.hypothetical_experiment import blanked, has
 from bayesid.identifiability.practical_identifiability import Basis
 from bayesid.inference.mode import Optimum, fit, maximise
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.wrong_units import refuse_wrong_units
-from bayesid.recording.joint_motion import MeasuredMotion
-from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.simulation.model import Manoeuvre, Model
 
 __all__ = ["LinearisationPoint", "missing_part", "prepare"]
@@ -74,7 +72,7 @@ def prepare(study: Study, seed: int) -> LinearisationPoint:
     """
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
-    if lacking := _lacking(model, manoeuvres):
+    if lacking := lacking_sensors(model, manoeuvres):
         return _predicted(study, model, manoeuvres, lacking)
     posterior = Posterior.of(model, manoeuvres)
     refuse_wrong_units(posterior)
@@ -91,13 +89,7 @@ def prepare(study: Study, seed: int) -> LinearisationPoint:
 def _predicted(
     study: Study, model: Model, manoeuvres: Sequence[Manoeuvre], lacking: Sequence[str]
 ) -> LinearisationPoint:
-    robot, (noise, assumed) = model.robot, assume_missing(encoder_noise(study, model.robot))
-    planned = []
-    for section, manoeuvre in zip(study.recordings, manoeuvres, strict=True):
-        refuse_impossible_joints(manoeuvre.recording, robot)
-        # a plan has no noise, so the encoders' noise cannot be estimated from it
-        motion = MeasuredMotion.from_recording(manoeuvre.recording, robot, sigma=noise, start=section.start)
-        planned.append(blanked(replace(manoeuvre, motion=motion), model.sensors, model.torque))
+    planned, assumed = planned_manoeuvres(study, model, manoeuvres)
     posterior = planned_posterior(model, planned)
     centre = np.zeros(posterior.size)
     posterior = relinearised(posterior, centre)
@@ -109,18 +101,6 @@ def _predicted(
     if assumed:
         statement += f" The study gives no encoder noise of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
     return LinearisationPoint(Basis.PREDICTION, statement, posterior, fit(posterior, centre))
-
-
-def _lacking(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[str]:
-    """Return the declared sensors that some recording does not hold."""
-    lacking = [
-        sensor.kind.value
-        for sensor in model.sensors
-        if not all(has(manoeuvre.recording, sensor.kind) for manoeuvre in manoeuvres)
-    ]
-    columns = [f"torque.{joint}" for joint in (model.torque.joints if model.torque is not None else ())]
-    recorded = all(column in manoeuvre.recording.channels for manoeuvre in manoeuvres for column in columns)
-    return lacking if recorded else [*lacking, "torque"]
 
 
 def _count(manoeuvres: Sequence[Manoeuvre]) -> str:

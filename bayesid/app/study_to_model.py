@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid.app.named_joints import named_joint
 from bayesid.app.schema import OtherSensor, RecordingSection, Study
 from bayesid.app.study_to_encoders import encoder_noise
 from bayesid.app.user_files import run_user_file
@@ -19,7 +20,7 @@ from bayesid.recording.plausibility import refuse_impossible_joints
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
-from bayesid.simulation.effects import AccelBias, Effect, RateBias, create
+from bayesid.simulation.effects import AccelBias, Effect, RateBias, create, known_effects
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
 from bayesid.simulation.orbit import Orbit
@@ -133,13 +134,32 @@ def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:
     """Read all recordings of a study, and return them as manoeuvres with smoothed joint motion."""
     if not study.recordings:
         raise InputError("no [[recordings]]", file=study.file, remedy="Name at least one recording")
+    _check_latitudes(study)
     return [load_manoeuvre(study, section, robot) for section in study.recordings]
+
+
+def _check_latitudes(study: Study) -> None:
+    """Refuse recordings that do not say where on the orbit they were made if an effect of the model depends on it."""
+    orbit, known = _orbit(study), known_effects()
+    names = [label.partition(":")[0] for label in study.model.effects]
+    placed = [name for name in names if name in known and known[name].uses_latitude(orbit)]
+    for number, section in enumerate(study.recordings, start=1):
+        if placed and section.argument_of_latitude is None:
+            raise InputError(
+                f"the key is missing, and {placed[0]!r} depends on where on the orbit the recording was made",
+                file=study.file,
+                place=f"recordings #{number}.argument_of_latitude",
+                remedy="Give the argument of latitude at time 0 [rad], or leave the effect out",
+            )
 
 
 def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
     recording = Recording.read(section.file)
     refuse_impossible_joints(recording, robot)  # before they are smoothed and simulated
+    for name in section.start:
+        number = study.recordings.index(section) + 1
+        named_joint(name, robot, f"recordings #{number}.start.{name}", study.file)
     motion = MeasuredMotion.from_recording(recording, robot, sigma=encoder_noise(study, robot), start=section.start)
     return Manoeuvre(
         recording=recording,
@@ -209,11 +229,14 @@ def _torque(study: Study, robot: Robot) -> TorqueSensor | None:
 
 
 def _effects(study: Study) -> tuple[Effect, ...]:
-    effects = [create(label) for label in study.model.effects]
-    # a sensor with a bias_sigma in the study has a bias in the model
-    for section, kind in ((study.sensors.rate, RateBias), (study.sensors.accel, AccelBias)):
-        if section is not None and section.bias_sigma is not None and kind.name not in study.model.effects:
-            effects.append(kind(section.bias_sigma))
+    # a sensor with a bias_sigma in the study has a bias in the model, whether the effects name it or not
+    biases: dict[str, Effect] = {
+        kind.name: kind(section.bias_sigma)
+        for section, kind in ((study.sensors.rate, RateBias), (study.sensors.accel, AccelBias))
+        if section is not None and section.bias_sigma is not None
+    }
+    effects = [biases.pop(label) if label in biases else create(label) for label in study.model.effects]
+    effects += biases.values()
     known = [effect.label for effect in effects]
     for label in study.model.priors:
         if label not in known:

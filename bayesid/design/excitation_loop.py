@@ -41,6 +41,7 @@ from bayesid.design.trajectory_search import Search
 from bayesid.design.visible_directions import with_visible_directions
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
+from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_joints
@@ -194,10 +195,9 @@ class Loop:
     def _check(self, recording: Recording) -> None:
         """Refuse a recording that does not allow an identification, before it is written."""
         model = self.problem.plan.model
-        flown(self.problem.plan, recording, self.encoder)
+        manoeuvre = flown(self.problem.plan, recording, self.encoder)
         refuse_impossible_joints(recording, model.robot)
-        for sensor in model.sensors:
-            recording.vector(sensor.kind.value, sensor.kind.axes)
+        RecordedSamples.of(model, manoeuvre)
 
     def _identify(self, history: History, number: int, model: Model) -> None:
         """Identify the bodies from the recording of a step unless it is done already."""
@@ -272,22 +272,15 @@ class Loop:
 def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
     """Return a recording as a manoeuvre with smoothed joint motion.
 
-    The initial attitude is that of the plan unless the recording has an attitude. The initial positions of joints that
-    are recorded by speed alone are those of the plan.
+    The initial attitude is that of the plan, or what a star sensor of the model reads at time 0. The initial positions
+    of joints that are recorded by speed alone are those of the plan.
     """
     attitude, sigma = plan.attitude, plan.attitude_sigma
-    if "attitude.x" in recording.channels:
-        time, values = recording.vector("attitude")
-        if time[0] > 0.0:
-            raise InputError(
-                f"the first attitude is at {time[0]:g} s",
-                file=recording.file,
-                remedy="Give the attitude at time 0, or leave the attitude out",
-            )
-        attitude = values[0]
-        star = plan.model.sensor(Kind.ATTITUDE)
-        if star is not None:
-            sigma = max(sigma, LOOSE * float(np.max(star.noise.sigma(plan.interval))))
+    star = plan.model.sensor(Kind.ATTITUDE)
+    if star is not None and star.kind.columns[0] in recording.channels:
+        time, values = recording.vector(star.kind.value, star.kind.axes)
+        if time[0] == 0.0:
+            attitude, sigma = values[0], max(sigma, LOOSE * float(np.max(star.noise.sigma(plan.interval))))
     names = [joint.name for joint in plan.model.robot.joints]
     start = dict(zip(names, start_of(plan).tolist(), strict=True))
     motion = MeasuredMotion.from_recording(recording, plan.model.robot, sigma=encoder, start=start)

@@ -104,7 +104,9 @@ class Identification:
 
     @property
     def covariance(self) -> Floats:
-        """Posterior covariance of the reported quantities of all bodies, in the order of `names`."""
+        """Posterior covariance of the quantities of all bodies in the order of `names`, (0, 0) without bodies."""
+        if not self.bodies:
+            return np.zeros((0, 0))
         return np.atleast_2d(np.cov(np.concatenate([body.values for body in self.bodies.values()], axis=1).T))
 
     @property

@@ -13,12 +13,13 @@ from bayesid.inference import compiled
 from bayesid.inference.compiled import Numbers, Simulated, Structure
 from bayesid.inference.data import attitudes_of, grids_of
 from bayesid.inference.recorded_samples import RecordedSamples
+from bayesid.recording.recording import Recording
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind
 from bayesid.simulation.time_grid import pad_grids, rounded
 
-__all__ = ["choose_step", "integration_error", "refuse_fast_turns", "simulate_padded"]
+__all__ = ["choose_step", "integration_error", "simulate_padded", "step_error"]
 
 LONGEST_STEP = 2.0
 """Longest integration step, from which the search starts [s]."""
@@ -28,9 +29,6 @@ STEP_TOLERANCE = 0.01
 
 HOPELESS = 1.0 / 64.0
 """Part of the first step at which a simulation without finite readings is given up."""
-
-FAST = 1.0
-"""Recorded rate of the base from which on it is named where no step is short enough [rad/s]."""
 
 FEWEST_STEPS = 512
 """Smallest number of steps to which simulations of different steps are padded; larger numbers are powers of two."""
@@ -63,27 +61,33 @@ def choose_step(
             )
         grids = {step: finer}
         if step < 1e-4 * LONGEST_STEP:
-            refuse_fast_turns(manoeuvres)
-            raise InputError(
-                "no integration step reaches 1 % of the sensors' noise",
-                remedy="Check the units of joint motion and of the sensors' sigma",
-            )
+            raise step_error(model, manoeuvres)
 
 
-def refuse_fast_turns(manoeuvres: Sequence[Manoeuvre]) -> None:
-    """Name the first recording whose base turns so fast that its rates may be in another unit."""
-    for recording in (manoeuvre.recording for manoeuvre in manoeuvres):
-        for column in (name for name in Kind.RATE.columns if name in recording.channels):
-            time, rate = recording.series(column)
-            row = int(np.argmax(np.abs(rate)))
-            if abs(rate[row]) > FAST:
-                raise InputError(
-                    f"{rate[row]:.3g} rad/s at time {time[row]:g} s is a turn that no integration step follows to 1 % "
-                    "of the sensors' noise",
-                    file=recording.file or recording.name,
-                    place=f"column {column}",
-                    remedy="Give rates in rad/s, not in degrees or arcseconds per second",
-                )
+def step_error(model: Model, manoeuvres: Sequence[Manoeuvre]) -> InputError:
+    """Return the error where no step is short enough, with the recorded column of the fastest motion."""
+    problem = "no integration step reaches 1 % of the sensors' noise"
+    remedy = "Give rates in rad/s and joints in rad, and check the sensors' sigma"
+    found: list[tuple[float, str, Recording, str]] = []
+    for manoeuvre in manoeuvres:
+        recording = manoeuvre.recording
+        for column in Kind.RATE.columns:
+            if column in recording.channels:
+                rate = float(np.nanmax(np.abs(recording.channels[column])))
+                found.append((rate, Kind.RATE.unit, recording, column))
+        speeds = np.abs(manoeuvre.motion.evaluate(recording.time).velocity).max(axis=0)
+        for joint, speed in zip(model.robot.joints, speeds, strict=True):
+            family = "position" if f"position.{joint.name}" in recording.channels else "velocity"
+            found.append((float(speed), f"{joint.unit}/s", recording, f"{family}.{joint.name}"))
+    if not found:
+        return InputError(problem, remedy=remedy)
+    speed, unit, recording, column = max(found, key=lambda item: item[0])
+    return InputError(
+        f"{problem}; the fastest motion recorded is {speed:.3g} {unit}",
+        file=recording.file or recording.name,
+        place=f"column '{column}'",
+        remedy=remedy,
+    )
 
 
 def integration_error(

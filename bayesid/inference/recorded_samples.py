@@ -66,7 +66,7 @@ class RecordedSamples:
         Raises
         ------
         InputError
-            If the recording lacks a declared sensor or has too few samples of it.
+            If the recording lacks a declared sensor, has too few samples of it, or ends earlier for a joint.
         """
         recording = manoeuvre.recording
         series = {sensor.kind: _series(recording, sensor.kind.value, sensor.kind.axes) for sensor in model.sensors}
@@ -74,6 +74,8 @@ class RecordedSamples:
         if model.torque is not None:
             torque = _series(recording, "torque", model.torque.joints)
         time = np.unique(np.concatenate([*(times for times, _ in series.values()), torque[0]]))
+        if isinstance(manoeuvre.motion, MeasuredMotion):
+            manoeuvre.motion.check_extent(float(time[-1]), recording.file or recording.name)
         rows = np.searchsorted(time, torque[0])
         used = tuple(rows[moving] for moving in _moving(model, manoeuvre.motion, torque[0]))
         return cls(manoeuvre.motion, model.sensors, model.torque, time, series, torque, used)

@@ -54,12 +54,17 @@ class Actions:
     def wheels(self, time: Floats) -> tuple[Floats, Floats]:
         """Return the momentum of the wheels and its derivative at the times (T,), each of shape (T, 3).
 
-        The momentum follows a modified Akima spline; of fewer than three samples the first is held.
+        The momentum follows a modified Akima spline, a line between two samples, and a single sample is held.
         """
         if len(self.wheel_time) == 0:
             return np.zeros((len(time), 3)), np.zeros((len(time), 3))
-        if len(self.wheel_time) < 3:
+        if len(self.wheel_time) == 1:
             return np.broadcast_to(self.wheel_momentum[0], (len(time), 3)), np.zeros((len(time), 3))
+        if len(self.wheel_time) == 2:
+            (begin, end), (first, second) = self.wheel_time, self.wheel_momentum
+            share, between = np.clip((time - begin) / (end - begin), 0.0, 1.0), (time >= begin) & (time <= end)
+            slope = (second - first) / (end - begin)
+            return first + share[:, None] * (second - first), between[:, None] * slope
         curve = Akima1DInterpolator(self.wheel_time, self.wheel_momentum, method="makima")
         inside = np.clip(time, self.wheel_time[0], self.wheel_time[-1])
         return curve(inside), curve.derivative()(inside)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
@@ -22,6 +23,10 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
 
 __all__ = ["Excitation", "MeasuredMotion", "Motion", "check_joints"]
+
+
+EXTENDED = 3.0
+"""Sample intervals by which the smoothed motion of a joint is extended at most beyond its samples."""
 
 
 class Motion(Protocol):
@@ -140,6 +145,22 @@ class MeasuredMotion:
         if not self.joints:
             return JointState(*np.zeros((3, len(time), 0)))
         return JointState(*np.stack([joint.evaluate(time) for joint in self.joints], axis=-1))
+
+    def check_extent(self, end: float, file: Path | str) -> None:
+        """Refuse a recording whose joints are not sampled from about time 0 to about the last of its sensors' samples.
+
+        A smoothing spline says nothing far beyond its samples, except where they are constant.
+        """
+        for name, joint in zip(self.names, self.joints, strict=True):
+            first, last, margin = joint.nodes[0], joint.nodes[-1], EXTENDED * joint.scale
+            if not joint.is_constant and (first > margin or end > last + margin):
+                raise InputError(
+                    f"its samples are from {first:g} s to {last:g} s, and its motion is needed from 0 s to {end:g} s",
+                    file=file,
+                    place=f"joint '{name}'",
+                    remedy="Record the joint all that time, or leave out what sensors read beyond; 0 is the start of "
+                    "the recording",
+                )
 
     def with_noise(self, factor: float) -> MeasuredMotion:
         """Return the motion smoothed anew with the declared noise of the encoders times a factor."""

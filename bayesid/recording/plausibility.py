@@ -5,10 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 
 __all__ = ["refuse_impossible_joints"]
+
+FASTEST = 5.0
+"""Speed of a joint relative to its limit that none reaches."""
+
+READING_ERROR = 0.01
+"""Largest change of a reading by the noise and the steps of a coarse encoder [rad or m]."""
+
+SPAN = 1.0
+"""Time in which a joint in wrong units moves by much more than that error even where its limit is low [s]."""
 
 
 def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
@@ -26,8 +36,6 @@ def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
         time, position = recording.series(name)
         slack = 0.1 * (joint.upper - joint.lower) if np.isfinite(joint.upper - joint.lower) else 0.0
         outside = (position < joint.lower - slack) | (position > joint.upper + slack)
-        speed = np.abs(np.diff(position) / np.diff(time))
-        fast = speed > 5.0 * joint.velocity
         remedy = (
             "Give positions in radians, not degrees"
             if joint.unit == "rad"
@@ -43,12 +51,24 @@ def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
                 place=f"column {name}",
                 remedy=f"{remedy}, or correct the limits in the URDF",
             )
-        if fast.any():
-            row = int(np.argmax(fast))
+        if fast := _impossible_speed(time, position, joint.velocity):
             raise InputError(
-                f"the joint moves at {speed[row]:.3g} {joint.unit}/s at time {time[row]:g} s, "
+                f"the joint moves at {fast[1]:.3g} {joint.unit}/s at time {fast[0]:g} s, "
                 f"its limit is {joint.velocity:g}",
                 file=file,
                 place=f"column {name}",
                 remedy=f"{remedy}, or correct the limit in the URDF",
             )
+
+
+def _impossible_speed(time: Floats, position: Floats, limit: float) -> tuple[float, float] | None:
+    """Return the first time of an impossible speed and that speed, between neighbours or over a longer span."""
+    first = np.arange(len(time) - 1)
+    over_span = np.minimum(np.searchsorted(time, time[:-1] + SPAN), len(time) - 1)
+    for last in (first + 1, over_span):
+        change, duration = np.abs(position[last] - position[first]), time[last] - time[first]
+        fast = change - READING_ERROR > FASTEST * limit * duration
+        if fast.any():
+            row = int(np.argmax(fast))
+            return float(time[row]), float(change[row] / duration[row])
+    return None

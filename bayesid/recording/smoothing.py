@@ -133,6 +133,11 @@ class SmoothedJoint:
         return IntegratedProcess(np.diff(self.nodes / self.scale), self.order, jumps, self.roughness)
 
     @property
+    def is_constant(self) -> bool:
+        """Whether all samples say the same position and no speed."""
+        return all(np.ptp(one.value) == 0.0 and (one.derivative == 0 or one.value[0] == 0.0) for one in self.series)
+
+    @property
     def scaled_intensity(self) -> float:
         """Intensity of the process in scaled time."""
         return self.intensity * self.scale ** (self.order - 0.5)

@@ -65,13 +65,14 @@ def _add_result(document: Document, result: Identification) -> None:
     document.section("Result")
     document.paragraph(sentences.summary(result))
     document.paragraph(sentences.verdict(result))
-    document.table(
-        ["quantity", "unit", "prior centre", "posterior mean ± sd", "sd / |mean|", "learnt"],
-        tables.parameter_rows(result),
-        "Identified bodies, in the axes of the link; inertias are about the body's centre of mass. Learnt is the share "
-        "by which the data narrowed the prior (half the central 68 %); prior only stands for less than 10 %.",
-        ["left", "left", "right", "right", "right", "right"],
-    )
+    if rows := tables.parameter_rows(result):
+        document.table(
+            ["quantity", "unit", "prior centre", "posterior mean ± sd", "sd / |mean|", "learnt"],
+            rows,
+            "Identified bodies, in the axes of the link; inertias are about the body's centre of mass. Learnt is the "
+            "share by which the data narrowed the prior (half the central 68 %); prior only stands for less than 10 %.",
+            ["left", "left", "right", "right", "right", "right"],
+        )
     if rows := tables.effect_rows(result):
         header = ["parameter", "unit", "prior, central 68 %", "posterior mean ± sd", "|mean| / sd"]
         caption = "Parameters of the effects in the model."
@@ -150,6 +151,8 @@ def _add_torques(document: Document, result: Identification) -> None:
 
 
 def _add_uncertainty(document: Document, result: Identification) -> None:
+    if not result.bodies and not result.effects:
+        return
     document.section("Uncertainty")
     document.figure(
         figures.prior_to_posterior(result),
@@ -161,7 +164,7 @@ def _add_uncertainty(document: Document, result: Identification) -> None:
             f"Joint posterior of {name}: contours hold 50 % and 90 %. Axes are offsets from the mean in standard "
             "deviations; mean and standard deviation stand over the diagonal.",
         )
-    if len(result.names) <= LARGEST_CORRELATIONS:
+    if 0 < len(result.names) <= LARGEST_CORRELATIONS:
         alone = len(result.bodies) == 1
         figure = figures.correlations(
             [name.split(".", 1)[1] if alone else name for name in result.names], result.covariance

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import integration_error_at
 from bayesid.inference.sensor_fit import sensor_fits
@@ -22,7 +24,9 @@ CURVE_POINTS = 600
 """Number of points of a curve over time."""
 
 
-def simulation_report(posterior: Posterior, recordings: Sequence[Recording], title: str, file: Path) -> None:
+def simulation_report(
+    posterior: Posterior, recordings: Sequence[Recording], title: str, file: Path, *, planned: bool = False
+) -> None:
     """Write the report of simulated recordings as PDF, whole or not at all.
 
     Parameters
@@ -34,6 +38,8 @@ def simulation_report(posterior: Posterior, recordings: Sequence[Recording], tit
     title : str
         Title of the study.
     file : path
+    planned : bool
+        Whether the manoeuvres were planned, so that there are no readings beside which the simulated ones could stand.
     """
     document = Document(title, "Simulation")
     document.section("Result")
@@ -52,6 +58,17 @@ def simulation_report(posterior: Posterior, recordings: Sequence[Recording], tit
         ["left", "left", "left", "right", "right", "right"],
     )
     z = posterior.starting_point()
+    beside = (
+        "Readings as simulated with the robot as given, beside those of the study's recording; beneath, the residual "
+        "in σ."
+    )
+    if planned:
+        pairs = zip(posterior.manoeuvres, recordings, strict=True)
+        posterior = with_manoeuvres(posterior, [replace(flown, recording=recording) for flown, recording in pairs])
+        beside = (
+            "Readings as simulated with the robot as given, without noise and, drawn as measured, as they are written; "
+            "beneath, their difference in σ."
+        )
     fits = sensor_fits(posterior, z)
     for index, recording in enumerate(recordings):
         manoeuvre = posterior.manoeuvres[index]
@@ -59,11 +76,7 @@ def simulation_report(posterior: Posterior, recordings: Sequence[Recording], tit
         if posterior.model.robot.joints:
             time = np.linspace(recording.time[0], recording.time[-1], CURVE_POINTS)
             document.figure(figures.manoeuvre(manoeuvre.motion, posterior.model.robot, time), "Motion of the joints.")
-        document.figure(
-            figures.measured_against_simulated(fits[index]),
-            "Readings as simulated with the robot as given, beside those of the study's recording; beneath, the "
-            "residual in σ.",
-        )
+        document.figure(figures.measured_against_simulated(fits[index]), beside)
     document.section("Assumptions")
     document.items(model_sentences(posterior, integration_error_at(posterior, z)))
     document.write(file)

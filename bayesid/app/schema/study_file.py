@@ -106,6 +106,13 @@ class Study(Section):
                     place=f"recordings #{index + 1}.file",
                     remedy="Remove one: the same data would count twice",
                 )
+            for other in files[:index]:
+                if other.stem == file.stem:
+                    raise InputError(
+                        f"the name '{file.stem}' is that of two files, '{other}' and '{file}'",
+                        place=f"recordings #{index + 1}.file",
+                        remedy="Rename one: reports and results tell recordings apart by their names",
+                    )
         for index, load in enumerate(self.robot.loads, start=1):
             if (
                 self.unknowns.posterior is None

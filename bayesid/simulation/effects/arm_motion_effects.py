@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -45,7 +45,7 @@ OFFSET_STEP = 0.02
 class EncoderOffset(DisplacedMotion, OnJoint):
     """Constant error of a joint's recorded position: recorded = true + offset.
 
-    The prior of 0.02 rad is about one degree.
+    The prior of 0.02 rad is about one degree; that of a slide is 0.02 m.
     """
 
     name = "encoder-offset"
@@ -59,11 +59,18 @@ class EncoderOffset(DisplacedMotion, OnJoint):
         super().__init__(place)
         self.parameters = (Parameter("offset", "rad", sigma),)
 
+    def attach(self, robot: Robot) -> Self:
+        """Return the effect with the unit of its joint's position."""
+        changed = self.copied()
+        unit = robot.joints[self.index_in(robot)].unit
+        changed.parameters = tuple(parameter._replace(unit=unit) for parameter in self.parameters)
+        return changed
+
     def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
-        """Return an error of the zero that the eye would see; that of a slide is in metres."""
+        """Return an error of the zero that the eye would see."""
         if model.robot.joints[self.index_in(model.robot)].kind == "prismatic":
             reason = f"A slide whose zero is wrong by more than {LARGEST_OFFSET_OF_SLIDE:g} m is seen with the eye."
-            return (PhysicalBound("rad", LARGEST_OFFSET_OF_SLIDE, reason),)
+            return (PhysicalBound("m", LARGEST_OFFSET_OF_SLIDE, reason),)
         reason = f"A joint whose zero is wrong by more than {LARGEST_OFFSET:g} rad, six degrees, is seen with the eye."
         return (PhysicalBound("rad", LARGEST_OFFSET, reason),)
 
@@ -221,12 +228,15 @@ class _JointCompliance(JointFlexibility):
 KNOTS = 0.5
 """Interval between the instants at which a joint's torque is computed [s]."""
 
+DEGREE = 5
+"""Of the spline through the torques, whose derivatives up to the fourth are taken."""
+
 
 class _Deflection:
     """Negative torque through a joint divided by the inertia beyond it at zero [1/s2], as a function of time."""
 
     def __init__(self, robot: Robot, motion: Motion, index: int, end: float) -> None:
-        knots = np.linspace(0.0, end, int(np.ceil(end / KNOTS)) + 1)
+        knots = np.linspace(0.0, end, max(int(np.ceil(end / KNOTS)), DEGREE) + 1)
         model = _loaded(robot)
         data = model.createData()
         state = motion.evaluate(knots)
@@ -242,7 +252,7 @@ class _Deflection:
         base = -np.linalg.solve(mass[:, :6, :6], mass[:, :6, 6:] @ acceleration + drift[:, :6, None])
         torque = mass[:, 6 + index, None] @ np.concatenate([base, acceleration], axis=1)
         ratio = -(torque[:, 0, 0] + drift[:, 6 + index]) / beyond
-        self.spline = make_interp_spline(knots, ratio, k=5)
+        self.spline = make_interp_spline(knots, ratio, k=DEGREE)
         self.span = (knots[0], knots[-1])
 
     def derivative(self, time: Floats, order: int) -> Floats:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from bayesid.recording.joint_motion import Motion
     from bayesid.robot.robot import Robot
     from bayesid.simulation.model import Model
+    from bayesid.simulation.orbit import Orbit
 
 __all__ = ["Effect"]
 
@@ -50,7 +51,7 @@ class Effect:
     needs_orbit : bool
         Whether the effect exists only in orbit.
     needs_latitude : bool
-        Whether the effect can be computed only if the recordings state their argument of latitude.
+        Whether the effect can be computed only if the recordings state their argument of latitude, in any orbit.
     states : int
         Number of inner states, zero at time 0.
     modes_count : int
@@ -81,6 +82,11 @@ class Effect:
             return [cls().attach(model.robot)]
         except (InputError, TypeError):
             return []
+
+    @classmethod
+    def uses_latitude(cls, orbit: Orbit | None) -> bool:
+        """Return whether the argument of latitude matters: in an eccentric orbit it does for all that need an orbit."""
+        return cls.needs_latitude or (cls.needs_orbit and orbit is not None and orbit.eccentricity > 0.0)
 
     @property
     def longest_step(self) -> float:

@@ -43,7 +43,7 @@ class OnJoint(Placed):
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
         """Return the effect at every moving joint."""
-        return [cls(joint.name) for joint in model.robot.joints]
+        return [cls(joint.name).attach(model.robot) for joint in model.robot.joints]
 
     def attach(self, robot: Robot) -> Self:
         """Return the effect after a check that the robot has the joint."""
