@@ -41,7 +41,7 @@ WHOLE = 24
 """Number of rows of a table above which it may break between two pages; the caption stays with the first of them."""
 
 _TEMPLATE = """\
-#set page(paper: "a4", margin: (x: 20mm, top: 20mm, bottom: 22mm), numbering: "1 / 1")
+#set page(paper: "a4", margin: (x: 20mm, top: 20mm, bottom: 22mm), numbering: "1 / 1", footer-descent: 18%)
 #set text(font: "Libertinus Serif", size: 10.5pt, lang: "en")
 #set par(justify: true, leading: 0.62em, spacing: 0.95em)
 #set heading(numbering: "1")
@@ -68,10 +68,14 @@ _TEMPLATE = """\
   if picture == none { entries }
   else { grid(columns: (1fr, auto), column-gutter: 1em, align: (left, horizon), entries, picture) }
 })
-#let foot(small) = context {
-  if counter(page).get().first() == 1 {
-    set par(justify: false, leading: 0.5em)
-    line(length: 100%, stroke: 0.4pt) + v(-0.5em) + text(size: 7.5pt, small) + v(-0.3em)
+#let small(body) = {
+  set par(justify: false, leading: 0.5em)
+  line(length: 100%, stroke: 0.4pt) + v(-0.5em) + text(size: 7.5pt, body) + v(-0.3em)
+}
+#let foot(first, last) = context {
+  let number = counter(page).get().first()
+  for (said, there) in ((first, number == 1), (last, number == counter(page).final().first())) {
+    if there and said != "" { small(said) }
   }
   align(center, counter(page).display("1 / 1", both: true))
 }
@@ -125,9 +129,9 @@ class Document:
         """Whether a regular expression occurs in what was added so far, figures aside."""
         return any(re.search(pattern, part) for part in self._parts[1:])
 
-    def foot(self, text: str) -> None:
-        """Put a text in small print at the foot of the first page."""
-        self._parts.insert(1, f"#set page(footer: foot({literal(text)}))\n")
+    def foot(self, first: str, last: str = "") -> None:
+        """Put a text in small print at the foot of the first page, and another at that of the last."""
+        self._parts.insert(1, f"#set page(footer: foot({literal(first)}, {literal(last)}))\n")
 
     def page(self) -> None:
         """Go on at the top of a new page."""

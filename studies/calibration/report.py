@@ -24,7 +24,7 @@ from studies.common.ets7 import START, ets7
 from studies.common.goals import Goal, Verdict
 from studies.common.robot_outline import robot_outline
 from studies.common.tables import add_number_table
-from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study
+from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 
 __all__ = ["FAMILYWISE", "goals_of", "write_report"]
 
@@ -121,13 +121,19 @@ def write_report(cases: Sequence[Replicates], file: Path, origin: str | None = N
     document.items(_failures(cases))
     document.section("What the ranks and intervals say")
     document.items(_findings(cases, corrected))
+    header = ["case and method", "made", *(format_percent(level) for level in LEVELS), "k-hat ≥ 0.7"]
+    pooled = _pooled_rows(cases)
+    every = [row for item in cases for row in _coverage_rows(item)] + pooled
+    table = write_table(file, "coverage", header, every)
+    weighed = [row for row in every if row in pooled or row[0].endswith(f": {Method.IMPORTANCE}")]
     add_number_table(
         document,
-        ["case and method", "made", *(format_percent(level) for level in LEVELS), "k-hat ≥ 0.7"],
-        [row for item in cases for row in _coverage_rows(item)] + _pooled_rows(cases),
+        header,
+        weighed,
         "Percentage of the true mass, centre of mass and inertia of all identified bodies within the stated central "
         "intervals, with the standard error over replicates. Emcee samples one replicate of twenty, and none with an "
-        "unknown arm, where it takes minutes; for the base alone it costs six times as much as all the rest.",
+        "unknown arm, where it takes minutes; for the base alone it costs six times as much as all the rest. Laplace "
+        f"and emcee of each case are in {table}.",
     )
     _add_chi_square(document, cases)
     write_study(document, summary, file, origin)

@@ -14,7 +14,7 @@ from bayesid.robot.robot import Robot
 
 __all__ = ["robot_outline"]
 
-SIDE = 1.4
+SIDE = 1.15
 """Longer side of the drawing as printed [in]."""
 
 BARS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
@@ -23,7 +23,7 @@ BARS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 
 @styled
 def robot_outline(robot: Robot, position: Floats | None = None) -> Figure:
-    """Draw the robot as sticks from the side that shows most of it, with a scale in metres.
+    """Draw the robot as sticks from the side on which it reaches furthest from the base, with a scale in metres.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def robot_outline(robot: Robot, position: Floats | None = None) -> Figure:
     box = equivalent_box(robot.link(robot.base).inertial)
     path = sticks_of(robot, kinematics(robot, state).pose[0])
     points = np.concatenate([box, *path])
-    _, across, up = max(VIEWS, key=lambda view: float(np.prod(np.ptp(points[:, view[1:]], axis=0))))
+    _, across, up = max(VIEWS, key=lambda view: _area(points, view[1:]) - _area(box, view[1:]))
     low, high = points[:, [across, up]].min(axis=0), points[:, [across, up]].max(axis=0)
     spans = 1.1 * (high - low)
     bar = max((length for length in BARS if length <= 0.5 * spans[0]), default=BARS[0])
@@ -53,3 +53,7 @@ def robot_outline(robot: Robot, position: Floats | None = None) -> Figure:
     axes.set_ylim(low[1] - 0.045 * spans[1] - below, high[1] + 0.045 * spans[1])
     axes.set_aspect("equal")
     return figure
+
+
+def _area(points: Floats, plane: tuple[int, int]) -> float:
+    return float(np.prod(np.ptp(points[:, plane], axis=0)))

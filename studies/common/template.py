@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from bayesid._io.files import complete_file, write_json
 from bayesid.report import Document
-from studies.common.glossary import add_glossary
+from studies.common.glossary import glossary
 from studies.common.goals import Goal, add_goals
 
 __all__ = ["Finding", "Setup", "Statement", "Summary", "add_first_page", "add_setup", "add_statements"]
@@ -116,7 +116,7 @@ def add_statements(document: Document, statements: Sequence[Statement]) -> None:
 def write_study(document: Document, summary: Summary, output: Path, origin: str | None = None) -> None:
     """Write the report as PDF, with where it comes from at its foot, and beside it question, answer and goals as JSON.
 
-    The meanings of the terms that it uses are its last paragraph.
+    The meanings of the terms that it uses stand at the foot of its last page.
 
     Parameters
     ----------
@@ -127,9 +127,7 @@ def write_study(document: Document, summary: Summary, output: Path, origin: str 
     origin : str, optional
         Result of `studies.common.provenance.study_origin`.
     """
-    add_glossary(document)
-    if origin is not None:
-        document.foot(origin)
+    document.foot(origin or "", glossary(document))
     document.write(output)
     write_json(output.with_suffix(".json"), {**asdict(summary), "origin": origin})
 
