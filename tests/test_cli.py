@@ -84,6 +84,7 @@ def test_identify_writes_what_the_contract_names(study: Path, tmp_path: Path) ->
             assert format_quantity(item["mean"], item["sd"]) in report
 
 
+@pytest.mark.slow
 def test_what_is_not_a_body_is_identified_where_no_body_is_unknown(study: Path, tmp_path: Path) -> None:
     file = copy(study, tmp_path)
     edit(file, lambda text: text.replace('bodies = ["base_link"]', "bodies = []"))

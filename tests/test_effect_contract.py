@@ -18,7 +18,7 @@ from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.log_cholesky import relative
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects import Effect, Parameter, Readings, Resonance, Wrench, known_effects
+from bayesid.simulation.effects import Effect, Parameter, Readings, Resonance, Wrench, create, known_effects
 from bayesid.simulation.effects.instant import Composite, Environment, Instant
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Model
@@ -347,6 +347,16 @@ def check_label(effect: Effect, hook: str) -> None:
     assert not place or place in {*ROBOT.links, *JOINTS, *"xyz"}
 
 
+def check_candidate(effect: Effect, hook: str) -> None:
+    assert effect.candidate == effect.label or effect.label.startswith(f"{effect.candidate}:")
+
+
+def check_entry(effect: Effect, hook: str) -> None:
+    again = create(effect.entry)
+    assert (type(again), again.label, again.entry) == (type(effect), effect.label, effect.entry)
+    assert jax.tree.map(np.asarray, again.constants) == jax.tree.map(np.asarray, effect.constants)
+
+
 def check_link(effect: Effect, hook: str) -> None:
     assert effect.link in ROBOT.links
 
@@ -439,6 +449,8 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "starts_near": check_starts_near,
     "tuned": check_tuned,
     "label": check_label,
+    "candidate": check_candidate,
+    "entry": check_entry,
     "link": check_link,
     "table": check_table,
     "in_recording": check_in_recording,
