@@ -38,7 +38,10 @@ LONG_WORD = 14
 """Number of characters from which on a word in a table may break at its punctuation."""
 
 WHOLE = 24
-"""Number of rows of a table above which it may break between two pages; the caption stays with the first of them."""
+"""Number of lines of a table above which it may break between two pages; the caption stays with the first of them."""
+
+LINE = 60
+"""Number of characters of a table's cell that fill about one line."""
 
 _TEMPLATE = """\
 #set page(paper: "a4", margin: (x: 20mm, top: 20mm, bottom: 22mm), numbering: "1 / 1", footer-descent: 18%)
@@ -169,7 +172,7 @@ class Document:
             f"{', '.join([*cells, 'table.hline(stroke: 0.8pt)'])})"
         )
         numbered = f"#figure(kind: table, caption: {literal(caption or '')}, {table})\n"
-        if len(rows) > WHOLE:
+        if sum(max(-(-len(text) // LINE) for text in row) for row in rows) > WHOLE:
             numbered = f"#{{ show figure: set block(breakable: true)\n {numbered[1:]} }}\n"
         self._parts.append(numbered if caption is not None else f"#{table}\n")
 

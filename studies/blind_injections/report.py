@@ -119,7 +119,7 @@ def _summary(trials: Sequence[Trial], planned: int) -> Summary:
         f"nothing is hidden {share_text(alarmed, len(nulls))} trials raised an alarm"
     )
     if any(goal.verdict is Verdict.FAIL and "wrongly explained" in goal.text for goal in goals):
-        answer += f"; {_explained_outside(trials)}"
+        answer += f"; {_explained_outside(trials)[0]}"
     if len(trials) < planned:
         answer += (
             f"; {len(trials):,} of {planned:,} planned trials leave {verdicts.count(Verdict.OPEN)} of {len(goals)} "
@@ -155,8 +155,8 @@ def _setup(trials: Sequence[Trial], planned: int) -> Setup:
     )
 
 
-def _explained_outside(trials: Sequence[Trial]) -> str:
-    """Return the words on outside effects that leave little and are wrongly explained, the kinds by their names."""
+def _explained_outside(trials: Sequence[Trial]) -> tuple[str, str]:
+    """Return the words on outside effects that leave little and are wrongly explained, and how sure that was said."""
     near = barely_left(trials)
     wrong = [trial for trial in near if wrongly_explained(trial)]
     kinds = Counter((trial.case, _said(trial)) for trial in wrong)
@@ -165,7 +165,8 @@ def _explained_outside(trials: Sequence[Trial]) -> str:
     sure = f", with stated probabilities of {min(stated):.3f} to {max(stated):.3f}" if stated else ""
     return (
         f"of the effects outside the catalogue that leave less than {LEFT:g} sigma {share_text(len(wrong), len(near))} "
-        f"were wrongly explained by known causes: {named}{sure}"
+        f"were wrongly explained: {named}",
+        sure,
     )
 
 
@@ -197,8 +198,8 @@ def _failures(trials: Sequence[Trial]) -> list[str]:
         alike.setdefault((trial.case, _said(trial)), []).append(trial)
     texts = [_failure(group) for group in alike.values()]
     if any(map(wrongly_explained, barely_left(trials))):
-        said = _explained_outside(trials)
-        texts.insert(0, f"{said[0].upper()}{said[1:]}.")
+        said, sure = _explained_outside(trials)
+        texts.insert(0, f"{said[0].upper()}{said[1:]}{sure}.")
     if not wrong:
         texts.append("No trial was misnamed, and none without anything hidden raised an alarm.")
     missed = [trial for trial in trials if trial.kind != "adequate" and not trial.alarmed]

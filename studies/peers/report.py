@@ -238,10 +238,10 @@ def _answer(made: Made) -> str:
             ratios[unknowns] = _fastest(own, peers).partition(" (")[0]
             bounds += [_needed(peer) / own["seconds"] for peer in peers.values() if _is_bound(peer)]
     if ratios:
-        beside = f" (those cut off by the limit of time at least {min(bounds):.1f})" if bounds else ""
+        beside = f", those cut off by the limit of time at least {min(bounds):.1f}" if bounds else ""
         parts.append(
             f"On the same density the fastest peer takes {joined(list(ratios.values()))} times the package's time "
-            f"with {joined(list(map(str, ratios)))} unknowns, by those whose time could be estimated{beside}"
+            f"with {joined(list(map(str, ratios)))} unknowns{beside}"
         )
     errors = [_evidence_error(made, unknowns, Sampler.OURS) for unknowns in CASES]
     known = [abs(error[0]) for error in errors if error is not None]
@@ -252,8 +252,7 @@ def _answer(made: Made) -> str:
         if len(own_errors) and rivals:
             others = " and ".join(f"{_inside(peer)} of {name}" for name, peer in rivals.items())
             parts.append(
-                f"{words} {_inside(own_errors)} of its stated 95 % intervals hold the truth, where those of others are "
-                f"{others}"
+                f"{words} {_inside(own_errors)} of its stated 95 % intervals hold the truth, where it is {others}"
             )
     return "; ".join(parts) + "." if parts else "Nothing was run."
 
