@@ -71,21 +71,31 @@ def floor_of(repeats: int) -> Floor:
     )
 
 
-def growth(repeats: int) -> dict[str, dict[int, float]]:
-    """Return the time of one evaluation by samples, recordings, links, unknowns and walkers in a batch [s]."""
-    robot = ets7()
+def growth(repeats: int, sizes: int | None = None) -> dict[str, dict[int, float]]:
+    """Return the time of one evaluation by samples, recordings, links, unknowns and walkers in a batch [s].
+
+    Parameters
+    ----------
+    repeats : int
+        Repetitions, of which the fastest counts.
+    sizes : int, optional
+        How many sizes of each are measured, the smallest ones; by default all.
+    """
+    robot, some = ets7(), slice(sizes)
     three = posterior_of(robot, recordings=3)
+
+    def seconds(posterior: Posterior) -> float:
+        return seconds_per_evaluation(posterior, repeats)
+
     return {
         "samples of a recording": {
-            round(120.0 / interval) + 1: seconds_per_evaluation(posterior_of(robot, interval=interval), repeats)
-            for interval in (1.0, 0.5, 0.25, 0.125)
+            round(120.0 / interval) + 1: seconds(posterior_of(robot, interval=interval))
+            for interval in (1.0, 0.5, 0.25, 0.125)[some]
         },
-        "recordings": {n: seconds_per_evaluation(posterior_of(robot, recordings=n), repeats) for n in (1, 2, 4, 8)},
-        "links": {n: seconds_per_evaluation(posterior_of(chain(n)), repeats) for n in (3, 6, 12, 24, 48)},
-        "unknowns": {
-            item.size: seconds_per_evaluation(item, repeats) for item in (_with_bodies(three, n) for n in (1, 2, 4, 7))
-        },
-        "walkers in a batch": {n: _seconds_of_batch(three, n, repeats) / n for n in (1, 4, 16, 64, 256)},
+        "recordings": {n: seconds(posterior_of(robot, recordings=n)) for n in (1, 2, 4, 8)[some]},
+        "links": {n: seconds(posterior_of(chain(n))) for n in (3, 6, 12, 24, 48)[some]},
+        "unknowns": {item.size: seconds(item) for item in (_with_bodies(three, n) for n in (1, 2, 4, 7)[some])},
+        "walkers in a batch": {n: _seconds_of_batch(three, n, repeats) / n for n in (1, 4, 16, 64, 256)[some]},
     }
 
 

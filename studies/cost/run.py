@@ -119,8 +119,8 @@ def run(
         found = diagnose(model, manoeuvres, seed)
         one = nested(found, LIMIT if full else 10.0, seed) if found.verdict.causes else None
     progress("growth of one evaluation")
-    repeated = 20 if full else 2
-    return Cost(diagnoses, sampled, others, by_candidates, growth(repeated), floor_of(repeated), one)
+    grown = growth(20) if full else growth(2, sizes=2)
+    return Cost(diagnoses, sampled, others, by_candidates, grown, floor_of(20 if full else 2), one)
 
 
 def middle(runs: list[Run], value: Callable[[Run], float]) -> float:
