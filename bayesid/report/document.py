@@ -118,9 +118,10 @@ class Document:
         self._parts.append(f"#par({literal(text)})\n")
 
     def items(self, texts: Sequence[str]) -> None:
-        """Add a bulleted list."""
+        """Add a bulleted list, each entry of which stays on one page."""
         if texts:
-            self._parts.append(f"#list({', '.join(literal(text) for text in texts)})\n")
+            entries = (f"block(breakable: false, {literal(text)})" for text in texts)
+            self._parts.append(f"#list({', '.join(entries)})\n")
 
     def decision(self, title: str, entries: Sequence[tuple[str, str]], picture: Figure | None = None) -> None:
         """Add a framed box with a title, rows of a name and its text, and a picture in its own size beside them."""
