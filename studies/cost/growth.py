@@ -81,7 +81,7 @@ def growth(repeats: int, sizes: int | None = None) -> dict[str, dict[int, float]
     sizes : int, optional
         How many sizes of each are measured, the smallest ones; by default all.
     """
-    robot, some = ets7(), slice(sizes)
+    robot = ets7()
     three = posterior_of(robot, recordings=3)
 
     def seconds(posterior: Posterior) -> float:
@@ -90,12 +90,12 @@ def growth(repeats: int, sizes: int | None = None) -> dict[str, dict[int, float]
     return {
         "samples of a recording": {
             round(120.0 / interval) + 1: seconds(posterior_of(robot, interval=interval))
-            for interval in (1.0, 0.5, 0.25, 0.125)[some]
+            for interval in (1.0, 0.5, 0.25, 0.125)[:sizes]
         },
-        "recordings": {n: seconds(posterior_of(robot, recordings=n)) for n in (1, 2, 4, 8)[some]},
-        "links": {n: seconds(posterior_of(chain(n))) for n in (3, 6, 12, 24, 48)[some]},
-        "unknowns": {item.size: seconds(item) for item in (_with_bodies(three, n) for n in (1, 2, 4, 7)[some])},
-        "walkers in a batch": {n: _seconds_of_batch(three, n, repeats) / n for n in (1, 4, 16, 64, 256)[some]},
+        "recordings": {n: seconds(posterior_of(robot, recordings=n)) for n in (1, 2, 4, 8)[:sizes]},
+        "links": {n: seconds(posterior_of(chain(n))) for n in (3, 6, 12, 24, 48)[:sizes]},
+        "unknowns": {item.size: seconds(item) for item in (_with_bodies(three, n) for n in (1, 2, 4, 7)[:sizes])},
+        "walkers in a batch": {n: _seconds_of_batch(three, n, repeats) / n for n in (1, 4, 16, 64, 256)[:sizes]},
     }
 
 
