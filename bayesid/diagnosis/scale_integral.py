@@ -21,10 +21,10 @@ import numpy as np
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.log_sum import log_sum
 from bayesid.diagnosis.gram import Gram
-from bayesid.diagnosis.scale_nodes import LogNodes, log_nodes, thinning
+from bayesid.diagnosis.scale_nodes import LogNodes, log_nodes, log_nodes_of_many, thinning
 from bayesid.diagnosis.scale_prior import AmplitudeGroup, ScaleRange, range_of
 
-__all__ = ["GroupSpectrum", "ScaleAverage", "average_over_scales", "log_ratios"]
+__all__ = ["GroupSpectrum", "ScaleAverage", "average_over_scales", "log_evidences", "log_ratios"]
 
 MOST_NODES = 2000
 """Product of the numbers of nodes of all groups but the last above which the grid is thinned and then narrowed."""
@@ -88,15 +88,6 @@ class GroupSpectrum:
                 found[place] = GroupSpectrum(own[row], root[row], scales, values[row], vectors[row], score[row])
         return [found[place] for place in range(len(groups))]
 
-    @property
-    def log_evidence(self) -> float:
-        """Logarithm of the evidence of the group by itself, averaged over its scale."""
-        nodes = self.nodes()
-        squared = nodes.scales[:, None] ** 2
-        visible = squared * self.values
-        gain = (squared / (1.0 + visible)) @ self.score**2 - np.log1p(visible).sum(axis=1)
-        return log_sum(0.5 * gain + nodes.log_weights)
-
     def nodes(self, thinned: float = 1.0, part: tuple[float, float] | None = None) -> LogNodes:
         """Return nodes over a part of the range of the scale, by default all of it."""
         part = (self.range.low, self.range.high) if part is None else part
@@ -120,6 +111,33 @@ class ScaleAverage:
     log_evidence: float
     nodes: tuple[LogNodes, ...]
     log_posterior: Floats
+
+
+def log_evidences(groups: Sequence[GroupSpectrum]) -> Floats:
+    """Return the logarithm of the evidence of each group by itself, averaged over its scale, shape (n,).
+
+    Groups of one size are averaged together.
+    """
+    found = np.zeros(len(groups))
+    sizes: dict[tuple[int, bool], list[int]] = {}
+    for place, group in enumerate(groups):
+        sizes.setdefault((len(group.columns), group.range.low == group.range.high), []).append(place)
+    for (_, single), places in sizes.items():
+        values = np.stack([groups[place].values for place in places])
+        scores = np.stack([groups[place].score for place in places])
+        ranges = [groups[place].range for place in places]
+        if single:
+            scales = np.array([[own.high] for own in ranges])
+            log_weights = np.zeros_like(scales)
+        else:
+            scales, log_weights = log_nodes_of_many(ranges, values)
+        squared = scales[:, :, None] ** 2
+        visible = 1.0 + squared * values[:, None, :]
+        gain = np.einsum("ntk,nk->nt", squared / visible, scores**2) - np.log(visible).sum(axis=-1)
+        terms = 0.5 * gain + log_weights
+        largest = terms.max(axis=1, keepdims=True)
+        found[places] = largest[:, 0] + np.log(np.exp(terms - largest).sum(axis=1))
+    return found
 
 
 def log_ratios(groups: Sequence[GroupSpectrum], gram: Gram, nodes: Sequence[LogNodes]) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.scale_prior import ScaleRange
 
-__all__ = ["LogNodes", "log_nodes", "thinning"]
+__all__ = ["LogNodes", "log_nodes", "log_nodes_of_many", "thinning"]
 
 PER_DECADE = 3.0
 """Nodes per decade of the scale where the data see no amplitude."""
@@ -20,8 +20,8 @@ PER_ROOT = 1.5
 scale is known, to ``1 / sqrt(2 m)`` in its logarithm. The log evidence of one group is then within 0.03 of the exact
 integral, and mostly within 0.005."""
 
-FINE = 16
-"""Points per decade from which the density of the nodes is integrated."""
+FINE = 97
+"""Points from which the density of the nodes is integrated."""
 
 
 @dataclass(frozen=True)
@@ -57,23 +57,57 @@ def log_nodes(whole: ScaleRange, part: tuple[float, float], values: Floats, thin
     """
     if whole.low == whole.high:
         return LogNodes(np.array([whole.high]), np.zeros(1))
-    first, last = np.log(part[0]), np.log(part[1])
-    logs = np.linspace(first, last, max(int(FINE * (last - first) / np.log(10.0)), 8) + 1)
+    scales, log_weights = _nodes(np.array([part]), np.array([np.log(whole.high / whole.low)]), values[None], thinned)
+    return LogNodes(scales[0], log_weights[0])
+
+
+def log_nodes_of_many(ranges: Sequence[ScaleRange], values: Floats) -> tuple[Floats, Floats]:
+    """Return the scales and the logarithms of the weights of `log_nodes` over the whole ranges of groups of one size.
+
+    Parameters
+    ----------
+    ranges : sequence of ScaleRange
+        None of them a single scale.
+    values : (n, k) array
+        Eigenvalues of each group.
+
+    Returns
+    -------
+    scales, log_weights : (n, t) arrays
+        Rows with fewer nodes than others end with some of no weight.
+    """
+    ends = np.array([(own.low, own.high) for own in ranges])
+    return _nodes(ends, np.log(ends[:, 1] / ends[:, 0]), values, 1.0)
+
+
+def _nodes(ends: Floats, widths: Floats, values: Floats, thinned: float) -> tuple[Floats, Floats]:
+    """Return nodes between ends, (n, 2), of log-uniform priors of some widths, (n,)."""
+    first, last = np.log(ends).T
+    logs = first[:, None] + (last - first)[:, None] * np.linspace(0.0, 1.0, FINE)
     density = _density(logs, values)
-    covered = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))]) * (logs[1] - logs[0])
-    count = max(int(np.ceil(covered[-1] * thinned)) + 1, 3)
-    places = np.interp(np.linspace(0.0, covered[-1], count), covered, logs)
-    weights = covered[-1] / (count - 1) / _density(places, values) / np.log(whole.high / whole.low)
-    weights[[0, -1]] *= 0.5
+    covered = np.zeros_like(logs)
+    np.cumsum(0.5 * (density[:, 1:] + density[:, :-1]), axis=1, out=covered[:, 1:])
+    covered *= ((last - first) / (FINE - 1))[:, None]
+    lasts = np.maximum(np.ceil(covered[:, -1] * thinned).astype(int), 2)  # place of the last node
+    steps = (covered[:, -1] / lasts)[:, None]
+    order = np.arange(lasts.max() + 1)
+    at = np.minimum(order, lasts[:, None]) * steps
+    places = np.stack([np.interp(*row) for row in zip(at, covered, logs, strict=True)])
+    weights = steps / _density(places, values) / widths[:, None]
+    rows = np.arange(len(ends))
+    weights[:, 0] *= 0.5
+    weights[rows, lasts] *= 0.5
     scales = np.exp(places)
-    scales[[0, -1]] = part  # exactly
-    return LogNodes(scales, np.log(weights))
+    scales[rows, 0], scales[rows, lasts] = ends.T  # exactly
+    with np.errstate(divide="ignore"):
+        return scales, np.log(np.where(order > lasts[:, None], 0.0, weights))
 
 
 def _density(logs: Floats, values: Floats) -> Floats:
-    """Return the number of nodes per unit of the logarithm of a scale, at some of these logarithms."""
-    visible = np.exp(2.0 * logs)[:, None] * values
-    seen = ((visible / (1.0 + visible)) ** 2).sum(axis=1)
+    """Return the number of nodes per unit of the logarithm of a scale, at some of these logarithms, (n, t)."""
+    visible = np.exp(2.0 * logs)[:, :, None] * values[:, None, :]
+    visible /= 1.0 + visible
+    seen = np.einsum("ntk,ntk->nt", visible, visible)
     return np.sqrt(PER_DECADE**2 + PER_ROOT**2 * seen) / np.log(10.0)
 
 

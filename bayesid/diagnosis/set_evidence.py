@@ -14,7 +14,13 @@ from scipy.special import logsumexp
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.log_sum import log_sum
 from bayesid.diagnosis.gram import Gram
-from bayesid.diagnosis.scale_integral import MOST_NODES, GroupSpectrum, ScaleAverage, average_over_scales
+from bayesid.diagnosis.scale_integral import (
+    MOST_NODES,
+    GroupSpectrum,
+    ScaleAverage,
+    average_over_scales,
+    log_evidences,
+)
 from bayesid.diagnosis.scale_nodes import LogNodes, thinning
 from bayesid.diagnosis.scale_prior import CandidateCause
 
@@ -316,13 +322,24 @@ class SetEvidence:
 
     def of_forms(self, name: str) -> Floats:
         """Return the logarithms of the evidence of each form of one cause, times the form's prior probability."""
-        forms = self._spectra[name]
-        single = not self.causes[name].fixed
         found = [
-            own[0].log_evidence if single and len(own) == 1 else self._of([name], (place,)).log_evidence
-            for place, own in enumerate(forms)
+            self._of([name], (place,)).log_evidence if alone is None else alone
+            for place, alone in enumerate(self._alone[name])
         ]
         return np.array(found) + self._log_weights[name]
+
+    @cached_property
+    def _alone(self) -> dict[str, list[float | None]]:
+        """Logarithm of the evidence of each form of each cause, None for those of several groups or of fixed size."""
+        places = [
+            (name, place)
+            for name, forms in self._spectra.items()
+            for place, form in enumerate(forms)
+            if len(form) == 1 and not self.causes[name].fixed
+        ]
+        values = log_evidences([self._spectra[name][place][0] for name, place in places])
+        known = dict(zip(places, values.tolist(), strict=True))
+        return {name: [known.get((name, k)) for k in range(len(forms))] for name, forms in self._spectra.items()}
 
     def most_probable(self, names: Iterable[str], forms: Mapping[str, int]) -> tuple[Integers, Floats]:
         """Return the columns of a set and the standard deviations of their amplitudes at the most probable scales.

@@ -17,7 +17,7 @@ from bayesid.diagnosis.catalogue_signatures import group_names
 from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.linearisation import Linearisation
 from bayesid.diagnosis.mass_shift_signatures import jump_signatures, sample_intervals, shift_instants, shift_spread
-from bayesid.diagnosis.scale_integral import GroupSpectrum
+from bayesid.diagnosis.scale_integral import GroupSpectrum, log_evidences
 from bayesid.diagnosis.scale_prior import AmplitudeGroup
 from bayesid.diagnosis.set_probabilities import SetProbabilities
 from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
@@ -160,5 +160,5 @@ def _weighed(gram: Gram, group: AmplitudeGroup, best: Sequence[int | None], size
     own = [gram.groups[f"{r},{k}"] for r, k in jumping]
     matrix = np.sum([gram.matrix[np.ix_(one, two)] for one in own for two in own], axis=0)
     score = np.sum([gram.score[one] for one in own], axis=0)
-    (spectrum,) = GroupSpectrum.of([group], Gram(matrix, score, {group.name: np.arange(len(score))}))
-    return spectrum.log_evidence - float(sum(np.log(sizes[r]) for r, _ in jumping))
+    spectra = GroupSpectrum.of([group], Gram(matrix, score, {group.name: np.arange(len(score))}))
+    return float(log_evidences(spectra)[0]) - float(sum(np.log(sizes[r]) for r, _ in jumping))

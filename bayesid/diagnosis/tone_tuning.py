@@ -18,7 +18,7 @@ from bayesid._math.log_sum import log_sum
 from bayesid.diagnosis.left_beside import LeftBeside
 from bayesid.diagnosis.linearisation import Linearisation
 from bayesid.diagnosis.perturbed_fit import Engine, Fit
-from bayesid.diagnosis.scale_integral import GroupSpectrum
+from bayesid.diagnosis.scale_integral import GroupSpectrum, log_evidences
 from bayesid.diagnosis.scale_prior import CandidateCause
 from bayesid.diagnosis.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.vibration_signatures import DAMPING, FREQUENCIES, tone_couplings, tone_forms, tone_signature
@@ -120,7 +120,7 @@ def _tuned(
             item = tone_signature(effect, tone, couplings.at(tone))
             own = [groups[0] for groups in tone_forms(effect, item.name, bounds)]
             spectra = GroupSpectrum.of(own, left.gram(item.columns, item.name))
-            tried[tone] = _Tried(item, log_sum([one.log_evidence for one in spectra]) - float(np.log(len(own))))
+            tried[tone] = _Tried(item, log_sum(log_evidences(spectra)) - float(np.log(len(own))))
         return tried[tone].log_evidence
 
     cells = _cells(evidence.gains_beside(others, forms, [effect.label])[effect.label], cause)
