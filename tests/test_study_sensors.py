@@ -196,7 +196,7 @@ def test_the_cause_of_what_is_not_honest_is_named_only_where_exact_joints_are_ho
 
 @pytest.mark.usefixtures("slow")
 def test_the_study(tmp_path):
-    result = run(effort=Effort(12, likelihood_fits=3, paper_fits=3, levels=("0.04 deg/s", REALISTIC)))
+    result = run(effort=Effort(8, likelihood_fits=3, paper_fits=2, levels=("0.04 deg/s", REALISTIC)))
     for level, refits in result.refits.items():
         assert refits[LIKELIHOOD].difference[JUDGED].max() < (0.3 if level == "0.04 deg/s" else 0.05)
         assert np.isfinite(refits[PAPER].nonlinear.errors).all()
