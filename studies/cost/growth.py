@@ -115,9 +115,11 @@ def _seconds_of_batch(posterior: Posterior, count: int, repeats: int) -> float:
 
 
 def verdict_by_candidates(model: Model, manoeuvres: list[Manoeuvre], counts: tuple[int, ...]) -> dict[int, float]:
-    """Return the time of the verdict by the number of candidates of the catalogue [s], compiled code kept."""
+    """Return the time of the verdict by the number of candidates of the catalogue [s].
+
+    The code must be compiled: the same recordings have been diagnosed in this process.
+    """
     every = candidates(model, longest=float(manoeuvres[0].recording.time[-1]))
-    diagnose(model, manoeuvres, effects=every)
     found = {}
     for count in counts:
         chosen = every[:count] if count < len(every) else every

@@ -115,11 +115,11 @@ def run(
         study = Study.load(files[chosen[-1 if len(chosen) < 2 else 1].title])
         model = load_model(study)
         manoeuvres = load_manoeuvres(study, model.robot)
-        by_candidates = verdict_by_candidates(model, manoeuvres, COUNTS if full else COUNTS[-1:])
         found = diagnose(model, manoeuvres, seed)
+        by_candidates = verdict_by_candidates(model, manoeuvres, COUNTS if full else COUNTS[-1:])
         one = nested(found, LIMIT if full else 10.0, seed) if found.verdict.causes else None
     progress("growth of one evaluation")
-    grown = growth(20) if full else growth(2, sizes=2)
+    grown = growth(20) if full else growth(2, sizes=1)
     return Cost(diagnoses, sampled, others, by_candidates, grown, floor_of(20 if full else 2), one)
 
 
