@@ -10,7 +10,7 @@ import pytest
 from bayesid._io.errors import InputError
 from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.recording.joint_motion import Excitation, MeasuredMotion, sample_joints
-from bayesid.recording.plausibility import refuse_impossible_joints
+from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre
@@ -162,7 +162,7 @@ def slow_arm(tmp_path) -> Robot:
 )
 def test_a_coarse_encoder_is_not_taken_for_an_impossible_speed(read, slow_arm):
     channels = {"position.joint1": read(SLOW), "position.joint2": read(0.5 * SLOW)}
-    refuse_impossible_joints(Recording("coarse", None, OFTEN, channels), slow_arm)
+    refuse_impossible_motion(Recording("coarse", None, OFTEN, channels), slow_arm)
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,17 @@ def test_a_coarse_encoder_is_not_taken_for_an_impossible_speed(read, slow_arm):
 def test_an_impossible_speed_is_seen_however_often_the_encoder_is_read(spoilt, slow_arm):
     channels = {"position.joint1": SLOW, "position.joint2": spoilt}
     with pytest.raises(InputError, match=r"column position.joint2: the joint moves at [\d.]+ rad/s .* radians"):
-        refuse_impossible_joints(Recording("fast", None, OFTEN, channels), slow_arm)
+        refuse_impossible_motion(Recording("fast", None, OFTEN, channels), slow_arm)
+
+
+def test_a_base_does_not_whirl_but_a_reading_may_be_garbled(slow_arm):
+    rate = 2e-3 * np.sin(0.1 * OFTEN)
+    rates = {"rate.x": rate, "rate.y": rate + 1e6 * (OFTEN == 30.0), "rate.z": rate}
+    channels = {"position.joint1": SLOW, "position.joint2": SLOW, **rates}
+    refuse_impossible_motion(Recording("garbled", None, OFTEN, channels), slow_arm)
+    channels["rate.y"] = np.degrees(rate) * 3600.0
+    with pytest.raises(InputError, match=r"column rate.y: half of the readings are beyond \d+ rad/s.*arcseconds"):
+        refuse_impossible_motion(Recording("arcseconds", None, OFTEN, channels), slow_arm)
 
 
 # the extent of a motion ----------------------------------------------------------------------------------------------

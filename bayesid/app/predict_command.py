@@ -36,13 +36,13 @@ def run(
     from bayesid._io.files import complete_folder, write_json
     from bayesid.app.study_to_model import load_manoeuvres, load_model
     from bayesid.design.base_prediction import BasePredictor
-    from bayesid.recording.plausibility import refuse_impossible_joints
+    from bayesid.recording.plausibility import refuse_impossible_motion
     from bayesid.report import format_quantity, prediction_report
 
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
     for manoeuvre in manoeuvres:
-        refuse_impossible_joints(manoeuvre.recording, model.robot)
+        refuse_impossible_motion(manoeuvre.recording, model.robot)
     tip = None if study.design is None else study.design.tip_frame
     streams, predictors, predictions = np.random.SeedSequence(seed).spawn(len(manoeuvres)), [], []
     for index, (manoeuvre, stream) in enumerate(zip(manoeuvres, streams, strict=True)):

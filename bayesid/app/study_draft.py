@@ -12,7 +12,7 @@ import numpy as np
 from bayesid._io.errors import InputError
 from bayesid.app.noise_estimates import channel_noise, vector_noise
 from bayesid.recording.joint_motion import check_joints
-from bayesid.recording.plausibility import refuse_impossible_joints
+from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Joint, Robot
 
@@ -58,7 +58,7 @@ def draft_study(robot: Robot, urdf: Path, recordings: Sequence[Recording], folde
     """
     for recording in recordings:
         check_joints(recording, robot)
-        refuse_impossible_joints(recording, robot)
+        refuse_impossible_motion(recording, robot)
     _require_base_sensor(recordings)
     sections = [
         _head(title),

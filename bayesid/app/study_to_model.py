@@ -16,7 +16,7 @@ from bayesid.app.user_files import run_user_file
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
 from bayesid.recording.joint_motion import MeasuredMotion
-from bayesid.recording.plausibility import refuse_impossible_joints
+from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
@@ -156,7 +156,7 @@ def _check_latitudes(study: Study) -> None:
 def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
     recording = Recording.read(section.file)
-    refuse_impossible_joints(recording, robot)  # before they are smoothed and simulated
+    refuse_impossible_motion(recording, robot)  # before they are smoothed and simulated
     for name in section.start:
         number = study.recordings.index(section) + 1
         named_joint(name, robot, f"recordings #{number}.start.{name}", study.file)

@@ -44,7 +44,7 @@ from bayesid.inference.posterior_as_prior import InertialDraws
 from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.recording.joint_motion import MeasuredMotion
-from bayesid.recording.plausibility import refuse_impossible_joints
+from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Kind
@@ -196,7 +196,7 @@ class Loop:
         """Refuse a recording that does not allow an identification, before it is written."""
         model = self.problem.plan.model
         manoeuvre = flown(self.problem.plan, recording, self.encoder)
-        refuse_impossible_joints(recording, model.robot)
+        refuse_impossible_motion(recording, model.robot)
         RecordedSamples.of(model, manoeuvre)
 
     def _identify(self, history: History, number: int, model: Model) -> None:

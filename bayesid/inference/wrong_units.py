@@ -27,7 +27,7 @@ from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
 from bayesid.recording.joint_motion import Motion
-from bayesid.recording.plausibility import refuse_impossible_joints
+from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.joint_state import JointState
 from bayesid.simulation.model import Manoeuvre
@@ -68,7 +68,7 @@ def refuse_wrong_units(posterior: Posterior) -> None:
         times are in milliseconds or minutes, or accelerations are in g.
     """
     for manoeuvre in posterior.manoeuvres:
-        refuse_impossible_joints(manoeuvre.recording, posterior.model.robot)
+        refuse_impossible_motion(manoeuvre.recording, posterior.model.robot)
     compared = _compared(posterior)
     for seen in compared:
         _refuse_times(posterior, seen)

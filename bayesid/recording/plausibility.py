@@ -1,4 +1,4 @@
-"""Refusal of recorded joint motion that no robot can have made."""
+"""Refusal of recorded motion that no robot can have made."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from bayesid._math.arrays import Floats
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 
-__all__ = ["refuse_impossible_joints"]
+__all__ = ["refuse_impossible_motion"]
 
 FASTEST = 5.0
 """Speed of a joint relative to its limit that none reaches."""
@@ -20,15 +20,37 @@ READING_ERROR = 0.01
 SPAN = 1.0
 """Time in which a joint in wrong units moves by much more than that error even where its limit is low [s]."""
 
+FASTEST_BASE = 20.0
+"""Angular speed of the base that no free-flying robot keeps up, some three turns a second [rad/s]."""
 
-def refuse_impossible_joints(recording: Recording, robot: Robot) -> None:
-    """Refuse joint positions and speeds far outside the joints' limits, such as degrees taken for radians.
+RATE = ("rate.x", "rate.y", "rate.z")
+"""Columns of the angular velocity of the base."""
+
+
+def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:
+    """Refuse what degrees or arcseconds make of radians: joints far outside their limits, and a base that whirls.
 
     Raises
     ------
     InputError
-        If a position is beyond a limit by more than a tenth of the range, or a speed is above five times its limit.
+        If a position is beyond a limit by more than a tenth of the range, a speed is above five times its limit, or
+        most rates of the base are above 20 rad/s.
     """
+    _refuse_joints(recording, robot)
+    for name in RATE:
+        readings = recording.series(name)[1] if name in recording.channels else np.zeros(0)
+        if readings.size:
+            speed = float(np.median(np.abs(readings)))  # single readings may be garbled
+            if speed > FASTEST_BASE:
+                raise InputError(
+                    f"half of the readings are beyond {speed:.3g} rad/s, which is over three turns a second",
+                    file=recording.file or recording.name,
+                    place=f"column {name}",
+                    remedy="Give rates in rad/s, not in arcseconds or degrees per second",
+                )
+
+
+def _refuse_joints(recording: Recording, robot: Robot) -> None:
     for joint in robot.joints:
         name = f"position.{joint.name}"
         if name not in recording.channels:
