@@ -63,7 +63,7 @@ def test_a_scheduler_of_dask_that_loses_a_worker_gives_the_same(tmp_path):
     """Two worker processes, of which one is killed while its trial runs."""
     distributed = pytest.importorskip("distributed")
     store, tasks = tmp_path / "trials.jsonl", range(12)
-    with distributed.LocalCluster(2, threads_per_worker=1, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         with distributed.Client(cluster) as client:
             pids = list(client.run(os.getpid).values())
 
