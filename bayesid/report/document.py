@@ -15,6 +15,7 @@ from pathlib import Path
 import matplotlib as mpl
 import typst
 from matplotlib.artist import Artist
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.collections import PathCollection, QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -242,17 +243,20 @@ def _check_table(header: Sequence[str], rows: Sequence[Sequence[str]], align: Se
 
 def _svg(fig: Figure) -> bytes:
     """Return a figure as SVG, what has many points as a picture in it."""
-    for artist in fig.findobj():
-        if _points(artist) > MANY_POINTS:
-            artist.set_rasterized(True)
+    for axes in fig.axes:
+        for artist in axes.get_children():
+            if _points(artist) > MANY_POINTS:
+                artist.set_rasterized(True)
     with_plain_labels(fig)
     engine = fig.get_layout_engine()
-    if engine is not None:  # saving would lay the figure out twice, and draw it once more for that
+    if engine is not None:  # drawing would lay the figure out once more
         engine.execute(fig)
         fig.set_layout_engine("none")
+    fig.set_dpi(RESOLUTION)
     content = io.BytesIO()
     with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": "bayesid"}):
-        fig.savefig(content, format="svg", dpi=RESOLUTION, metadata={"Date": None})
+        # savefig would draw the figure twice, the first time to find its layout
+        FigureCanvasSVG(fig).print_svg(content, metadata={"Date": None})
     return content.getvalue()
 
 

@@ -17,6 +17,7 @@ from bayesid.report.figures.figure_style import (
     residual_limits,
     shared_legend,
     styled,
+    title_panel,
     wide_figure,
 )
 from bayesid.report.numbers import format_unit
@@ -42,7 +43,7 @@ def measured_against_simulated(fits: Sequence[SensorFit]) -> Figure:
         for axis in range(fit.kind.size):
             above, below = panels[2 * row][axis], panels[2 * row + 1][axis]
             _draw_readings(above, fit.time, fit.measured[:, axis] / scale, fit.predicted[:, axis] / scale)
-            above.set_title(f"{axis_title(fit.kind, axis)} [{prefix}{format_unit(fit.kind.unit)}]")
+            title_panel(above, f"{axis_title(fit.kind, axis)} [{prefix}{format_unit(fit.kind.unit)}]")
             _draw_residual(below, fit.residual_time, fit.residual[:, axis])
         for axis in range(fit.kind.size, COLUMNS):
             panels[2 * row][axis].set_axis_off()
@@ -71,7 +72,7 @@ def torques_over_time(fits: Sequence[TorqueFit]) -> Figure:
             continue
         fit = fits[index]
         _draw_readings(above, fit.time, fit.measured, fit.predicted)
-        above.set_title(f"{fit.joint} [{fit.unit}]")
+        title_panel(above, f"{fit.joint} [{fit.unit}]")
         _draw_residual(below, fit.residual_time, fit.residual)
     shared_legend(figure, panels[0][0], columns=2, markerscale=2.0)
     return figure

@@ -16,6 +16,7 @@ from bayesid.report.figures.figure_style import (
     decimal_scale,
     shared_legend,
     styled,
+    title_panel,
     wide_figure,
 )
 
@@ -92,7 +93,7 @@ def wrench_histories(wrench: Unexplained, frame: Frame, cause: Sequence[Floats] 
                 if cause is not None and title == "torque":
                     axes.plot(time, cause[index][:, axis] / scale, "--", color="black", linewidth=0.9)
             axes.axhline(0.0, color="black", linewidth=0.5)
-            axes.set_title(f"{title} {'xyz'[axis]} [{prefix}{unit}]")
+            title_panel(axes, f"{title} {'xyz'[axis]} [{prefix}{unit}]")
             axes.locator_params(axis="both", nbins=4)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
@@ -115,7 +116,7 @@ def wrench_spectrum(wrench: Unexplained) -> Figure:
             axes.plot(
                 frequency, amplitude[:, axis] / scale, linewidth=0.9, label=wrench.names[index], **curve_style(index)
             )
-        axes.set_title(f"torque {'xyz'[axis]} [{prefix}N m]")
+        title_panel(axes, f"torque {'xyz'[axis]} [{prefix}N m]")
         axes.set_xlabel("frequency [Hz]")
         axes.locator_params(axis="both", nbins=4)
     panels[0, 0].set_ylabel("amplitude")

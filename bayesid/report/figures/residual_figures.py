@@ -22,6 +22,7 @@ from bayesid.report.figures.figure_style import (
     sensor_title,
     shared_legend,
     styled,
+    title_panel,
     wide_figure,
 )
 
@@ -62,7 +63,7 @@ def residual_histories(sides: Sequence[Residuals], recording: int) -> Figure:
                 draw_history(axes, time, value, colour, f"{name}: {label}" if len(sides) > 1 else label)
                 drawn.append(value)
             residual_limits(axes, np.concatenate(drawn))
-            axes.set_title(axis_title(kind, axis))
+            title_panel(axes, axis_title(kind, axis))
             axes.locator_params(axis="both", nbins=4)
         panels[sensor, 0].set_ylabel("residual [σ]")
     for axes in panels[-1]:
@@ -105,7 +106,7 @@ def residual_spectra(sides: Sequence[Residuals]) -> Figure:
                 for side, (name, colour) in zip(sides, SIDES, strict=False)
             ]
             _draw_spectra(axes, curves)
-            axes.set_title(axis_title(kind, axis))
+            title_panel(axes, axis_title(kind, axis))
             axes.set_xlabel("frequency [Hz]")
             axes.locator_params(axis="x", nbins=4)
         panels[sensor, 0].set_ylabel("power [σ² per bin]")
