@@ -142,7 +142,9 @@ class SignatureProducts:
         groups: dict[str, Integers] = {}
         for item, where in zip(self.signatures, self.places, strict=True):
             groups[item.name] = np.concatenate([groups.get(item.name, np.zeros(0, dtype=int)), where])
-        return Gram(self.matrix - taken.T @ taken, self.score - taken.T @ pull, groups)
+        matrix = taken.T @ taken
+        np.subtract(self.matrix, matrix, out=matrix)
+        return Gram.owning(matrix, self.score - taken.T @ pull, groups)
 
 
 def _columns(signatures: Sequence[Signatures], block: slice) -> Floats:
