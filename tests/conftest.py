@@ -47,10 +47,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "slow: left to ``pytest --slow``, as tests with the fixture of that name")
     given = os.environ.get("XLA_FLAGS", "")
-    if config.getoption("--slow") or config.getoption("--catalogue"):
-        _take_one_core()
-    elif QUICKLY not in given:
+    if not (config.getoption("--slow") or config.getoption("--catalogue") or QUICKLY in given):
         os.environ["XLA_FLAGS"] = f"{QUICKLY} {given}"
+    _take_one_core()
     if COMPILED not in os.environ:
         folder = tempfile.TemporaryDirectory()
         os.environ[COMPILED] = folder.name
@@ -61,7 +60,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def _take_one_core() -> None:
     """Keep this process to a core of its own where there is one for each.
 
-    Their threads would otherwise wait for each other, which costs a fifth of the time.
+    Their threads would otherwise wait for each other, which costs a fifth of the time. What runs in threads is tested
+    on all cores in test_threads.py.
     """
     worker, count = os.environ.get("PYTEST_XDIST_WORKER", ""), os.environ.get("PYTEST_XDIST_WORKER_COUNT", "")
     if worker and hasattr(os, "sched_setaffinity"):
