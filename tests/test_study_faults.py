@@ -37,6 +37,11 @@ def test_faults_around_a_run_get_one_clear_error(title):
 
 
 @pytest.mark.slow
+def test_a_cache_of_another_version_changes_nothing():
+    assert attempt({"cache": "another version"}, np.random.default_rng(0)) == {"same": True, "differs": True}
+
+
+@pytest.mark.slow
 def test_spoilt_files_are_counted():
     found = attempt({"spoil": 3, "changes": 20}, np.random.default_rng(0))
     assert sum(sum(counts.values()) for counts in found["answers"].values()) == 20
@@ -61,8 +66,24 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     assert text.row("Nothing half written after a kill", "1 file after 2 kills", "FAIL")
     assert text.row("design: same answer after kills", "2 kills", "FAIL")
     assert text.row("loop: same answer after kills", "0 kills", "NOT TESTED")
+    unmoved = "a cache of another version: no effect"
+    assert text.row(unmoved, "not tried; a damaged file of it: tests/test_kept_jit.py", "NOT TESTED")
     for part in ("KeyError", "not refused", "other files", "a trial broke"):
         assert part in text
+
+
+@pytest.mark.parametrize(
+    ("same", "differs", "reached", "verdict"),
+    [
+        (True, True, "same answer as with an empty cache; the other version answers otherwise", "PASS"),
+        (False, True, "another answer than with an empty cache; the other version answers otherwise", "FAIL"),
+        (True, False, "the other version itself gives the same answer", "NOT TESTED"),
+    ],
+)
+def test_another_cache_passes_only_where_it_could_have_failed(same, differs, reached, verdict, tmp_path):
+    write_report([{"cache": "another version", "same": same, "differs": differs}], [], tmp_path / "faults.pdf")
+    text = PdfText.read(tmp_path / "faults.pdf")
+    assert text.row("a cache of another version: no effect", reached, verdict)
 
 
 def test_the_small_study_is_a_part_of_the_full_one():

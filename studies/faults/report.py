@@ -81,6 +81,7 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
     units = {item["unit"]: item for item in made if "unit" in item}
     killed = {item["kill"]: item for item in made if "kill" in item}
     around = {item["around"]: item for item in made if "around" in item}
+    cache = next((item for item in made if "cache" in item), None)
     answers = {
         kind: {key: sum(item["answers"].get(kind, {}).get(key, 0) for item in spoilt) for key in OUTCOMES}
         for kind in KINDS
@@ -97,7 +98,7 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
         f"{'was' if len(units) == 1 else 'were'} refused; after {counted(kills, 'kill')} "
         f"{sum(item['same'] for item in killed.values())} of {counted(len(killed), 'command')} gave the answer of a "
         "run left alone.",
-        goals=tuple(_goals(numbers, units, killed, around)),
+        goals=tuple(_goals(numbers, units, killed, around, cache)),
         valid=f"files are those of a robot with three joints and one recording of 40 s; {done} of the {planned} trials "
         "of the full study were made.",
         full=done >= planned,
@@ -143,8 +144,9 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
         "Hypothesis from a fixed seed; the command stops when all files are read. A file counts as refused where the "
         "exit status is 2, one message begins with Error, nothing is written, and no warning of Python is raised. "
         "Accepted files are those that are still valid, such as another number in a cell. A full disk is "
-        "/dev/full, and the second run finds a folder that another one has claimed. More failing effects of a user, "
-        "and a run that is killed while it writes, are in tests/test_faults.py."
+        "/dev/full, and the second run finds a folder that another one has claimed. The other version, whose cache an "
+        "identification finds, computes a torque of the gravity gradient a hundred times as large. "
+        "More failing effects of a user, and a run that is killed while it writes, are in tests/test_faults.py."
     )
     packages = ", ".join(f"{name} {version(name)}" for name in ("hypothesis", "jax", "numpy"))
     write_study(document, summary, file, None if origin is None else f"{origin} With {packages}.")
@@ -158,13 +160,28 @@ def _refused(title: str, item: Made | None) -> Goal:
     return Goal(text, "refused" if item["refused"] else "not refused", Verdict.of(item["refused"]))
 
 
+def _unmoved(item: Made | None) -> Goal:
+    """Return the goal on a cache that another version filled."""
+    text = "a cache of another version: no effect"
+    if item is None:
+        return Goal(text, "not tried; a damaged file of it: tests/test_kept_jit.py", Verdict.NOT_TESTED)
+    if not item["differs"]:
+        return Goal(text, "the other version itself gives the same answer", Verdict.NOT_TESTED)
+    same = "same answer as" if item["same"] else "another answer than"
+    return Goal(text, f"{same} with an empty cache; the other version answers otherwise", Verdict.of(item["same"]))
+
+
 def _short(said: str) -> str:
     """Return the beginning of a message, without the folders of files."""
     return re.sub(r"/\S*/", "", said)[:300]
 
 
 def _goals(
-    numbers: Mapping[str, int], units: Mapping[str, Made], killed: Mapping[str, Made], around: Mapping[str, Made]
+    numbers: Mapping[str, int],
+    units: Mapping[str, Made],
+    killed: Mapping[str, Made],
+    around: Mapping[str, Made],
+    cache: Made | None,
 ) -> list[Goal]:
     """Return each goal, what was reached, and whether that passes."""
     total, kills = sum(numbers.values()), sum(item["kills"] for item in killed.values())
@@ -199,9 +216,5 @@ def _goals(
     return [
         *(Goal(goal, reached, Verdict.of(passed if tested else None)) for goal, reached, passed, tested in goals),
         *(_refused(title, around.get(title)) for title in SURROUNDINGS),
-        Goal(
-            "a cache of another version: no effect",
-            "not tried; a damaged file of it: tests/test_kept_jit.py",
-            Verdict.NOT_TESTED,
-        ),
+        _unmoved(cache),
     ]

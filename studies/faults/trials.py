@@ -1,4 +1,4 @@
-"""The trials of the study: files spoilt, units mistaken, commands killed, and faults around a run."""
+"""The trials of the study: files spoilt, units mistaken, commands killed, faults around a run, another's cache."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import seed as seeded
 
 from bayesid.app.compilation_cache import keep_compiled
+from studies.faults.foreign_cache import answers_beside_another_version
 from studies.faults.fuzz import KINDS, Spoilt, answer_to, spoilt
 from studies.faults.kills import COMMANDS, kill_and_resume
 from studies.faults.surroundings import SURROUNDINGS, answer_amid
@@ -35,7 +36,7 @@ def tasks(full: bool) -> list[Task]:
     if not full:
         return [*spoiling, killing[0]]
     around = [{"around": title} for title in SURROUNDINGS]
-    return [*spoiling, *killing, *({"unit": slip} for slip in SLIPS), *around]
+    return [*spoiling, *killing, *({"unit": slip} for slip in SLIPS), *around, {"cache": "another version"}]
 
 
 def attempt(task: Task, rng: np.random.Generator) -> dict[str, Any]:
@@ -53,6 +54,8 @@ def attempt(task: Task, rng: np.random.Generator) -> dict[str, Any]:
         if "around" in task:
             clear, said = answer_amid(study, task["around"], folder)
             return {"refused": clear, "said": said}
+        if "cache" in task:
+            return answers_beside_another_version(study, folder)
         return asdict(kill_and_resume(task["kill"], study.parent, rng, task["kills"]))
 
 
