@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from bayesid._io.errors import InputError
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
-from bayesid.diagnosis import CauseSet, Status, diagnose
+from bayesid.diagnosis import CauseSet, Status, diagnose, left_over
 from bayesid.diagnosis.candidate_effects import candidates
 from bayesid.diagnosis.left_over import LEFT_OVER, log_odds_of_anything, log_p_left, with_left_over
 from bayesid.diagnosis.set_probabilities import SetProbabilities
@@ -56,4 +57,21 @@ def test_a_set_is_fitted_in_full_and_what_it_leaves_is_weighed(backlash) -> None
     fit = hypothesis.fit
     assert stats.chi2.logsf(fit.chi2, fit.posterior.samples) < -20.0
     assert weighed.probabilities.inclusion[LEFT_OVER] > 0.9
+    assert sum(item.probability for item in weighed.probabilities.sets) == pytest.approx(1.0)
+
+
+def test_a_set_with_which_nothing_moves_is_no_explanation(backlash, monkeypatch) -> None:
+    def without_motion(*_: object) -> None:
+        raise InputError("the simulation diverges")
+
+    monkeypatch.setattr(left_over, "fit_hypothesis", without_motion)
+    found = backlash.weighed.probabilities
+    sure = [item for item in found.sets if len(item.causes) == 1 and item.generic is None]
+    nothing = CauseSet((), None, min(item.log_evidence for item in sure) - 20.0)
+    only = SetProbabilities.of([*sure, nothing], found.causes, found.generics, found.prior)
+    weighed, fitted = with_left_over(replace(backlash.weighed, probabilities=only), backlash.effects)
+    assert not fitted
+    assert weighed.probabilities.unknown > 0.9
+    most = max(item.log_evidence for item in sure)
+    assert [item.log_evidence for item in weighed.probabilities.sets if item.generic == LEFT_OVER] == [most]
     assert sum(item.probability for item in weighed.probabilities.sets) == pytest.approx(1.0)

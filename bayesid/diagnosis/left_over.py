@@ -36,7 +36,8 @@ def with_left_over(
 
     The probabilities come from linear signatures. A set that does not follow the data once its effects are simulated
     gets a companion: the same causes beside something else, with as much more evidence as the p-value of what is left
-    allows at most (`log_odds_of_anything`).
+    allows at most (`log_odds_of_anything`). One with which no motion can be simulated is no explanation: its evidence
+    goes to something else alone.
 
     Parameters
     ----------
@@ -64,8 +65,9 @@ def with_left_over(
             break
         try:
             hypothesis = fit_hypothesis(weighed.state(best.causes), best.causes, effects)
-        except InputError:  # no motion with these causes: what they leave is not evaluated
-            break
+        except InputError:
+            found = _without_motion(found, best)
+            continue
         if weighed.state(best.causes).point.far:
             hypothesis = exactly_fitted(hypothesis)
         fitted[frozenset(best.causes)] = hypothesis
@@ -73,6 +75,14 @@ def with_left_over(
         companion = CauseSet(best.causes, LEFT_OVER, best.log_evidence + more)
         found = SetProbabilities.of([*found.sets, companion], found.causes, generics, found.prior)
     return replace(weighed, probabilities=found), fitted
+
+
+def _without_motion(found: SetProbabilities, refuted: CauseSet) -> SetProbabilities:
+    """Return the probabilities where the evidence of one set speaks for something else alone."""
+    alone = [item for item in found.sets if item.names == (LEFT_OVER,)]
+    others = [item for item in found.sets if item is not refuted and item not in alone]
+    most = max(item.log_evidence for item in (refuted, *alone))
+    return SetProbabilities.of([*others, CauseSet((), LEFT_OVER, most)], found.causes, found.generics, found.prior)
 
 
 def log_p_left(hypothesis: Hypothesis) -> float:
