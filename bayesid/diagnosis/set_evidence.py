@@ -12,7 +12,7 @@ import scipy.linalg as sla
 from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats, Integers
-from bayesid._math.log_sum import log_sum
+from bayesid._math.log_sum import log_sum, log_sums
 from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.scale_integral import (
     MOST_NODES,
@@ -445,7 +445,7 @@ class SetEvidence:
         squares = ((scores[:, own.columns] * own.root) @ own.vectors) ** 2
         share = nodes.scales[:, None] ** 2 / (1.0 + visible)
         offset = nodes.log_weights - 0.5 * np.log1p(visible).sum(axis=1)
-        return np.asarray(logsumexp(0.5 * squares @ share.T + offset, axis=1))
+        return log_sums(squares @ (0.5 * share).T + offset)
 
     def _several(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
         """Return the same for several groups, on the product of their nodes."""
@@ -465,7 +465,7 @@ class SetEvidence:
             part = scores[start : start + step][:, columns]
             products = part[:, upper[0]] * part[:, upper[1]]
             terms = products @ weights.T + nodes.log_weights - half_log_det
-            found[start : start + step] = logsumexp(terms, axis=1)
+            found[start : start + step] = log_sums(terms)
         return found
 
 
