@@ -139,14 +139,11 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
         document.table(["fault", "refused", "what the command says"], said, "What commands say of faults around a run.")
     document.section("Conditions")
     document.paragraph(
-        "Files are those of a robot with three joints and one recording of 40 s, made by MuJoCo. A spoilt file has one "
-        "value replaced, text inserted, the end cut off, a line dropped or repeated, or a byte changed, drawn by "
-        "Hypothesis from a fixed seed; the command stops when all files are read. A file counts as refused where the "
-        "exit status is 2, one message begins with Error, nothing is written, and no warning of Python is raised. "
-        "Accepted files are those that are still valid, such as another number in a cell. A full disk is "
-        "/dev/full, and the second run finds a folder that another one has claimed. The other version, whose cache an "
-        "identification finds, computes a torque of the gravity gradient a hundred times as large. "
-        "More failing effects of a user, and a run that is killed while it writes, are in tests/test_faults.py."
+        "MuJoCo makes the files. A spoilt file has one value replaced, text inserted, the end cut off, a line dropped "
+        "or repeated, or a byte changed, drawn by Hypothesis. It counts as refused where the exit status is 2, one "
+        "message begins with Error, nothing is written and Python warns of nothing. The full disk holds 16 kB. The "
+        "other version, whose cache an identification finds, computes a torque of the gravity gradient a hundred times "
+        "as large."
     )
     packages = ", ".join(f"{name} {version(name)}" for name in ("hypothesis", "jax", "numpy"))
     write_study(document, summary, file, None if origin is None else f"{origin} With {packages}.")

@@ -6,6 +6,9 @@ import fcntl
 import os
 import re
 import shutil
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +17,7 @@ from typer.testing import CliRunner
 
 from bayesid.app.command_line import app
 
-__all__ = ["HOOKS", "PLUGIN", "SURROUNDINGS", "answer_amid", "with_plugin"]
+__all__ = ["FULL", "HOOKS", "PLUGIN", "SURROUNDINGS", "answer_amid", "can_fill_a_disk", "with_plugin"]
 
 PLUGIN = '''
 import jax.numpy as jnp
@@ -49,11 +52,6 @@ def with_plugin(study: Path, hook: str) -> None:
     study.write_text(text + '\nplugins = ["mine.py"]\n')
 
 
-def _full(study: Path, folder: Path) -> list[str]:
-    recording = min(study.parent.glob("*.csv"))
-    return ["init", str(study.parent / "robot.urdf"), str(recording), "--output", "/dev/full"]
-
-
 def _closed(study: Path, folder: Path) -> list[str]:
     closed = Path("/sys")  # root may write wherever a disk lets it
     if os.geteuid() != 0:
@@ -77,8 +75,14 @@ def _plugin(hook: str) -> Callable[[Path, Path], list[str]]:
 TWICE = "two runs into one folder"
 """Title of the case whose folder is claimed meanwhile."""
 
+FULL = "a full disk"
+"""Title of the case whose folder for results lies on a file system of a few kilobytes."""
+
+FILL = 'mount -t tmpfs -o size=16k tmpfs "$0" && exec "$@"'
+"""Shell command that runs another one where a folder is such a file system, in a name space of its own."""
+
 SURROUNDINGS: Mapping[str, Callable[[Path, Path], list[str]]] = {
-    "a full disk": _full,
+    FULL: lambda study, folder: ["check", str(study), "--output", str(folder / "disk" / "out")],
     "a folder that cannot be written": _closed,
     TWICE: _check,
     **{title: _plugin(hook) for title, hook in HOOKS.items()},
@@ -90,16 +94,40 @@ def answer_amid(study: Path, title: str, folder: Path) -> tuple[bool, str]:
     """Return whether a command refuses one of `SURROUNDINGS` with one clear message, and what it says."""
     copied = Path(shutil.copytree(study.parent, folder / "study")) / study.name
     arguments = SURROUNDINGS[title](copied, folder)
+    if title == FULL:
+        done = _on_full_disk(folder / "disk", sys.executable, "-m", "bayesid.app.command_line", *arguments)
+        clear, said = _judged(done.returncode, done.stdout + done.stderr)
+        return clear and "No space left" in said, said
     if title == TWICE:
         with _claimed(folder / "out"):
             return _answer(arguments)
     return _answer(arguments)
 
 
+def can_fill_a_disk() -> bool:
+    """Return whether this system lets a process have a file system of its own."""
+    if shutil.which("unshare") is None:
+        return False
+    with tempfile.TemporaryDirectory() as name:
+        return _on_full_disk(Path(name) / "disk", "true").returncode == 0
+
+
+def _on_full_disk(disk: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    """Run a command that finds a new folder to be a file system of a few kilobytes."""
+    disk.mkdir()
+    words = ["unshare", "--map-root-user", "--mount", "sh", "-c", FILL, str(disk), *command]
+    return subprocess.run(words, capture_output=True, text=True, check=False)
+
+
 def _answer(arguments: list[str]) -> tuple[bool, str]:
     done = CliRunner().invoke(app, arguments)
-    said = " ".join(done.output.split())
-    return done.exit_code == 2 and len(re.findall(r"(?:^|\s)Error: ", said)) == 1, said
+    return _judged(done.exit_code, done.output)
+
+
+def _judged(status: int, output: str) -> tuple[bool, str]:
+    """Return whether a command has refused with one clear message, and what it says, in one line."""
+    said = " ".join(output.split())
+    return status == 2 and len(re.findall(r"(?:^|\s)Error: ", said)) == 1, said
 
 
 @contextmanager

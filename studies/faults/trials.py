@@ -18,7 +18,7 @@ from bayesid.app.compilation_cache import keep_compiled
 from studies.faults.foreign_cache import answers_beside_another_version
 from studies.faults.fuzz import KINDS, Spoilt, answer_to, spoilt
 from studies.faults.kills import COMMANDS, kill_and_resume
-from studies.faults.surroundings import SURROUNDINGS, answer_amid
+from studies.faults.surroundings import FULL, SURROUNDINGS, answer_amid, can_fill_a_disk
 from studies.faults.units import SLIPS, refused
 from studies.truth.mujoco import Manoeuvres, write_study
 from studies.truth.urdf import SERVICER3
@@ -35,7 +35,7 @@ def tasks(full: bool) -> list[Task]:
     killing = [{"kill": name, "kills": 8 if name == "campaign" else 3} for name in COMMANDS]
     if not full:
         return [*spoiling, killing[0]]
-    around = [{"around": title} for title in SURROUNDINGS]
+    around = [{"around": title} for title in SURROUNDINGS if title != FULL or can_fill_a_disk()]
     return [*spoiling, *killing, *({"unit": slip} for slip in SLIPS), *around, {"cache": "another version"}]
 
 
