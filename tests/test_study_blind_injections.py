@@ -11,16 +11,30 @@ import pytest
 from bayesid.diagnosis import Status
 from bayesid.report.verdict_record import Share, record_sentence, shipped_record
 from studies.blind_injections import Trial, plan, run, write_report
-from studies.blind_injections.goals import _correlation, _coverage, _least, _most, _rate, _scatter, _stated, share_text
+from studies.blind_injections.goals import (
+    _correlation,
+    _coverage,
+    _least,
+    _most,
+    _rate,
+    _scatter,
+    _stated,
+    goals_of,
+    share_text,
+)
 from studies.blind_injections.record import record_of
 from studies.blind_injections.rows import confusion, confusion_matrix, rates, reliability, scores, statements
 from studies.blind_injections.trials import Plan, read
 from studies.common.goals import Verdict
 from studies.common.monte_carlo import read_store
 from studies.truth import hidden_causes
+from studies.truth.basilisk.cases import BASILISK_CASES
 from tests.report_rules import broken_rules
 
 REPORTS = Path(__file__).resolve().parents[1] / "reports"
+
+IN_BASILISK = {case.name for case in BASILISK_CASES}
+"""Names of the cases that Basilisk flies."""
 
 PLANS = [Plan("rate-bias", 5, 0.3), Plan("null, three joints", 5)]
 
@@ -140,8 +154,32 @@ def test_the_plans_hide_everything_and_nothing():
     for full in (False, True):
         plans = plan(full)
         assert len({item.seed for item in plans}) == len(plans)
-        assert len({item.case for item in plans}) == len(hidden_causes.CASES)
+        assert len({item.case for item in plans}) == len(hidden_causes.CASES) + len(BASILISK_CASES)
     assert sum(item.case.startswith("null") for item in plans) == 1000
+
+
+def test_trials_that_were_made_keep_their_places():
+    """Cases that came later replace trials of the full plan that were still to be made."""
+    plans = plan(True)
+    lines = read_store(REPORTS / "blind_injections.jsonl.gz")
+    assert all(line["task"] == asdict(plans[line["trial"]]) for line in lines if "task" in line)
+    assert {item.case for item in plans if item.case in IN_BASILISK} == IN_BASILISK
+    assert not any(item.case in IN_BASILISK for item in plans[:937])
+
+
+def test_trials_of_basilisk_are_counted_by_themselves():
+    wheel = replace(stated(0.99, ("wheel-momentum",), ("wheel-momentum",)), kind="effect", status="explained", sets=())
+    wheel = replace(wheel, sets=(wheel.causes,), amplitude_errors=(), body_errors=())
+    flown = replace(wheel, case="wheel-momentum in Basilisk")
+    wrong = replace(flown, causes=("rate-bias",), sets=(("rate-bias",),))
+    text = "trials with Basilisk as truth"
+    none, some = (
+        next(goal for goal in goals_of(trials) if goal.text.startswith(text))
+        for trials in ([wheel], [wheel] + 199 * [flown] + [wrong])
+    )
+    assert none.verdict is Verdict.NOT_TESTED
+    assert some.verdict is Verdict.PASS
+    assert some.reached.startswith("1 of 200 ")
 
 
 @pytest.fixture(scope="module")

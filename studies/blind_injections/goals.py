@@ -8,10 +8,11 @@ import numpy as np
 from scipy import stats
 
 from bayesid.report.verdict_record import Share
-from studies.blind_injections.trials import Trial
+from studies.blind_injections.trials import CASES, Trial
 from studies.common.goals import Goal, Verdict
+from studies.truth.basilisk.cases import BasiliskCase
 
-__all__ = ["CLEAR", "LEFT", "TORQUES", "barely_left", "goals_of", "share_text", "wrongly_explained"]
+__all__ = ["CLEAR", "LEFT", "TORQUES", "barely_left", "goals_of", "in_basilisk", "share_text", "wrongly_explained"]
 
 CLEAR = 7.0
 """Signal-to-noise ratio from which the hidden causes should be named."""
@@ -63,6 +64,7 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
     limited = [t for t in clear if t.detection is not None and t.naming is not None]
     amplitudes = np.array([e for t in trials if t.named_rightly for e in t.amplitude_errors])
     bodies = np.array([e for t in trials if t.named_rightly or t.kind == "adequate" for e in t.body_errors])
+    flown = in_basilisk(trials)
     return [
         _rate("false alarms where nothing is hidden", 0.01, sum(t.alarmed for t in nulls), len(nulls)),
         _least("named causes right where 0.9 and more is stated", 0.93, sum(t.holds for t in sure), len(sure)),
@@ -80,8 +82,18 @@ def goals_of(trials: Sequence[Trial]) -> list[Goal]:
         _coverage([t.amplitude_errors for t in trials if t.named_rightly and t.amplitude_errors]),
         _scatter("amplitudes", amplitudes),
         _scatter("base parameters", bodies),
-        Goal("trials with Basilisk as truth", "none: MuJoCo makes the data of all trials", Verdict.NOT_TESTED),
+        _most("trials with Basilisk as truth: false alarms and wrong names", 0.03, _wrong(flown), len(flown)),
     ]
+
+
+def in_basilisk(trials: Sequence[Trial]) -> list[Trial]:
+    """Return the trials whose data Basilisk made."""
+    return [trial for trial in trials if isinstance(CASES.get(trial.case), BasiliskCase)]
+
+
+def _wrong(trials: Sequence[Trial]) -> int:
+    """Return how many trials raise a false alarm or name something that is not hidden."""
+    return sum(t.misnamed or (t.kind == "adequate" and t.alarmed) for t in trials)
 
 
 def _verdict(low: float, high: float, goal: float) -> Verdict:

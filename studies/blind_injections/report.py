@@ -16,7 +16,15 @@ from bayesid._io.words import joined
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, BEFORE, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_number
-from studies.blind_injections.goals import LEFT, SURE, barely_left, goals_of, share_text, wrongly_explained
+from studies.blind_injections.goals import (
+    LEFT,
+    SURE,
+    barely_left,
+    goals_of,
+    in_basilisk,
+    share_text,
+    wrongly_explained,
+)
 from studies.blind_injections.limits import DRAWS
 from studies.blind_injections.record import record_of
 from studies.blind_injections.reliability import reliability_figure
@@ -141,7 +149,8 @@ def _setup(trials: Sequence[Trial], planned: int) -> Setup:
     seeds = [trial.seed for trial in trials]
     return Setup(
         robot="Three robots of three to five joints, one with slides and branches, in MuJoCo: bodies, springs, fields "
-        "and sensor faults, without any code of the package.",
+        f"and sensor faults, without any code of the package. In {len(in_basilisk(trials))} trials two of them fly in "
+        "Basilisk, whose joints follow a soft servo: its own wheel, leak, slosh or panel, or nothing, is hidden.",
         manoeuvre="Three recordings of 120 to 170 s each; a single one in some trials.",
         sensors=f"At 2 Hz, noise per sample: rate {format_number(1e-5)} rad/s, accelerometer {format_number(1e-5)} "
         f"m/s², encoders {format_number(1e-6)} rad.",

@@ -25,6 +25,7 @@ from bayesid.inference.posterior import Posterior
 from studies.blind_injections.limits import Limits, limits_of, what_is_left
 from studies.common.monte_carlo import Workers, read_store, run_trials
 from studies.truth import hidden_causes
+from studies.truth.basilisk.cases import BASILISK_CASES, BasiliskCase
 from studies.truth.mujoco import Study as Written
 
 __all__ = ["Plan", "Trial", "make", "plan", "read", "run"]
@@ -44,6 +45,14 @@ FIRST_SEED = {False: 200, True: 90_000}
 LATER, FROM, EVERY = ("mass-shift",), 700, 26
 """Cases that were added when the first trials of the full plan had been made; from which trial on, and how many of the
 others with a cause of the catalogue there are for each that they replace."""
+
+IN_BASILISK, EVERY_EIGHTH = 937, 8
+"""From which trial of the full plan on, and how often, Basilisk makes the data of a case with or without a cause."""
+
+_ALL: tuple[hidden_causes.Case | BasiliskCase, ...] = (*hidden_causes.CASES, *BASILISK_CASES)
+
+CASES = {case.name: case for case in _ALL}
+"""All cases by name."""
 
 _NOT_SEEN = Limits(None, None, None)
 """Limits where what is hidden does not change the mean of the data."""
@@ -169,12 +178,15 @@ def plan(full: bool) -> list[Plan]:
 
     A run that was stopped has thus made a random sample of its plan. The small plan has one trial of every case; the
     full one has 1,000 with something hidden, every fifth of them outside the catalogue, and 1,000 with nothing. The
-    strengths are log-uniform between ends that give signal-to-noise ratios of about 3 to 80. Cases that came later
-    replace some of the full plan's last trials, so that those made before keep their places.
+    strengths are log-uniform between ends that give signal-to-noise ratios of about 3 to 80. Cases that came later,
+    those that Basilisk flies among them, replace some of the full plan's last trials, so that those made before keep
+    their places.
     """
     draw = np.random.default_rng(2)
     effects, outside, quiet = (_names(status) for status in ("effect", "unknown", "adequate"))
-    effects = [name for name in effects if not (full and name in LATER)]
+    if full:
+        later = {*LATER, *(case.name for case in BASILISK_CASES)}
+        effects, quiet = ([name for name in names if name not in later] for names in (effects, quiet))
     counts = (800, 200, 1000) if full else (len(effects), len(outside), len(quiet))
     cases = [
         (names[index % len(names)], ends)
@@ -190,11 +202,19 @@ def plan(full: bool) -> list[Plan]:
     places = [place for place in range(FROM, len(shuffled)) if shuffled[place].case in effects]
     for number, place in enumerate(places[::EVERY]):
         shuffled[place] = replace(shuffled[place], case=LATER[number % len(LATER)])
+    if full:
+        for status in ("effect", "adequate"):
+            flown = [case.name for case in BASILISK_CASES if case.status == status]
+            like = [
+                place for place in range(IN_BASILISK, len(shuffled)) if CASES[shuffled[place].case].status == status
+            ]
+            for number, place in enumerate(like[::EVERY_EIGHTH]):
+                shuffled[place] = replace(shuffled[place], case=flown[number % len(flown)])
     return shuffled
 
 
 def _names(status: str) -> list[str]:
-    return [case.name for case in hidden_causes.CASES if case.status == status]
+    return [case.name for case in CASES.values() if case.status == status]
 
 
 def run(
@@ -254,7 +274,7 @@ def _at_most_one(value: float | None) -> float | None:
 
 def make(item: Plan) -> Trial:
     """Make one trial: hide, diagnose and compare."""
-    case = next(case for case in hidden_causes.CASES if case.name == item.case)
+    case = CASES[item.case]
     began = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         written = case.write(Path(folder) / "study", item.seed, item.strength)
@@ -265,6 +285,7 @@ def make(item: Plan) -> Trial:
         total = time.perf_counter() - began
         weaker = case.make(Path(folder) / "weaker", item.seed, WEAKER * item.strength) if _visible(case) else None
         size = _NOT_SEEN if weaker is None else _limits(result, case, item.seed, _signal(result, Study.load(weaker)))
+    wrench = case if isinstance(case, hidden_causes.Case) and case.frame is not None else None
     return Trial(
         case=item.case,
         seed=item.seed,
@@ -286,13 +307,13 @@ def make(item: Plan) -> Trial:
         amplitude_errors=_amplitude_errors(result, case.amplitudes(item.seed, item.strength)),
         body_errors=_body_errors(result, written),
         frame=None if result.unexplained.fixed_in is None else result.unexplained.fixed_in.value,
-        true_frame=case.frame,
-        correlation=None if case.frame is None else _correlation(result, case, item, written),
+        true_frame=None if wrench is None else wrench.frame,
+        correlation=None if wrench is None else _correlation(result, wrench, item, written),
         seconds={**result.seconds, "total": total},
     )
 
 
-def _visible(case: hidden_causes.Case) -> bool:
+def _visible(case: hidden_causes.Case | BasiliskCase) -> bool:
     """Return whether what is hidden changes the mean of the data."""
     return case.status != "adequate" and not any("noise" in c or c.startswith(SPOILT) for c in case.causes)
 
@@ -308,7 +329,7 @@ def _signal(result: Diagnosis, weaker: Study) -> Floats:
     return (engine.residual(fit.z, arrays) - residual_of(like, fit.z, other).ravel()) / (1.0 - WEAKER)
 
 
-def _limits(result: Diagnosis, case: hidden_causes.Case, seed: int, change: Floats) -> Limits:
+def _limits(result: Diagnosis, case: hidden_causes.Case | BasiliskCase, seed: int, change: Floats) -> Limits:
     if case.status == "unknown":
         return replace(_NOT_SEEN, signal_to_noise=what_is_left(result, change))
     names = set(case.causes) | set(case.accept)
