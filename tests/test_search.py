@@ -140,7 +140,7 @@ def test_exchanges_are_made_after_the_starts_and_the_best_three_of_all_are_follo
 
     found = optimise(planar, criterion, np.random.default_rng(6), search, keep=keep)
     assert sorted(kept) == ["0.0", "0.1", *(f"1.{k}" for k in range(3)), *(f"2.{k}" for k in range(6)), "3.0"]
-    assert len(found.costs) == 3
+    assert np.all(np.diff(found.costs) > 0.0)  # two that end alike count as one
     assert found.cost < sorted(kept[name] for name in kept if name[0] != "1")[2]  # three were followed
 
 

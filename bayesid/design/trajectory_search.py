@@ -1,8 +1,9 @@
-"""Search for the best manoeuvre: descents from random starts, of which the best are followed to the end.
+"""Search for the best manoeuvre: descents from many starts, of which the best are followed to the end.
 
-On ETS-VII 1 of 100 descents from random starts ends in the basin of the best manoeuvre. Descents that pass through
-loosened limits end there more often, and so do those from good manoeuvres with the courses of some joints exchanged;
-a thorough search makes use of both.
+On ETS-VII 1 of 100 descents from random motions ends in the basin of the best manoeuvre. Those from swings to which the
+base reacts much (`bayesid.design.reacting_swing`) end lower, descents that pass through loosened limits end there more
+often, and so do those from good manoeuvres with the courses of some joints exchanged; a thorough search makes use of
+all three.
 """
 
 from __future__ import annotations
@@ -21,9 +22,14 @@ from bayesid._math.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem
 from bayesid.design.polish import Polished, Shared, Task, fitted_to_fine_limits, polish
+from bayesid.design.reacting_swing import reacting_swing
 from bayesid.design.search_starts import SLACK, exchanged, random_start
+from bayesid.design.trajectories import Linear, PaperExcitation
 
 __all__ = ["THOROUGH", "Found", "Search", "optimise"]
+
+REACTING = 2.0 / 3.0
+"""Fraction of the starts that are swings to which the base reacts much, where the family is linear."""
 
 FOLLOWED = 3
 """Number of motions that are followed to the end, unless there are fewer."""
@@ -51,7 +57,7 @@ class Search:
     Parameters
     ----------
     starts : int
-        Number of random starts.
+        Number of starts drawn at random.
     iterations : int
         Largest number of iterations of SLSQP from each.
     exchanges : int
@@ -143,7 +149,7 @@ def optimise(
     """
     problem.compile()
     points = problem.points(criterion, rng) if points is None else points
-    starts = [*first, *(random_start(problem, rng) for _ in range(search.starts))]
+    starts = [*first, *(_start(problem, rng) for _ in range(search.starts))]
     followed = min(FOLLOWED, len(starts) + search.exchanges)
     first_round = [] if len(starts) <= followed and not search.exchanges else starts
     total = (len(first_round) + search.exchanges + followed) * (search.iterations + 1)
@@ -160,6 +166,13 @@ def optimise(
     ends = work.run(1, last, FINISH * search.tolerance, points)
     alive = _ranked(work.fitted(ends, FINISH * search.tolerance, points), problem)
     return Found(alive[0].parameters, alive[0].cost, tuple(item.cost for item in alive), work.evaluations)
+
+
+def _start(problem: Problem, rng: np.random.Generator) -> Floats:
+    """Draw a start: mostly a swing to which the base reacts much, else a random motion."""
+    family = problem.plan.family
+    swings = isinstance(family, Linear) and not isinstance(family, PaperExcitation)
+    return reacting_swing(problem, rng) if swings and rng.random() < REACTING else random_start(problem, rng)
 
 
 def _ranked(done: Sequence[Polished], problem: Problem) -> list[Polished]:
