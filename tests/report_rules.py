@@ -20,11 +20,14 @@ __all__ = ["badly_written", "broken_rules"]
 CELL = 2.0
 """Size of a pixel of the pages that are looked at [mm]."""
 
-TOP, BOTTOM = 20.0, 275.0
-"""Where the text of a page begins and ends, from the top of the sheet [mm]."""
+TOP, BOTTOM, LEFT, RIGHT = 20.0, 275.0, 20.0, 190.0
+"""Where the text of a page begins and ends, from the top and the left of the sheet [mm]."""
 
 FOOT = 24.0
 """Height that small print may take at the foot of the first page [mm]; it does not count."""
+
+TERMS = "Terms. "
+"""How the small print at the foot of the last page begins, which stands under a line and does not count either."""
 
 STYLES = {
     "a power of ten as computers print it": re.compile(r"\d[eE][+-]?\d"),
@@ -70,16 +73,30 @@ def _captioned(file: Path) -> Iterator[str]:
 
 def _filled(file: Path, full: bool) -> Iterator[str]:
     """Every page is filled to one half at least."""
-    count = len(PdfText.read(file).pages)
+    pages = PdfText.read(file).pages
+    count = len(pages)
     for number in range(1, count + int(full)):
-        end = _lowest_ink(file, number, FOOT if number == 1 else 0.0)
+        ink = _ink(file, number)
+        foot = FOOT if number == 1 else BOTTOM - _lowest_line(ink) if TERMS in pages[number - 1] else 0.0
+        end = float((at := _rows(ink, ink.any(axis=1)))[at < BOTTOM - foot].max(initial=0.0))
         share = (end - TOP) / (BOTTOM - TOP)
         if share < 0.5:
             yield f"page {number} of {count} is filled to {100.0 * share:.0f} % only"
 
 
-def _lowest_ink(file: Path, page: int, foot: float) -> float:
-    """Return how far down a page something stands above the foot [mm]; Typst draws the page."""
+def _lowest_line(ink: np.ndarray) -> float:
+    """Return how far down a page the lowest line over the whole width stands, a little above it [mm]."""
+    left, right = (round(edge / 210.0 * ink.shape[1]) for edge in (LEFT, RIGHT))
+    return float(_rows(ink, ink[:, left + 1 : right - 1].all(axis=1)).max(initial=BOTTOM)) - 2.0 * CELL
+
+
+def _rows(ink: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return how far down the sheet chosen rows of pixels are [mm]."""
+    return 297.0 / len(ink) * np.flatnonzero(chosen)
+
+
+def _ink(file: Path, page: int) -> np.ndarray:
+    """Return where a page is not white; Typst draws it."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         shutil.copy(file, folder / "report.pdf")
@@ -89,7 +106,4 @@ def _lowest_ink(file: Path, page: int, foot: float) -> float:
             encoding="utf-8",
         )
         drawn = typst.compile(str(source), root=name, format="png", ppi=2.0 * 25.4 / CELL)
-    ink = np.asarray(Image.open(io.BytesIO(drawn)).convert("L")) < 240
-    rows = 297.0 / len(ink) * np.flatnonzero(ink.any(axis=1))
-    above = rows[rows < BOTTOM - foot]
-    return float(above.max(initial=0.0))
+    return np.asarray(Image.open(io.BytesIO(drawn)).convert("L")) < 240

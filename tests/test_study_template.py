@@ -110,6 +110,37 @@ def test_a_hyphen_an_empty_half_page_and_a_lonely_caption_are_seen_in_a_report(t
     assert [rule[:8] for rule in found] == ["page 1 h", "page 2 e", "page 2 o"], found
 
 
+def test_small_print_at_the_foot_of_the_last_page_does_not_fill_it(tmp_path: Path):
+    document = Document("Bad")
+    document.figure(picture(6.0), "Fills the page.")
+    document.page()
+    document.paragraph("One line.")
+    document.foot("", f"Terms. {'words ' * 400}")
+    document.write(tmp_path / "bad.pdf")
+    (found,) = broken_rules(tmp_path / "bad.pdf")
+    assert found.startswith("page 2 of 2 is filled to")
+
+
+@pytest.mark.parametrize(("heights", "pages"), [((2.35, 2.35, 2.35), 1), ((6.0, 2.0, 2.0), 2)], ids=["lower", "higher"])
+def test_figures_become_lower_or_higher_until_the_last_page_is_filled(
+    heights: tuple[float, ...], pages: int, tmp_path: Path
+):
+    document = Document("Good")
+    for number, height in enumerate(heights):
+        document.figure(picture(height), f"{height:g} inches.")
+        if pages == 2 and number == 0:
+            document.page()
+    document.paragraph(" ".join(["words"] * (150 if pages == 1 else 1)))
+    document.write(tmp_path / "as-asked.pdf")
+    document.write(tmp_path / "filled.pdf", filled=True)
+    document.write(tmp_path / "again.pdf")
+    (found,) = broken_rules(tmp_path / "as-asked.pdf")
+    assert "is filled to" in found
+    assert broken_rules(tmp_path / "filled.pdf") == []
+    assert len(PdfText.read(tmp_path / "filled.pdf").pages) == pages
+    assert (tmp_path / "again.pdf").read_bytes() == (tmp_path / "as-asked.pdf").read_bytes()
+
+
 def test_labels_can_be_read_in_print():
     @styled
     def sizes() -> list[float]:

@@ -6,6 +6,7 @@ Text that callers give is never read as markup: it reaches Typst as string liter
 from __future__ import annotations
 
 import io
+import json
 import math
 import re
 import tempfile
@@ -44,6 +45,12 @@ WHOLE = 24
 LINE = 60
 """Number of characters of a table's cell that fill about one line."""
 
+HEIGHTS = (1.0, 0.95, 1.05, 0.9, 1.1, 0.85, 1.15, 0.8, 1.2)
+"""Factors on the heights of figures and on the space in tables, tried in this order until the last page is filled."""
+
+LOWEST = 0.55
+"""Fraction of its text's height to which the last page is then filled at least."""
+
 _TEMPLATE = """\
 #set page(paper: "a4", margin: (x: 20mm, top: 20mm, bottom: 22mm), numbering: "1 / 1", footer-descent: 18%)
 #set text(font: "Libertinus Serif", size: 10.5pt, lang: "en")
@@ -58,7 +65,7 @@ _TEMPLATE = """\
 #show figure.caption: it => block(width: 100%, sticky: true, { set text(size: 9pt)
   set par(justify: true); set align(left)
   strong(it.supplement + " " + context it.counter.display(it.numbering) + ". ") + it.body })
-#set table(stroke: none, inset: (x: 5pt, y: 2.9pt))
+#set table(stroke: none, inset: (x: 5pt, y: 2.9pt * float(sys.inputs.at("height", default: "1"))))
 #show table: set text(size: 8.5pt)
 #show table: set par(justify: false, leading: 0.5em)
 #show table.cell.where(y: 0): strong
@@ -92,6 +99,15 @@ _TEMPLATE = """\
 """
 
 
+_END = """
+#context {
+  let at = here().position()
+  [#metadata((at.page, (at.y - 20mm) / 255mm)) <end>]
+}
+"""
+"""Mark at the end of the text: its page, and how far down the text's height it stands."""
+
+
 class Document:
     """A report under construction.
 
@@ -108,7 +124,8 @@ class Document:
             f"#set document(title: {literal(title)}, date: none)\n",
             f"#title({literal(title)}, {literal(subtitle)}, {literal(date or '')})\n",
         ]
-        self._figures: list[bytes] = []
+        self._figures: list[Figure] = []
+        self._drawn: list[bytes] = []
 
     def section(self, title: str) -> None:
         """Begin a numbered section."""
@@ -200,19 +217,42 @@ class Document:
 
     def _image(self, fig: Figure) -> str:
         """Keep a figure for the document and return the literal of its file's name."""
-        self._figures.append(_svg(fig))
+        self._figures.append(fig)
+        self._drawn.append(_svg(fig))
         return literal(f"figure-{len(self._figures)}.svg")
 
-    def write(self, path: str | Path) -> None:
-        """Set the document and write it as PDF, all or nothing."""
-        with tempfile.TemporaryDirectory() as folder:
-            source = Path(folder) / "main.typ"
-            source.write_text("".join(self._parts), encoding="utf-8")
-            for number, content in enumerate(self._figures, start=1):
-                (Path(folder) / f"figure-{number}.svg").write_bytes(content)
-            pdf = typst.compile(str(source), root=folder, format="pdf")
+    def write(self, path: str | Path, *, filled: bool = False) -> None:
+        """Set the document and write it as PDF, all or nothing.
+
+        Parameters
+        ----------
+        path : str or Path
+        filled : bool
+            Whether all figures and tables may be made lower or higher by one of `HEIGHTS`, if that fills the last page.
+        """
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            source = folder / "main.typ"
+            source.write_text("".join([*self._parts, _END]), encoding="utf-8")
+            factor = self._filling_height(source) if filled else 1.0
+            drawn = self._drawn if factor == 1.0 else [_svg(fig, factor) for fig in self._figures]
+            _write_all(folder, drawn)
+            pdf = typst.compile(str(source), root=name, format="pdf", sys_inputs={"height": str(factor)})
         with complete_file(path) as part:
             part.write_bytes(pdf)
+
+    def _filling_height(self, source: Path) -> float:
+        """Return the first factor with which the last page is filled to `LOWEST`, 1 where there is none."""
+        for factor in HEIGHTS:
+            _write_all(source.parent, [_blank(fig, factor) for fig in self._figures])
+            inputs = {"height": str(factor)}
+            found = typst.query(
+                str(source), "<end>", field="value", one=True, root=str(source.parent), sys_inputs=inputs
+            )
+            page, depth = json.loads(found)
+            if page == 1 or depth >= LOWEST:
+                return factor
+        return 1.0
 
 
 def literal(text: str) -> str:
@@ -241,13 +281,27 @@ def _check_table(header: Sequence[str], rows: Sequence[Sequence[str]], align: Se
         raise InputError(f"unknown alignment {', '.join(sorted(unknown))}", remedy="Choose left, center or right")
 
 
-def _svg(fig: Figure) -> bytes:
-    """Return a figure as SVG, what has many points as a picture in it."""
+def _write_all(folder: Path, figures: Sequence[bytes]) -> None:
+    for number, content in enumerate(figures, start=1):
+        (folder / f"figure-{number}.svg").write_bytes(content)
+
+
+def _blank(fig: Figure, factor: float) -> bytes:
+    """Return an empty SVG of a figure's size, its height multiplied by a factor."""
+    width, height = 72.0 * fig.get_size_inches() * (1.0, factor)
+    size = f'width="{width}pt" height="{height}pt" viewBox="0 0 {width} {height}"'
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size}/>'.encode()
+
+
+def _svg(fig: Figure, factor: float = 1.0) -> bytes:
+    """Return a figure, its height multiplied by a factor, as SVG, what has many points as a picture in it."""
     for axes in fig.axes:
         for artist in axes.get_children():
             if _points(artist) > MANY_POINTS:
                 artist.set_rasterized(True)
     with_plain_labels(fig)
+    width, height = fig.get_size_inches()
+    fig.set_size_inches(width, factor * height)
     engine = fig.get_layout_engine()
     if engine is not None:  # drawing would lay the figure out once more
         engine.execute(fig)
@@ -257,6 +311,8 @@ def _svg(fig: Figure) -> bytes:
     with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": "bayesid"}):
         # savefig would draw the figure twice, the first time to find its layout
         FigureCanvasSVG(fig).print_svg(content, metadata={"Date": None})
+    fig.set_size_inches(width, height)
+    fig.set_layout_engine(engine)
     return content.getvalue()
 
 

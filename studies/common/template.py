@@ -116,7 +116,8 @@ def add_statements(document: Document, statements: Sequence[Statement]) -> None:
 def write_study(document: Document, summary: Summary, output: Path, origin: str | None = None) -> None:
     """Write the report as PDF, with where it comes from at its foot, and beside it question, answer and goals as JSON.
 
-    The meanings of the terms that it uses stand at the foot of its last page.
+    The meanings of the terms that it uses stand at the foot of its last page, which is filled to one half where the
+    figures' heights permit.
 
     Parameters
     ----------
@@ -128,7 +129,7 @@ def write_study(document: Document, summary: Summary, output: Path, origin: str 
         Result of `studies.common.provenance.study_origin`.
     """
     document.foot(origin or "", glossary(document))
-    document.write(output)
+    document.write(output, filled=True)
     write_json(output.with_suffix(".json"), {**asdict(summary), "origin": origin})
 
 
