@@ -26,7 +26,7 @@ def run(
     starts: Annotated[int, typer.Option(min=1, help="Number of random starts for every criterion.")] = 12,
     iterations: Annotated[int, typer.Option(min=1, help="Most iterations of the optimiser from each.")] = 400,
     thorough: Annotated[
-        bool, typer.Option(help="Search on between the best motions, which takes about three times as long.")
+        bool, typer.Option(help="Search on between the best motions, which takes about five times as long.")
     ] = False,
     separate: Annotated[
         tuple[str, str] | None,
