@@ -24,6 +24,7 @@ from studies.blind_injections.goals import (
 )
 from studies.blind_injections.record import record_of
 from studies.blind_injections.rows import confusion, confusion_matrix, rates, reliability, scores, statements
+from studies.blind_injections.snap_limit import snap_limit
 from studies.blind_injections.trials import Plan, read
 from studies.common.goals import Verdict
 from studies.common.monte_carlo import read_store
@@ -245,6 +246,13 @@ def test_torques_and_coverage_are_decided_by_their_intervals():
     assert _coverage(list(rng.normal(size=(3000, 3)))).verdict is Verdict.PASS
     assert _coverage(list(rng.normal(size=(20, 3)))).verdict is Verdict.OPEN
     assert _coverage(list(2.0 * rng.normal(size=(3000, 3)))).verdict is Verdict.FAIL
+
+
+def test_a_snap_can_be_reconstructed_the_better_the_larger_it_is():
+    limits = {size: [snap_limit(size, np.random.default_rng(seed)) for seed in range(12)] for size in (0.1, 8.0, 100.0)}
+    assert abs(np.mean(limits[0.1])) < 0.1  # noise alone
+    assert 0.2 < np.median(limits[8.0]) < 0.6
+    assert min(limits[100.0]) > 0.8  # an onset between two samples is never known exactly
 
 
 @pytest.mark.usefixtures("slow")

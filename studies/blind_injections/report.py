@@ -19,6 +19,7 @@ from bayesid.report.numbers import format_number
 from studies.blind_injections.goals import (
     LEFT,
     SURE,
+    TORQUES,
     barely_left,
     goals_of,
     in_basilisk,
@@ -29,6 +30,7 @@ from studies.blind_injections.limits import DRAWS
 from studies.blind_injections.record import record_of
 from studies.blind_injections.reliability import reliability_figure
 from studies.blind_injections.rows import confusion, confusion_matrix, errors, rates, reliability, scores
+from studies.blind_injections.snap_limit import snap_limit
 from studies.blind_injections.trials import Trial, plan, read, run
 from studies.common.command import WORKERS, Command
 from studies.common.goals import Verdict
@@ -41,6 +43,9 @@ __all__ = ["main", "write_report"]
 SCORES = ["stated of", "statements", "Brier score", "log score", "mean stated", "share true"]
 SHOWN = 2
 """Trials of a case that were not answered rightly, from which the report lists its answers."""
+
+SNAPS = 20
+"""Draws of what could be reached of each snap."""
 
 TICKS = (3, 5, 7, 10, 20, 50, 100)
 """Ticks of the signal-to-noise ratio in the figure."""
@@ -226,12 +231,39 @@ def _failures(trials: Sequence[Trial]) -> list[str]:
             f"wrongly. The torque reconstructed correlates with the true one by {median:.2f} in the median, "
             f"{min(trial.correlation or 0.0 for trial in framed):.2f} in the worst case."
         )
+    texts += _snaps(trials)
     outside = [trial for trial in wrong if trial.kind == "unknown"]
     if outside and all((trial.signal_to_noise or 0.0) < LEFT for trial in outside):
         texts.append(
             f"Every outside effect that was misnamed left less than {LEFT:g} σ beside the causes it was taken for."
         )
     return texts
+
+
+def _snaps(trials: Sequence[Trial]) -> list[str]:
+    """Return a sentence on how well the torque of snaps is reconstructed beside what their data permit."""
+    found = [
+        (trial.correlation, trial.signal_to_noise, trial.seed)
+        for trial in trials
+        if trial.case == "thermal-snap" and trial.correlation is not None and trial.signal_to_noise is not None
+    ]
+    if not found:
+        return []
+    reached, sizes, seeds = zip(*found, strict=True)
+    limits = []
+    for size, seed in zip(sizes, seeds, strict=True):
+        rng = np.random.default_rng(seed)
+        limits.append([snap_limit(size, rng) for _ in range(SNAPS)])
+    low, median, high = np.quantile(limits, [0.1, 0.5, 0.9])
+    least = TORQUES["snaps and pulses"][0]
+    beyond = f": the goal of {least:g} lies beyond what rates tell" if high < least else ""
+    return [
+        f"Of {len(found)} snaps of {min(sizes):.1f} to {max(sizes):.1f} σ the torque reconstructed correlates with the "
+        f"true one by {np.median(reached):.2f} in the median. On rates alone, a reader who knows that each recording "
+        "holds one torque that sets in at once and dies away, but neither when, how fast, along which axis nor how "
+        f"large, would reach {median:.2f} ({low:.2f} to {high:.2f} in eight of ten draws) at the same sizes, simulated "
+        f"on a free body{beyond}."
+    ]
 
 
 def _framed(trial: Trial) -> bool:
