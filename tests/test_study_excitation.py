@@ -8,7 +8,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from bayesid.design import Search
+from bayesid import Robot
+from bayesid.design import Search, Store
 from studies.base_body import paper
 from studies.common import mission
 from studies.common.goals import Verdict
@@ -16,6 +17,7 @@ from studies.common.repeated_fits import Realised, Reference
 from studies.excitation import run
 from studies.excitation.cloud import Cloud
 from studies.excitation.contest import paper_problem, shrunk
+from studies.excitation.other_robots import Rivals, other_problem, other_robots
 from studies.excitation.report import goals, write_report
 from studies.excitation.saturation import Crowd, Searches
 from tests.report_rules import broken_rules
@@ -98,6 +100,11 @@ def test_the_whole_study_small(tmp_path):
             if goal.text.startswith("A thorough search")
         )
         assert near.verdict is verdict
+    for away, verdict in ((0.1, Verdict.PASS), (0.3, Verdict.FAIL)):  # 1 and 3 % of each of ten deviations
+        rivals = {"one": Rivals(cost, cost + away), "two": Rivals(cost, cost - 1.0)}
+        searched = replace(result, crowds=crowds, searches=Searches(np.zeros(1), np.array([cost])), rivals=rivals)
+        (robots,) = (goal for goal in goals(searched) if goal.text.startswith("On 3 robots"))
+        assert robots.verdict is verdict
     for count, verdict in ((1, Verdict.OPEN), (3, Verdict.PASS)):
         searches = Searches(np.zeros(1), np.full(count, cost))
         (largest,) = (
@@ -106,3 +113,18 @@ def test_the_whole_study_small(tmp_path):
             if goal.text.startswith("Largest factor")
         )
         assert largest.verdict is verdict  # with the crowd's own, two and four followed searches agree
+
+
+@pytest.mark.usefixtures("slow")
+def test_other_robots_are_searched_by_many_descents_and_by_a_search_and_kept(monkeypatch, tmp_path):
+    monkeypatch.setattr("studies.excitation.other_robots.ROBOTS", {"a table": lambda: Robot.shipped("planar")})
+    store, efforts = Store.open(tmp_path / "store.json", "small"), (Search(3, 10), Search(1, 10, exchanges=1))
+    told: list[str] = []
+    found = other_robots(1, *efforts, store, told.append)
+    assert list(found) == ["a table"]
+    (own,) = found.values()
+    problem = other_problem(Robot.shipped("planar"))
+    assert own.crowd < problem.cost(problem.plan.family.centre, problem.criteria[0])
+    again = other_robots(1, *efforts, Store.open(tmp_path / "store.json", "small"), told.append)
+    assert again == found
+    assert any("100 %" in line for line in told)

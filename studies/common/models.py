@@ -1,4 +1,4 @@
-"""The model with which studies identify the base of ETS-VII."""
+"""The model with which studies identify the base of ETS-VII, and of other robots."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from bayesid import BodyPrior, Kind, Model, Orbit, Robot, Sensor, White
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.simulation.effects import AccelBias, GravityGradient
 from bayesid.simulation.model import RATE_SIGMA, spread_links
-from studies.common.ets7 import ACCELEROMETER, BASE, BIAS, RADIUS, ets7
+from studies.common.ets7 import ACCELEROMETER, BIAS, RADIUS, ets7
 
 __all__ = ["ARM_SPREAD", "BASE_SPREAD", "base_model"]
 
@@ -50,14 +50,14 @@ def base_model(
         Prior standard deviation of the initial rate [rad/s]; 0 for a start at rest.
     """
     robot = ets7() if robot is None else robot
-    centre = robot.link(BASE).inertial if centre is None else centre
+    centre = robot.link(robot.base).inertial if centre is None else centre
     return Model(
         robot=robot,
         sensors=tuple(
             Sensor(kind, White(sigma), position=ACCELEROMETER if kind is Kind.ACCEL else (0.0, 0.0, 0.0))
             for kind, sigma in noise.items()
         ),
-        priors=(BodyPrior(BASE, centre, base_spread), *spread_links(robot, arm_spread, (BASE,))),
+        priors=(BodyPrior(robot.base, centre, base_spread), *spread_links(robot, arm_spread, (robot.base,))),
         orbit=Orbit(RADIUS),
         effects=(*([GravityGradient()] if gradient else []), *([AccelBias(bias)] if bias > 0.0 else [])),
         rate_sigma=rate_sigma,

@@ -24,6 +24,7 @@ from studies.common.monte_carlo import Workers
 from studies.common.repeated_fits import Realised, repeat
 from studies.excitation.cloud import Cloud, random_cloud
 from studies.excitation.contest import Contest, compete, contest_problem, sparse
+from studies.excitation.other_robots import Rivals, other_robots
 from studies.excitation.saturation import CROWDED, Crowd, Searches, crowd_of, searches_of
 
 __all__ = ["Result", "main", "run"]
@@ -47,6 +48,8 @@ class Result:
         Searches from many starts by criterion, if there were any.
     searches : Searches or None
         Repeated thorough searches by d-optimality, if there were any.
+    rivals : mapping of str to Rivals
+        A search and the best of many descents on other robots, if there were any.
     search : Search
         Effort of each other search.
     full : bool
@@ -57,6 +60,7 @@ class Result:
     cloud: Cloud
     crowds: Mapping[str, Crowd]
     searches: Searches | None
+    rivals: Mapping[str, Rivals]
     search: Search
     full: bool
 
@@ -92,6 +96,7 @@ def run(
         Number of cheap descents by each of `CROWDED` from which the contest begins, too; none where left out.
     searches : int, optional
         Number of thorough searches by d-optimality that differ in their seeds, from whose best the contest begins, too.
+        With ``starts`` as well, other robots are searched.
     repeats : int, optional
         Number of flights of each design that is flown; 400 in a full run, 100 in a quick one.
     flown : sequence of str
@@ -113,7 +118,7 @@ def run(
     repeats = (400 if full else 100) if repeats is None else repeats
     random = (500 if full else 100) if random is None else random
     store = store or Store.forgetful()
-    problem, crowds = contest_problem(full, points), {}
+    problem, crowds, rivals = contest_problem(full, points), {}, {}
     if starts is not None:
         effort = replace(QUICK, starts=starts, executor=executor)
         crowds = {item.name: crowd_of(problem, item, seed, effort, store, sparse(progress)) for item in CROWDED}
@@ -122,6 +127,8 @@ def run(
         effort = replace(THOROUGH, executor=executor)
         repeated = searches_of(problem, DOptimal(), seed, searches, effort, store, sparse(progress))
         first.append(repeated.best)
+        if starts is not None:
+            rivals = other_robots(seed, replace(QUICK, starts=starts, executor=executor), effort, store, progress)
     contest = compete(problem, seed, search, first, store, progress)
     own = contest.designs["d-optimal"].problem
     cloud = random_cloud(own, random, np.random.default_rng(seed))
@@ -137,7 +144,7 @@ def run(
                 workers=workers,
                 progress=lambda text, name=name: progress(f"{name}: {text}"),  # type: ignore[misc]
             )
-    return Result(contest, realised, cloud, crowds, repeated, search, full)
+    return Result(contest, realised, cloud, crowds, repeated, rivals, search, full)
 
 
 COMMAND = Command(

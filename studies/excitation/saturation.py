@@ -49,13 +49,16 @@ class Crowd:
 
 
 def crowd_of(
-    problem: Problem, criterion: Criterion, seed: int, search: Search, store: Store, progress: Progress
+    problem: Problem, criterion: Criterion, seed: int, search: Search, store: Store, progress: Progress, name: str = ""
 ) -> Crowd:
     """Search by a criterion of the problem from many starts; an interrupted search goes on from the store.
 
-    The starts are those of `bayesid.design.design` with the same seed, and more.
+    The starts are those of `bayesid.design.design` with the same seed, and more. The name of the problem is part of
+    that in the store.
     """
-    kept = store.of(f"{search.starts} starts.{criterion.name}")  # which descents are followed depends on their number
+    kept = store.of(
+        f"{name}{search.starts} starts.{criterion.name}"
+    )  # which descents are followed depends on their number
     index = problem.criteria.index(criterion)
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(index + 1)[index])
     found = optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=progress)
@@ -79,12 +82,19 @@ class Searches(NamedTuple):
 
 
 def searches_of(
-    problem: Problem, criterion: Criterion, seed: int, count: int, search: Search, store: Store, progress: Progress
+    problem: Problem,
+    criterion: Criterion,
+    seed: int,
+    count: int,
+    search: Search,
+    store: Store,
+    progress: Progress,
+    name: str = "",
 ) -> Searches:
     """Search several times, each from random starts of its own; an interrupted study goes on from the store."""
     found = []
     for number in range(count):
-        kept = store.of(f"search {number}.{criterion.name}")
+        kept = store.of(f"{name}search {number}.{criterion.name}")
         rng = np.random.default_rng([seed, number])
         found.append(optimise(problem, criterion, rng, search, known=kept.known, keep=kept.keep, progress=progress))
     costs = np.array([item.cost for item in found])
