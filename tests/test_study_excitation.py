@@ -124,7 +124,7 @@ def test_other_robots_are_searched_by_many_descents_and_by_a_search_and_kept(mon
     assert list(found) == ["a table"]
     (own,) = found.values()
     problem = other_problem(Robot.shipped("planar"))
-    assert own.crowd < problem.cost(problem.plan.family.centre, problem.criteria[0])
+    assert own.crowd < problem.cost(problem.criteria[0], problem.plan.family.centre)[0]
     again = other_robots(1, *efforts, Store.open(tmp_path / "store.json", "small"), told.append)
     assert again == found
     assert any("100 %" in line for line in told)
