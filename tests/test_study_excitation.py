@@ -17,8 +17,8 @@ from studies.common.repeated_fits import Realised, Reference
 from studies.excitation import run
 from studies.excitation.cloud import Cloud
 from studies.excitation.contest import paper_problem, shrunk
-from studies.excitation.other_robots import Rivals, other_problem, other_robots
 from studies.excitation.report import goals, write_report
+from studies.excitation.rivals import Rivals, other_problem, other_robots
 from studies.excitation.saturation import Crowd, Searches
 from tests.report_rules import broken_rules
 
@@ -117,7 +117,7 @@ def test_the_whole_study_small(tmp_path):
 
 @pytest.mark.usefixtures("slow")
 def test_other_robots_are_searched_by_many_descents_and_by_a_search_and_kept(monkeypatch, tmp_path):
-    monkeypatch.setattr("studies.excitation.other_robots.ROBOTS", {"a table": lambda: Robot.shipped("planar")})
+    monkeypatch.setattr("studies.excitation.rivals.ROBOTS", {"a table": lambda: Robot.shipped("planar")})
     store, efforts = Store.open(tmp_path / "store.json", "small"), (Search(3, 10), Search(1, 10, exchanges=1))
     told: list[str] = []
     found = other_robots(1, *efforts, store, told.append)

@@ -24,7 +24,7 @@ from studies.common.monte_carlo import Workers
 from studies.common.repeated_fits import Realised, repeat
 from studies.excitation.cloud import Cloud, random_cloud
 from studies.excitation.contest import Contest, compete, contest_problem, sparse
-from studies.excitation.other_robots import Rivals, other_robots
+from studies.excitation.rivals import Rivals, other_robots
 from studies.excitation.saturation import CROWDED, Crowd, Searches, crowd_of, searches_of
 
 __all__ = ["Result", "main", "run"]
