@@ -45,7 +45,7 @@ WHOLE = 24
 LINE = 60
 """Number of characters of a table's cell that fill about one line."""
 
-HEIGHTS = (1.0, 0.95, 1.05, 0.9, 1.1, 0.85, 1.15, 0.8, 1.2)
+HEIGHTS = (1.0, 0.95, 1.05, 0.9, 1.1, 0.85, 1.15, 0.8, 1.2, 0.75, 1.25, 0.7, 1.3)
 """Factors on the heights of figures and on the space in tables, tried in this order until the last page is filled."""
 
 LOWEST = 0.55
