@@ -20,7 +20,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.kept_jit import QUICKLY
 from bayesid.design.criteria import Criterion
-from bayesid.design.encoder_shadow import Encoder, encoder_shadow, position_noise
+from bayesid.design.encoder_shadow import Encoder, encoder_shadow, likely_shadow, position_noise
 from bayesid.design.flight import Flight
 from bayesid.design.motion_limits import ACTIVE, Limit, Limits, smooth_largest
 from bayesid.design.plan import FlightOutcome, Plan
@@ -195,16 +195,31 @@ class Problem:
         return np.eye(self.plan.unknowns.size) if self.known is None else self.known.precision
 
     def compile(self) -> None:
-        """Compile all functions of the problem at once, each in a thread of its own; at most once."""
+        """Compile all functions of the problem at once, each in a thread of its own; at most once.
+
+        They are traced one after the other, what takes the longest to compile first: threads that trace at the same
+        time hold each other up, and write code that is not found among what earlier runs kept.
+        """
         if "_latest" in self.__dict__:
             return
-        parameters = self.plan.family.centre
-        first = {criterion.informed: criterion for criterion in self.criteria}
+        parameters, likely = self.plan.family.centre, likely_shadow(self.plan)
+        costs: list[Any] = [self._informed_cost for one in self.criteria if one.informed][:1]
+        costs += [self._motion_cost for one in self.criteria if not one.informed][:1]
+        arguments: tuple[Any, ...] = (parameters, self.centre, 0, self.precision, likely)
+        pending: list[Future[Any]] = []
         with ThreadPoolExecutor() as pool:
-            pending: list[Future[Any]] = [pool.submit(self.cost, one, parameters) for one in first.values()]
-            pending += [pool.submit(self.fractions, parameters), pool.submit(self.trajectory, parameters)]
+            for cost in costs:
+                cost.lower(*arguments)
+                pending.append(pool.submit(cost, *arguments))
+            self._fractions.lower(parameters, self.centre, self.bounds)
+            pending.append(pool.submit(self.fractions, parameters))
+            self._fine_trajectory.lower(parameters, self.centre)
+            pending.append(pool.submit(lambda: (self.trajectory(parameters), self.shadow)))
             for future in pending:
                 future.result()
+        if self.shadow.shape != likely.shape:
+            for cost in costs:
+                cost(parameters, self.centre, 0, self.precision, self.shadow)
 
     def draws(self, count: int, rng: np.random.Generator) -> Floats:
         """Return draws of the bodies from their prior, other unknowns at its centre, shape (count, n)."""

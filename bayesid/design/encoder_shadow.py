@@ -20,7 +20,7 @@ from bayesid.simulation.time_grid import time_tables
 if TYPE_CHECKING:
     from bayesid.design.plan import Plan
 
-__all__ = ["Encoder", "encoder_shadow", "position_noise"]
+__all__ = ["Encoder", "encoder_shadow", "likely_shadow", "position_noise"]
 
 Encoder = Mapping[int, float | Mapping[str, float | None] | None]
 """Standard deviation of joint position (0), velocity (1) and acceleration (2), for all joints or by joint."""
@@ -75,6 +75,11 @@ def encoder_shadow(plan: Plan, parameters: Floats, rate: Floats) -> Floats:
     shadow = np.zeros((len(signals), -(-used // UNIT) * UNIT))
     shadow[:, :used] = directions[:, :used] * np.sqrt(lost[:used])
     return shadow
+
+
+def likely_shadow(plan: Plan) -> Floats:
+    """Return zeros of the shape that `encoder_shadow` most likely has, so that what uses it can be compiled before."""
+    return np.zeros((len(plan.samples) * len(plan.sigma), UNIT if any(plan.encoder_sigma) else 0))
 
 
 def _cosines(time: Floats, end: float, count: int) -> Floats:

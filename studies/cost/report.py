@@ -23,6 +23,7 @@ from studies.common.template import Setup, Summary, add_first_page, add_setup, w
 from studies.cost.cases import COMMANDS, DIAGNOSES
 from studies.cost.commands import AFTER_VERDICT
 from studies.cost.run import Cost, middle, run
+from studies.cost.search_times import SearchTimes
 
 __all__ = ["goals_of", "main", "write_report"]
 
@@ -31,6 +32,9 @@ MEMORY = 1.5
 
 SAMPLES = 30.0
 """Longest wanted time for 4,000 effective samples of an extended model [s]."""
+
+STEP, BEGIN = 0.03, 20.0
+"""Longest wanted times of one criterion with its gradient, and of a cold start of a search [s]."""
 
 CHANGED = 0.1
 """Relative change of a time beside an earlier run from which it is told."""
@@ -78,7 +82,27 @@ def goals_of(cost: Cost) -> list[Goal]:
                     _verdict(walls, limit),
                 )
             )
-    return goals
+    return goals + _search_goals(cost.search)
+
+
+def _search_goals(search: SearchTimes | None) -> list[Goal]:
+    """Return the goals of the search for manoeuvres."""
+    step = f"One criterion of a design with its gradient, one core: at most {1e3 * STEP:g} ms"
+    begin = f"Cold start of a search for manoeuvres: at most {BEGIN:g} s"
+    if search is None:
+        return [Goal(text, "not measured", Verdict.NOT_TESTED) for text in (step, begin)]
+    low, middle_of, high = (1e3 * value for value in np.percentile(search.criterion, [5.0, 50.0, 95.0]))
+    return [
+        Goal(
+            step,
+            f"{middle_of:.1f} ms ({low:.1f} to {high:.1f}, 90 % of {len(search.criterion)} manoeuvres of "
+            f"{search.unknowns} free numbers)",
+            Verdict.of(middle_of <= 1e3 * STEP),
+        ),
+        Goal(
+            begin, f"{search.cold:.1f} s, {search.warm:.1f} s with compiled code kept", Verdict.of(search.cold <= BEGIN)
+        ),
+    ]
 
 
 def _times(cost: Cost, names: Sequence[str], kind: str, limit: float) -> Goal:

@@ -16,6 +16,7 @@ from studies.cost.cases import COMMANDS, DIAGNOSES, write_case
 from studies.cost.commands import Run, run_command
 from studies.cost.growth import Floor, floor_of, growth, verdict_by_candidates
 from studies.cost.nested import Nested, nested
+from studies.cost.search_times import SearchTimes, search_times
 
 __all__ = ["Cost", "middle", "run"]
 
@@ -54,6 +55,8 @@ class Cost:
     floor : Floor
     nested : Nested or None
         One candidate by nested sampling.
+    search : SearchTimes or None
+        A search for manoeuvres.
     """
 
     diagnoses: dict[str, list[Run]]
@@ -63,6 +66,7 @@ class Cost:
     growth: dict[str, dict[int, float]]
     floor: Floor
     nested: Nested | None
+    search: SearchTimes | None
 
 
 def run(
@@ -111,6 +115,8 @@ def run(
             name: timed(name, COMMANDS[name][0], files[chosen[0].title], 1 + repeats, place / f"cache-{name}")
             for name in commands
         }
+        progress("search for manoeuvres")
+        search = search_times(place / "cache-search") if full else None
         progress("candidates and nested sampling")
         study = Study.load(files[chosen[-1 if len(chosen) < 2 else 1].title])
         model = load_model(study)
@@ -120,7 +126,7 @@ def run(
         one = nested(found, LIMIT if full else 10.0, seed) if found.verdict.causes else None
     progress("growth of one evaluation")
     grown = growth(20) if full else growth(2, sizes=1)
-    return Cost(diagnoses, sampled, others, by_candidates, grown, floor_of(20 if full else 2), one)
+    return Cost(diagnoses, sampled, others, by_candidates, grown, floor_of(20 if full else 2), one, search)
 
 
 def middle(runs: list[Run], value: Callable[[Run], float]) -> float:

@@ -95,8 +95,6 @@ def goals(result: Result) -> tuple[Goal, ...]:
     kept = all(item.kept for own in contest.designs.values() for item in own.reached)
     finer = "on a grid eight times finer than the search's"
     rows.append(Goal("Every limit kept", finer if kept else f"broken {finer}", Verdict.of(kept)))
-    for text in ("One criterion with its gradient in 30 ms, compiled, one core", "Cold start of a search within 20 s"):
-        rows.append(Goal(text, "not measured here", Verdict.NOT_TESTED))
     return tuple(rows)
 
 
