@@ -44,6 +44,7 @@ def test_one_trial_where_the_posterior_is_nearly_gaussian(
     assert evaluated == [TRIAL]
 
 
+@pytest.mark.slow
 def test_the_better_of_two_where_it_is_not(planar_posterior: Callable[..., Posterior], evaluated: list[int]) -> None:
     """An unknown error of the last link, of which the recording tells little."""
     base = planar_posterior(np.random.default_rng(3), step=0.5)

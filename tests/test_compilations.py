@@ -87,6 +87,7 @@ def test_another_prior_compiles_nothing(compiled):
     assert np.abs(other.residuals(np.ones(other.size)) - compiled.residuals(np.ones(other.size))).max() > 0.1
 
 
+@pytest.mark.slow
 def test_another_noise_and_another_place_of_the_sensor_compile_nothing(compiled):
     rate, accel = compiled.model.sensors
     sensors = (replace(rate, noise=White(2.2e-5)), replace(accel, noise=White(2.2e-5), position=(0.3, 0.2, 0.1)))
@@ -100,6 +101,7 @@ def test_another_noise_and_another_place_of_the_sensor_compile_nothing(compiled)
     assert np.abs(other.residuals(z) - compiled.residuals(z)).max() > 0.1
 
 
+@pytest.mark.slow
 def test_another_recording_of_similar_length_compiles_nothing(compiled):
     manoeuvre = compiled.manoeuvres[0]
     whole = manoeuvre.recording
@@ -111,6 +113,7 @@ def test_another_recording_of_similar_length_compiles_nothing(compiled):
     assert seen == []
 
 
+@pytest.mark.slow
 def test_another_effect_does_compile(compiled):
     model = compiled.model
     with counted() as seen:

@@ -89,6 +89,7 @@ def test_without_the_unknown_speeds_rest_would_raise_one(flights):
     assert naive > 5.0 * 3 * RECORDINGS
 
 
+@pytest.mark.slow
 def test_the_speeds_are_unknowns_where_the_rate_is_declared_zero(flights):
     posterior = posterior_of(flights, np.random.default_rng(1), speed_errors=True, rate_sigma=0.0)
     layout = posterior.unknowns.layout
@@ -104,6 +105,7 @@ def test_the_speeds_are_unknowns_where_the_rate_is_declared_zero(flights):
     assert exact.unknowns.layout.joints == 0
 
 
+@pytest.mark.slow
 def test_the_bodies_are_covered(flights):
     """Squared distances of the true base over noises, 10 degrees of freedom each."""
     total = 0.0

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
-__all__ = ["SearchTimes", "search_times"]
+__all__ = ["SearchTimes", "search_clock", "search_times"]
 
 EVALUATIONS = 30
 """Number of manoeuvres at which the criterion is evaluated."""
@@ -43,13 +43,14 @@ class SearchTimes(NamedTuple):
 
 def search_times(cache: Path) -> SearchTimes:
     """Measure a search; the folder of compiled code must be empty or absent."""
-    cold = _run(cache, one_core=False)
-    warm = _run(cache, one_core=False)
-    step = _run(cache, one_core=True)
+    cold = search_clock(cache, one_core=False)
+    warm = search_clock(cache, one_core=False)
+    step = search_clock(cache, one_core=True)
     return SearchTimes(cold["ready"], warm["ready"], tuple(step["criterion"]), tuple(step["limits"]), step["unknowns"])
 
 
-def _run(cache: Path, *, one_core: bool) -> dict:
+def search_clock(cache: Path, *, one_core: bool) -> dict:
+    """Return what `main` prints, run in a process of its own with a folder of compiled code."""
     command = [sys.executable, "-m", __name__, repr(time.time()), *(["one-core"] if one_core else [])]
     environment = os.environ | {"BAYESID_CACHE": str(cache)}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
