@@ -12,6 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from bayesid.report import Document
+from bayesid.report.figures.figure_height import fitted_height
 from bayesid.report.figures.figure_style import styled, wide_figure
 from studies.common.goals import Goal, Verdict
 from studies.common.provenance import study_origin
@@ -139,6 +140,24 @@ def test_figures_become_lower_or_higher_until_the_last_page_is_filled(
     assert broken_rules(tmp_path / "filled.pdf") == []
     assert len(PdfText.read(tmp_path / "filled.pdf").pages) == pages
     assert (tmp_path / "again.pdf").read_bytes() == (tmp_path / "as-asked.pdf").read_bytes()
+
+
+def test_a_figure_is_not_made_lower_than_its_named_ticks_permit(tmp_path: Path):
+    @styled
+    def named(count: int) -> Figure:
+        figure = wide_figure(2.0)
+        figure.subplots().set_yticks(range(count), [f"name {number}" for number in range(count)])
+        return figure
+
+    letters = 72.0 * 2.0 / 8.0  # of 8 points, which a figure of two inches would hold without axes and room
+    for count, lowest in ((2, 0.7), (10, 0.9), (int(letters), 1.0)):
+        document = Document("Good")
+        document.figure(named(count), "Named ticks.")
+        (drawn,) = document._figures
+        height = fitted_height(drawn, 0.7) / 2.0
+        assert height == pytest.approx(0.7) if lowest == 0.7 else 0.7 < height <= lowest
+        axes = drawn.axes[0].get_position().height * 2.0 * 72.0 - 144.0 * (1.0 - height)
+        assert axes >= 1.15 * 8.0 * count - 1e-9 or height == 1.0
 
 
 def test_labels_can_be_read_in_print():

@@ -23,6 +23,7 @@ from matplotlib.lines import Line2D
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import complete_file
+from bayesid.report.figures.figure_height import fitted_height
 from bayesid.report.figures.figure_style import with_plain_labels
 
 __all__ = ["Document", "Rows"]
@@ -287,21 +288,21 @@ def _write_all(folder: Path, figures: Sequence[bytes]) -> None:
 
 
 def _blank(fig: Figure, factor: float) -> bytes:
-    """Return an empty SVG of a figure's size, its height multiplied by a factor."""
-    width, height = 72.0 * fig.get_size_inches() * (1.0, factor)
+    """Return an empty SVG of the size that `_svg` gives a figure."""
+    width, height = 72.0 * fig.get_size_inches()[0], 72.0 * fitted_height(fig, factor)
     size = f'width="{width}pt" height="{height}pt" viewBox="0 0 {width} {height}"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size}/>'.encode()
 
 
 def _svg(fig: Figure, factor: float = 1.0) -> bytes:
-    """Return a figure, its height multiplied by a factor, as SVG, what has many points as a picture in it."""
+    """Return a figure, its height multiplied by a factor (`fitted_height`), as SVG, many points as a picture."""
     for axes in fig.axes:
         for artist in axes.get_children():
             if _points(artist) > MANY_POINTS:
                 artist.set_rasterized(True)
     with_plain_labels(fig)
     width, height = fig.get_size_inches()
-    fig.set_size_inches(width, factor * height)
+    fig.set_size_inches(width, fitted_height(fig, factor))
     engine = fig.get_layout_engine()
     if engine is not None:  # drawing would lay the figure out once more
         engine.execute(fig)
