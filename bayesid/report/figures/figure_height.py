@@ -23,6 +23,6 @@ def fitted_height(figure: Figure, factor: float) -> float:
     lowest = 0.0
     for axes in figure.axes:
         named = [label for label in axes.get_yticklabels() if label.get_text()]
-        needed = ROOM * sum(label.get_fontsize() for label in named) / 72.0
+        needed = ROOM * sum(float(label.get_fontsize()) for label in named) / 72.0
         lowest = max(lowest, height + needed - axes.get_position().height * height if named else 0.0)
     return max(factor * height, min(lowest, height))
