@@ -33,6 +33,7 @@ def share(parameterisation: type, posterior: Posterior, optimum: Optimum) -> flo
     return drawn.effective_samples / 2000
 
 
+@pytest.mark.slow
 def test_one_trial_where_the_posterior_is_nearly_gaussian(
     planar_posterior: Callable[..., Posterior], evaluated: list[int]
 ) -> None:

@@ -102,6 +102,7 @@ def seen(own: Plan) -> np.ndarray:
     return (rate**2).sum() / own.sigma[2] ** 2 * slope.T @ slope
 
 
+@pytest.mark.slow
 def test_optimality_of_the_posterior_in_closed_form(flywheel: Problem) -> None:
     costs, information = flywheel.costs(PARAMETERS), seen(flywheel.plan)
     variances = 0.25 / (1.0 + np.linalg.eigvalsh(information))  # of log-Cholesky coordinates, whose prior has sd 0.5
@@ -200,6 +201,7 @@ def told_apart(own: Plan) -> np.ndarray:
     return np.diag(gram) * (1.0 - rho**2)
 
 
+@pytest.mark.slow
 def test_separation_is_lambda_times_one_minus_rho_squared() -> None:
     own = plan(effects=(Steady(), Growing()), unknown=False)
     criterion = Separation(("steady", "growing"))

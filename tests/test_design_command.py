@@ -160,6 +160,7 @@ def test_a_manoeuvre_keeps_its_limits_by_independent_kinematics(made, name: str)
     assert np.abs(spline(fine)).max() < 2.8
 
 
+@pytest.mark.slow
 def test_a_search_taken_up_again_ends_as_one_never_interrupted(made, tmp_path: Path):
     folder = made[0]
     status, text = run("design", folder / "study.toml", "--output", tmp_path, *EFFORT)

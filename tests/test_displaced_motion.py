@@ -95,6 +95,7 @@ def share(truth: np.ndarray, without: np.ndarray, carried: np.ndarray) -> float:
     return max(np.linalg.norm((carried - truth)[:, p]) / np.linalg.norm((without - truth)[:, p]) for p in parts)
 
 
+@pytest.mark.slow
 def test_the_rigid_robot_is_that_of_mujoco():
     exact, error = truth(), simulated(Recorded()) - truth()
     assert np.abs(error[:, :3]).max() < 1e-6 * np.abs(exact[:, :3]).max()

@@ -56,7 +56,13 @@ CASES = {
 }
 
 
-LONG = ("ets7", "four joints, other rates and a gap", "known thrust", "wheel in the model")
+LONG = (
+    "ets7",
+    "four joints, other rates and a gap",
+    "branched, attitude in place of rate",
+    "known thrust",
+    "wheel in the model",
+)
 """Cases left to ``--slow``."""
 
 

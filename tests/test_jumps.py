@@ -39,6 +39,7 @@ def deviations(joint: SmoothedJoint, acceleration: np.ndarray) -> np.ndarray:
 NEAR = (np.abs(TIME - RAMP) <= 1.5) | (np.abs(TIME - 160.0 + RAMP) <= 1.5)
 
 
+@pytest.mark.slow
 def test_errors_where_ramps_end_are_covered():
     """The mean square of the acceleration's errors near the ends, in what is stated, over 28 joints.
 

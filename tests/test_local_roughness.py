@@ -103,10 +103,9 @@ def quintic(time: float, length: float, ramp: float) -> tuple[float, float, floa
     return x**3 * (10.0 - 15.0 * x + 6.0 * x**2), 30.0 * left**2 / length, 60.0 * left * (1.0 - 2.0 * x) / length**2
 
 
-@pytest.mark.parametrize(
-    "profile", [cycloid, *(pytest.param(own, marks=pytest.mark.slow) for own in (quintic, septic))]
-)
-@pytest.mark.parametrize("sigma", [pytest.param(1e-5, marks=pytest.mark.slow), 1e-4])
+@pytest.mark.slow
+@pytest.mark.parametrize("profile", [cycloid, quintic, septic])
+@pytest.mark.parametrize("sigma", [1e-5, 1e-4])
 def test_errors_of_moves_with_rests_are_covered(
     profile: Callable[..., tuple[float, float, float]], sigma: float
 ) -> None:

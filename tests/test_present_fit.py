@@ -90,7 +90,8 @@ def test_a_fit_that_follows_the_data_keeps_its_body(tmp_path):
     assert found.fit.chi2 < 1.2 * engine.posterior.samples
 
 
-@pytest.mark.parametrize("share", [pytest.param(1.0 / 20.0, marks=pytest.mark.slow), 1.0 / 40.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [1.0 / 20.0, 1.0 / 40.0])
 def test_a_link_of_many_times_its_guess_is_found(share):
     """Of the planar robot in MuJoCo; the first fit ends far from the data, once with an improbable body, once not."""
     times = np.arange(0.0, 40.01, 0.5)

@@ -97,6 +97,7 @@ def test_a_search_is_the_same_in_threads_and_keeps_every_limit(planar: Problem) 
         assert np.abs(finer.velocity[:, index]).max() <= joint.velocity * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
 def test_a_descent_may_be_sent_to_another_process(planar: Problem) -> None:
     start = random_start(planar, np.random.default_rng(3))
     content = pickle.dumps(Task(Shared(planar), planar.criteria[0], [], start, 3, 1e-5))

@@ -28,6 +28,7 @@ def diagnosed(folder, seed, count=2, **hidden):
     )
 
 
+@pytest.mark.slow
 def test_samples_are_independent_and_their_noise_is_measured(tmp_path):
     write_throws(tmp_path, "body", np.zeros((8, 3)), np.random.default_rng(3))
     recordings = read_throws(tmp_path, "body", Timing(fast=1e9))

@@ -259,6 +259,7 @@ def test_marginalised_encoder_noise_equals_errors_in_variables():
     assert refined.samples == len(measured)
 
 
+@pytest.mark.slow
 def test_clean_data_have_a_chi_square_near_one_where_the_encoder_dominates():
     """10 Hz and 1e-5 rad: the joints' acceleration is worth more than the accelerometer's noise; 4 standard errors."""
     posterior = loud_posterior(planar_run(4, 12.0, 0.1), 1e-5)
