@@ -36,8 +36,7 @@ EFFECTIVE = 1000.0
 """Effective samples of emcee."""
 
 EVERY = 20
-"""Of so many replicates of a case, emcee samples the posterior of one, unless the arm is unknown too, when it takes
-minutes."""
+"""Of so many replicates of a case, emcee samples the posterior of one."""
 
 ARMS = (Case.ARM, Case.WHOLE)
 """Cases with an unknown arm."""
@@ -195,6 +194,6 @@ def plan(full: bool) -> list[Plan]:
     counts = REPLICATES if full else dict.fromkeys(SMALL, 1)
     order = [(number / np.sqrt(count), case, number) for case, count in counts.items() for number in range(count)]
     return [
-        Plan(case, full and case not in ARMS and number % EVERY == EVERY // 2)
+        Plan(case, full and number % EVERY == EVERY // 2)
         for _, case, number in sorted(order, key=lambda item: item[0])
     ]
