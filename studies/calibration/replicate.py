@@ -194,6 +194,5 @@ def plan(full: bool) -> list[Plan]:
     counts = REPLICATES if full else dict.fromkeys(SMALL, 1)
     order = [(number / np.sqrt(count), case, number) for case, count in counts.items() for number in range(count)]
     return [
-        Plan(case, full and number % EVERY == EVERY // 2)
-        for _, case, number in sorted(order, key=lambda item: item[0])
+        Plan(case, full and number % EVERY == EVERY // 2) for _, case, number in sorted(order, key=lambda item: item[0])
     ]

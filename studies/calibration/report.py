@@ -132,8 +132,8 @@ def write_report(cases: Sequence[Replicates], file: Path, origin: str | None = N
         header,
         weighed,
         "Percentage of the true mass, centre of mass and inertia of all identified bodies within the stated central "
-        "intervals, with the standard error over replicates. Emcee samples one replicate of twenty. Laplace and emcee of "
-        f"each case are in {table}.",
+        "intervals, with the standard error over replicates. Emcee samples one replicate of twenty. Laplace and emcee "
+        f"of each case are in {table}.",
     )
     _add_chi_square(document, cases)
     write_study(document, summary, file, origin)
