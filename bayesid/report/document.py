@@ -257,8 +257,8 @@ class Document:
 
 
 def literal(text: str) -> str:
-    """Return plain text as a string literal of Typst."""
-    clean = text.encode("utf-8", "replace").decode("utf-8")
+    """Return plain text as a string literal of Typst, with no line broken between a number and its per cent sign."""
+    clean = re.sub(r"(?<=\d) (?=%)", "\u00a0", text.encode("utf-8", "replace").decode("utf-8"))
     escaped = clean.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     return '"' + re.sub(r"[\x00-\x09\x0b-\x1f\x7f]", " ", escaped) + '"'
 

@@ -21,6 +21,9 @@ ROOT = Path(__file__).resolve().parents[2]
 COUNTS = ("starts", "searches", "repeats", "flights", "ships")
 """Options of single studies that say how much is repeated."""
 
+KEPT = "Trials were kept from former runs, and what they took is the time of the machines that made them"
+"""What a report says that only sets trials anew that were made before."""
+
 MODELS = ROOT / "bayesid" / "robot" / "models"
 """Folder of the robots that are shipped."""
 
@@ -43,7 +46,11 @@ def study_origin(name: str, options: argparse.Namespace, inputs: Sequence[Path] 
     words += [] if seed is None else ["--seed", str(seed)]
     counts = {key: getattr(options, key, None) for key in COUNTS}
     words += [word for key, count in counts.items() if count is not None for word in (f"--{key}", str(count))]
-    return f"{datetime.now(UTC):%Y-%m-%d}, commit {commit()}, {processor()}. {origin_text(inputs, words, seed)}"
+    now = f"{datetime.now(UTC):%Y-%m-%d}, commit {commit()}, {processor()}. "
+    if not getattr(options, "made", False):
+        return now + origin_text(inputs, words, seed)
+    kept = [*inputs, *(file for file in [options.trials] if file not in inputs)]
+    return f"{now}{origin_text(kept, words, seed)}. {KEPT}"
 
 
 def commit() -> str:
