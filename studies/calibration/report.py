@@ -88,8 +88,9 @@ def _emcee_goal(cases: Sequence[Replicates]) -> Goal:
         return Goal(text, "none made", Verdict.NOT_TESTED)
     least = min(holm(p_values).values())
     verdict = Verdict.FAIL if least <= FAMILYWISE else Verdict.OPEN  # so few replicates show gross errors alone
-    made = sum(len(item.bodies(Method.EMCEE)) for item in cases if item.case in ARMS)
-    return Goal(text, f"{made} made; smallest corrected p {format_p_value(least)}", verdict)
+    made = {item.case: len(item.bodies(Method.EMCEE)) for item in cases if item.case in ARMS}
+    counts = ", ".join(f"{count or 'none'} of {case}" for case, count in made.items())
+    return Goal(text, f"{counts}; smallest corrected p {format_p_value(least)}", verdict)
 
 
 def corrected_p_values(cases: Sequence[Replicates]) -> dict[tuple[Case, str], float]:
@@ -132,8 +133,8 @@ def write_report(cases: Sequence[Replicates], file: Path, origin: str | None = N
         header,
         weighed,
         "Percentage of the true mass, centre of mass and inertia of all identified bodies within the stated central "
-        "intervals, with the standard error over replicates. Emcee samples one replicate of twenty. Laplace and emcee "
-        f"of each case are in {table}.",
+        "intervals, with the standard error over replicates. Emcee samples one replicate of twenty, and none of the "
+        f"whole system. Laplace and emcee of each case are in {table}.",
     )
     _add_chi_square(document, cases)
     write_study(document, summary, file, origin)
