@@ -306,6 +306,17 @@ def test_no_posture_takes_a_body_beyond_the_stated_inertia(name):
         assert found.max() > 0.2 * inertia
 
 
+def test_torques_of_a_slide_are_forces():
+    model = with_torque(Model(Robot.from_string(BRANCHED.read_text()), SENSORS, ()))
+    for name, units in (("joint-friction", ("N", "N s/m")), ("torque-bias", ("N",))):
+        effect = create(f"{name}:slide").attach(model.robot)
+        assert tuple(item.unit for item in effect.parameters) == units
+        assert tuple(bound.unit for bound in effect.physical_bounds(model)) == units
+        assert effect.attach(model.robot).parameters == effect.parameters
+        hinge = create(f"{name}:{model.robot.joints[0].name}").attach(model.robot)
+        assert hinge.parameters[0].unit == "N m"
+
+
 def test_a_slide_is_extended_to_its_limit():
     short, long = (Robot.from_string(BRANCHED.read_text().replace('upper="1"', f'upper="{x}"')) for x in (1, 5))
     slide = short.joint_index("slide")

@@ -96,6 +96,15 @@ def test_a_rate_differenced_from_the_attitude_is_noticed(model: Model, recording
     assert not check(model, recording).rate_is_differenced
 
 
+def test_a_stuck_axis_and_a_sensor_that_is_not_declared_are_noticed(model: Model, recording: Recording) -> None:
+    alone = replace(model, sensors=model.sensors[:1])
+    warnings = check(alone, changed(recording, rate__z=np.full(len(TIME), 2e-4))).warnings
+    assert "Column rate.z never changes: it is stuck." in warnings
+    assert "accel is recorded, but not declared under [sensors]: it is not used." in warnings
+    assert "attitude is recorded, but not declared under [sensors]: it is not used." in warnings
+    assert not any("position" in warning or "time" in warning.split(".")[0] for warning in warnings)
+
+
 def test_paths_of_the_repository_hold_no_measurements() -> None:
     """The measured throws may not be redistributed."""
     root = Path(__file__).parents[1]

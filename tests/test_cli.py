@@ -74,6 +74,9 @@ def test_identify_writes_what_the_contract_names(study: Path, tmp_path: Path) ->
     data = az.from_netcdf(tmp_path / "posterior.nc")
     assert {"posterior", "log_likelihood", "posterior_predictive", "observed_data"} <= set(data.groups())
     assert data.posterior["base_link.mass"].attrs["unit"] == "kg"
+    assert data.posterior["inertial"].attrs["frame"] == "link axes, about the origin of the link"
+    assert data.posterior["initial-rate"].attrs["frame"] == "base axes"
+    assert "frame" not in data.posterior["z"].attrs
     report = PdfText.read(tmp_path / "report.pdf")
     assert "Servicer" in report
     for key, unit in (("mass", "kg"), ("com", "m"), ("inertia", "kg m²")):
@@ -194,7 +197,22 @@ BAD = {
     "unknown effect": (
         "study",
         lambda text: text.replace("gravity-gradient", "gravity-gradiant"),
-        ["gravity-gradiant", "gravity-gradient"],
+        ["model.effects #", "gravity-gradiant", "Did you mean 'gravity-gradient'?"],
+    ),
+    "a verdict that is no effect": (
+        "study",
+        lambda text: text.replace('"gravity-gradient"', '"gravity-gradient", "rate-noise"'),
+        ["model.effects #2", "rate-noise", "Give a larger sensors.rate.sigma"],
+    ),
+    "effect without what it needs": (
+        "study",
+        lambda text: text.replace('"gravity-gradient"', '"gravity-gradient", "attitude-misalignment"'),
+        ["attitude-misalignment", "cannot act without [sensors.attitude]"],
+    ),
+    "position in millimetres": (
+        "study",
+        lambda text: re.sub(r"position = .*", "position = [72.0, -15.1, -37.2]", text),
+        ["sensors.accel.position", "82.44 m", "Give it in metres"],
     ),
     "unknown body": (
         "study",
@@ -214,6 +232,25 @@ BAD = {
     ),
     "not XML": ("robot", lambda text: text[:-20], ["XML"]),
 }
+
+
+@pytest.mark.parametrize("option", [("--seed", "-1"), ("--samples", "0")])
+def test_options_out_of_range_are_refused_at_once(option: tuple[str, str], study: Path, tmp_path: Path) -> None:
+    status, text = run("identify", study, "--output", tmp_path / "out", *option)
+    assert status == 2, text
+    assert option[0] in text
+    assert not (tmp_path / "out").exists()
+
+
+def test_one_recording_under_two_names_does_not_count_twice(study: Path, tmp_path: Path) -> None:
+    file = copy(study, tmp_path)
+    first = recording_of(tmp_path)
+    first.with_name("again.csv").write_bytes(first.read_bytes())
+    section = re.compile(r"\[\[recordings\]\].*?(?=\n\[)", re.DOTALL)
+    edit(file, lambda text: section.sub(lambda own: f"{own[0]}\n{own[0].replace(first.name, 'again.csv')}", text))
+    status, text = run("identify", file, "--output", tmp_path / "out")
+    assert status == 2, text
+    assert "recordings #2.file: 'again.csv' holds the same as" in text
 
 
 @pytest.mark.parametrize("kind", BAD)

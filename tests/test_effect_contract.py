@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from bayesid._io.errors import InputError
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.joint_state import JointState
@@ -278,6 +279,17 @@ def check_places(effect: Effect, hook: str) -> None:
         assert (WITH_TORQUE if place.uses("friction") else PLAIN).extend(place).effects[-1].label == place.label
 
 
+def check_lacks(effect: Effect, hook: str) -> None:
+    """A model without orbit and without the sensor lacks what it says, so that the effect occurs nowhere in it."""
+    others = tuple(sensor for sensor in SENSORS if sensor.kind != getattr(effect, "sensor", None))
+    poor, kind = Model(ROBOT, others, UNKNOWN), type(effect)
+    assert kind.lacks(PLAIN) is None
+    assert kind.lacks(poor)
+    assert not kind.instances(poor)
+    with pytest.raises(InputError, match=re.escape(f"cannot act without {kind.lacks(poor)}")):
+        poor.extend(effect)
+
+
 def check_starts(effect: Effect, hook: str) -> None:
     for start in effect.starts:
         assert start.shape == (len(effect.parameters),)
@@ -438,6 +450,7 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "states": check_count,
     "modes_count": check_count,
     "instances": check_places,
+    "lacks": check_lacks,
     "longest_step": check_step,
     "quantities": check_quantities,
     "amplitude_quantities": check_amplitude_quantities,

@@ -18,11 +18,37 @@ from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import Effect, Parameter, Wrench, create, register
 from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Kind, Sensor, White
 from studies.truth import mujoco as mj
 from studies.truth import stepwise as ref
 
 PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf"
+
+
+@pytest.mark.parametrize(
+    ("name", "orbit", "lacking"),
+    [
+        ("gravity-gradient", None, r"\[orbit\]"),
+        ("solar-pressure", Orbit(6.9e6), r"sun in \[orbit\]"),
+        ("magnetic-dipole", Orbit(6.9e6), r"inclination in \[orbit\]"),
+        ("accel-bias", Orbit(6.9e6), r"\[sensors.accel\]"),
+        ("attitude-misalignment", Orbit(6.9e6), r"\[sensors.attitude\]"),
+    ],
+)
+def test_a_model_refuses_an_effect_that_could_not_act(name: str, orbit: Orbit | None, lacking: str):
+    robot = Robot.shipped("planar")
+    with pytest.raises(InputError, match=f"{name}' cannot act without {lacking}"):
+        Model(robot, (Sensor(Kind.RATE, White(1e-5)),), (), orbit, (create(name),))
+
+
+def test_a_stated_place_of_a_tank_is_kept_and_the_usual_one_is_the_spacecraft():
+    robot = Robot.shipped("ets7")
+    usual, stated = create("fuel-slosh").attach(robot), create("fuel-slosh", reach=0.05).attach(robot)
+    assert all(item.sigma > 0.3 for item in usual.parameters[3:])
+    assert [item.sigma for item in stated.parameters[3:]] == [0.05] * 3
+    assert [item.mean for item in stated.parameters[3:]] == [item.mean for item in usual.parameters[3:]]
+    assert stated.attach(robot).parameters == stated.parameters
 
 
 def test_the_register():

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy import stats
 
 from bayesid.diagnosis.cause_power import cause_power
 from bayesid.diagnosis.evidence_alarm import EvidenceAlarm, NullTail
+from bayesid.diagnosis.family_alarm import FamilyAlarm
 from bayesid.diagnosis.gram import Gram
 from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.set_evidence import SetEvidence
@@ -135,3 +139,11 @@ def test_what_cannot_be_seen_has_no_power():
     evidence = SetEvidence(gram, [CandidateCause("b", (AmplitudeGroup("b", 1e-5),)), *candidates()[2:]])
     assert evidence.invisible == ("b",)
     assert cause_power("b", evidence, EvidenceAlarm.of(evidence, rng), rng) == 0.0
+
+
+def test_candidates_and_noise_share_the_level_of_the_family():
+    """A candidate whose p-value is at the level of the candidates is at that of the family."""
+    alarm = FamilyAlarm(SimpleNamespace(log_p_value=0.0), {})
+    at = replace(alarm, candidates=SimpleNamespace(log_p_value=np.log(alarm.candidates_level)))
+    assert at.p_value == pytest.approx(alarm.level, rel=1e-12)
+    assert alarm.candidates_level == pytest.approx(0.5 * alarm.level, rel=0.01)

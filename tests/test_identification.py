@@ -10,9 +10,11 @@ import pytest
 from scipy.stats import chi2
 
 import bayesid
+from bayesid import BodyPrior, Excitation, Kind, Manoeuvre, Model, Posterior, Robot, Sensor, White
 from bayesid.inference import maximise
 from bayesid.inference.body_quantities import bodies_of
 from bayesid.inference.predicted_readings import integration_error_at
+from bayesid.inference.simulated_recordings import simulate_manoeuvre
 from studies.truth.mujoco import Hidden, Manoeuvres, Rotor, Sensors, Thrust, write_study
 from studies.truth.urdf import BRANCHED, SERVICER4
 
@@ -90,6 +92,21 @@ def test_truth_lies_inside_the_posterior_and_noise_is_all_that_is_left(name: str
     miss = truth - body.mean(axis=0)
     assert miss @ np.linalg.solve(np.cov(body.T), miss) < chi2.ppf(0.9999, 10)
     assert integration_error_at(posterior, optimum.z) < 0.01
+
+
+def test_the_error_of_an_integrated_attitude_is_its_angle_however_the_base_is_turned() -> None:
+    robot, time = Robot.shipped("planar"), np.arange(0.0, 40.01, 0.5)
+    body = BodyPrior("base_link", robot.link("base_link").inertial, 1.0)
+    model = Model(robot, (Sensor(Kind.ATTITUDE, White(1e-5)),), (body,))
+    motion = Excitation([0.3, -0.5], [0.4, 0.6], 2.0 * np.pi / 12.0, periods=3)
+    recording = simulate_manoeuvre(model, motion, time)
+    errors = []
+    for attitude in ((0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 1.0, 0.0), (0.5, 0.5, 0.5, 0.5)):
+        manoeuvre = Manoeuvre(recording, motion, attitude=np.array(attitude))
+        posterior = Posterior.of(model, [manoeuvre], step=2.0)
+        errors.append(integration_error_at(posterior, posterior.starting_point()))
+    assert errors[0] > 1e-3
+    np.testing.assert_allclose(errors, errors[0], rtol=1e-4)
 
 
 @pytest.mark.slow

@@ -59,6 +59,8 @@ def test_check_passes_on_a_drafted_study_at_once(flown, tmp_path, slow):
     drafted(copied(flown, tmp_path), study)
     status, output = run("check", study, "--output", tmp_path / "check")
     assert status == 0, output
+    marks = study.read_text(encoding="utf-8").count("# please check")
+    assert f"{marks} places are still marked `# please check`" in " ".join(output.split())
     assert (tmp_path / "check" / "check.json").is_file()
 
 

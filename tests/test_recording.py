@@ -139,7 +139,18 @@ WRONG_CSV = {
     "misspelt joint": (csv_text("time,postion.Arm"), ["unknown column 'postion.Arm'", "Did you mean 'position.Arm'?"]),
     "reversed joint": (csv_text("time,j1.velocity"), ["unknown column 'j1.velocity'", "Did you mean 'velocity.j1'?"]),
     "no joint": (csv_text("time,velocity."), ["unknown column 'velocity.'", "velocity.<joint>"]),
-    "unlike anything": (csv_text("time,comment"), ["unknown column 'comment'", "Known columns: time", "rate.x|y|z"]),
+    "unlike anything": (
+        csv_text("time,comment"),
+        ["unknown column 'comment'", "Remove or rename", "rate.x|y|z"],
+    ),
+    "row of units": (
+        csv_text(line2="s,rad,rad/s,rad/s,rad/s"),
+        ["line 2", "'s' is not a", "row of units"],
+    ),
+    "decimal comma": (
+        csv_text(line3='0.5,0,"0,01",0,0'),
+        ["line 3", "'0,01' is not", "a decimal point"],
+    ),
     "semicolons": (csv_text("time;position.j1"), ["unknown column", "Separate the columns by commas"]),
     "axis missing": (csv_text("time,accel.x,accel.z"), ["'accel.y' is missing", "accel.x, accel.y, accel.z"]),
     "w missing": (csv_text("time,attitude.x,attitude.y,attitude.z"), ["column 'attitude.w' is missing"]),

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import bayesid.diagnosis
+from bayesid._io.errors import InputError
 from bayesid.app.diagnose_command import diagnose_study
 from bayesid.app.schema import Study
 from bayesid.diagnosis import (
@@ -495,6 +496,13 @@ def test_the_reconstructed_wrench_is_drawn_with_its_uncertainty(disturbance):
     assert spectrum.get_xlabel() == "frequency [Hz]"
 
 
+def test_a_force_that_nothing_sees_is_not_drawn(disturbance):
+    blank = {frame: [np.full_like(value, np.nan) for value in values] for frame, values in disturbance.force.items()}
+    drawn = figures.wrench_histories(replace(disturbance, force=blank), Frame.BASE)
+    assert [axes.get_title()[:6] for axes in drawn.axes] == ["torque"] * 3
+    assert [axes.get_xlabel() for axes in drawn.axes] == ["time [s]"] * 3
+
+
 def test_the_table_of_the_gain_compares_before_and_after(biased):
     before, after = biased.gain.before, biased.gain.after
     rows = {row[0]: row[1:] for row in tables.gain_rows(biased)}
@@ -758,6 +766,19 @@ def printed(biased, clean, disturbance, readings, tmp_path_factory):
         patch.setattr(limits, "integration_error_at", lambda posterior, z: 1e-3)
         patch.setattr(appendix, "sensor_fits", lambda posterior, z: readings)
         yield read
+
+
+def test_a_report_is_written_where_the_extended_model_cannot_be_simulated(biased, tmp_path, monkeypatch):
+    def refuse(after):
+        raise InputError("the simulation gives no finite readings")
+
+    result = judged(biased, Status.EXPLAINED)
+    monkeypatch.setattr(import_module("bayesid.diagnosis.diagnosis_run"), "extended_posterior", refuse)
+    diagnosis_report(result, None, "Lost motion", tmp_path / "report.pdf")
+    text = PdfText.read(tmp_path / "report.pdf")
+    assert "neither simulated in full nor sampled: the simulation gives no finite readings." in text
+    assert "Measured and simulated" not in text
+    assert "Consequences" in text
 
 
 SECTIONS = {

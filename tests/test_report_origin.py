@@ -14,13 +14,21 @@ def test_the_origin_names_every_file_with_its_hash(tmp_path):
     study, urdf, *recordings = files
     made = SimpleNamespace(
         file=study,
-        robot=SimpleNamespace(urdf=urdf),
+        defining_files=[study, urdf, None],  # no earlier posterior
         recordings=[SimpleNamespace(file=file) for file in recordings],
     )
     hashes = [f"{file.name} {hashlib.sha256(file.name.encode()).hexdigest()[:12]}" for file in files]
     said = f"bayesid {version('bayesid')}, seed 7, command: bayesid diagnose"
-    options = ["--output", "my results"]
+    options = {
+        "output": tmp_path / "my results",
+        "samples": 2000.0,
+        "wanted": None,
+        "wanted-sd": ["a=1", "b=2"],
+        "fly-next": False,
+        "sample": True,
+    }
+    typed = "--output 'my results' --samples 2000 --wanted-sd a=1 --wanted-sd b=2 --no-fly-next --sample"
     found = report_origin(made, "diagnose", 7, options)
-    assert found == f"SHA-256: {', '.join(hashes)}. {said} study.toml --seed 7 --output 'my results'"
-    made.file = None
-    assert report_origin(made, "diagnose", 7) == f"SHA-256: {', '.join(hashes[1:])}. {said} --seed 7"
+    assert found == f"SHA-256: {', '.join(hashes)}. {said} study.toml --seed 7 {typed}"
+    made.file, made.defining_files = None, [None, urdf]
+    assert report_origin(made, "diagnose", 7, {}) == f"SHA-256: {', '.join(hashes[1:])}. {said} --seed 7"

@@ -457,6 +457,13 @@ def test_the_first_of_several_errors_counts_the_others(tmp_path):
         Study.load(write(tmp_path, text))
 
 
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
+    text = SHORTEST
+    marked = tmp_path / "marked.toml"
+    marked.write_text(text, encoding="utf-8-sig")
+    assert Study.load(marked).model_dump() == Study.load(write(tmp_path, text)).model_dump() | {"title": "marked"}
+
+
 def test_an_absent_and_a_binary_file(tmp_path):
     with pytest.raises(InputError, match=r"absent.toml: there is no such file. Give the path of a study"):
         Study.load(tmp_path / "absent.toml")

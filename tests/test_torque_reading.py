@@ -17,7 +17,7 @@ from bayesid.diagnosis.present_fit import fit_present_model
 from bayesid.diagnosis.probable_verdict import ProbableVerdict
 from bayesid.diagnosis.torque_reading import TorqueReading, Unread, read_torques, torques_beside
 from bayesid.inference.posterior import Posterior
-from bayesid.simulation.effects import JointFriction, WheelMomentum
+from bayesid.simulation.effects import JointFriction, TorqueBias, WheelMomentum
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from studies.truth import mujoco as mj
@@ -111,11 +111,22 @@ def test_friction_that_the_study_knows_is_not_found_again(flown, friction):
     assert "joint-friction:joint2" not in {cause.name for cause in found.causes}
 
 
-def test_torques_are_not_read_beside_an_unknown_motion(flown):
+@pytest.mark.usefixtures("slow")  # another model is compiled
+def test_torques_are_read_where_the_study_knows_every_candidate(flown, friction):
+    model, manoeuvres = flown(10, friction)
+    known = [kind(joint) for joint in ("joint1", "joint2") for kind in (JointFriction, TorqueBias)]
+    found = read((replace(model, effects=(*model.effects, *known)), manoeuvres))
+    assert found.verdict.status is Status.ADEQUATE
+
+
+@pytest.mark.parametrize(
+    "verdict",
+    [ProbableVerdict(Status.UNKNOWN), ProbableVerdict(Status.AMBIGUOUS, ("rate-bias",), {}, (("unknown",),))],
+    ids=["unknown", "or unknown"],
+)
+def test_torques_are_not_read_beside_a_motion_that_may_hold_something_without_a_name(flown, verdict):
     case = flown(11)
-    found = torques_beside(
-        ProbableVerdict(Status.UNKNOWN), fitted(case), case[0], CausePrior(), np.random.default_rng(0)
-    )
+    found = torques_beside(verdict, fitted(case), case[0], CausePrior(), np.random.default_rng(0))
     assert isinstance(found, Unread)
     assert "no name" in found.reason
 

@@ -21,6 +21,7 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
     study = Study.load(file)
 
     from bayesid._io.files import complete_folder, write_json
+    from bayesid.app.study_draft import open_places
     from bayesid.app.study_to_model import load_posterior
     from bayesid.inference.recording_check import check_recording
     from bayesid.inference.wrong_units import refuse_wrong_units
@@ -30,6 +31,7 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
     refuse_wrong_units(posterior)
     count = len(posterior.manoeuvres)
     yield f"{study.title}: {count} recordings, {posterior.samples} samples, {posterior.size} unknowns."
+    yield from open_places(study)
     checks = [check_recording(posterior, index) for index in range(count)]
     with complete_folder(output) as folder:
         write_json(

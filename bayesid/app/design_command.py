@@ -44,7 +44,7 @@ def run(
     from bayesid._io.store import content_key
     from bayesid._io.words import counted
     from bayesid.app.fly_next import write_motion
-    from bayesid.app.study_to_design import defining_files, load_problem, separating
+    from bayesid.app.study_to_design import load_problem, separating
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
     from bayesid.design import THOROUGH, Search, Store, best_design, design
     from bayesid.report import design_report
@@ -63,7 +63,7 @@ def run(
         yield f"The study gives no sensors.encoder.sigma of {', '.join(assumed)}: {ASSUMED:g} rad or m is assumed."
     progress(0.0, "compiling")
     effort = replace(THOROUGH if thorough else Search(), starts=starts, iterations=iterations)
-    key = content_key(bayesid.__version__, *defining_files(study), seed, effort, *(separate or ()))
+    key = content_key(bayesid.__version__, *study.defining_files, seed, effort, *(separate or ()))
     with claimed_folder(output):
         store = Store.open(output / "search.json", key)
         try:

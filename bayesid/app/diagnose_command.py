@@ -73,10 +73,12 @@ def diagnose_study(
         Sentences to show.
     """
     from bayesid._io.files import claimed_folder
+    from bayesid.app.study_draft import open_places
     from bayesid.app.study_to_model import load_manoeuvres, load_model
 
     model = load_model(study)
     manoeuvres = load_manoeuvres(study, model.robot)
+    yield from open_places(study)
     with claimed_folder(output):
         yield from _written(study, model, manoeuvres, output, seed, effective_samples, progress, keep, plan)
     yield f"Wrote {output / 'report.pdf'}."
@@ -154,8 +156,8 @@ def _written(
             write_motion(designed, folder / FILE)
         if identification is not None:
             write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
-        asked = ["--no-sample"] if effective_samples is None else ["--samples", f"{effective_samples:g}"]
-        origin = report_origin(study, "diagnose", seed, ["--output", output.name, *asked])
+        asked = {"sample": False} if effective_samples is None else {"samples": effective_samples}
+        origin = report_origin(study, "diagnose", seed, {"output": output, **asked, "fly-next": plan})
         record = record_sentence(result.verdict.status)
         said = {"record": record, "advice": advice, "origin": origin}
         diagnosis_report(result, identification, study.title, folder / "report.pdf", **said)

@@ -21,7 +21,7 @@ def run(
     output: Output,
     progress: Progress,
     seed: Seed = 0,
-    samples: Annotated[float, typer.Option(help="Number of effective samples where emcee is needed.")] = 500.0,
+    samples: Annotated[float, typer.Option(min=1.0, help="Number of effective samples where emcee is needed.")] = 500.0,
     profiles: Annotated[int, typer.Option(min=0, help="Largest number of parameters to profile.")] = 6,
 ) -> Iterator[str]:
     """Determine what manoeuvres and sensors tell of the bodies, and what would tell more: identifiability.json."""

@@ -18,7 +18,7 @@ __all__ = ["run"]
 def run(
     file: StudyFile, output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4000.0
 ) -> Iterator[str]:
-    """Identify the unknown bodies: identification.json, posterior.nc and report.pdf."""
+    """Identify the unknown bodies, by the posterior of their inertial parameters."""
     from bayesid.app.schema import Study
 
     study = Study.load(file)
@@ -27,6 +27,7 @@ def run(
 
     from bayesid._io.files import claimed_folder, complete_folder, write_json
     from bayesid._io.phase_clock import PhaseClock
+    from bayesid.app.study_draft import open_places
     from bayesid.app.study_to_model import load_posterior
     from bayesid.inference import identify
     from bayesid.inference.identified_robot import write_identified
@@ -40,6 +41,7 @@ def run(
     if not posterior.size:
         raise InputError("nothing is unknown", file=file, place="unknowns.bodies", remedy="Name a body to identify")
     yield f"{study.title}: {posterior.samples} samples, {posterior.size} unknowns, step {posterior.step:g} s."
+    yield from open_places(study)
     clock.ends("load")
     with claimed_folder(output):
         progress(0.0, "fitting")

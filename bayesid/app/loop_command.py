@@ -22,7 +22,10 @@ def run(
     seed: Seed = 0,
     samples: Samples = 2000.0,
     spacecraft: Annotated[
-        Path | None, typer.Option(help="Python file that executes plans; without it, put the recordings into DIR.")
+        Path | None,
+        typer.Option(
+            help="Python file that executes plans; without it, put step-N-recording.csv into the output folder."
+        ),
     ] = None,
     wanted: Annotated[
         float | None, typer.Option(help="Relative sd of mass and principal moments; 0.01 if nothing else is wanted.")
@@ -48,7 +51,7 @@ def run(
     study = Study.load(file)
 
     from bayesid._io.files import claimed_folder
-    from bayesid.app.report_origin import report_origin
+    from bayesid.app.report_origin import Option, report_origin
     from bayesid.app.study_to_causes import loop_review
     from bayesid.app.study_to_design import load_loop_problem
     from bayesid.app.study_to_encoders import encoder_noise
@@ -74,8 +77,17 @@ def run(
         history = loop.run(executing, output, progress)
         written = any("identification" in step for step in history.steps)
         if written:
-            options = ["--output", output.name, "--at-most", str(at_most)]
-            options += [] if spacecraft is None else ["--spacecraft", spacecraft.name]
+            options: dict[str, Option] = {
+                "output": output,
+                "samples": samples,
+                "spacecraft": spacecraft,
+                "wanted": wanted,
+                "wanted-sd": wanted_sd,
+                "wanted-tip": wanted_tip,
+                "wanted-cause": wanted_cause,
+                "at-most": at_most,
+                "diagnose": diagnose,
+            }
             origin = report_origin(study, "loop", seed, options)
             loop_report(history, study.title, output / "report.pdf", origin=origin)
     yield from loop_sentences(history)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
@@ -12,11 +12,14 @@ from bayesid.app.schema import Study
 
 __all__ = ["origin_text", "report_origin"]
 
+Option = bool | str | float | Path | list[str] | None
+"""Value of an option of a command."""
+
 DIGITS = 12
 """Digits of a hash that are printed."""
 
 
-def report_origin(study: Study, command: str, seed: int, options: Sequence[str] = ()) -> str:
+def report_origin(study: Study, command: str, seed: int, options: Mapping[str, Option]) -> str:
     """Return the files of a study with the beginnings of their SHA-256, the version, the seed and the whole command.
 
     Parameters
@@ -25,14 +28,30 @@ def report_origin(study: Study, command: str, seed: int, options: Sequence[str] 
     command : str
         Name of the command.
     seed : int
-    options : sequence of str
-        Further words of the command.
+    options : mapping of str to object
+        Further options of the command with their values: whether a switch is on, or what is given, one or several;
+        None for what is not given.
     """
-    files = [study.robot.urdf, *(recording.file for recording in study.recordings)]
-    if study.file is not None:
-        files.insert(0, study.file)
+    files = [*study.defining_files, *(recording.file for recording in study.recordings)]
     place = [] if study.file is None else [study.file.name]
-    return origin_text(files, ["bayesid", command, *place, "--seed", str(seed), *options], seed)
+    words = ["bayesid", command, *place, "--seed", str(seed), *_words(options)]
+    return origin_text([file for file in files if file is not None], words, seed)
+
+
+def _words(options: Mapping[str, Option]) -> list[str]:
+    """Return options as they are typed."""
+    words = []
+    for name, value in options.items():
+        if isinstance(value, bool):
+            words.append(f"--{'' if value else 'no-'}{name}")
+        else:
+            several = value if isinstance(value, list) else [] if value is None else [value]
+            words += [word for item in several for word in (f"--{name}", _typed(item))]
+    return words
+
+
+def _typed(value: str | float | Path) -> str:
+    return value.name if isinstance(value, Path) else f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def origin_text(files: Sequence[Path], words: Sequence[str], seed: int | None) -> str:

@@ -11,12 +11,13 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid.app.noise_estimates import channel_noise, vector_noise
+from bayesid.app.schema import Study
 from bayesid.recording.joint_motion import check_joints
 from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Joint, Robot
 
-__all__ = ["CHECK", "draft_study"]
+__all__ = ["CHECK", "draft_study", "open_places"]
 
 CHECK = "# please check"
 """Mark of every value that recordings cannot tell."""
@@ -72,6 +73,16 @@ def draft_study(robot: Robot, urdf: Path, recordings: Sequence[Recording], folde
         MODEL,
     ]
     return "\n".join(section for section in sections if section)
+
+
+def open_places(study: Study) -> list[str]:
+    """Return a sentence on how many places of a study are still as drafted, or none."""
+    text = "" if study.file is None else study.file.read_text(encoding="utf-8-sig")
+    count = text.count(CHECK)
+    if count == 0:
+        return []
+    places = "1 place is" if count == 1 else f"{count} places are"
+    return [f"{places} still marked `{CHECK}` in {study.file}: what is drafted there is a guess."]
 
 
 def _line(content: str, note: str = "") -> str:

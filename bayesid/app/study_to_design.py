@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -36,7 +35,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import create
 from bayesid.simulation.model import Model
 
-__all__ = ["defining_files", "load_loop_problem", "load_problem", "separating"]
+__all__ = ["load_loop_problem", "load_problem", "separating"]
 
 SAMPLES = 120
 """Largest number of samples that are simulated; in longer manoeuvres each of them stands for several."""
@@ -129,11 +128,6 @@ def separating(study: Study, rivals: tuple[str, str]) -> Study:
     section = study.design or DesignSection()
     chosen = section.model_copy(update={"criteria": (Separation.name,), "rivals": rivals})
     return study.model_copy(update={"design": chosen})
-
-
-def defining_files(study: Study) -> list[Path | None]:
-    """Return all files that define the problem of a study, None for those that it does not name."""
-    return [study.file, study.robot.urdf, study.unknowns.posterior, *study.model.plugins]
 
 
 def _with_rivals(model: Model, section: DesignSection) -> Model:

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._io.store import file_key
 from bayesid.app.named_joints import named_joint
 from bayesid.app.schema import OtherSensor, RecordingSection, Study
 from bayesid.app.study_to_encoders import encoder_noise
 from bayesid.app.user_files import run_user_file
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
+from bayesid.recording.channel_families import JOINT_FAMILIES
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
+from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.effects import AccelBias, Effect, RateBias, create, known_effects
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
@@ -29,6 +32,9 @@ from bayesid.simulation.sensors import Filter, Kind, Sensor, White
 
 __all__ = ["load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
 
+
+FARTHEST = 10.0
+"""Distance of a sensor from the base's origin, in radii of the base, beyond which its unit must be wrong."""
 
 CHANGE_SEED = 0
 """Seed of the draws of an uncertain mass-property change, so that a study always has the same prior."""
@@ -112,11 +118,25 @@ def load_model(study: Study) -> Model:
             mixing=mixing,
             torque=_torque(study, robot),
         )
+        _check_levers(model)
         for effect in model.effects:
             check_own_effect(effect, robot, model.sensors)
     except InputError as error:
         raise error.within(file=study.file) from None
     return model
+
+
+def _check_levers(model: Model) -> None:
+    """Raise if a sensor lies so far from the base that its position is hardly in metres."""
+    radius = RobotSize.of(model.robot).radius
+    for sensor in model.sensors:
+        distance = float(np.linalg.norm(sensor.position))
+        if distance > FARTHEST * max(radius, 1.0):
+            raise InputError(
+                f"the sensor lies {distance:.4g} m from the base's origin, whose radius is {radius:.3g} m",
+                place=f"sensors.{sensor.kind.value}.position",
+                remedy="Give it in metres, in base axes",
+            )
 
 
 def _priors(study: Study, robot: Robot, carried: JointPrior | None) -> tuple[tuple[BodyPrior, ...], Mixing | None]:
@@ -135,7 +155,24 @@ def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:
     if not study.recordings:
         raise InputError("no [[recordings]]", file=study.file, remedy="Name at least one recording")
     _check_latitudes(study)
-    return [load_manoeuvre(study, section, robot) for section in study.recordings]
+    manoeuvres = [load_manoeuvre(study, section, robot) for section in study.recordings]
+    _refuse_copies(study, manoeuvres)
+    return manoeuvres
+
+
+def _refuse_copies(study: Study, manoeuvres: Sequence[Manoeuvre]) -> None:
+    """Raise if two files hold the same readings of sensors; plans to simulate hold joint motion alone."""
+    seen: dict[str, Path] = {}
+    for number, (section, manoeuvre) in enumerate(zip(study.recordings, manoeuvres, strict=True), start=1):
+        if {name.partition(".")[0] for name in manoeuvre.recording.channels} <= {"time", *JOINT_FAMILIES}:
+            continue
+        if (same := seen.setdefault(file_key(section.file), section.file)) != section.file:
+            raise InputError(
+                f"'{section.file.name}' holds the same as '{same.name}'",
+                file=study.file,
+                place=f"recordings #{number}.file",
+                remedy="Remove one: the same data would count twice",
+            )
 
 
 def _check_latitudes(study: Study) -> None:
@@ -228,6 +265,20 @@ def _torque(study: Study, robot: Robot) -> TorqueSensor | None:
     return TorqueSensor(tuple(sigma), tuple(sigma.values()))
 
 
+def _effect(label: str, place: str) -> Effect:
+    """Return the effect of a label; a verdict may also name what a study states elsewhere."""
+    name, _, sensor = label.partition(":")
+    if name == "initial-rate":
+        raise InputError(f"{label!r} is no effect", place=place, remedy='Set initial_rate = "unknown" in its place')
+    if name in ("outliers", "quantisation") or name.endswith("-noise"):
+        key = f"sensors.{sensor or name.removesuffix('-noise')}.sigma"
+        raise InputError(f"{label!r} is a fault of the noise", place=place, remedy=f"Give a larger {key} in its place")
+    try:
+        return create(label)
+    except InputError as error:
+        raise error.within(place=place) from None
+
+
 def _effects(study: Study) -> tuple[Effect, ...]:
     # a sensor with a bias_sigma in the study has a bias in the model, whether the effects name it or not
     biases: dict[str, Effect] = {
@@ -235,7 +286,10 @@ def _effects(study: Study) -> tuple[Effect, ...]:
         for section, kind in ((study.sensors.rate, RateBias), (study.sensors.accel, AccelBias))
         if section is not None and section.bias_sigma is not None
     }
-    effects = [biases.pop(label) if label in biases else create(label) for label in study.model.effects]
+    effects = [
+        biases.pop(label) if label in biases else _effect(label, f"model.effects #{number}")
+        for number, label in enumerate(study.model.effects, start=1)
+    ]
     effects += biases.values()
     known = [effect.label for effect in effects]
     for label in study.model.priors:

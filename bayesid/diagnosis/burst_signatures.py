@@ -36,6 +36,8 @@ def burst_signatures(engine: Engine, fit: Fit) -> SignatureBank:
         places: list[tuple[float, int, Integers]] = []
         for r, item in enumerate(posterior.whitenings):
             there = np.flatnonzero(item.outputs[:, columns].any(axis=1))
+            if len(there) < LENGTH:  # a burst needs as many samples as it lasts
+                continue
             energy = (whole[r, there, columns] ** 2).sum(axis=1)
             sums = np.convolve(energy, np.ones(LENGTH), "valid")
             places += [(float(value), r, there[k : k + LENGTH]) for k, value in enumerate(sums)]

@@ -96,7 +96,7 @@ def candidate_table(weighed: WeighedCauses, effects: Sequence[Effect], rng: np.r
                 amplitude.mean,
                 amplitude.sd,
                 amplitude.limit,
-                cause_power(name, evidence, alarm.candidates, rng, draws=POWER_DRAWS),
+                cause_power(name, evidence, alarm.candidates, rng, alarm.candidates_level, POWER_DRAWS),
                 cause.generic,
             )
         )

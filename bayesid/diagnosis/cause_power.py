@@ -32,7 +32,7 @@ def cause_power(
         Of the same candidates.
     rng : Generator
     level : float
-        Family-wise level of the alarm.
+        Family-wise level of the alarm among candidates.
     draws : int
         Number of draws; 2,000 are good to 0.011.
     """

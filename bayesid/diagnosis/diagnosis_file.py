@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from bayesid.diagnosis.candidate_table import Candidate
 from bayesid.diagnosis.cause_amplitudes import amplitudes_of, amplitudes_of_others
 from bayesid.diagnosis.jump_instants import jump_instants
-from bayesid.diagnosis.probable_verdict import UNKNOWN
 from bayesid.diagnosis.torque_reading import TorqueReading, Unread
 from bayesid.inference import Identification
 from bayesid.inference.body_quantities import quantity
@@ -33,7 +32,7 @@ def diagnosis_dict(result: Diagnosis, identification: Identification | None) -> 
     """
     verdict, found = result.verdict, result.probabilities
     inclusion = found.inclusion
-    fitted = {name: _fitted(result, name) for name in verdict.causes if name != UNKNOWN}
+    fitted = {name: _fitted(result, name) for name in verdict.causes}
     return {
         "status": verdict.status.value,
         "causes": [name for name in verdict.causes if name in inclusion and name in found.causes],

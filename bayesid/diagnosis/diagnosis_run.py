@@ -29,7 +29,7 @@ from bayesid.diagnosis.hypothesis_fit import fit_hypothesis
 from bayesid.diagnosis.left_over import with_left_over
 from bayesid.diagnosis.perturbed_fit import Engine
 from bayesid.diagnosis.present_fit import fit_present_model
-from bayesid.diagnosis.probable_verdict import UNKNOWN, ProbableVerdict
+from bayesid.diagnosis.probable_verdict import ProbableVerdict
 from bayesid.diagnosis.set_evidence import SetEvidence
 from bayesid.diagnosis.set_probabilities import SetProbabilities
 from bayesid.diagnosis.status import Status
@@ -228,7 +228,7 @@ def _diagnose(
     sensitivity = verdict_sensitivity(weighed.probabilities, classes, weighed.alarm.silent, weighed.widened)
     verdict = sensitivity.verdict
     clock.ends("verdict")
-    named = [name for name in verdict.causes if name != UNKNOWN]
+    named = list(verdict.causes)
     progress(0.7, "fitting the extended model")
     after = before
     if named:

@@ -49,7 +49,8 @@ class Unexplained:
     time : list of (S,) arrays
         Per recording [s].
     torque, force : dict of Frame to list of (S, 3) arrays
-        Mean, about and through the common centre of mass [N m, N].
+        Mean, about and through the common centre of mass [N m, N]; the force is not a number where no accelerometer
+        sees it.
     torque_sd, force_sd : list of (S, 3) arrays
         Base axes.
     fixed_in : Frame or None
@@ -114,7 +115,7 @@ def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: 
     amplitude[where], covariance[np.ix_(where, where)] = -root.T @ along, root.T @ root
     freedom = float(np.einsum("ij,ji->", root.T @ root, disturbance.matrix))
     snr = float(np.sqrt(max(float(along @ along) - freedom, 0.0)))
-    scale = float(disturbance.deviations[: 3 * WAVES * count].max())
+    scale = float(disturbance.deviations[: len(held)][held < 3 * WAVES * count].max())  # of the torque's cosines
 
     time, torque, force, torque_sd, force_sd = [], [], [], [], []
     for r in range(count):
@@ -135,9 +136,10 @@ def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: 
             sides.append((mean, np.sqrt(variance)))
         time.append(times[r][own])
         torque.append(sides[0][0])
-        force.append(sides[1][0])
         torque_sd.append(sides[0][1])
-        force_sd.append(sides[1][1])
+        shown = 1.0 if FORCE in names else np.nan  # without an accelerometer nothing is known of the force
+        force.append(shown * sides[1][0])
+        force_sd.append(shown * sides[1][1])
 
     def turned(series: list[Floats], frame: Frame) -> list[Floats]:
         out = []

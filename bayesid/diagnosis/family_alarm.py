@@ -41,6 +41,11 @@ class FamilyAlarm:
         return FamilyAlarm(EvidenceAlarm.of(point.evidence, rng, draws), tests)
 
     @property
+    def candidates_level(self) -> float:
+        """Level of the test of the candidates, which with that of the noise has the family-wise one."""
+        return float(-np.expm1(0.5 * np.log1p(-self.level)))
+
+    @property
     def log_p_noise(self) -> float:
         """Logarithm of the p-value of the smallest among the tests of the noise, which are taken as independent."""
         if not self.noise:

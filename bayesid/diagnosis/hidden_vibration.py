@@ -48,7 +48,7 @@ class Vibration(NamedTuple):
     com: tuple[Floats, Floats]
 
     @classmethod
-    def along(cls, node: Instant, sample: Instant, steps: Floats) -> Vibration:
+    def along(cls, node: Instant, sample: Instant) -> Vibration:
         """Prepare the forcing from a motion without vibrations."""
         times = np.asarray(node.environment.time)
         end = float(times.max())

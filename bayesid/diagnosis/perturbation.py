@@ -61,8 +61,7 @@ def operating_trajectory_of(
     posterior: Posterior, node: Instant, sample: Instant, readings: Readings
 ) -> OperatingTrajectory:
     """Collect what effects are evaluated on."""
-    steps = np.asarray(posterior.data.arrays.grid.step)
-    return OperatingTrajectory(posterior, node, sample, readings, Vibration.along(node, sample, steps))
+    return OperatingTrajectory(posterior, node, sample, readings, Vibration.along(node, sample))
 
 
 def coordinates_shape(effect: Effect, recordings: int) -> tuple[int, ...]:

@@ -76,7 +76,7 @@ class Fit:
         And in each effect's coordinates.
     cost : float
         Half of chi-square and squared coordinates.
-    situation : Situation
+    operating : OperatingTrajectory
     converged : bool
     released : (k,) array of int
         Which of the model's unknowns the study takes to be zero and this fit does not.
@@ -230,7 +230,7 @@ class Engine:
             To start from; by default the first of each effect's `Effect.starts`.
         z : (size,) array, optional
             To start from.
-        situation : Situation, optional
+        operating : OperatingTrajectory, optional
             Of an earlier fit nearby.
         iterations : int
             Most steps.

@@ -46,8 +46,9 @@ def enumerate_sets(
 ) -> SetProbabilities:
     """Return the probabilities of nothing, of all single candidates, all pairs, and larger sets grown from the best.
 
-    Sets grow by one candidate at a time, of which at most one is generic. All sets of up to two candidates are
-    considered, a cause beside a generic candidate among them. Larger ones are the extensions of the best sets of one
+    Sets grow by one candidate at a time, of which at most one is generic. All single candidates are considered, and
+    all pairs, a cause beside a generic candidate among them; where the forms of candidates make the pairs too many,
+    those with one of the best single candidates. Larger ones are the extensions of the best sets of one
     fewer: of the most probable one, of the most probable one without anything generic, of up to 19 others that are not
     much less probable than the most probable set of any size, and of all where their extensions are few. A large set is
     missed only if none of those within it is among these.

@@ -113,7 +113,8 @@ def torques_beside(
     Torques depend on the motion of the base. Where something without a name moves it, a torque that the model does not
     have would say no more than the motion did.
     """
-    if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED) or UNKNOWN in verdict.causes:
+    nameless = any(UNKNOWN in names for names in verdict.ambiguous_with)
+    if nameless or verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
         return Unread("The motion shows something that has no name, and torques depend on the motion.")
     try:
         return read_torques(hypothesis, model, prior, rng, bounds)
@@ -233,9 +234,10 @@ def _bank(
 ) -> SignatureBank:
     """Return the signatures of the candidates, and of an unknown torque of each joint."""
     sizes = [len(effect.in_amplitudes().parameters) for effect in candidates]
-    parts = np.split(fitted.columns, np.cumsum(sizes)[:-1], axis=1)
+    ends = np.cumsum(sizes)
     banks = []
-    for effect, columns in zip(candidates, parts, strict=True):
+    for effect, size, end in zip(candidates, sizes, ends, strict=True):
+        columns = fitted.columns[:, end - size : end]
         largest = {bound.unit: bound.largest for bound in bounds[effect.label]}
         found = amplitude_signatures(effect, columns, 1)
         groups = tuple(AmplitudeGroup(item.name, largest[unit]) for unit, item in found.items())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
@@ -134,17 +135,18 @@ def _error(
     worst = 0.0
     for kind in model.channels.kinds:
         sigma = np.stack([item.sigma(kind) for item in recorded])
-        first, second = (np.asarray(item.channels[kind.value])[..., : kind.size] for item in (coarse, fine))
-        worst = max(worst, _largest(first, second, sigma[:, None]))
+        between = jnp.vectorize(kind.residual, signature="(a),(a)->(c)")
+        difference = np.asarray(between(fine.channels[kind.value], coarse.channels[kind.value]))
+        worst = max(worst, _largest(difference, sigma[:, None]))
     if model.torque is not None:
         columns = model.torque.columns(model.robot)
         first, second = (np.asarray(item.torque)[..., columns] for item in (coarse, fine))
-        worst = max(worst, _largest(first, second, np.array(model.torque.sigma)))
+        worst = max(worst, _largest(first - second, np.array(model.torque.sigma)))
     return worst * 16.0 / 15.0  # error of a fourth-order method from the difference to half the step
 
 
-def _largest(first: Floats, second: Floats, sigma: Floats) -> float:
+def _largest(difference: Floats, sigma: Floats) -> float:
     """Return the largest difference in sigma, infinite where one is not finite."""
     with np.errstate(invalid="ignore", over="ignore"):  # a step that is far too long
-        largest = float(np.abs((first - second) / sigma).max())
+        largest = float(np.abs(difference / sigma).max())
     return largest if np.isfinite(largest) else float("inf")

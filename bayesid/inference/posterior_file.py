@@ -27,6 +27,9 @@ STORED = 1000
 PREDICTED = 50
 """Number of posterior predictive draws per ensemble, each of which takes a simulation."""
 
+CENTRAL = "link axes; the inertia is about the centre of mass"
+"""Frame of the reported quantities of a body."""
+
 LINEAR = ("m", "mc.x", "mc.y", "mc.z", "xx", "xy", "yy", "xz", "yz", "zz")
 """Names of the linear parameters of a body (`InertialParameters.vector`), which a later study reads."""
 
@@ -42,7 +45,7 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
 
     z = _thin(result.chains.z, STORED)
     few = z[:, :: max(1, z.shape[1] // PREDICTED)][:, :PREDICTED]
-    posterior, dims, units = _posterior_group(result, z)
+    posterior, dims, attributes = _posterior_group(result, z)
     data = az.from_dict(
         posterior=posterior,
         log_likelihood=_log_likelihood(result),
@@ -51,8 +54,8 @@ def to_arviz(result: Identification, rng: np.random.Generator) -> az.InferenceDa
         dims={**dims, **_sensor_dims(result)},
         coords=_coords(result),
     )
-    for name, unit in units.items():
-        data.posterior[name].attrs.update(unit=unit, frame="link axes; the inertia is about the centre of mass")
+    for name, own in attributes.items():
+        data.posterior[name].attrs.update(own)
     for group in (data.posterior_predictive, data.observed_data):
         for sensor in result.posterior.model.sensors:
             for manoeuvre in result.posterior.manoeuvres:
@@ -94,31 +97,34 @@ def _thin(draws: Floats, count: int) -> Floats:
 
 def _posterior_group(
     result: Identification, z: Floats
-) -> tuple[dict[str, Floats], dict[str, list[str]], dict[str, str]]:
+) -> tuple[dict[str, Floats], dict[str, list[str]], dict[str, dict[str, str]]]:
+    """Return the variables, each (chains, draws, ...), their further dimensions, and their units and frames."""
     chains, draws, size = z.shape
     flat = z.reshape(-1, size)
     group: dict[str, Floats] = {"z": z}
     dims: dict[str, list[str]] = {"z": ["unknown"]}
-    units = {"z": "1"}
+    attributes = {"z": {"unit": "1"}}
     for name, body in bodies_of(result.posterior, flat).items():
         for column, (key, unit) in enumerate(BODY_QUANTITIES.items()):
             group[f"{name}.{key}"] = body.values[:, column].reshape(chains, draws)
-            units[f"{name}.{key}"] = unit
+            attributes[f"{name}.{key}"] = {"unit": unit, "frame": CENTRAL}
     values = result.posterior.unknowns.values_of(flat)
     if result.posterior.model.priors:
         group["inertial"] = np.asarray(values.inertial).reshape(chains, draws, -1, 10)
-        dims["inertial"], units["inertial"] = ["body", "parameter"], "kg, kg m, kg m2 about the origin of the link"
+        dims["inertial"] = ["body", "parameter"]
+        attributes["inertial"] = {"unit": "kg, kg m, kg m2", "frame": "link axes, about the origin of the link"}
     for effect, parameters in zip(result.posterior.model.effects, values.effects, strict=True):
         reported = reported_effect(effect, np.asarray(parameters)) if effect.parameters else np.zeros((0, 0))
         for column, (key, unit) in enumerate(effect.quantities):
             name = f"{effect.label}.{key}"
             group[name] = reported[..., column].reshape(chains, draws, *reported.shape[1:-1])
-            units[name] = unit
+            attributes[name] = {"unit": unit}
             if effect.per_recording:
                 dims[name] = ["recording"]
     group["initial-rate"] = np.asarray(values.rate).reshape(chains, draws, -1, 3)
-    dims["initial-rate"], units["initial-rate"] = ["recording", "axis"], "rad/s"
-    return group, dims, units
+    dims["initial-rate"] = ["recording", "axis"]
+    attributes["initial-rate"] = {"unit": "rad/s", "frame": "base axes"}
+    return group, dims, attributes
 
 
 def _coords(result: Identification) -> dict[str, Any]:

@@ -126,6 +126,10 @@ class RecordingCheck:
         Noise and delay of every sensor.
     rate_is_differenced : bool
         Whether the rate is the difference of the attitude and no independent measurement.
+    stuck : tuple of str
+        Columns of sensors that hold one number alone, while others of their sensor change.
+    unused : tuple of str
+        Sensors that are recorded and not declared.
     """
 
     name: str
@@ -134,6 +138,8 @@ class RecordingCheck:
     joints: tuple[JointCheck, ...]
     sensors: tuple[SensorCheck, ...]
     rate_is_differenced: bool
+    stuck: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -158,10 +164,15 @@ class RecordingCheck:
                         f"{', '.join(f'{value:.2g}' for value in sensor.sigma)}."
                     )
             if sensor.delay is not None and abs(sensor.delay[0]) > 4.0 * sensor.delay[1]:
+                side = "late" if sensor.delay[0] > 0.0 else "early"
                 sentences.append(
-                    f"The samples of {sensor.kind.value} seem {sensor.delay[0]:.3g} +- {sensor.delay[1]:.2g} s late "
-                    "against the joints."
+                    f"The samples of {sensor.kind.value} seem {abs(sensor.delay[0]):.3g} ± {sensor.delay[1]:.2g} s "
+                    f"{side} against the joints, or something else is wrong with robot or model."
                 )
+        sentences += [f"Column {column} never changes: it is stuck." for column in self.stuck]
+        sentences += [
+            f"{family} is recorded, but not declared under [sensors]: it is not used." for family in self.unused
+        ]
         if self.rate_is_differenced:
             sentences.append("The rate is the difference of the attitude, not a second sensor: declare one of them.")
         for channel in self.channels:
@@ -180,9 +191,29 @@ def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
         duration=float(recording.time[-1] - recording.time[0]),
         channels=_channels(recording, model),
         joints=_joints(manoeuvre, model.robot),
-        sensors=tuple(_sensor(sensor, manoeuvre, model, predicted) for sensor in model.sensors),
+        sensors=tuple(_sensor(sensor, manoeuvre, predicted) for sensor in model.sensors),
         rate_is_differenced=_is_differenced(manoeuvre, model),
+        stuck=_stuck(recording, model),
+        unused=_unused(recording, model),
     )
+
+
+def _stuck(recording: Recording, model: Model) -> tuple[str, ...]:
+    """Return the columns of the sensors that never change, where another column of the sensor does."""
+    found: list[str] = []
+    for sensor in model.sensors:
+        columns = sensor.kind.columns
+        still = [column for column in columns if np.ptp(recording.series(column)[1]) == 0.0]
+        found += still if len(still) < len(columns) else []
+    return tuple(found)
+
+
+def _unused(recording: Recording, model: Model) -> tuple[str, ...]:
+    """Return the sensors that a recording holds and the model does not have."""
+    held = {column.partition(".")[0] for column in recording.channels}
+    read = {sensor.kind.value for sensor in model.sensors} | ({"torque"} if model.torque is not None else set())
+    known = [Kind.RATE.value, Kind.ACCEL.value, Kind.ATTITUDE.value, "torque"]
+    return tuple(family for family in known if family in held - read)
 
 
 def _channels(recording: Recording, model: Model) -> tuple[ChannelSampling, ...]:
@@ -220,7 +251,7 @@ def _joints(manoeuvre: Manoeuvre, robot: Robot) -> tuple[JointCheck, ...]:
     return tuple(checks)
 
 
-def _sensor(sensor: Sensor, manoeuvre: Manoeuvre, model: Model, predicted: PredictedReadings) -> SensorCheck:
+def _sensor(sensor: Sensor, manoeuvre: Manoeuvre, predicted: PredictedReadings) -> SensorCheck:
     if not sensor.kind.mounted:
         time, _ = manoeuvre.recording.vector(sensor.kind.value, sensor.kind.axes)
         return SensorCheck(sensor.kind, sensor.noise.sigma(float(np.median(np.diff(time)))), None, 0.0, None)

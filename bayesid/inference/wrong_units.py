@@ -142,11 +142,13 @@ def _comparisons(posterior: Posterior, index: int, predicted: PredictedReadings)
     if (torque := posterior.model.torque) is not None:
         time, measured = posterior.data.torques(index)
         expected = predicted.torque[np.searchsorted(predicted.time, time)]
+        kinds = {joint.name: joint.kind for joint in posterior.model.robot.joints}
         for k, (joint, sigma) in enumerate(zip(torque.joints, torque.sigma, strict=True)):
             one = slice(k, k + 1)
+            unit = "N" if kinds[joint] == "prismatic" else "N m"
             readings = (time, _detrend(time, measured[:, one]), _detrend(time, expected[:, one]), sigma)
             mistaken = "mN m or at the motor before the gear"
-            comparisons.append(_Comparison(index, None, f"torque.{joint}", "N m", mistaken, *readings))
+            comparisons.append(_Comparison(index, None, f"torque.{joint}", unit, mistaken, *readings))
     return comparisons
 
 

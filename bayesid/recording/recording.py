@@ -295,6 +295,8 @@ class Recording:
 
 _FORMATS = "Use .csv or .parquet"
 _NO_SAMPLE = "Leave the cell empty where there is no sample"
+_DECIMAL = "Write numbers with a decimal point, and leave the cell empty where there is no sample"
+_ONE_HEADER = "Begin with the samples in the second line: a row of units or a second header is not read"
 
 
 def _locked(values: ArrayLike) -> Array:
@@ -329,7 +331,7 @@ def _nearest(column: str) -> str:
         return f"Did you mean '{near[0]}'?"
     families = ["time", *(f"{name}.<joint>" for name in JOINT_FAMILIES)]
     families += [f"{name}.{'|'.join(axes)}" for name, axes in VECTOR_FAMILIES.items()]
-    return f"Known columns: {', '.join(families)}"
+    return f"Remove or rename the column. Known ones: {', '.join(families)}"
 
 
 def _check_names(columns: Sequence[str], file: Path | str) -> None:
@@ -347,7 +349,11 @@ def _check_names(columns: Sequence[str], file: Path | str) -> None:
                 remedy="Remove one",
             )
         if not _is_known(column):
-            remedy = "Separate the columns by commas" if {";", "\t"} & set(column) else _nearest(column)
+            remedy = (
+                "Separate the columns by commas, and write decimal points"
+                if {";", "\t"} & set(column)
+                else _nearest(column)
+            )
             raise InputError(f"unknown column '{column}'", file=file, remedy=remedy)
     if "time" not in columns:
         raise InputError("column 'time' is missing", file=file, remedy="Add the time in seconds, 0 at the start")
@@ -426,7 +432,10 @@ def _numbers(cells: Sequence[object], column: str, file: Path, convert: Callable
     if bad.any():
         row = int(np.argmax(bad))
         problem = "the time is missing" if absent[row] else f"{cells[row]!r} is not a finite number"
-        remedy = "Give every row a time" if column == "time" else _NO_SAMPLE
+        if column == "time":
+            remedy = _ONE_HEADER if row == 0 and not absent[row] else "Give every row a time"
+        else:
+            remedy = _NO_SAMPLE if str(cells[row]).lower().strip("+-") in ("nan", "inf", "infinity") else _DECIMAL
         raise InputError(problem, file=file, place=f"column '{column}', {_row(file, row)}", remedy=remedy)
     return values
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bayesid._io.errors import InputError
 from bayesid.diagnosis import Diagnosis
 from bayesid.inference import Identification
 from bayesid.report.diagnosis_pages.appendix import add_appendix, add_measured
@@ -54,14 +55,27 @@ def diagnosis_report(
     add_causes(document, result)
     add_consequences(document, result, changes)
     add_limits(document, result, advice)
-    if identification is None:
+    refusal = None if identification is not None else _refusal(result)
+    if refusal is not None:
+        document.section("Assumptions")
+        document.paragraph(f"The extended model was neither simulated in full nor sampled: {refusal}.")
+    elif identification is None:
         add_assumptions(document, result)
     add_appendix(document, result)
-    if identification is None:
-        add_measured(document, result)
-    else:
+    if identification is not None:
         _add_sampled(document, result, identification)
+    elif refusal is None:
+        add_measured(document, result)
     document.write(file)
+
+
+def _refusal(result: Diagnosis) -> InputError | None:
+    """Return why the extended model cannot be simulated, as where its prior's centre permits no motion, else None."""
+    try:
+        _ = result.posterior
+    except InputError as error:
+        return error
+    return None
 
 
 def _add_sampled(document: Document, result: Diagnosis, identification: Identification) -> None:

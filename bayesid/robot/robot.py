@@ -120,7 +120,7 @@ class Robot:
         if not path.is_file():
             raise InputError("no such file", file=path, remedy="Correct the path of the URDF")
         try:
-            text = path.read_text(encoding="utf-8")
+            text = path.read_text(encoding="utf-8-sig")
         except UnicodeDecodeError as error:
             raise InputError(f"not a text file: {error}", file=path, remedy="Save it as UTF-8 text") from error
         root = _parsed(text, path)

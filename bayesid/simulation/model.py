@@ -95,10 +95,10 @@ class Model:
         if len(set(kinds)) != len(kinds):
             raise InputError("two sensors of one kind are declared", remedy="Declare each kind once")
         for effect in self.effects:
-            if effect.needs_orbit and self.orbit is None:
+            if (lacking := effect.lacks(self)) is not None:
                 raise InputError(
-                    f"effect {effect.label!r} exists only in orbit and the study has no [orbit]",
-                    remedy="Give the orbit or leave the effect out",
+                    f"effect {effect.label!r} cannot act without {lacking}, which the study does not have",
+                    remedy=f"Give {lacking} or leave the effect out",
                 )
         object.__setattr__(self, "effects", tuple(effect.attach(self.robot) for effect in self.effects))
         labels = [effect.label for effect in self.effects]

@@ -56,6 +56,11 @@ class Study(Section):
     # a private attribute, because it is not a key of the file
     _file: Path | None = PrivateAttr(default=None)
 
+    @property
+    def defining_files(self) -> list[Path | None]:
+        """All files that define the problem, without the recordings; None for those that the study does not name."""
+        return [self.file, self.robot.urdf, self.unknowns.posterior, *self.model.plugins]
+
     @classmethod
     def load(cls, path: str | Path) -> Study:
         """Read and check a study file; its paths are resolved relative to the file's folder.
@@ -69,7 +74,7 @@ class Study(Section):
         if not file.is_file():
             raise InputError("there is no such file", file=file, remedy="Give the path of a study, a TOML file")
         try:
-            data = tomllib.loads(file.read_text(encoding="utf-8"))
+            data = tomllib.loads(file.read_text(encoding="utf-8-sig"))
         except UnicodeDecodeError as error:
             raise InputError(f"not a text file: {error}", file=file, remedy="Save it as UTF-8 text") from error
         except tomllib.TOMLDecodeError as error:

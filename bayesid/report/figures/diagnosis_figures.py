@@ -64,7 +64,7 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
 
 @styled
 def wrench_histories(wrench: Unexplained, frame: Frame, cause: Sequence[Floats] | None = None) -> Figure:
-    """Draw a reconstructed torque and force over time in the axes of one frame, with ± 1 sd in base axes.
+    """Draw a reconstructed torque, and force where it is seen, over time in the axes of one frame, ± 1 sd in base axes.
 
     Parameters
     ----------
@@ -73,12 +73,11 @@ def wrench_histories(wrench: Unexplained, frame: Frame, cause: Sequence[Floats] 
     cause : sequence of (S, 3) arrays, optional
         Torque of the named causes in each recording, in the same axes, drawn over the reconstructed one.
     """
-    figure = wide_figure(3.6)
-    panels = figure.subplots(2, 3, squeeze=False, sharex=True)
-    families = (
-        ("torque", "N m", wrench.torque[frame], wrench.torque_sd),
-        ("force", "N", wrench.force[frame], wrench.force_sd),
-    )
+    families = [("torque", "N m", wrench.torque[frame], wrench.torque_sd)]
+    if all(np.isfinite(force).all() for force in wrench.force[frame]):
+        families.append(("force", "N", wrench.force[frame], wrench.force_sd))
+    figure = wide_figure(1.8 * len(families))
+    panels = figure.subplots(len(families), 3, squeeze=False, sharex=True)
     for row, (title, unit, values, spread) in enumerate(families):
         scale, prefix = decimal_scale(np.concatenate([np.abs(value).ravel() for value in values[:FEW]]))
         for axis in range(3):

@@ -46,7 +46,8 @@ def _addition(result: Diagnosis) -> str:
     if INITIAL_RATE in causes:
         steps.append("let the initial rates be unknown")
     if named := [name for name in causes if name in faults]:
-        steps.append(f"declare {joined(named)} with the sensors")
+        keys = [f"sensors.{name.partition(':')[2] or name.removesuffix('-noise')}.sigma" for name in named]
+        steps.append(f"state {joined(keys)} as large as the noise with {joined(named)}")
     steps.append(f"use the values fitted with {'it' if len(causes) == 1 else 'them'}")
     text = f"{joined(steps)}."
     return text[0].upper() + text[1:]

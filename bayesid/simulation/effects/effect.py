@@ -70,13 +70,21 @@ class Effect:
     modes_count: ClassVar[int] = 0
 
     @classmethod
+    def lacks(cls, model: Model) -> str | None:
+        """Return what a model does not have and the effect cannot act or show without, None where nothing is lacking.
+
+        By default that is the orbit, for an effect that exists only there.
+        """
+        return "[orbit]" if cls.needs_orbit and model.orbit is None else None
+
+    @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
         """Return the effect at every place of a model's robot where it can occur and show in the model's sensors.
 
-        By default it occurs once; it does not occur if it needs an orbit that the model lacks, or if the class needs
-        arguments, such as a place, which cannot be guessed.
+        By default it occurs once; it does not occur if the model lacks what it needs, or if the class needs arguments,
+        such as a place, which cannot be guessed.
         """
-        if cls.needs_orbit and model.orbit is None:
+        if cls.lacks(model) is not None:
             return []
         try:
             return [cls().attach(model.robot)]

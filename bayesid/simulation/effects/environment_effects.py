@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
@@ -236,9 +235,9 @@ class SolarPressure(_Pressure):
     needs_latitude = True
 
     @classmethod
-    def instances(cls, model: Model) -> Sequence[Effect]:
-        """Return the effect if the direction of the Sun is known."""
-        return [] if model.orbit is None or model.orbit.sun is None else super().instances(model)
+    def lacks(cls, model: Model) -> str | None:
+        """Return the orbit or the direction of the Sun where it is not known."""
+        return super().lacks(model) or ("sun in [orbit]" if model.orbit is None or model.orbit.sun is None else None)
 
     def __init__(self, force: float = 3.0e-4, spread: float = 2.0) -> None:
         super().__init__(force, spread)
@@ -271,9 +270,10 @@ class MagneticDipole(Effect):
     needs_orbit = True
 
     @classmethod
-    def instances(cls, model: Model) -> Sequence[Effect]:
-        """Return the effect if the inclination, and with it the direction of the Earth's field, is known."""
-        return [] if model.orbit is None or model.orbit.inclination is None else super().instances(model)
+    def lacks(cls, model: Model) -> str | None:
+        """Return the orbit or its inclination, and with it the direction of the field, where it is not known."""
+        inclination = None if model.orbit is None else model.orbit.inclination
+        return super().lacks(model) or ("inclination in [orbit]" if inclination is None else None)
 
     def __init__(self, sigma: float = 10.0) -> None:
         self.parameters = tuple(Parameter(axis, "A m2", sigma) for axis in "xyz")

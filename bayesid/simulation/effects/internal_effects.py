@@ -57,6 +57,9 @@ of 4 kg and 0.3 m what four small ones of 15 mN m s do.
 APPENDAGES = 0.1
 """Mass of all panels, booms and antennas that swing, relative to the robot's; assumed."""
 
+REACH = 1.5
+"""Half width of the place of a tank in a spacecraft of unknown size [m]."""
+
 FUEL = 0.3
 """Mass of fuel that sloshes relative to the base's; assumed, if half of the base is fuel and 60 % of that sloshes."""
 
@@ -176,14 +179,14 @@ class FuelSlosh(_Vibration):
     """Fuel in a tank, as a mass on equal springs along three axes (Dodge 2000) that at rest is part of the base.
 
     The prior's median is 10 kg with a spread of 1 in the logarithm; the tank lies within the spacecraft, which is taken
-    as one and a half times the uniform box of the base's mass and inertia.
+    as one and a half times the uniform box of the base's mass and inertia, unless another half width is given.
     """
 
     name = "fuel-slosh"
     summary = "Fuel that does not fill its tank lags behind the base and swings back and forth in it."
     modes_count = 3
 
-    def __init__(self, mass: float = 10.0, reach: float = 1.5) -> None:
+    def __init__(self, mass: float = 10.0, reach: float = REACH) -> None:
         self.parameters = (
             Parameter("mass", "kg", 1.0, mass, Prior.LOG_NORMAL),
             Parameter("frequency", "Hz", FREQUENCY_SPREAD, FREQUENCY, Prior.LOG_NORMAL),
@@ -210,8 +213,8 @@ class FuelSlosh(_Vibration):
         changed.parameters = (
             *self.parameters[:3],
             *(
-                Parameter(f"position.{axis}", "m", float(size), float(middle), Prior.UNIFORM)
-                for axis, size, middle in zip("xyz", reach, centre, strict=True)
+                own._replace(sigma=float(size) if own.sigma == REACH else own.sigma, mean=float(middle))
+                for own, size, middle in zip(self.parameters[3:], reach, centre, strict=True)
             ),
         )
         return changed

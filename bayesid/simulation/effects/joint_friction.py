@@ -37,18 +37,26 @@ SENSOR_ERROR = 0.1
 """Largest constant error of a torque sensor, relative to the drive's torque; assumed."""
 
 
+OF_SLIDES = {"N m": "N", "N m s": "N s/m"}
+"""What slides have in place of units of torques."""
+
+
 class _OnTorque(OnJoint):
     """Effect on the reading of the torque sensor of one joint."""
 
     @classmethod
     def instances(cls, model: Model) -> Sequence[Effect]:
         """Return the effect at every joint whose torque is measured."""
-        return [] if model.torque is None else [cls(joint) for joint in model.torque.joints]
+        return [] if model.torque is None else [cls(joint).attach(model.robot) for joint in model.torque.joints]
 
     def attach(self, robot: Robot) -> Self:
         """Return the effect with the index of its joint in the robot."""
         changed = self.copied()
         changed.index = self.index_in(robot)
+        if robot.joints[changed.index].kind == "prismatic":
+            changed.parameters = tuple(
+                item._replace(unit=OF_SLIDES.get(item.unit, item.unit)) for item in self.parameters
+            )
         return changed
 
     index: int = -1
@@ -99,8 +107,8 @@ class JointFriction(_OnTorque):
         torque, drive = self.drive(model.robot)
         moves = f"A joint moves only if its friction takes less than {drive}"
         return (
-            PhysicalBound("N m", torque, f"{moves}."),
-            PhysicalBound("N m s", torque / SPEED, f"{moves}, and does so at a speed of {SPEED:g}."),
+            PhysicalBound(self.parameters[0].unit, torque, f"{moves}."),
+            PhysicalBound(self.parameters[1].unit, torque / SPEED, f"{moves}, and does so at a speed of {SPEED:g}."),
         )
 
     def extra(self, values: Array, velocity: Array) -> Array:
@@ -126,7 +134,7 @@ class TorqueBias(_OnTorque):
         """Return a tenth of the torque of the joint's drive."""
         torque, drive = self.drive(model.robot)
         reason = f"The zero of a torque sensor is wrong by at most {100.0 * SENSOR_ERROR:g} % of {drive}."
-        return (PhysicalBound("N m", SENSOR_ERROR * torque, reason),)
+        return (PhysicalBound(self.parameters[0].unit, SENSOR_ERROR * torque, reason),)
 
     def extra(self, values: Array, velocity: Array) -> Array:
         """Return the constant error."""

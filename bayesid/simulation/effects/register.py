@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -38,10 +39,9 @@ def create(label: str, **options: Any) -> Effect:
     """
     name, _, place = label.partition(":")
     if name not in _REGISTER:
-        raise InputError(
-            f"unknown effect {label!r}",
-            remedy=f"Choose from {', '.join(sorted(_REGISTER))}, or name your file under model.plugins",
-        )
+        near = difflib.get_close_matches(name, _REGISTER, n=1)
+        remedy = f"Did you mean '{near[0]}'?" if near else f"Choose from {', '.join(sorted(_REGISTER))}."
+        raise InputError(f"unknown effect {label!r}", remedy=f"{remedy} Or name your file under model.plugins")
     build: Callable[..., Effect] = _REGISTER[name]
     try:
         return build(place, **options) if place else build(**options)

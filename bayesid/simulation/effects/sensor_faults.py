@@ -6,7 +6,6 @@ positive latency the sample stamped t shows the past.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import jax.numpy as jnp
@@ -63,9 +62,9 @@ class SensorFault(Effect):
     sensor: ClassVar[Kind]
 
     @classmethod
-    def instances(cls, model: Model) -> Sequence[Effect]:
-        """Return the effect if the sensor is declared."""
-        return super().instances(model) if model.sensor(cls.sensor) is not None else []
+    def lacks(cls, model: Model) -> str | None:
+        """Return the sensor where it is not declared."""
+        return super().lacks(model) or (None if model.sensor(cls.sensor) else f"[sensors.{cls.sensor.value}]")
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
         """Return the reading of the faulty sensor from the true reading, both of shape (T, 3)."""
