@@ -79,6 +79,7 @@ def test_identify_writes_what_the_contract_names(study: Path, tmp_path: Path) ->
     assert "frame" not in data.posterior["z"].attrs
     report = PdfText.read(tmp_path / "report.pdf")
     assert "Servicer" in report
+    assert "command: bayesid identify study.toml --seed 0" in report
     for key, unit in (("mass", "kg"), ("com", "m"), ("inertia", "kg m²")):
         items = {f"{key}.xx": body[key]["xx"]} if key == "inertia" else {key: body[key]}
         items = {f"com.{axis}": item for axis, item in zip("xyz", body[key], strict=True)} if key == "com" else items
@@ -110,6 +111,7 @@ def test_check_and_simulate(study: Path, tmp_path: Path) -> None:
     status, output = run("simulate", study, "--output", tmp_path / "simulate", "--seed", 5)
     assert status == 0, output
     report = PdfText.read(tmp_path / "check" / "report.pdf")
+    assert "command: bayesid check study.toml" in report
     assert "Check of the study and its recordings" in report
     for channel in checked["channels"]:
         assert report.row(
@@ -126,6 +128,7 @@ def test_check_and_simulate(study: Path, tmp_path: Path) -> None:
     assert "simulation.json" in names
     largest = json.loads((tmp_path / "simulate" / "simulation.json").read_text())["recordings"][0]["largest"]
     report = PdfText.read(tmp_path / "simulate" / "report.pdf")
+    assert "command: bayesid simulate study.toml --seed" in report
     for kind, unit in (("rate", "rad/s"), ("accel", "m/s²")):
         assert report.row(kind, unit, *(format_number(value, 4) for value in largest[kind]))
     assert sum(name.endswith(".csv") for name in names) == 1

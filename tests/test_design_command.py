@@ -187,6 +187,7 @@ def test_the_report_holds_the_result_and_the_assumptions(made):
     for words in (
         "2 manoeuvres of 30 s for the robot planar, of the family",
         "were designed to identify base_link",
+        "command: bayesid design study.toml",
         f"The smallest posterior is that of {content['best']}",
         "−y1² + y2² + 3 y3²",
         "white noise of the sensors and the noise of the encoders",

@@ -121,7 +121,13 @@ def test_the_report_holds_directions_parameters_and_structure(made: tuple[dict, 
     worst = content["directions"][0]["words"]
     assert worst in report
     assert worst in text
-    for words in ("Of 30 standard inertial parameters", "depend on 24", "was fitted to 1 recording", "nats"):
+    for words in (
+        "Of 30 standard inertial parameters",
+        "depend on 24",
+        "was fitted to 1 recording",
+        "nats",
+        "command: bayesid identifiability",
+    ):
         assert words in report, words
     for number, direction in enumerate(content["directions"], start=1):
         left = format_percent(direction["sd"] / direction["prior_sd"])

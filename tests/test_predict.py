@@ -187,6 +187,7 @@ def test_predict_writes_a_pose_with_its_region(plan: Path, tmp_path: Path) -> No
     # every draw starts where the base starts
     assert content["base"]["course"]["position"]["sd"][0] == [0.0, 0.0, 0.0]
     report = PdfText.read(output / "report.pdf")
+    assert "command: bayesid predict" in report
     assert "Every ± is one standard deviation of 40 draws from the present knowledge of the robot." in report
     assert "plan: the base starts with the first measured rate" not in report
     for key, name in (("base", "base"), ("tip", "end-effector tip")):

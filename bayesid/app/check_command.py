@@ -21,6 +21,7 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
     study = Study.load(file)
 
     from bayesid._io.files import complete_folder, write_json
+    from bayesid.app.report_origin import report_origin
     from bayesid.app.study_draft import open_places
     from bayesid.app.study_to_model import load_posterior
     from bayesid.inference.recording_check import check_recording
@@ -37,7 +38,8 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
         write_json(
             folder / "check.json", {"title": study.title, "recordings": [_check_dict(check) for check in checks]}
         )
-        check_report(posterior, checks, study.title, folder / "report.pdf")
+        origin = report_origin(study, "check", None, {"output": output})
+        check_report(posterior, checks, study.title, folder / "report.pdf", origin=origin)
     for check in checks:
         yield f"{check.name}: {check.duration:.4g} s. " + (" ".join(check.warnings) or "Nothing conspicuous.")
     yield f"Wrote {output / 'report.pdf'}."

@@ -44,6 +44,7 @@ def run(
     from bayesid._io.store import content_key
     from bayesid._io.words import counted
     from bayesid.app.fly_next import write_motion
+    from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_design import load_problem, separating
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
     from bayesid.design import THOROUGH, Search, Store, best_design, design
@@ -79,7 +80,9 @@ def run(
             write_json(folder / "design.json", {**content, "best": best.name})
             for item in designs:
                 write_motion(item, folder / f"{item.name}.csv")
-            design_report(designs, best, study.title, folder / "report.pdf")
+            effort_asked = {"starts": starts, "iterations": iterations, "thorough": thorough}
+            origin = report_origin(study, "design", seed, {"output": output, **effort_asked, "separate": separate})
+            design_report(designs, best, study.title, folder / "report.pdf", origin=origin)
         store.remove()
     yield from design_sentences(designs, best)
     yield f"Wrote {output / 'report.pdf'}."

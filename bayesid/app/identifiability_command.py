@@ -30,6 +30,7 @@ def run(
     study = Study.load(file)
 
     from bayesid._io.files import complete_folder, write_json
+    from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_linearisation import missing_part, prepare
     from bayesid.app.study_to_model import load_robot
     from bayesid.identifiability import base_parameters
@@ -63,7 +64,9 @@ def run(
         content |= result.to_dict()
     with complete_folder(output) as folder:
         write_json(folder / "identifiability.json", {"title": study.title, **content, "statement": statement})
-        identifiability_report(structure, result, statement, study.title, folder / "report.pdf")
+        effort = {"samples": samples, "profiles": profiles}
+        origin = report_origin(study, "identifiability", seed, {"output": output, **effort})
+        identifiability_report(structure, result, statement, study.title, folder / "report.pdf", origin=origin)
     yield statement
     if result is not None:
         yield from practical_sentences(result)

@@ -27,6 +27,7 @@ def run(
 
     from bayesid._io.files import claimed_folder, complete_folder, write_json
     from bayesid._io.phase_clock import PhaseClock
+    from bayesid.app.report_origin import report_origin
     from bayesid.app.study_draft import open_places
     from bayesid.app.study_to_model import load_posterior
     from bayesid.inference import identify
@@ -53,7 +54,8 @@ def run(
             write_netcdf(result, folder / "posterior.nc", np.random.default_rng(seed))
             if result.posterior.model.priors:
                 write_identified(result, folder)
-            identification_report(result, study.title, [], folder / "report.pdf")
+            origin = report_origin(study, "identify", seed, {"output": output, "samples": samples})
+            identification_report(result, study.title, [], folder / "report.pdf", origin=origin)
             clock.ends("report")
             write_json(folder / "identification.json", result.to_dict() | {"seconds": clock.seconds})
         kept.unlink(missing_ok=True)

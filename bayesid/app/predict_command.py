@@ -19,7 +19,7 @@ def run(
     output: Output,
     progress: Progress,
     seed: Seed = 0,
-    draws: Annotated[int, typer.Option(help="Number of draws of the robot's parameters.")] = 500,
+    draws: Annotated[int, typer.Option(min=2, help="Number of draws of the robot's parameters.")] = 500,
     posterior: Annotated[
         Path | None, typer.Option(help="posterior.nc of an earlier study, in place of the study's prior.")
     ] = None,
@@ -34,6 +34,7 @@ def run(
     import numpy as np
 
     from bayesid._io.files import complete_folder, write_json
+    from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_model import load_manoeuvres, load_model
     from bayesid.design.base_prediction import BasePredictor
     from bayesid.recording.plausibility import refuse_impossible_motion
@@ -51,7 +52,9 @@ def run(
         predictions.append(predictors[-1].predict(draws, np.random.default_rng(stream)))
     with complete_folder(output) as folder:
         write_json(folder / "prediction.json", {"recordings": [prediction.to_dict() for prediction in predictions]})
-        prediction_report(predictors[0].posterior, manoeuvres, predictions, study.title, folder / "report.pdf")
+        origin = report_origin(study, "predict", seed, {"output": output, "draws": draws, "posterior": posterior})
+        first = predictors[0].posterior
+        prediction_report(first, manoeuvres, predictions, study.title, folder / "report.pdf", origin=origin)
     for prediction in predictions:
         final = prediction.tip.pose().millimetres
         place = ", ".join(format_quantity(float(m), float(s)) for m, s in zip(final.mean, final.sd, strict=True))

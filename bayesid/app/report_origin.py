@@ -12,14 +12,14 @@ from bayesid.app.schema import Study
 
 __all__ = ["origin_text", "report_origin"]
 
-Option = bool | str | float | Path | list[str] | None
+Option = bool | str | int | float | Path | list[str] | tuple[str, ...] | None
 """Value of an option of a command."""
 
 DIGITS = 12
 """Digits of a hash that are printed."""
 
 
-def report_origin(study: Study, command: str, seed: int, options: Mapping[str, Option]) -> str:
+def report_origin(study: Study, command: str, seed: int | None, options: Mapping[str, Option]) -> str:
     """Return the files of a study with the beginnings of their SHA-256, the version, the seed and the whole command.
 
     Parameters
@@ -27,14 +27,15 @@ def report_origin(study: Study, command: str, seed: int, options: Mapping[str, O
     study : Study
     command : str
         Name of the command.
-    seed : int
+    seed : int or None
+        None of a command without random numbers.
     options : mapping of str to object
-        Further options of the command with their values: whether a switch is on, or what is given, one or several;
-        None for what is not given.
+        Further options of the command with their values: whether a switch is on, or what is given; a list for an option
+        that is repeated, a tuple for one of several words, None for one that is not given.
     """
     files = [*study.defining_files, *(recording.file for recording in study.recordings)]
     place = [] if study.file is None else [study.file.name]
-    words = ["bayesid", command, *place, "--seed", str(seed), *_words(options)]
+    words = ["bayesid", command, *place, *_words({"seed": seed, **options})]
     return origin_text([file for file in files if file is not None], words, seed)
 
 
@@ -46,7 +47,8 @@ def _words(options: Mapping[str, Option]) -> list[str]:
             words.append(f"--{'' if value else 'no-'}{name}")
         else:
             several = value if isinstance(value, list) else [] if value is None else [value]
-            words += [word for item in several for word in (f"--{name}", _typed(item))]
+            for item in several:
+                words += [f"--{name}", *(item if isinstance(item, tuple) else [_typed(item)])]
     return words
 
 

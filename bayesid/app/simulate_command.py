@@ -27,6 +27,7 @@ def run(
 
     from bayesid._io.files import complete_folder, write_json
     from bayesid.app.planned_motion import lacking_sensors, planned_manoeuvres
+    from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_model import load_manoeuvres, load_model
     from bayesid.inference.posterior import Posterior
     from bayesid.inference.predicted_readings import integration_error_at
@@ -65,6 +66,7 @@ def run(
             "integration": {"step": posterior.step, "error_in_sigma": error},
         }
         write_json(folder / "simulation.json", content)
-        simulation_report(posterior, recordings, study.title, folder / "report.pdf", planned=planned)
+        origin = report_origin(study, "simulate", seed, {"output": output, "noise": noise})
+        simulation_report(posterior, recordings, study.title, folder / "report.pdf", planned=planned, origin=origin)
     yield f"Simulated {len(recordings)} recordings; integration step {posterior.step:g} s, error {error:.2g} sigma."
     yield f"Wrote {output / 'report.pdf'}."

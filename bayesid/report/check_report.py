@@ -21,7 +21,9 @@ CURVE_POINTS = 600
 """Number of points of a curve over time."""
 
 
-def check_report(posterior: Posterior, checks: Sequence[RecordingCheck], title: str, file: Path) -> None:
+def check_report(
+    posterior: Posterior, checks: Sequence[RecordingCheck], title: str, file: Path, *, origin: str = ""
+) -> None:
     """Write the report of a check as PDF, whole or not at all.
 
     Parameters
@@ -32,8 +34,11 @@ def check_report(posterior: Posterior, checks: Sequence[RecordingCheck], title: 
     title : str
         Title of the study.
     file : path
+    origin : str, optional
+        Where the report comes from: files with their hashes, version, seed and command.
     """
     document = Document(title, "Check of the study and its recordings")
+    document.foot(origin)
     document.section("Summary")
     document.paragraph(
         f"The study has {counted(len(checks), 'recording')} with {posterior.samples} scalar samples, and "

@@ -29,7 +29,7 @@ PAIRS = (
 """Pairs of a body's quantities whose ellipses are drawn."""
 
 
-def design_report(designs: Sequence[Design], best: Design, title: str, file: Path) -> None:
+def design_report(designs: Sequence[Design], best: Design, title: str, file: Path, *, origin: str = "") -> None:
     """Write the report of designs of one problem as PDF, whole or not at all.
 
     Parameters
@@ -40,8 +40,11 @@ def design_report(designs: Sequence[Design], best: Design, title: str, file: Pat
     title : str
         Title of the study.
     file : path
+    origin : str, optional
+        Where the report comes from: files with their hashes, version, seed and command.
     """
     document = Document(title, "Design of manoeuvres")
+    document.foot(origin)
     _add_result(document, designs, best)
     _add_limits(document, designs, best)
     _add_manoeuvres(document, designs, best)

@@ -22,7 +22,7 @@ SHOWN = 20
 
 
 def identifiability_report(
-    structure: BaseParameters, result: Practical | None, statement: str, title: str, file: Path
+    structure: BaseParameters, result: Practical | None, statement: str, title: str, file: Path, *, origin: str = ""
 ) -> None:
     """Write the report as PDF, whole or not at all.
 
@@ -37,8 +37,11 @@ def identifiability_report(
     title : str
         Title of the study.
     file : path
+    origin : str, optional
+        Where the report comes from: files with their hashes, version, seed and command.
     """
     document = Document(title, "What can be identified")
+    document.foot(origin)
     document.section("Summary")
     document.paragraph(sentences.structure_sentence(structure))
     document.paragraph(statement)

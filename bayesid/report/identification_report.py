@@ -31,7 +31,13 @@ LARGEST_CORRELATIONS = 30
 
 
 def identification_report(
-    result: Identification, title: str, assumptions: Sequence[str], file: str | Path, date: str | None = None
+    result: Identification,
+    title: str,
+    assumptions: Sequence[str],
+    file: str | Path,
+    date: str | None = None,
+    *,
+    origin: str = "",
 ) -> None:
     """Write the report of an identification as PDF, whole or not at all.
 
@@ -45,8 +51,11 @@ def identification_report(
     file : path
     date : str, optional
         Date printed under the title. Where it is left out, equal results give equal files.
+    origin : str, optional
+        Where the report comes from: files with their hashes, version, seed and command.
     """
     document = Document(title, "Identification of inertial parameters", date)
+    document.foot(origin)
     add_identification(document, result, assumptions)
     document.write(file)
 

@@ -31,6 +31,8 @@ def prediction_report(
     predictions: Sequence[Prediction],
     title: str,
     file: Path,
+    *,
+    origin: str = "",
 ) -> None:
     """Write the report of predicted manoeuvres as PDF, whole or not at all.
 
@@ -45,8 +47,11 @@ def prediction_report(
     title : str
         Title of the study.
     file : path
+    origin : str, optional
+        Where the report comes from: files with their hashes, version, seed and command.
     """
     document = Document(title, "Prediction of planned manoeuvres")
+    document.foot(origin)
     document.section("Result")
     document.paragraph(
         "Final pose of base and end-effector in orbit axes: the position of their frames' origins relative to the "

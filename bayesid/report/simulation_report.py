@@ -25,7 +25,13 @@ CURVE_POINTS = 600
 
 
 def simulation_report(
-    posterior: Posterior, recordings: Sequence[Recording], title: str, file: Path, *, planned: bool = False
+    posterior: Posterior,
+    recordings: Sequence[Recording],
+    title: str,
+    file: Path,
+    *,
+    planned: bool = False,
+    origin: str = "",
 ) -> None:
     """Write the report of simulated recordings as PDF, whole or not at all.
 
@@ -40,8 +46,11 @@ def simulation_report(
     file : path
     planned : bool
         Whether the manoeuvres were planned, so that there are no readings beside which the simulated ones could stand.
+    origin : str, optional
+        Where the report comes from: files with their hashes, version, seed and command.
     """
     document = Document(title, "Simulation")
+    document.foot(origin)
     document.section("Result")
     rows = []
     for recording in recordings:
