@@ -711,7 +711,8 @@ def test_what_is_no_effect_is_put_elsewhere_into_the_model(biased):
     after = replace(biased.after, faults=(SimpleNamespace(label="rate-noise"),))
     result = replace(biased, after=after, sensitivity=replace(biased.sensitivity, verdict=verdict))
     assert action_sentence(result) == (
-        "Let the initial rates be unknown, declare rate-noise with the sensors and use the values fitted with them."
+        "Let the initial rates be unknown, state sensors.rate.sigma as large as the noise with rate-noise and use the "
+        "values fitted with them."
     )
 
 

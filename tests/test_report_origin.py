@@ -23,15 +23,15 @@ def test_the_origin_names_every_file_with_its_hash(tmp_path):
         "output": tmp_path / "my results",
         "samples": 2000.0,
         "wanted": None,
-        "wanted-sd": ["a=1", "b=2"],
+        "wanted_sd": ["a=1", "b=2"],
         "separate": ("rate-bias", "rate-scale"),
-        "fly-next": False,
+        "fly_next": False,
         "sample": True,
     }
     typed = "--output 'my results' --samples 2000 --wanted-sd a=1 --wanted-sd b=2 --separate rate-bias rate-scale "
     typed += "--no-fly-next --sample"
-    found = report_origin(made, "diagnose", 7, options)
+    found = report_origin(made, "diagnose", 7, **options)
     assert found == f"SHA-256: {', '.join(hashes)}. {said} study.toml --seed 7 {typed}"
-    assert report_origin(made, "check", None, {}).endswith("command: bayesid check study.toml")
+    assert report_origin(made, "check", None).endswith("command: bayesid check study.toml")
     made.file, made.defining_files = None, [None, urdf]
-    assert report_origin(made, "diagnose", 7, {}) == f"SHA-256: {', '.join(hashes[1:])}. {said} --seed 7"
+    assert report_origin(made, "diagnose", 7) == f"SHA-256: {', '.join(hashes[1:])}. {said} --seed 7"

@@ -38,7 +38,7 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
         write_json(
             folder / "check.json", {"title": study.title, "recordings": [_check_dict(check) for check in checks]}
         )
-        origin = report_origin(study, "check", None, {"output": output})
+        origin = report_origin(study, "check", None, output=output)
         check_report(posterior, checks, study.title, folder / "report.pdf", origin=origin)
     for check in checks:
         yield f"{check.name}: {check.duration:.4g} s. " + (" ".join(check.warnings) or "Nothing conspicuous.")

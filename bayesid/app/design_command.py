@@ -80,8 +80,16 @@ def run(
             write_json(folder / "design.json", {**content, "best": best.name})
             for item in designs:
                 write_motion(item, folder / f"{item.name}.csv")
-            effort_asked = {"starts": starts, "iterations": iterations, "thorough": thorough}
-            origin = report_origin(study, "design", seed, {"output": output, **effort_asked, "separate": separate})
+            origin = report_origin(
+                study,
+                "design",
+                seed,
+                output=output,
+                starts=starts,
+                iterations=iterations,
+                thorough=thorough,
+                separate=separate,
+            )
             design_report(designs, best, study.title, folder / "report.pdf", origin=origin)
         store.remove()
     yield from design_sentences(designs, best)

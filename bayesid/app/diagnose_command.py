@@ -156,8 +156,8 @@ def _written(
             write_motion(designed, folder / FILE)
         if identification is not None:
             write_netcdf(identification, folder / "posterior.nc", np.random.default_rng(seed))
-        asked = {"sample": False} if effective_samples is None else {"samples": effective_samples}
-        origin = report_origin(study, "diagnose", seed, {"output": output, **asked, "fly-next": plan})
+        sample, samples = effective_samples is not None, effective_samples
+        origin = report_origin(study, "diagnose", seed, output=output, sample=sample, samples=samples, fly_next=plan)
         record = record_sentence(result.verdict.status)
         said = {"record": record, "advice": advice, "origin": origin}
         diagnosis_report(result, identification, study.title, folder / "report.pdf", **said)

@@ -64,8 +64,7 @@ def run(
         content |= result.to_dict()
     with complete_folder(output) as folder:
         write_json(folder / "identifiability.json", {"title": study.title, **content, "statement": statement})
-        effort = {"samples": samples, "profiles": profiles}
-        origin = report_origin(study, "identifiability", seed, {"output": output, **effort})
+        origin = report_origin(study, "identifiability", seed, output=output, samples=samples, profiles=profiles)
         identifiability_report(structure, result, statement, study.title, folder / "report.pdf", origin=origin)
     yield statement
     if result is not None:

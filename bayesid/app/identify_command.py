@@ -54,7 +54,7 @@ def run(
             write_netcdf(result, folder / "posterior.nc", np.random.default_rng(seed))
             if result.posterior.model.priors:
                 write_identified(result, folder)
-            origin = report_origin(study, "identify", seed, {"output": output, "samples": samples})
+            origin = report_origin(study, "identify", seed, output=output, samples=samples)
             identification_report(result, study.title, [], folder / "report.pdf", origin=origin)
             clock.ends("report")
             write_json(folder / "identification.json", result.to_dict() | {"seconds": clock.seconds})

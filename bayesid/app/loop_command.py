@@ -51,7 +51,7 @@ def run(
     study = Study.load(file)
 
     from bayesid._io.files import claimed_folder
-    from bayesid.app.report_origin import Option, report_origin
+    from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_causes import loop_review
     from bayesid.app.study_to_design import load_loop_problem
     from bayesid.app.study_to_encoders import encoder_noise
@@ -77,18 +77,20 @@ def run(
         history = loop.run(executing, output, progress)
         written = any("identification" in step for step in history.steps)
         if written:
-            options: dict[str, Option] = {
-                "output": output,
-                "samples": samples,
-                "spacecraft": spacecraft,
-                "wanted": wanted,
-                "wanted-sd": wanted_sd,
-                "wanted-tip": wanted_tip,
-                "wanted-cause": wanted_cause,
-                "at-most": at_most,
-                "diagnose": diagnose,
-            }
-            origin = report_origin(study, "loop", seed, options)
+            origin = report_origin(
+                study,
+                "loop",
+                seed,
+                output=output,
+                samples=samples,
+                spacecraft=spacecraft,
+                wanted=wanted,
+                wanted_sd=wanted_sd,
+                wanted_tip=wanted_tip,
+                wanted_cause=wanted_cause,
+                at_most=at_most,
+                diagnose=diagnose,
+            )
             loop_report(history, study.title, output / "report.pdf", origin=origin)
     yield from loop_sentences(history)
     if written:

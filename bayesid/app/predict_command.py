@@ -52,7 +52,7 @@ def run(
         predictions.append(predictors[-1].predict(draws, np.random.default_rng(stream)))
     with complete_folder(output) as folder:
         write_json(folder / "prediction.json", {"recordings": [prediction.to_dict() for prediction in predictions]})
-        origin = report_origin(study, "predict", seed, {"output": output, "draws": draws, "posterior": posterior})
+        origin = report_origin(study, "predict", seed, output=output, draws=draws, posterior=posterior)
         first = predictors[0].posterior
         prediction_report(first, manoeuvres, predictions, study.title, folder / "report.pdf", origin=origin)
     for prediction in predictions:

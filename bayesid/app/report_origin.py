@@ -19,7 +19,7 @@ DIGITS = 12
 """Digits of a hash that are printed."""
 
 
-def report_origin(study: Study, command: str, seed: int | None, options: Mapping[str, Option]) -> str:
+def report_origin(study: Study, command: str, seed: int | None, **options: Option) -> str:
     """Return the files of a study with the beginnings of their SHA-256, the version, the seed and the whole command.
 
     Parameters
@@ -29,9 +29,9 @@ def report_origin(study: Study, command: str, seed: int | None, options: Mapping
         Name of the command.
     seed : int or None
         None of a command without random numbers.
-    options : mapping of str to object
-        Further options of the command with their values: whether a switch is on, or what is given; a list for an option
-        that is repeated, a tuple for one of several words, None for one that is not given.
+    options : object
+        Further options of the command, with underscores for dashes, and their values: whether a switch is on, or what
+        is given; a list for an option that is repeated, a tuple for one of several words, None for one not given.
     """
     files = [*study.defining_files, *(recording.file for recording in study.recordings)]
     place = [] if study.file is None else [study.file.name]
@@ -42,7 +42,8 @@ def report_origin(study: Study, command: str, seed: int | None, options: Mapping
 def _words(options: Mapping[str, Option]) -> list[str]:
     """Return options as they are typed."""
     words = []
-    for name, value in options.items():
+    for key, value in options.items():
+        name = key.replace("_", "-")
         if isinstance(value, bool):
             words.append(f"--{'' if value else 'no-'}{name}")
         else:

@@ -66,7 +66,7 @@ def run(
             "integration": {"step": posterior.step, "error_in_sigma": error},
         }
         write_json(folder / "simulation.json", content)
-        origin = report_origin(study, "simulate", seed, {"output": output, "noise": noise})
+        origin = report_origin(study, "simulate", seed, output=output, noise=noise)
         simulation_report(posterior, recordings, study.title, folder / "report.pdf", planned=planned, origin=origin)
     yield f"Simulated {len(recordings)} recordings; integration step {posterior.step:g} s, error {error:.2g} sigma."
     yield f"Wrote {output / 'report.pdf'}."
