@@ -45,8 +45,8 @@ def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
 @styled
 def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
     """Draw the spectrum of what is left on the accelerometer, and the raw accelerometer against the wheel's orders."""
-    figure = wide_figure(0.6 + 0.68 * len(left))
-    panels = figure.subplots(len(left), 2, squeeze=False)
+    figure = wide_figure(0.6 + 0.72 * len(left))
+    panels = figure.subplots(len(left), 2, sharex="col", squeeze=False)
     for row, (body, own) in zip(panels, left.items(), strict=True):
         spectrum = np.array([own.spectrum[:, c] for c in range(3, 6)])
         for edge in (own.wheel[0], own.wheel[2]):
@@ -57,7 +57,8 @@ def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
                 ORDERS, np.sqrt((own.orders[:, :, c] ** 2).mean(axis=0)), linewidth=1, label=CHANNELS[c][-1]
             )
         row[1].axvline(own.turn[0], color="#888888", linewidth=0.8)
-        row[0].set_ylabel(f"{body}\n[mm/s²]")
+        row[0].set_title(body, loc="left")
+        row[0].set_ylabel("[mm/s²]")
         row[1].set_ylabel("[m/s²]")
     panels[0][0].set_title("residual of samples")
     panels[0][1].set_title("raw readings, wheel at speed")
