@@ -247,6 +247,7 @@ def flights_with_jumps(instants, ends, noise):
     return model, flights, moments
 
 
+@pytest.mark.slow
 def test_intervals_are_those_of_the_samples_and_not_of_their_padding():
     """One recording is four times as long as the others, whose grids are filled with copies of the last sample."""
     model, flights, _ = flights_with_jumps((16.3, 5.0, 5.0), (40.0, 10.0, 10.0), 1e-5)

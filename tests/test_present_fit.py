@@ -83,6 +83,7 @@ def test_a_free_torque_brings_the_held_model_to_the_data(engine):
     assert along.chi2 < 1e-4 * without_torque(along).chi2
 
 
+@pytest.mark.slow
 def test_a_fit_that_follows_the_data_keeps_its_body(tmp_path):
     engine = Engine(Posterior.of(*model_and_flight(tmp_path, np.zeros(24)), step=0.1))
     found = fit_present_model(engine)
