@@ -122,6 +122,7 @@ def test_the_information_gain_is_averaged_over_the_prior(flywheel: Problem) -> N
     assert flywheel.cost(criterion, PARAMETERS, points)[0] == pytest.approx(np.mean(single))
 
 
+@pytest.mark.slow
 def test_base_motion_of_a_flywheel_in_closed_form(flywheel: Problem) -> None:
     trajectory = flywheel.trajectory(PARAMETERS)
     state = flywheel.plan.family.motion(PARAMETERS).evaluate(np.asarray(trajectory.time))

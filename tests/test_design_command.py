@@ -118,6 +118,7 @@ def made(shared_problem, tmp_path_factory: pytest.TempPathFactory):
     return folder, text, PdfText.read(folder / "out" / "report.pdf")
 
 
+@pytest.mark.slow
 def test_files_are_those_of_the_contract(made):
     folder, text, _ = made
     names = sorted(item.name for item in (folder / "out").iterdir())
@@ -135,6 +136,7 @@ def test_files_are_those_of_the_contract(made):
     assert content["best"] == best["name"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["paper-26", "condition-number"])
 def test_a_manoeuvre_keeps_its_limits_by_independent_kinematics(made, name: str):
     """The tip's twist relative to the base, by Pinocchio, 30 times more finely than the optimiser looked."""
@@ -181,6 +183,7 @@ def test_a_thorough_search_goes_on_from_the_best_motions(made, tmp_path: Path):
         assert thorough["search"]["evaluations"] > 2 * plain["search"]["evaluations"]
 
 
+@pytest.mark.slow
 def test_the_report_holds_the_result_and_the_assumptions(made):
     text = made[2]
     content = json.loads((made[0] / "out" / "design.json").read_text())

@@ -73,6 +73,7 @@ def check_columns(null, labels):
     assert first == expected.shape[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", ["thruster-leak", "payload:link3"])
 def test_signatures_are_what_the_simulation_does(label, null):
     check_columns(null, [label])
@@ -90,6 +91,7 @@ def test_all_signatures_are_what_the_simulation_does(null):
     check_columns(null, labels)
 
 
+@pytest.mark.slow
 def test_signatures_of_a_jump_are_what_the_simulation_does(null):
     engine, fit, effects, bounds = null
     bank = mass_shift_signatures(engine, fit, effects, bounds)

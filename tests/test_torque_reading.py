@@ -80,6 +80,7 @@ def test_friction_of_one_joint_is_named_and_measured(flown, friction):
     assert 0.8 < after < 1.25
 
 
+@pytest.mark.slow
 def test_an_error_of_a_sensor_is_told_from_friction(flown):
     found = read(flown(4, np.array([OFFSET, 0.0])))
     assert found.verdict.causes == ("torque-bias:joint1",)
