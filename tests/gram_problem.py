@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bayesid.diagnosis.gram import Gram
+from bayesid.diagnosis.evidence.gram import Gram
 
 __all__ = ["LinearProblem"]
 

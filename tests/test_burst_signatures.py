@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bayesid.diagnosis.burst_signatures import LENGTH, STRONGEST, burst_signatures
+from bayesid.diagnosis.candidates.burst_signatures import LENGTH, STRONGEST, burst_signatures
 from bayesid.simulation.sensors import Kind
 
 TIMES, CHANNELS = 30, 6

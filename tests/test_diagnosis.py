@@ -14,14 +14,14 @@ import pytest
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
-from bayesid.diagnosis.extended_model import extended_start
-from bayesid.diagnosis.gain import measure_gain
-from bayesid.diagnosis.generic_signatures import CORNERS, WAVES
-from bayesid.diagnosis.left_beside import LeftBeside
-from bayesid.diagnosis.noise_faults import noise_fault
-from bayesid.diagnosis.noise_tests import chi2_log_sf
-from bayesid.diagnosis.perturbed_fit import Engine
-from bayesid.diagnosis.set_evidence import SetEvidence
+from bayesid.diagnosis.candidates.generic_signatures import CORNERS, WAVES
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.noise.noise_faults import noise_fault
+from bayesid.diagnosis.noise.noise_tests import chi2_log_sf
+from bayesid.diagnosis.outcome.extended_model import extended_start
+from bayesid.diagnosis.outcome.gain import measure_gain
+from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.search.left_beside import LeftBeside
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from bayesid.diagnosis.encoder_fault import ENCODER_NOISE, encoder_test, noise_of, with_encoder_noise
+from bayesid.diagnosis.noise.encoder_fault import ENCODER_NOISE, encoder_test, noise_of, with_encoder_noise
 from bayesid.inference.noise_changes import leaving_out, relinearised, with_sensors
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording

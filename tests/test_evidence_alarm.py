@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bayesid.diagnosis.cause_power import cause_power
-from bayesid.diagnosis.evidence_alarm import EvidenceAlarm, NullTail
-from bayesid.diagnosis.family_alarm import FamilyAlarm
-from bayesid.diagnosis.gram import Gram
-from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.set_evidence import SetEvidence
+from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm, NullTail
+from bayesid.diagnosis.evidence.gram import Gram
+from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
+from bayesid.diagnosis.outcome.cause_power import cause_power
 from tests.gram_problem import LinearProblem
 
 SIZES = {"a": 1, "b": 3, "c": 2, "d": 1, "e": 6}

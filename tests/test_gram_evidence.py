@@ -9,10 +9,10 @@ import pytest
 import scipy.linalg as sla
 from scipy import integrate
 
-from bayesid.diagnosis.amplitude_posterior import AmplitudePosterior
-from bayesid.diagnosis.gram import Gram
-from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause, scale_range
-from bayesid.diagnosis.set_evidence import SetEvidence
+from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
+from bayesid.diagnosis.evidence.gram import Gram
+from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause, scale_range
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from tests.gram_problem import LinearProblem
 
 

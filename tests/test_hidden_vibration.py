@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bayesid.diagnosis.hidden_vibration import Vibration
+from bayesid.diagnosis.response.hidden_vibration import Vibration
 from bayesid.robot.composite_tables import ENTRIES
 from bayesid.simulation.effects import FuelSlosh
 

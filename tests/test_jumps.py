@@ -8,7 +8,7 @@ import pytest
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Status, diagnose
-from bayesid.diagnosis.encoder_fault import noise_of
+from bayesid.diagnosis.noise.encoder_fault import noise_of
 from bayesid.recording.integrated_process import HIGHER, IntegratedProcess, Jump
 from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth

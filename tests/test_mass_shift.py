@@ -11,8 +11,8 @@ import pytest
 
 from bayesid._io.errors import InputError
 from bayesid.diagnosis import Status, diagnose
-from bayesid.diagnosis.mass_shift_signatures import sample_intervals
-from bayesid.diagnosis.perturbed_fit import Engine
+from bayesid.diagnosis.candidates.mass_shift_signatures import sample_intervals
+from bayesid.diagnosis.response.perturbed_fit import Engine
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording

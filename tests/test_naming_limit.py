@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesid.diagnosis.cause_prior import CausePrior
-from bayesid.diagnosis.probable_verdict import NAMED, ProbableVerdict
-from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.set_evidence import SetEvidence
-from bayesid.diagnosis.status import Status
+from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.diagnosis.evidence.probable_verdict import NAMED, ProbableVerdict
+from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.evidence.status import Status
 from studies.blind_injections import Trial
 from studies.blind_injections.goals import _relative
 from studies.blind_injections.limits import simulated_naming

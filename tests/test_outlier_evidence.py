@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesid.diagnosis.noise_states import FaultyFit, faulty_fit
-from bayesid.diagnosis.perturbed_fit import Engine
+from bayesid.diagnosis.noise.noise_states import FaultyFit, faulty_fit
+from bayesid.diagnosis.response.perturbed_fit import Engine
 from bayesid.inference.posterior import Posterior
 from tests.conftest import SIGMA
 

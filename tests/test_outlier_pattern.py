@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesid.diagnosis.outlier_pattern import LEVEL, is_event
+from bayesid.diagnosis.noise.outlier_pattern import LEVEL, is_event
 
 TIMES = [np.arange(0.0, 160.0, 0.5)] * 3
 

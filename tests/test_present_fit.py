@@ -18,9 +18,9 @@ from bayesid import (
     White,
 )
 from bayesid.diagnosis import Status, diagnose
-from bayesid.diagnosis.followed_motion import follow, step_along_data, without_torque
-from bayesid.diagnosis.perturbed_fit import Engine
-from bayesid.diagnosis.present_fit import fit_present_model, strayed
+from bayesid.diagnosis.response.followed_motion import follow, step_along_data, without_torque
+from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.present_fit import fit_present_model, strayed
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create
 from studies.truth import mujoco as mj

@@ -26,9 +26,9 @@ from bayesid.diagnosis import (
     candidates,
     diagnose,
 )
-from bayesid.diagnosis.cause_amplitudes import CauseAmplitude, amplitudes_of
-from bayesid.diagnosis.cause_prior import CausePrior
-from bayesid.diagnosis.wrench_correlations import torque_correlations
+from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.diagnosis.outcome.cause_amplitudes import CauseAmplitude, amplitudes_of
+from bayesid.diagnosis.outcome.wrench_correlations import torque_correlations
 from bayesid.inference.residual_series import Residuals
 from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.recording import Recording

@@ -11,15 +11,15 @@ import pytest
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import candidates
-from bayesid.diagnosis.body_evidence import MissingBodyPrior, body_log_evidence, outer_moments, rigid_moments
-from bayesid.diagnosis.catalogue_signatures import catalogue_signatures
-from bayesid.diagnosis.mass_shift_signatures import mass_shift_signatures, shift_instants
-from bayesid.diagnosis.perturbed_fit import Engine
-from bayesid.diagnosis.scale_prior import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.set_evidence import SetEvidence
-from bayesid.diagnosis.signature_bank import Signatures
-from bayesid.diagnosis.signature_products import SignatureProducts
-from bayesid.diagnosis.vibration_signatures import PAIRS, slosh_entries
+from bayesid.diagnosis.candidates.catalogue_signatures import catalogue_signatures
+from bayesid.diagnosis.candidates.mass_shift_signatures import mass_shift_signatures, shift_instants
+from bayesid.diagnosis.candidates.signature_bank import Signatures
+from bayesid.diagnosis.candidates.signature_products import SignatureProducts
+from bayesid.diagnosis.candidates.vibration_signatures import PAIRS, slosh_entries
+from bayesid.diagnosis.evidence.body_evidence import MissingBodyPrior, body_log_evidence, outer_moments, rigid_moments
+from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.response.perturbed_fit import Engine
 from bayesid.inference.importance import choose_parameterisation, importance_sample
 from bayesid.inference.mode import maximise
 from bayesid.inference.posterior import Posterior

@@ -9,11 +9,11 @@ import pytest
 
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
-from bayesid.diagnosis.disturbing_wrench import Frame, unexplained_wrench
-from bayesid.diagnosis.generic_signatures import generic_signatures
-from bayesid.diagnosis.hypothesis import Hypothesis
-from bayesid.diagnosis.perturbed_fit import Engine
-from bayesid.diagnosis.torque_events import EventCandidates, Held
+from bayesid.diagnosis.candidates.generic_signatures import generic_signatures
+from bayesid.diagnosis.outcome.disturbing_wrench import Frame, unexplained_wrench
+from bayesid.diagnosis.outcome.torque_events import EventCandidates, Held
+from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from studies.truth import hidden_causes

@@ -10,12 +10,12 @@ import pytest
 
 from bayesid import InputError, MeasuredMotion, Robot
 from bayesid.diagnosis import Status, diagnose
-from bayesid.diagnosis.cause_prior import CausePrior
-from bayesid.diagnosis.hypothesis import Hypothesis
-from bayesid.diagnosis.perturbed_fit import Engine
-from bayesid.diagnosis.present_fit import fit_present_model
-from bayesid.diagnosis.probable_verdict import ProbableVerdict
-from bayesid.diagnosis.torque_reading import TorqueReading, Unread, read_torques, torques_beside
+from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict
+from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread, read_torques, torques_beside
+from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.present_fit import fit_present_model
+from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import JointFriction, TorqueBias, WheelMomentum
 from bayesid.simulation.joint_torques import TorqueSensor

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.encoder_fault import noise_of
+from bayesid.diagnosis.noise.encoder_fault import noise_of
 from bayesid.recording.recording import Recording
 from bayesid.recording.smoothing import JointSamples, smooth
 

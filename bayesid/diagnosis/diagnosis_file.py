@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from bayesid.diagnosis.candidate_table import Candidate
-from bayesid.diagnosis.cause_amplitudes import amplitudes_of, amplitudes_of_others
-from bayesid.diagnosis.jump_instants import jump_instants
-from bayesid.diagnosis.torque_reading import TorqueReading, Unread
+from bayesid.diagnosis.candidates.jump_instants import jump_instants
+from bayesid.diagnosis.outcome.candidate_table import Candidate
+from bayesid.diagnosis.outcome.cause_amplitudes import amplitudes_of, amplitudes_of_others
+from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread
 from bayesid.inference import Identification
 from bayesid.inference.body_quantities import quantity
 from bayesid.simulation.effects.mass_shift import MassShift

@@ -14,27 +14,27 @@ from threadpoolctl import threadpool_limits
 from bayesid._io.phase_clock import PhaseClock
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.candidate_effects import candidates
-from bayesid.diagnosis.candidate_table import Candidate, candidate_table
-from bayesid.diagnosis.cause_prior import CausePrior
-from bayesid.diagnosis.cause_weighing import WeighedCauses, weigh_causes
+from bayesid.diagnosis.candidates.candidate_effects import candidates
 from bayesid.diagnosis.diagnosis_file import diagnosis_dict
-from bayesid.diagnosis.disturbing_wrench import Unexplained, unexplained_wrench
-from bayesid.diagnosis.extended_model import extended_posterior, extended_start
-from bayesid.diagnosis.family_alarm import FamilyAlarm
-from bayesid.diagnosis.followed_motion import step_along_data, without_torque
-from bayesid.diagnosis.gain import Gain, measure_gain
-from bayesid.diagnosis.hypothesis import Hypothesis
-from bayesid.diagnosis.hypothesis_fit import fit_hypothesis
-from bayesid.diagnosis.left_over import with_left_over
-from bayesid.diagnosis.perturbed_fit import Engine
-from bayesid.diagnosis.present_fit import fit_present_model
-from bayesid.diagnosis.probable_verdict import ProbableVerdict
-from bayesid.diagnosis.set_evidence import SetEvidence
-from bayesid.diagnosis.set_probabilities import SetProbabilities
-from bayesid.diagnosis.status import Status
-from bayesid.diagnosis.torque_reading import TorqueReading, Unread, torque_candidates, torques_beside
-from bayesid.diagnosis.verdict_sensitivity import VerdictSensitivity, verdict_sensitivity
+from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
+from bayesid.diagnosis.evidence.status import Status
+from bayesid.diagnosis.evidence.verdict_sensitivity import VerdictSensitivity, verdict_sensitivity
+from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
+from bayesid.diagnosis.outcome.candidate_table import Candidate, candidate_table
+from bayesid.diagnosis.outcome.disturbing_wrench import Unexplained, unexplained_wrench
+from bayesid.diagnosis.outcome.extended_model import extended_posterior, extended_start
+from bayesid.diagnosis.outcome.gain import Gain, measure_gain
+from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread, torque_candidates, torques_beside
+from bayesid.diagnosis.response.followed_motion import step_along_data, without_torque
+from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.present_fit import fit_present_model
+from bayesid.diagnosis.search.cause_weighing import WeighedCauses, weigh_causes
+from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
+from bayesid.diagnosis.search.left_over import with_left_over
 from bayesid.inference import Identification, identify
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior

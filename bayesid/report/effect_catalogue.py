@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from bayesid._io.errors import InputError
-from bayesid.diagnosis.encoder_fault import ENCODER_NOISE
-from bayesid.diagnosis.noise_faults import SUMMARIES
+from bayesid.diagnosis.noise.encoder_fault import ENCODER_NOISE
+from bayesid.diagnosis.noise.noise_faults import SUMMARIES
 from bayesid.report.numbers import format_number, format_text, format_unit
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot

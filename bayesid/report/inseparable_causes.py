@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesid.diagnosis import Diagnosis
-from bayesid.diagnosis.gram import Gram
+from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.report.class_probabilities import alternatives, class_of
 
 __all__ = ["CausePair", "cause_cosines", "inseparable_pairs"]

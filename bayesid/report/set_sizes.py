@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesid.diagnosis import CauseSet, Diagnosis
-from bayesid.diagnosis.scale_prior import AmplitudeGroup
-from bayesid.diagnosis.set_evidence import precision_roots
+from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup
+from bayesid.diagnosis.evidence.set_evidence import precision_roots
 
 __all__ = ["GroupSize", "set_sizes"]
 

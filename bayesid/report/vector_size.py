@@ -9,7 +9,7 @@ from scipy import stats
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Hypothesis
-from bayesid.diagnosis.effect_functions import report_of, report_slopes
+from bayesid.diagnosis.response.effect_functions import report_of, report_slopes
 
 __all__ = ["Z95", "VectorSize", "vector_size"]
 

@@ -10,15 +10,15 @@ from scipy import stats
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis import Diagnosis
-from bayesid.diagnosis.cause_prior import CausePrior
-from bayesid.diagnosis.equivalent_causes import classes_of_equivalents
-from bayesid.diagnosis.family_alarm import FamilyAlarm
-from bayesid.diagnosis.gram import Gram, independent_directions
-from bayesid.diagnosis.perturbed_fit import Fit
-from bayesid.diagnosis.probable_verdict import ProbableVerdict, probable_verdict
-from bayesid.diagnosis.set_enumeration import enumerate_sets
-from bayesid.diagnosis.set_evidence import SetEvidence
-from bayesid.diagnosis.signature_products import SignatureProducts
+from bayesid.diagnosis.candidates.signature_products import SignatureProducts
+from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.diagnosis.evidence.equivalent_causes import classes_of_equivalents
+from bayesid.diagnosis.evidence.gram import Gram, independent_directions
+from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict, probable_verdict
+from bayesid.diagnosis.evidence.set_enumeration import enumerate_sets
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
+from bayesid.diagnosis.response.perturbed_fit import Fit
 from bayesid.inference.posterior import Posterior
 
 __all__ = ["Limits", "limits_of", "simulated_naming", "what_is_left"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bayesid.diagnosis import Diagnosis, Frame, Status, Unexplained
-from bayesid.diagnosis.wrench_correlations import torque_correlations
+from bayesid.diagnosis.outcome.wrench_correlations import torque_correlations
 from bayesid.report import figures
 from bayesid.report.cause_torque import cause_torque
 from bayesid.report.document import Document

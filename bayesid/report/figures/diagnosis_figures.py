@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Candidate, Frame, Unexplained
-from bayesid.diagnosis.disturbing_wrench import WAVES
+from bayesid.diagnosis.outcome.disturbing_wrench import WAVES
 from bayesid.report.figures.figure_style import (
     COLOURS,
     curve_style,

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, Status, Unexplained
-from bayesid.diagnosis.cause_amplitudes import amplitudes_of
-from bayesid.diagnosis.jump_instants import jump_instants
-from bayesid.diagnosis.noise_faults import SUMMARIES
-from bayesid.diagnosis.probable_verdict import COVERED, NAMED, UNKNOWN
+from bayesid.diagnosis.candidates.jump_instants import jump_instants
+from bayesid.diagnosis.evidence.probable_verdict import COVERED, NAMED, UNKNOWN
+from bayesid.diagnosis.noise.noise_faults import SUMMARIES
+from bayesid.diagnosis.outcome.cause_amplitudes import amplitudes_of
 from bayesid.report.class_probabilities import alternative_probability, alternatives, cause_probability
 from bayesid.report.numbers import (
     format_fixed,

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesid.diagnosis import Candidate, Diagnosis
-from bayesid.diagnosis.cause_amplitudes import CauseAmplitude, amplitudes_of
-from bayesid.diagnosis.jump_instants import jump_instants
-from bayesid.diagnosis.wrench_correlations import TorqueCorrelation
+from bayesid.diagnosis.candidates.jump_instants import jump_instants
+from bayesid.diagnosis.outcome.cause_amplitudes import CauseAmplitude, amplitudes_of
+from bayesid.diagnosis.outcome.wrench_correlations import TorqueCorrelation
 from bayesid.report.document import Rows
 from bayesid.report.numbers import (
     format_fixed,

@@ -1,0 +1,1 @@
+"""Kinds of causes: what each would change in the residual."""

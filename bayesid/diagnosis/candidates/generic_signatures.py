@@ -1,0 +1,171 @@
+"""Signatures of what nobody listed: disturbing torques, forces, errors of sensors, and pulses at unknown instants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
+from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.inference.posterior import Posterior
+from bayesid.robot.robot_size import RobotSize
+
+__all__ = ["FORCE", "TORQUE", "WAVES", "error_signatures", "generic_signatures"]
+
+TORQUE, FORCE = "disturbing torque", "disturbing force"
+"""Names of the smooth disturbances."""
+
+WAVES = 40
+"""Cosines in time of a disturbing torque or force, per axis and recording."""
+
+ERROR_WAVES = 40
+"""Cosines in time of an error of a sensor, per channel and recording."""
+
+CORNERS = (2.0, 7.0, 25.0)
+"""Numbers of half waves in a recording up to which a smooth disturbance has its variance, equally probable."""
+
+ROLL = 4.0
+"""Power with which the variance falls beyond."""
+
+BANDS = (4.0, 5.4, 7.3, 9.8, 13.0, 18.0, 24.0, 32.0)
+"""Half waves in a recording about which a disturbance that swings has its variance; all bands together are as probable
+as all corners."""
+
+WIDTH = 0.2
+"""Half width of a band relative to its middle."""
+
+ABSENT = 0.03
+"""Variance relative to the largest below which a cosine is left out of a band."""
+
+INSTANTS = 20
+"""Instants per recording at which something may happen."""
+
+ACCELERATION = 0.01
+"""Largest acceleration by an unknown force [m/s2]: that of a thruster for attitude control; assumed."""
+
+ERROR = 1000.0
+"""Largest unknown error of a sensor, in standard deviations of its noise; assumed."""
+
+
+def generic_signatures(engine: Engine, fit: Fit) -> SignatureBank:
+    """Return the bank of candidates that name nothing.
+
+    - disturbing torque and force: smooth courses in base axes, whose cosines have variances that fall beyond a corner,
+      or on both sides of a band where it swings; the force acts through the centre of mass;
+    - pulse of torque: at one instant of one recording, about any axis;
+    - error of each sensor: smooth courses of its channels.
+    """
+    posterior = engine.posterior
+    kinds, size = posterior.model.channels.kinds, RobotSize.of(posterior.model.robot)
+    force = ACCELERATION * size.mass
+    torque = force * size.radius
+    banks = [
+        _smooth(engine, fit, TORQUE, 3, torque),
+        *([_smooth(engine, fit, FORCE, 0, force)] if any(kind.feels_force for kind in kinds) else []),
+        _pulses(engine, fit, torque),
+        *(error_signatures(posterior, f"error of {kind.value}", posterior.model.channels.of(kind)) for kind in kinds),
+    ]
+    return SignatureBank.joined(banks)
+
+
+def _smooth(engine: Engine, fit: Fit, name: str, first: int, high: float) -> SignatureBank:
+    """Return the bank of a smooth torque (first = 3) or force (0) in base axes."""
+
+    def waves(time: Floats, end: float) -> Floats:
+        return np.cos(np.pi * np.arange(WAVES)[:, None] * time / end)
+
+    columns = _wrenches(engine, fit, WAVES, waves, first)
+    recordings = len(columns)
+    signatures = tuple(Signatures(name, own, r) for r, own in enumerate(columns))
+    spreads = [np.tile(np.repeat(own, 3), recordings) for own in _courses(WAVES)]
+    return SignatureBank(signatures, (_cause(name, high, spreads),))
+
+
+def _cause(name: str, high: float, spreads: Sequence[Floats]) -> CandidateCause:
+    """Return the candidate with one form for each course, corners and bands with half of the prior each."""
+    forms = [(AmplitudeGroup(name, high, spread=own),) for own in spreads]
+    bands = len(forms) - len(CORNERS)
+    shares = [(0.5 if bands else 1.0) / len(CORNERS)] * len(CORNERS) + [0.5 / max(bands, 1)] * bands
+    return CandidateCause(name, forms[0], True, tuple(forms[1:]), tuple(shares))
+
+
+def _courses(waves: int) -> list[Floats]:
+    """Return the variances of cosines, whose sum is one, for every corner and for every band within their number."""
+    number = np.arange(waves)
+    found = [1.0 / (1.0 + (number / corner) ** ROLL) for corner in CORNERS]
+    for middle in BANDS:
+        if middle * (1.0 + WIDTH) < waves:
+            band = 1.0 / (1.0 + (np.abs(number - middle) / (WIDTH * middle)) ** ROLL)
+            found.append(np.where(band >= ABSENT * band.max(), band, 0.0))
+    return [own / own.sum() for own in found]
+
+
+def _pulses(engine: Engine, fit: Fit, high: float) -> SignatureBank:
+    """Return the bank of one pulse of torque at an instant of a recording."""
+
+    def pulses(time: Floats, end: float) -> Floats:
+        centres = end * (np.arange(INSTANTS)[:, None] + 0.5) / INSTANTS
+        return np.maximum(1.0 - np.abs(time - centres) * INSTANTS / end, 0.0)
+
+    signatures = []
+    for r, columns in enumerate(_wrenches(engine, fit, INSTANTS, pulses, 3)):
+        for k in range(INSTANTS):
+            name = f"pulse of torque {k + 1} of recording {r + 1}"
+            signatures.append(Signatures(name, columns[:, 3 * k : 3 * k + 3], r))
+    forms = [(AmplitudeGroup(item.name, high),) for item in signatures]
+    return SignatureBank(tuple(signatures), (CandidateCause("pulse of torque", forms[0], True, tuple(forms[1:])),))
+
+
+def _wrenches(
+    engine: Engine, fit: Fit, count: int, courses: Callable[[Floats, float], Floats], first: int
+) -> list[Floats]:
+    """Return the responses of each recording to ``count`` courses in time of a torque or force: (rows, 3 count).
+
+    The recordings are independent given the unknowns, so that one push acts on all of them at once.
+    """
+    moments = (fit.operating.node, fit.operating.sample)
+    times = [np.asarray(instant.environment.time) for instant in moments]
+    wrenches = []
+    for instant, time in zip(moments, times, strict=True):
+        wrench = np.zeros((count, 3, *time.shape, 6))
+        for r, end in enumerate(times[0].max(axis=1)):
+            course = courses(time[r], float(end))
+            for axis in range(3):
+                wrench[:, axis, r, :, first + axis] = course
+        if first == 0:
+            wrench[..., 3:] = np.cross(np.asarray(instant.body.com), wrench[..., :3])
+        wrenches.append(wrench.reshape(3 * count, *time.shape, 6))
+    push = engine.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
+    found = engine.respond(push, fit.z, fit.data)
+    return list(found.reshape(len(times[0]), -1, 3 * count))
+
+
+def error_signatures(posterior: Posterior, name: str, channels: slice) -> SignatureBank:
+    """Return the bank of smooth errors of some channels of the residual, in standard deviations of their samples.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    name : str
+        Name of the candidate.
+    channels : slice
+        Columns of the residual, which have one variance.
+    """
+    _, outputs, width = posterior.residual_shape
+    signatures, waves = [], []
+    for r, item in enumerate(posterior.whitenings):
+        for channel in range(channels.start, channels.stop):
+            there = np.flatnonzero(item.outputs[:, channel])
+            waves.append(min(ERROR_WAVES, len(there) // 3))
+            own = np.zeros((outputs, width, waves[-1]))
+            place = (np.arange(len(there)) + 0.5) / max(len(there), 1)
+            own[there, channel] = np.cos(np.pi * np.arange(waves[-1]) * place[:, None])
+            signatures.append(Signatures(name, own.reshape(outputs * width, -1), r))
+    if not sum(waves):
+        return SignatureBank()
+    each = [_courses(count) for count in waves if count]
+    spreads = [np.concatenate(parts) for parts in zip(*each, strict=False)]  # bands that all channels can show
+    return SignatureBank(tuple(signatures), (_cause(name, ERROR, spreads),))

@@ -1,0 +1,187 @@
+"""Prior of amplitudes of one unit whose common scale is itself unknown.
+
+The amplitudes of a group are normal, ``a ~ N(0, tau^2 Lambda)``, and their scale ``tau`` is log-uniform between a floor
+below what the data can resolve and a physical bound. A Gaussian prior at the bound would charge a group with many small
+amplitudes for every one of them; here the common scale is charged once. Every candidate has a prior of this one form,
+so that their Occam factors are comparable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from bayesid._math.arrays import Floats, Integers
+from bayesid.diagnosis.evidence.body_evidence import MissingBody
+from bayesid.diagnosis.evidence.gram import Gram
+
+__all__ = ["AmplitudeGroup", "CandidateCause", "ScaleRange", "Variant", "range_of", "scale_range"]
+
+UNRESOLVED_GAIN = 0.01
+"""Square of the scale times the information in the most visible direction, at the floor that the data set: there the
+evidence differs from that of no amplitude at all by less than 0.01 per direction."""
+
+
+@dataclass(frozen=True)
+class AmplitudeGroup:
+    """Amplitudes that share one unknown scale.
+
+    Attributes
+    ----------
+    name : str
+        Name of the group of columns in the Gram.
+    high : float
+        Physical bound of the scale, in the unit of the amplitudes.
+    low : float, optional
+        Smallest scale. Where it is left out, it is what the data cannot resolve (`scale_range`).
+    spread : (k,) array, optional
+        Variances of the amplitudes relative to the square of the scale, the diagonal of ``Lambda``; ones by default.
+        Amplitudes of no variance are absent.
+    """
+
+    name: str
+    high: float
+    low: float | None = None
+    spread: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.high < np.inf:
+            raise ValueError(f"{self.name}: the bound of the scale must be positive and finite, received {self.high}")
+        if self.low is not None and not 0.0 < self.low <= self.high:
+            raise ValueError(f"{self.name}: the floor of the scale must lie in (0, {self.high}], received {self.low}")
+        if self.spread is not None:
+            spread = np.array(self.spread, dtype=float)
+            if not ((spread >= 0.0) & np.isfinite(spread)).all() or not spread.any():
+                raise ValueError(f"{self.name}: relative variances must be positive and finite, received {spread}")
+            spread.setflags(write=False)
+            object.__setattr__(self, "spread", spread)
+
+    def columns(self, gram: Gram) -> Integers:
+        """Return the columns of the Gram whose amplitudes are not absent, shape (k,)."""
+        own = gram.groups[self.name]
+        if self.spread is None:
+            return own
+        if self.spread.shape != own.shape:
+            raise ValueError(f"{self.name}: {len(own)} amplitudes need so many variances, received {self.spread.shape}")
+        return own[self.spread > 0.0]
+
+    def roots(self, gram: Gram) -> Floats:
+        """Return the standard deviations relative to the scale of the amplitudes in `columns`, shape (k,)."""
+        if self.spread is None:
+            return np.ones(len(gram.groups[self.name]))
+        return np.sqrt(self.spread[self.spread > 0.0])
+
+
+class Variant(NamedTuple):
+    """One of the forms that a cause may take, such as a vibration of one frequency or a jump at one instant.
+
+    Attributes
+    ----------
+    groups : tuple of AmplitudeGroup
+        Groups of amplitudes that come and go together, each with its own scale.
+    log_weight : float
+        Logarithm of the prior probability of this form, given that the cause is at work.
+    """
+
+    groups: tuple[AmplitudeGroup, ...]
+    log_weight: float = 0.0
+
+
+@dataclass(frozen=True)
+class CandidateCause:
+    """What the model may lack.
+
+    Attributes
+    ----------
+    name : str
+    groups : tuple of AmplitudeGroup
+        Groups of amplitudes of a cause of one form, or of the first of its forms.
+    generic : bool
+        Whether it stands for something unknown, such as a disturbing torque, rather than for a cause of the catalogue.
+    others : tuple of tuples of AmplitudeGroup
+        Groups of further forms.
+    shares : tuple of float
+        Prior probabilities of all forms, given that the cause is at work; by default they are equal.
+    body : MissingBody, optional
+        Body of positive mass at a bounded place whose moments the amplitudes are.
+    fixed : bool
+        Whether the amplitudes are all exactly one, since physics leaves them no freedom; their scales do not matter.
+    """
+
+    name: str
+    groups: tuple[AmplitudeGroup, ...]
+    generic: bool = False
+    others: tuple[tuple[AmplitudeGroup, ...], ...] = ()
+    shares: tuple[float, ...] = ()
+    body: MissingBody | None = None
+    fixed: bool = False
+
+    def __post_init__(self) -> None:
+        if self.shares and (len(self.shares) != 1 + len(self.others) or not all(share > 0.0 for share in self.shares)):
+            raise ValueError(f"{self.name!r}: every form needs a positive share, received {self.shares}")
+        if self.fixed and (self.others or len(self.groups) != 1):
+            raise ValueError(f"{self.name!r}: a cause of fixed size has one form with one group")
+
+    @cached_property
+    def variants(self) -> tuple[Variant, ...]:
+        """All forms, with their prior probabilities."""
+        forms = (self.groups, *self.others)
+        shares = self.shares or (1.0 / len(forms),) * len(forms)
+        return tuple(Variant(groups, float(np.log(share))) for groups, share in zip(forms, shares, strict=True))
+
+    def rescaled(self, gram: Gram, bound: float = 1.0, floor: float = 1.0) -> CandidateCause:
+        """Return the cause with the bounds of its scales and the floors multiplied by factors.
+
+        A floor that the data would set is written down first, so that it is multiplied, too. What physics fixes keeps
+        its size.
+        """
+        if self.fixed:
+            return self
+        forms = []
+        for variant in self.variants:
+            groups = []
+            for group in variant.groups:
+                low = scale_range(group, gram).low if group.low is None and floor != 1.0 else group.low
+                groups.append(replace(group, high=group.high * bound, low=None if low is None else low * floor))
+            forms.append(tuple(groups))
+        body = None if self.body is None else replace(self.body, heaviest=self.body.heaviest * bound)
+        return replace(self, groups=forms[0], others=tuple(forms[1:]), body=body)
+
+
+@dataclass(frozen=True)
+class ScaleRange:
+    """Range of a log-uniform scale.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends, in the unit of the amplitudes. They are equal where the data cannot see the group within its bound.
+    visible : bool
+        Whether the data can see the group within its bound at all.
+    """
+
+    low: float
+    high: float
+    visible: bool
+
+
+def scale_range(group: AmplitudeGroup, gram: Gram) -> ScaleRange:
+    """Return the range of a group's scale (`range_of`)."""
+    own, root = group.columns(gram), group.roots(gram)
+    values = np.linalg.eigvalsh(root[:, None] * gram.matrix[np.ix_(own, own)] * root)
+    return range_of(group, float(values.max(initial=0.0)))
+
+
+def range_of(group: AmplitudeGroup, largest: float) -> ScaleRange:
+    """Return the range of a group's scale, given the largest eigenvalue of its information in units of the scale.
+
+    The floor that the data set is the scale at which its square times the largest eigenvalue of
+    ``Lambda^1/2 A Lambda^1/2`` is 0.01. A group whose bound is below that floor is invisible: its evidence is that of
+    nothing, whatever the data.
+    """
+    floor = np.sqrt(UNRESOLVED_GAIN / largest) if largest > 0.0 else np.inf
+    low = min(floor, group.high) if group.low is None else group.low
+    return ScaleRange(float(low), group.high, bool(floor <= group.high))

@@ -1,0 +1,483 @@
+"""Evidence of any set of causes relative to nothing, from the Gram alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+import scipy.linalg as sla
+from scipy.special import logsumexp
+
+from bayesid._math.arrays import Floats, Integers
+from bayesid._math.log_sum import log_sum, log_sums
+from bayesid.diagnosis.evidence.gram import Gram
+from bayesid.diagnosis.evidence.scale_integral import (
+    MOST_NODES,
+    GroupSpectrum,
+    ScaleAverage,
+    average_over_scales,
+    log_evidences,
+)
+from bayesid.diagnosis.evidence.scale_nodes import LogNodes, thinning
+from bayesid.diagnosis.evidence.scale_prior import CandidateCause
+
+__all__ = ["SetEvidence", "near_best", "precision_roots"]
+
+FEW_COMBINATIONS = 8
+"""Combinations of the forms of a set up to which all are integrated."""
+
+MOST_FORMS = 12
+"""Most forms of one cause that are weighed beside a set: those that do best by themselves."""
+
+FORMS_NEAR, MOST_NEAR = 4.0, 4
+"""Nats below a cause's best form down to which its forms are evaluated in full, and how many of them at most."""
+
+_Spectra = tuple[tuple[GroupSpectrum, ...], ...]
+"""Spectra of the groups of each form of a cause."""
+
+BLOCK = 4_000_000
+"""Most numbers in one intermediate array where many scores are evaluated at once."""
+
+
+def precision_roots(matrix: Floats, deviations: Floats) -> tuple[Floats, Floats]:
+    """Return roots of the posterior covariance of amplitudes with known prior deviations.
+
+    With ``D`` the diagonal of the deviations, ``1 + D A D`` has eigenvalues of at least one whatever ``A`` is, and a
+    Cholesky factor ``L``; the posterior covariance is ``D (1 + D A D)^-1 D``.
+
+    Parameters
+    ----------
+    matrix : (m, m) array
+        Information ``A``.
+    deviations : (t, m) array
+        Prior standard deviations, one row for each combination of scales.
+
+    Returns
+    -------
+    roots : (t, m, m) array
+        ``L^-1 D``, of which the covariance is the transpose times the matrix itself.
+    half_log_det : (t,) array
+        Half of the logarithm of the determinant of ``1 + D A D``.
+    """
+    scaled = deviations[:, :, None] * matrix * deviations[:, None, :] + np.eye(len(matrix))
+    lower = np.linalg.cholesky(scaled)
+    roots = np.linalg.solve(lower, np.eye(len(matrix)) * deviations[:, None, :])
+    return roots, np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+
+
+def near_best(values: Mapping[int, float]) -> list[int]:
+    """Return the forms of a cause whose log evidence is near that of the best, the best first."""
+    order = sorted(values, key=lambda form: (-values[form], form))[:MOST_NEAR]
+    return [form for form in order if values[form] > values[order[0]] - FORMS_NEAR]
+
+
+class SetEvidence:
+    """Evidence of sets of causes.
+
+    Parameters
+    ----------
+    gram : Gram
+    causes : iterable of CandidateCause
+        Candidates, generic ones included, whose groups are in the Gram.
+    known : SetEvidence, optional
+        Of another bank about the same fit: what is known of sets whose causes are the same objects in both is kept.
+
+    Raises
+    ------
+    ValueError
+        If two candidates have one name, or a candidate has no group, one that is not in the Gram, or one twice.
+    """
+
+    def __init__(self, gram: Gram, causes: Iterable[CandidateCause], known: SetEvidence | None = None) -> None:
+        self.gram = gram
+        self.causes: dict[str, CandidateCause] = {}
+        for cause in causes:
+            if cause.name in self.causes:
+                raise ValueError(f"two causes have the name {cause.name!r}; names must differ")
+            for groups, _ in cause.variants:
+                absent = [group.name for group in groups if group.name not in gram.groups]
+                if absent or not groups:
+                    raise ValueError(f"{cause.name!r} needs groups of columns of the Gram, received {absent or 'none'}")
+                if len({group.name for group in groups}) < len(groups):
+                    raise ValueError(f"{cause.name!r} names one group of columns twice; each has one scale")
+            self.causes[cause.name] = cause
+        self._spectra: dict[str, _Spectra] = {}
+        self._chosen: dict[tuple[str, ...], dict[str, int]] = {}
+        self._known: dict[tuple[tuple[str, ...], tuple[int, ...]], float] = {}
+        self._scaled: dict[tuple[tuple[str, ...], tuple[int, ...]], tuple[Integers, Floats]] = {}
+        if known is not None:
+            self._take(known)
+        new = {name: cause for name, cause in self.causes.items() if name not in self._spectra}
+        found = iter(GroupSpectrum.of([g for cause in new.values() for v in cause.variants for g in v.groups], gram))
+        self._spectra |= {
+            name: tuple(tuple(next(found) for _ in variant.groups) for variant in cause.variants)
+            for name, cause in new.items()
+        }
+        self._log_weights = {
+            name: np.array([variant.log_weight for variant in cause.variants]) for name, cause in self.causes.items()
+        }
+
+    def _take(self, known: SetEvidence) -> None:
+        """Take over what is known of causes that are the same objects in another bank about the same fit."""
+        same = {name for name, cause in self.causes.items() if known.causes.get(name) is cause}
+        for name in same:
+            self._spectra[name] = tuple(
+                tuple(
+                    replace(spectrum, columns=group.columns(self.gram))
+                    for spectrum, group in zip(spectra, variant.groups, strict=True)
+                )
+                for spectra, variant in zip(known._spectra[name], self.causes[name].variants, strict=True)
+            )
+        self._chosen |= {names: forms for names, forms in known._chosen.items() if same.issuperset(names)}
+        self._known |= {key: value for key, value in known._known.items() if same.issuperset(key[0])}
+
+    @cached_property
+    def catalogue(self) -> tuple[str, ...]:
+        """Names of the causes of the catalogue, sorted."""
+        return tuple(sorted(name for name, cause in self.causes.items() if not cause.generic))
+
+    @cached_property
+    def generics(self) -> tuple[str, ...]:
+        """Names of the generic causes, sorted."""
+        return tuple(sorted(name for name, cause in self.causes.items() if cause.generic))
+
+    @property
+    def invisible(self) -> tuple[str, ...]:
+        """Names of the candidates that the data cannot see within their physical bounds, sorted."""
+        return tuple(
+            sorted(
+                name
+                for name, forms in self._spectra.items()
+                if not any(spectrum.range.visible for form in forms for spectrum in form)
+            )
+        )
+
+    def forms(self, names: Iterable[str]) -> dict[str, int]:
+        """Return the most probable form of each cause of a set, by its place among `CandidateCause.variants`.
+
+        Where there are many combinations the forms are chosen one cause after another, each beside those before it, and
+        once more beside all others.
+        """
+        ordered = tuple(sorted(names))
+        if ordered not in self._chosen:
+            self._chosen[ordered] = self._most_probable_forms(ordered)
+        return dict(self._chosen[ordered])
+
+    def _most_probable_forms(self, ordered: Sequence[str]) -> dict[str, int]:
+        """Return what `forms` returns, and find it."""
+        if self._combinations(ordered) <= FEW_COMBINATIONS:
+            choices = list(product(*(range(len(self._spectra[name])) for name in ordered)))
+            best = choices[0] if len(choices) == 1 else max(choices, key=lambda own: self._log_evidence(ordered, own))
+            return dict(zip(ordered, best, strict=True))
+        chosen = {name: 0 for name in ordered if len(self._spectra[name]) == 1}
+        several = sorted(set(ordered) - set(chosen), key=lambda name: (-self.of_forms(name).max(), name))
+        for name in (*several, *several) if len(ordered) > 1 else several:
+            chosen.pop(name, None)
+            gains = self.gains_beside(chosen, chosen, [name])[name]
+            chosen[name] = max(gains, key=lambda form: (gains[form], -form))
+        return chosen
+
+    def _combinations(self, ordered: Sequence[str]) -> int:
+        """Return the number of combinations of the forms of some causes."""
+        return int(np.prod([len(self._spectra[name]) for name in ordered], dtype=float))
+
+    def gains_beside(
+        self, names: Iterable[str], forms: Mapping[str, int], others: Iterable[str]
+    ) -> dict[str, dict[int, float]]:
+        """Return what each other cause adds to the log evidence of a set, by the cause's forms: a screening of sets.
+
+        The set's scales are held at their most probable values, at which its amplitudes take their share of the Gram;
+        what remains is a Gram of single causes. One such Gram serves all other causes. Scales that the addition moves
+        make the true gain larger.
+
+        Parameters
+        ----------
+        names : iterable of str
+            The set.
+        forms : mapping of str to int
+            Form of each of its causes.
+        others : iterable of str
+            Causes to add, each by itself, in those of its forms that do best by themselves.
+        """
+        kept = {name: self.ranked[name][:MOST_FORMS] for name in others}
+        causes = [_with_forms(self.causes[name], places) for name, places in kept.items()]
+        groups = {group.name for cause in causes for variant in cause.variants for group in variant.groups}
+        rest = SetEvidence(self.beside(names, forms, groups), causes)
+        return {name: dict(zip(places, rest.of_forms(name).tolist(), strict=True)) for name, places in kept.items()}
+
+    def places(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[tuple[str, int]]:
+        """Return the groups of a set, each by its cause and its place in that, in the order of the integration.
+
+        The order, and so the last digit of the result, depends neither on the order of the names nor on that of the
+        candidates: the group with most columns comes first.
+
+        Parameters
+        ----------
+        names : iterable of str
+        forms : mapping of str to int, optional
+            Form of each cause; by default the most probable ones.
+        """
+        forms = self.forms(names) if forms is None else forms
+        found = [(name, place) for name in sorted(names) for place in range(len(self._spectra[name][forms[name]]))]
+        return sorted(found, key=lambda item: -len(self._spectra[item[0]][forms[item[0]]][item[1]].columns))
+
+    def spectra(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[GroupSpectrum]:
+        """Return the spectra of the groups of a set, in the order of `places`."""
+        forms = self.forms(names) if forms is None else forms
+        return [self._spectra[name][forms[name]][place] for name, place in self.places(names, forms)]
+
+    def average(self, names: Iterable[str]) -> ScaleAverage:
+        """Return the evidence of a set in its most probable form, and the posterior of its scales."""
+        ordered = sorted(names)
+        forms = self.forms(ordered)
+        return self._of(ordered, tuple(forms[name] for name in ordered))
+
+    def log_evidence(self, names: Iterable[str], choices: Sequence[Mapping[str, int]] | None = None) -> float:
+        """Return the logarithm of the evidence of a set, relative to nothing, averaged over the forms of its causes.
+
+        Parameters
+        ----------
+        names : iterable of str
+        choices : sequence of mappings of str to int, optional
+            Forms of each cause beyond which the evidence is negligible; by default all, or the best of each.
+        """
+        ordered = sorted(names)
+        forms = (
+            self._choices(ordered)
+            if choices is None
+            else [tuple(choice[name] for name in ordered) for choice in choices]
+        )
+        values = [self._log_evidence(ordered, own) for own in forms]
+        best = dict(zip(ordered, forms[int(np.argmax(values))], strict=True))
+        return log_sum(values) + self._bodily(ordered, best)
+
+    def _log_evidence(self, ordered: Sequence[str], forms: tuple[int, ...]) -> float:
+        """Return the logarithm of the evidence of causes in given forms, times the prior probability of these."""
+        key = (tuple(ordered), forms)
+        if key not in self._known:
+            self._known[key] = self._of(ordered, forms).log_evidence + self._log_weight(ordered, forms)
+        return self._known[key]
+
+    def _bodily(self, ordered: Sequence[str], forms: Mapping[str, int]) -> float:
+        """Return what it adds to the log evidence of a set that some of its amplitudes are moments of a body.
+
+        A body has a positive mass at a place, where the linear prior has ten free moments. Each is weighed beside the
+        others of the set at their most probable scales, both ways.
+        """
+        total = 0.0
+        for name in ordered:
+            cause = self.causes[name]
+            if cause.body is not None:
+                (group,) = cause.variants[forms[name]].groups
+                beside = self.beside([other for other in ordered if other != name], forms, [group.name])
+                own = beside.groups[group.name]
+                lightest = self._spectra[name][forms[name]][0].range.low
+                body = cause.body.log_evidence(beside.matrix[np.ix_(own, own)], beside.score[own], lightest)
+                alone = SetEvidence(
+                    beside.keeping([group.name]), [replace(cause, groups=(group,), others=(), shares=())]
+                )
+                total += body - alone._of([name], (0,)).log_evidence
+        return total
+
+    @cached_property
+    def bodily(self) -> dict[str, float]:
+        """What it adds to the log evidence of each cause by itself that its amplitudes are moments of a body."""
+        names = [name for name, cause in self.causes.items() if cause.body is not None]
+        return {name: self._bodily([name], self.forms([name])) for name in names}
+
+    def beside(self, names: Iterable[str], forms: Mapping[str, int], groups: Iterable[str]) -> Gram:
+        """Return the Gram of some groups of columns after a set at its most probable scales has taken its share.
+
+        Parameters
+        ----------
+        names : iterable of str
+            The set.
+        forms : mapping of str to int
+            Form of each of its causes.
+        groups : iterable of str
+            Names of the groups in the Gram.
+        """
+        names = list(names)
+        part = self.gram.keeping(sorted(groups))
+        if not names:
+            return part
+        kept = np.concatenate([np.zeros(0, dtype=int), *(self.gram.groups[name] for name in part.groups)])
+        score = self.score_beside(names)
+        held, deviations = self.most_probable(names, forms)
+        information = deviations[:, None] * self.gram.matrix[np.ix_(held, held)] * deviations + np.eye(len(held))
+        lower = np.linalg.cholesky(information)
+        shared = sla.solve_triangular(lower, deviations[:, None] * self.gram.matrix[np.ix_(held, kept)], lower=True)
+        pull = sla.solve_triangular(lower, deviations * score[held], lower=True)
+        matrix, left = part.matrix - shared.T @ shared, score[kept] - shared.T @ pull
+        for own in (matrix, left):
+            own.setflags(write=False)  # finite, since the set's information is positive definite
+        return Gram(matrix, left, part.groups)
+
+    def _log_weight(self, ordered: Sequence[str], forms: Sequence[int]) -> float:
+        """Return the logarithm of the prior probability of a combination of forms."""
+        return sum(self._log_weights[name][form] for name, form in zip(ordered, forms, strict=True))
+
+    def of_forms(self, name: str) -> Floats:
+        """Return the logarithms of the evidence of each form of one cause, times the form's prior probability."""
+        found = [
+            self._of([name], (place,)).log_evidence if alone is None else alone
+            for place, alone in enumerate(self._alone[name])
+        ]
+        return np.array(found) + self._log_weights[name]
+
+    @cached_property
+    def _alone(self) -> dict[str, list[float | None]]:
+        """Logarithm of the evidence of each form of each cause, None for those of several groups or of fixed size."""
+        places = [
+            (name, place)
+            for name, forms in self._spectra.items()
+            for place, form in enumerate(forms)
+            if len(form) == 1 and not self.causes[name].fixed
+        ]
+        values = log_evidences([self._spectra[name][place][0] for name, place in places])
+        known = dict(zip(places, values.tolist(), strict=True))
+        return {name: [known.get((name, k)) for k in range(len(forms))] for name, forms in self._spectra.items()}
+
+    def most_probable(self, names: Iterable[str], forms: Mapping[str, int]) -> tuple[Integers, Floats]:
+        """Return the columns of a set and the standard deviations of their amplitudes at the most probable scales.
+
+        What physics fixes is left out.
+        """
+        ordered = tuple(sorted(names))
+        key = (ordered, tuple(forms[name] for name in ordered))
+        if key not in self._scaled:
+            self._scaled[key] = self._at_peak(ordered, forms)
+        return self._scaled[key]
+
+    def _at_peak(self, ordered: Sequence[str], forms: Mapping[str, int]) -> tuple[Integers, Floats]:
+        """Return what `most_probable` returns, and find it."""
+        average = self._of(ordered, tuple(forms[name] for name in ordered))
+        where = np.unravel_index(int(np.argmax(average.log_posterior)), average.log_posterior.shape)
+        free = [name for name in ordered if not self.causes[name].fixed]
+        spectra = self.spectra(free, forms)
+        empty = np.zeros(0)
+        columns = np.concatenate([empty.astype(int), *(own.columns for own in spectra)])
+        scales = [nodes.scales[index] for nodes, index in zip(average.nodes, where, strict=True)]
+        return columns, np.concatenate([empty, *(scale * own.root for scale, own in zip(scales, spectra, strict=True))])
+
+    def score_beside(self, names: Iterable[str]) -> Floats:
+        """Return the score of all columns after the causes of fixed size among a set are in the model."""
+        return self._with_fixed(sorted(names), self.gram.score[None])[0][0]
+
+    def _choices(self, ordered: Sequence[str]) -> list[tuple[int, ...]]:
+        """Return the combinations of forms that are integrated: all, or those near the best."""
+        if self._combinations(ordered) <= FEW_COMBINATIONS:
+            return list(product(*(range(len(self._spectra[name])) for name in ordered)))
+        if len(ordered) == 1:
+            return [(form,) for form in self.ranked[ordered[0]]]
+        best = self.forms(ordered)
+        near = {name: near_best(self.gains_beside(set(best) - {name}, best, [name])[name]) for name in best}
+        return [
+            own
+            for own in product(*(near[name] for name in ordered))
+            if sum(form != best[name] for name, form in zip(ordered, own, strict=True)) < 2
+        ]
+
+    @cached_property
+    def ranked(self) -> dict[str, tuple[int, ...]]:
+        """Forms of each cause, the most probable by itself first."""
+        found = {}
+        for name in self._spectra:
+            values = self.of_forms(name)
+            found[name] = tuple(int(place) for place in np.argsort(-values, kind="stable"))
+        return found
+
+    def _of(self, ordered: Sequence[str], forms: tuple[int, ...]) -> ScaleAverage:
+        """Return the evidence of causes in given forms."""
+        free = [name for name in ordered if not self.causes[name].fixed]
+        chosen = dict(zip(ordered, forms, strict=True))
+        spectra = self.spectra(free, chosen)
+        if len(free) == len(ordered):
+            return average_over_scales(spectra, self.gram)
+        shifted, gain = self._with_fixed(ordered, self.gram.score[None])
+        score = shifted[0]
+        moved = [replace(own, score=own.vectors.T @ (own.root * score[own.columns])) for own in spectra]
+        average = average_over_scales(moved, replace(self.gram, score=score))
+        return replace(average, log_evidence=average.log_evidence + float(gain[0]))
+
+    def _with_fixed(self, ordered: Sequence[str], scores: Floats) -> tuple[Floats, Floats]:
+        """Return scores, (d, m), after the causes of fixed size are in the model, and what those gain, (d,)."""
+        gain = np.zeros(len(scores))
+        for name in ordered:
+            if self.causes[name].fixed:
+                own = self.gram.groups[self.causes[name].groups[0].name]
+                gain = gain - scores[:, own].sum(axis=1) - 0.5 * self.gram.matrix[np.ix_(own, own)].sum()
+                scores = scores + self.gram.matrix[:, own].sum(axis=1)
+        return scores, gain
+
+    def log_evidences(self, names: Iterable[str], scores: Floats) -> Floats:
+        """Return the logarithm of the evidence of one set for many scores, shape (d,).
+
+        The nodes are those of `log_evidence`, unless the set has so many groups that their product is thinned.
+
+        Parameters
+        ----------
+        names : iterable of str
+        scores : (d, m) array
+            Scores of all columns of the Gram.
+        """
+        ordered = sorted(names)
+        free = [name for name in ordered if not self.causes[name].fixed]
+        shifted, gain = self._with_fixed(ordered, scores)
+        found = []
+        for forms in self._choices(ordered):
+            chosen = dict(zip(ordered, forms, strict=True))
+            found.append(self._many(self.spectra(free, chosen), shifted) + self._log_weight(ordered, forms))
+        return np.asarray(logsumexp(found, axis=0)) + gain
+
+    def _many(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
+        """Return the logarithm of the evidence of groups for many scores."""
+        if not spectra:
+            return np.zeros(len(scores))
+        if len(spectra) > 1:
+            return self._several(spectra, scores)
+        (own,) = spectra
+        nodes = own.nodes()
+        visible = nodes.scales[:, None] ** 2 * own.values
+        squares = ((scores[:, own.columns] * own.root) @ own.vectors) ** 2
+        share = nodes.scales[:, None] ** 2 / (1.0 + visible)
+        offset = nodes.log_weights - 0.5 * np.log1p(visible).sum(axis=1)
+        return log_sums(squares @ (0.5 * share).T + offset)
+
+    def _several(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
+        """Return the same for several groups, on the product of their nodes."""
+        thinned = thinning([len(own.nodes().scales) for own in spectra], MOST_NODES)
+        nodes = _product([own.nodes(thinned) for own in spectra])
+        columns = np.concatenate([own.columns for own in spectra])
+        deviations = np.concatenate(
+            [nodes.scales[:, place, None] * own.root for place, own in enumerate(spectra)], axis=1
+        )
+        roots, half_log_det = precision_roots(self.gram.matrix[np.ix_(columns, columns)], deviations)
+        covariance = np.swapaxes(roots, 1, 2) @ roots
+        upper = np.triu_indices(len(columns))
+        weights = 0.5 * covariance[:, upper[0], upper[1]] * np.where(upper[0] == upper[1], 1.0, 2.0)
+        found = np.empty(len(scores))
+        step = max(BLOCK // max(len(half_log_det), len(upper[0])), 1)
+        for start in range(0, len(scores), step):
+            part = scores[start : start + step][:, columns]
+            products = part[:, upper[0]] * part[:, upper[1]]
+            terms = products @ weights.T + nodes.log_weights - half_log_det
+            found[start : start + step] = log_sums(terms)
+        return found
+
+
+def _with_forms(cause: CandidateCause, places: Sequence[int]) -> CandidateCause:
+    """Return a cause with some of its forms, each with the share of the prior that it has among all."""
+    chosen = [cause.variants[place] for place in places]
+    shares = tuple(float(np.exp(variant.log_weight)) for variant in chosen)
+    return replace(cause, groups=chosen[0].groups, others=tuple(own.groups for own in chosen[1:]), shares=shares)
+
+
+def _product(nodes: Sequence[LogNodes]) -> LogNodes:
+    """Return the product of the nodes of several groups: scales (t, k) and logarithms of weights (t,)."""
+    scales = np.stack([axis.ravel() for axis in np.meshgrid(*(own.scales for own in nodes), indexing="ij")], axis=1)
+    weights = np.meshgrid(*(own.log_weights for own in nodes), indexing="ij")
+    return LogNodes(scales, np.sum([axis.ravel() for axis in weights], axis=0))

@@ -1,0 +1,198 @@
+"""Faults of the noise as states of the whole problem, each with its own evidence and its own Gram."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesid.diagnosis.noise.encoder_fault import ENCODER_NOISE
+from bayesid.diagnosis.noise.noise_faults import NoiseFault, noise_fault, refined
+from bayesid.diagnosis.noise.noise_tests import ON_LATTICE
+from bayesid.diagnosis.response.followed_motion import linearise_along_data
+from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.search.linearisation import Linearisation, linearise
+from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.sensors import Kind
+
+__all__ = ["FaultyFit", "NoiseState", "fault_names", "faulty_fit"]
+
+DECADES = 3.0
+"""Decades over which the size of a fault is log-uniform beforehand, and the correlation time of coloured noise."""
+
+HOPELESS, BEHIND = 60.0, 20.0
+"""Nats by which a fault alone, as first estimated and refined, may be behind the best explanation to be weighed."""
+
+SAME = 0.2
+"""Difference of the logarithms of two estimates of a fault's size, from different residuals, that leads to one end."""
+
+REFITS = 3
+"""Steps of the fit that tells what a fault is worth beside the causes that a residual's fit holds."""
+
+
+@dataclass(frozen=True)
+class NoiseState:
+    """The model under some faults of its noise, or under none.
+
+    Attributes
+    ----------
+    faults : tuple of NoiseFault
+    point : Linearisation
+    log_charge : float
+        Logarithm of what the freedom of the faults costs.
+    """
+
+    faults: tuple[NoiseFault, ...]
+    point: Linearisation
+    log_charge: float = 0.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the faults, in order."""
+        return tuple(sorted(fault.label for fault in self.faults))
+
+    @property
+    def log_nothing(self) -> float:
+        """Logarithm of the evidence of the present model with these faults and no other cause."""
+        return self.point.log_nothing + self.log_charge
+
+
+def fault_names(engine: Engine) -> tuple[str, ...]:
+    """Return the names of all faults of the noise of a model's sensors and encoders."""
+    kinds = [sensor.kind.value for sensor in engine.posterior.model.sensors]
+    found = [
+        name
+        for kind in kinds
+        for name in (f"{kind}-noise", f"coloured-noise:{kind}", f"outliers:{kind}", f"quantisation:{kind}")
+    ]
+    measured = any(isinstance(item.motion, MeasuredMotion) for item in engine.posterior.manoeuvres)
+    return (*found, ENCODER_NOISE) if measured else tuple(found)
+
+
+@dataclass(frozen=True)
+class FaultyFit:
+    """Fit of the present model, without causes, under some faults of its noise.
+
+    Attributes
+    ----------
+    faults : tuple of NoiseFault
+    engine : Engine
+    fit : Fit
+    log_charge : float
+        Logarithm of what the freedom of the faults costs.
+    held : bool
+        Whether the bodies are held, since the present model's fit diverged.
+    """
+
+    faults: tuple[NoiseFault, ...]
+    engine: Engine
+    fit: Fit
+    log_charge: float
+    held: bool
+
+    @staticmethod
+    def declared(base: Linearisation) -> FaultyFit:
+        """Return the fit with the noise as declared."""
+        return FaultyFit((), base.engine, base.fit, 0.0, base.held)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the faults, in order."""
+        return tuple(sorted(fault.label for fault in self.faults))
+
+    @property
+    def log_nothing(self) -> float:
+        """Logarithm of the evidence of the present model with these faults and no other cause."""
+        return self.fit.log_evidence + self.log_charge
+
+    def linearised(self, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]) -> NoiseState:
+        """Return the state linearised about this fit.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            Candidates of the catalogue.
+        bounds : mapping of str to sequence of PhysicalBound
+        """
+        if self.held:
+            return NoiseState(self.faults, linearise_along_data(self.engine, effects, bounds), self.log_charge)
+        return NoiseState(self.faults, linearise(self.engine, self.fit, effects, bounds), self.log_charge)
+
+
+def faulty_fit(
+    label: str, residual: Fit, before: FaultyFit, best: float, known: FaultyFit | None = None
+) -> FaultyFit | None:
+    """Return the fit with one fault more, whose size is estimated from a residual.
+
+    It is None if the residual shows no such fault, if the fault beside what the residual's fit holds would be far
+    behind the best explanation, or if the fault is known with this size.
+
+    Parameters
+    ----------
+    label : str
+        Name of the fault.
+    residual : Fit
+        From whose residual the fault is estimated.
+    before : FaultyFit
+        From which the fit under the fault starts.
+    best : float
+        Log evidence of the best explanation so far.
+    known : FaultyFit, optional
+        With a fault of this name, estimated from another residual.
+    """
+    alone = residual is before.fit
+    least = best - before.log_charge - HOPELESS
+    fault = noise_fault(label, residual, least - residual.log_evidence)
+    if fault is None or (known is not None and _alike(fault, known)):
+        return None
+    engine = before.engine.with_posterior(fault.posterior)
+    beside = engine.fit(residual.effects, residual.coordinates, z=residual.z, iterations=REFITS)
+    if beside.log_evidence + _log_charge(fault) < least:
+        return None
+    if label.startswith("coloured-noise"):
+        fault = refined(fault, engine, residual)
+        engine = engine.with_posterior(fault.posterior)
+    fit = engine.fit(z=before.fit.z)
+    found = FaultyFit((*before.faults, fault), engine, fit, before.log_charge + _log_charge(fault), before.held)
+    return None if alone and found.log_nothing < best - BEHIND else found
+
+
+def _alike(fault: NoiseFault, known: FaultyFit) -> bool:
+    """Return whether a known fit has a fault of about the same size."""
+    other = next((own for own in known.faults if own.label == fault.label), None)
+    return other is not None and bool((np.abs(np.log(fault.mean / other.mean)) < SAME).all())
+
+
+def _log_charge(fault: NoiseFault) -> float:
+    """Return the logarithm of posterior over prior width of a fault's size, and what its samples say by themselves."""
+    width = DECADES * np.log(10.0)
+    name, _, place = fault.label.partition(":")
+    if name == "quantisation":  # that values fall on a lattice by chance
+        return -float(np.log(2.0 * ON_LATTICE)) * fault.posterior.samples / 3.0
+    relative = np.maximum(fault.sd / np.maximum(fault.mean, np.finfo(float).tiny), 1e-6)
+    charge = float(np.minimum(np.log(np.sqrt(2.0 * np.pi) * relative / width), 0.0).sum()) + fault.log_gain
+    if name == "outliers":
+        charge += _contamination(fault, Kind.of(place))
+    return charge
+
+
+def _contamination(fault: NoiseFault, kind: Kind) -> float:
+    """Return the logarithm of the probability density of the samples that count as outliers.
+
+    A sample is contaminated with the probability that the fault states, and then uniform over the range of the readings
+    of its channel; it does not count as certain.
+    """
+    posterior, fraction = fault.posterior, float(fault.mean[0])
+    columns = posterior.model.channels.of(kind)
+    total = 0.0
+    for r, gone in enumerate(posterior.data.left_out):
+        mask = gone[:, columns]
+        span = np.ptp(posterior.data.measured(r, kind)[1], axis=0)[: mask.shape[1]]
+        width = np.maximum(span, posterior.data.sigma(r, kind))
+        total += float((mask.sum(axis=0) * (np.log(max(fraction, 1e-9)) - np.log(width))).sum())
+        kept = int((~mask & posterior.whitenings[r].outputs[:, columns]).sum())
+        total += kept * float(np.log1p(-min(fraction, 0.5)))
+    return total

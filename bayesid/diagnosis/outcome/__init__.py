@@ -1,0 +1,1 @@
+"""What follows from a verdict: table of candidates, gain, disturbance, joint torques, extended model."""

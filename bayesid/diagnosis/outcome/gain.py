@@ -1,0 +1,136 @@
+"""What an extension is worth: prediction of recordings left out, residuals, shift of the parameters, calibration."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.inference.body_quantities import BODY_QUANTITIES
+from bayesid.inference.noise_changes import leaving_out
+from bayesid.robot.inertial_parameters import PARAMETERS, mass_com_inertia
+
+__all__ = ["BodyFigures", "Gain", "body_figures", "measure_gain"]
+
+
+@dataclass(frozen=True)
+class BodyFigures:
+    """Laplace approximation of the reported quantities of all identified bodies: names, means, standard deviations."""
+
+    names: tuple[str, ...]
+    mean: Floats
+    sd: Floats
+
+
+@dataclass(frozen=True)
+class Side:
+    """The figures of one model: before or after.
+
+    Attributes
+    ----------
+    chi2_per_sample : float
+    held_out : (R,) array or None
+        Log predictive density of each recording given the others; None with a single recording.
+    rms : dict of str to float
+        Root mean square of the residual in sigma, by sensor channel.
+    inside : float
+        Share of the whitened residual within one sigma; 0.683 if all is well.
+    bodies : BodyFigures
+    """
+
+    chi2_per_sample: float
+    held_out: Floats | None
+    rms: dict[str, float]
+    inside: float
+    bodies: BodyFigures
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Before and after an extension."""
+
+    before: Side
+    after: Side
+
+    @property
+    def shift(self) -> Floats:
+        """Shift of every reported quantity, in the standard deviations believed before."""
+        return (self.after.bodies.mean - self.before.bodies.mean) / self.before.bodies.sd
+
+
+def measure_gain(before: Hypothesis, after: Hypothesis, executor: Executor | None = None) -> Gain:
+    """Compare two hypotheses on the same recordings; an executor refits them without each of the recordings at once."""
+    first = _side(before, executor)
+    return Gain(first, first if after is before else _side(after, executor))
+
+
+def _side(hypothesis: Hypothesis, executor: Executor | None) -> Side:
+    fit = hypothesis.fit
+    posterior = fit.posterior
+    whole = fit.residual.reshape(posterior.residual_shape)
+    names = posterior.model.channels.names
+    there = np.zeros(posterior.residual_shape, dtype=bool)
+    for r, item in enumerate(posterior.whitenings):
+        there[r, : len(item.outputs)] = item.outputs
+    rms = {
+        name: float(np.sqrt((whole[..., c][there[..., c]] ** 2).mean()))
+        for c, name in enumerate(names)
+        if there[..., c].any()
+    }
+    return Side(
+        fit.chi2 / posterior.samples,
+        _held_out(hypothesis, executor) if len(posterior.manoeuvres) > 1 else None,
+        rms,
+        float((np.abs(whole[there]) < 1.0).mean()),
+        body_figures(hypothesis),
+    )
+
+
+def _held_out(hypothesis: Hypothesis, executor: Executor | None) -> Floats:
+    """Log density of each recording given the others: the ratio of evidences with and without it (Laplace)."""
+    fit = hypothesis.fit
+    numbers = range(len(fit.posterior.manoeuvres))
+    each = map if executor is None else executor.map
+    rest = np.array(list(each(_bare_without, [hypothesis] * len(numbers), numbers)))
+    return _bare_fit(fit.cost, fit.hessian[0]) - rest + fit.posterior.log_normalisation
+
+
+def _bare_without(hypothesis: Hypothesis, number: int) -> float:
+    """Log evidence, without constants, of all recordings but one."""
+    fit = hypothesis.fit
+    outputs = [item.outputs for item in fit.posterior.whitenings]
+    masks = [own if i == number else np.zeros_like(own) for i, own in enumerate(outputs)]
+    without = hypothesis.engine.with_posterior(leaving_out(fit.posterior, masks))
+    rest = without.fit(fit.effects, fit.coordinates, z=fit.z, operating=fit.operating)
+    return _bare_fit(rest.cost, rest.hessian[0])
+
+
+def _bare_fit(cost: float, factor: Floats) -> float:
+    return -cost - float(np.log(np.diag(factor)).sum())
+
+
+def body_figures(hypothesis: Hypothesis) -> BodyFigures:
+    """Means and standard deviations of what is reported of the identified bodies."""
+    fit = hypothesis.fit
+    posterior = fit.posterior
+    free = hypothesis.engine.free
+    vector = posterior.unknowns.values_at(fit.z).inertial.reshape(-1, PARAMETERS)
+    slope = posterior.unknowns.inertial_slope(fit.z).reshape(-1, PARAMETERS, len(fit.z))[..., free]
+    covariance = fit.covariance[: len(free), : len(free)]
+    names, mean, sd = [], [], []
+    for index, prior in enumerate(posterior.model.priors):
+        if prior.nuisance:
+            continue
+        here = mass_com_inertia(vector[index])
+        step = 1e-6 * np.maximum(np.abs(vector[index]), 1e-3 * np.abs(vector[index]).max())
+        stepped = mass_com_inertia(vector[index] + np.diag(step))
+        turn = ((stepped - here) / step[:, None]).T
+        own = turn @ slope[index]
+        names += [f"{prior.name}.{key}" for key in BODY_QUANTITIES]
+        mean.append(here)
+        sd.append(np.sqrt(np.einsum("ij,jk,ik->i", own, covariance, own)))
+    empty = np.zeros(0)
+    return BodyFigures(tuple(names), np.concatenate(mean) if mean else empty, np.concatenate(sd) if sd else empty)

@@ -1,0 +1,52 @@
+"""Diagnosis of what a loop has flown, so that a wrong model is not identified to ever more digits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bayesid._io.files import write_json
+from bayesid.design.step_review import Review
+from bayesid.diagnosis.diagnosis_run import diagnose
+from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.model import Manoeuvre, Model
+
+__all__ = ["DiagnosisReview"]
+
+EXCLUDED = 0.05
+"""Probability of the model as it is below which it is not trusted."""
+
+
+@dataclass(frozen=True)
+class DiagnosisReview:
+    """Reviewer of a loop that diagnoses all its recordings together.
+
+    Parameters
+    ----------
+    bounds : mapping of str to sequence of PhysicalBound
+        Largest sizes that the user knows, by the candidates' labels.
+    prior : CausePrior
+        Prior of the number of causes, and of something generic.
+    knows_latitude : bool
+        Whether the manoeuvres' argument of latitude is known.
+    """
+
+    bounds: Mapping[str, Sequence[PhysicalBound]] = field(default_factory=dict)
+    prior: CausePrior = CausePrior()  # noqa: RUF009  (immutable)
+    knows_latitude: bool = False
+
+    def review(self, model: Model, manoeuvres: Sequence[Manoeuvre], seed: int, file: Path) -> Review:
+        """Diagnose, write the content of diagnosis.json to a file, and return its summary."""
+        result = diagnose(
+            model, manoeuvres, seed, bounds=self.bounds, prior=self.prior, knows_latitude=self.knows_latitude
+        )
+        write_json(file, result.to_dict())
+        found = result.probabilities
+        return Review(
+            result.verdict.status.value,
+            tuple(result.verdict.causes),
+            result.alarm.silent or found.nothing >= EXCLUDED,
+            {**found.inclusion, "unknown": found.unknown},
+        )

@@ -1,0 +1,286 @@
+"""Events of a disturbing torque: what sets in at one instant and dies away or stays.
+
+A smooth torque has one variance per frequency, with which a jump cannot be drawn. Events are chosen one by one: each is
+the one with the largest evidence beside those before, averaged over its size, and is kept while that exceeds what its
+freedom to be any of the candidates costs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as sla
+from scipy.special import logsumexp
+
+from bayesid._math.arrays import Floats, Integers
+from bayesid.diagnosis.search.hypothesis import Hypothesis
+
+__all__ = ["ChosenEvents", "EventCandidates", "Held"]
+
+INSTANTS = 80
+"""Instants per recording at which a torque may set in."""
+
+DECAYS = (1.0 / 160.0, 1.0 / 40.0, 1.0 / 10.0, np.inf)
+"""Times in which it falls to 1/e, relative to the length of the recording; the last stays."""
+
+GRID = np.array([(k / INSTANTS, decay) for decay in DECAYS for k in range(INSTANTS)])
+"""Instant and decay of every event of a recording, relative to its length."""
+
+FINER, REFINED = 4, 8
+"""Parts into which the interval of the grid is divided about the chosen events, and how many of these are refined."""
+
+MOST = 30
+"""Most events of all recordings."""
+
+ANOTHER = 0.5
+"""Prior probability of one more event."""
+
+DECADES = 4.0
+"""Decades over which the size of an event is log-uniform below its bound."""
+
+NODES = 25
+"""Nodes of the average over the size."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """Columns that are part of the disturbance already, at the most probable deviations of their amplitudes.
+
+    Attributes
+    ----------
+    share : (h, c) array
+        Root of what they take of the information on the candidates' amplitudes: ``share' share``.
+    pull : (h,) array
+        What they take of the candidates' score: ``share' pull``.
+    """
+
+    share: Floats
+    pull: Floats
+
+    @staticmethod
+    def nothing(columns: int) -> Held:
+        """Return what holds nothing, for a number of candidates' columns."""
+        return Held(np.zeros((0, columns)), np.zeros(0))
+
+
+@dataclass(frozen=True)
+class ChosenEvents:
+    """Events that were chosen.
+
+    Attributes
+    ----------
+    places : tuple of int
+        Which of the candidates, in the order of their choice.
+    deviations : (3 n,) array
+        Most probable standard deviations of their amplitudes.
+    log_evidence : float
+        What they add to the log evidence, after the cost of their choice.
+    """
+
+    places: tuple[int, ...]
+    deviations: Floats
+    log_evidence: float
+
+    @property
+    def columns(self) -> Integers:
+        """Indices of their columns, (3 n,)."""
+        return (3 * np.array(self.places, dtype=int)[:, None] + np.arange(3)).ravel()
+
+
+@dataclass(frozen=True)
+class EventCandidates:
+    """All events that a torque may consist of, three columns each, about the axes of the base.
+
+    Attributes
+    ----------
+    recording : (e,) array of int
+        Of each event.
+    shapes : (k, 2) array
+        Instant and decay of the events of each recording, relative to its length.
+    course : tuple of (S,) arrays
+        Course in time of each event at the integration nodes of its recording.
+    matrix : (3 e, 3 e) array
+        Information on the amplitudes beside all that is fitted.
+    shared : (3 e, s) array
+        Information shared with the columns of a smooth disturbance.
+    score : (3 e,) array
+    largest : float
+        Largest plausible torque [N m].
+    among : int
+        Number of events that are equally probable beforehand; those about the chosen ones are a part of a finer grid.
+    """
+
+    recording: Integers
+    shapes: Floats
+    course: tuple[Floats, ...]
+    matrix: Floats
+    shared: Floats
+    score: Floats
+    largest: float
+    among: int
+
+    @staticmethod
+    def of(hypothesis: Hypothesis, smooth: Floats, largest: float, finer: Floats | None = None) -> EventCandidates:
+        """Compute the responses to all events about a fit.
+
+        Parameters
+        ----------
+        hypothesis : Hypothesis
+        smooth : (N, s) array
+            Columns of a smooth disturbance.
+        largest : float
+            Largest plausible torque [N m].
+        finer : (k, 2) array, optional
+            Instants and decays, relative to the length of each recording, of a part of a finer grid (`nearby`); by
+            default the grid.
+        """
+        shapes = GRID if finer is None else finer
+        engine, fit = hypothesis.engine, hypothesis.fit
+        moments = (fit.operating.node, fit.operating.sample)
+        times = [np.asarray(instant.environment.time) for instant in moments]
+        ends = times[0].max(axis=1)
+        count, recordings = len(shapes), len(ends)
+        # between two nodes of the integration a jump would be lost: there it is averaged over a step
+        longest = np.asarray(engine.posterior.data.arrays.grid.step).max(axis=1)
+        pushed = [
+            np.stack([_courses(*own, shapes) for own in zip(time, ends, width, strict=True)])
+            for time, width in zip(times, (longest, np.zeros(recordings)), strict=True)
+        ]
+        wrenches = []
+        for own in pushed:  # (R, k, S)
+            wrench = np.zeros((count, 3, recordings, own.shape[2], 6))
+            for axis in range(3):
+                wrench[:, axis, :, :, 3 + axis] = np.swapaxes(own, 0, 1)
+            wrenches.append(wrench.reshape(3 * count, recordings, own.shape[2], 6))
+        push = engine.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
+        blocks = engine.respond(push, fit.z, fit.data).reshape(recordings, -1, 3 * count)
+        known, residual = (x.reshape(recordings, blocks.shape[1], -1) for x in (fit.known, fit.residual))
+        apart = smooth.reshape(recordings, blocks.shape[1], -1)
+        cross = np.concatenate([known[r].T @ blocks[r] for r in range(recordings)], axis=1)
+        taken = sla.cho_solve(fit.hessian, cross).T
+        return EventCandidates(
+            np.repeat(np.arange(recordings), count),
+            shapes,
+            tuple(own for time, end in zip(times[0], ends, strict=True) for own in _courses(time, end, 0.0, shapes)),
+            sla.block_diag(*(block.T @ block for block in blocks)) - taken @ cross,
+            np.concatenate([blocks[r].T @ apart[r] for r in range(recordings)]) - taken @ (fit.known.T @ smooth),
+            np.concatenate([(blocks[r].T @ residual[r]).ravel() for r in range(recordings)]),
+            largest,
+            recordings * len(GRID) * (1 if finer is None else 2 * FINER * FINER),
+        )
+
+    def nearby(self, events: ChosenEvents) -> Floats:
+        """Return the shapes of the chosen events, and of others between them and their neighbours on the grid."""
+        places = np.array(events.places) % len(self.shapes)
+        near = [tuple(shape) for shape in self.shapes[places]]
+        near += [
+            (min(max(instant + shift / INSTANTS, 0.0), 1.0), decay * factor)
+            for instant, decay in self.shapes[np.unique(places[:REFINED])]
+            for shift in np.linspace(-1.0, 1.0, 2 * FINER + 1)
+            for factor in ((1.0,) if np.isinf(decay) else 2.0 ** np.linspace(-1.0, 1.0, FINER + 1))
+        ]
+        return np.unique(near, axis=0)
+
+    def chosen(self, held: Held) -> ChosenEvents:
+        """Choose events beside what is held, one by one."""
+        cost = float(np.log(self.among / ANOTHER))
+        places: list[int] = []
+        deviations: list[float] = []
+        total = 0.0
+        while len(places) < MOST:
+            gain = self._gains(held)[0]
+            averaged = logsumexp(gain, axis=1) - np.log(NODES)
+            averaged[places] = -np.inf
+            best = int(np.argmax(averaged))
+            if averaged[best] < cost:
+                break
+            deviation = float(self._scales[int(np.argmax(gain[best]))])
+            held = self._holding(held, best, deviation)
+            places.append(best)
+            deviations.append(deviation)
+            total += float(averaged[best]) - cost
+        return ChosenEvents(tuple(places), np.repeat(deviations, 3), total)
+
+    def like(self, others: EventCandidates, events: ChosenEvents) -> ChosenEvents:
+        """Return events that were chosen among other candidates by their places among these."""
+        places = []
+        for place in events.places:
+            alike = (self.recording == others.recording[place]) & np.tile(
+                (self.shapes == others.shapes[place % len(others.shapes)]).all(axis=1),
+                len(self.recording) // len(self.shapes),
+            )
+            places.append(int(np.flatnonzero(alike)[0]))
+        return replace(events, places=tuple(places))
+
+    def averaged(self, held: Held, events: ChosenEvents) -> list[tuple[int, Floats, Floats]]:
+        """Average each of the chosen events over all shapes, the others as chosen.
+
+        Returns
+        -------
+        list of tuples of int, (S, 3) array and (S, 3) array
+            Recording, torque, and its standard deviation over the shapes [N m].
+        """
+        found = []
+        for place in events.places:
+            beside = held
+            for other, deviation in zip(events.places, events.deviations[::3], strict=True):
+                if other != place:
+                    beside = self._holding(beside, other, float(deviation))
+            gain, vectors, along, visible = self._gains(beside)
+            own = np.flatnonzero(self.recording == self.recording[place])
+            weights = np.exp(gain[own] - logsumexp(gain[own]))
+            means = -along[own] / (1.0 + visible[own]) * self._scales[:, None]  # along the eigenvectors, (k, t, 3)
+            amplitudes = np.einsum("kt,kab,ktb->ka", weights, vectors[own], means)
+            probability = weights.sum(axis=1)
+            courses = np.stack([self.course[k] for k in own])
+            torque = courses.T @ amplitudes
+            each = np.divide(
+                amplitudes, probability[:, None], out=np.zeros_like(amplitudes), where=probability[:, None] > 0
+            )
+            square = (courses.T**2) @ (probability[:, None] * each**2)
+            found.append((int(self.recording[place]), torque, np.sqrt(np.maximum(square - torque**2, 0.0))))
+        return found
+
+    @property
+    def _scales(self) -> Floats:
+        return self.largest * 10.0 ** np.linspace(-DECADES, 0.0, NODES)
+
+    def _gains(self, held: Held) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return the log evidence of each event at each scale, (e, t), and what its amplitudes' mean follows from."""
+        part = held.share.reshape(len(held.share), len(self.recording), 3)
+        values, vectors = np.linalg.eigh(self._blocks - np.einsum("hea,heb->eab", part, part))
+        score = (self.score - held.share.T @ held.pull).reshape(-1, 3)
+        visible = np.maximum(values, 0.0)[:, None] * self._scales[:, None] ** 2  # (e, t, 3)
+        along = np.einsum("eab,ea->eb", vectors, score)[:, None] * self._scales[:, None]
+        gain = 0.5 * (along**2 / (1.0 + visible) - np.log1p(visible)).sum(axis=-1)
+        return gain, vectors, along, visible
+
+    @cached_property
+    def _blocks(self) -> Floats:
+        """Information on the amplitudes of each event, (e, 3, 3)."""
+        each = np.arange(len(self.recording))
+        return self.matrix.reshape(len(each), 3, -1, 3)[each, :, each]
+
+    def _holding(self, held: Held, place: int, deviation: float) -> Held:
+        """Return what is held with one more event."""
+        own = slice(3 * place, 3 * place + 3)
+        rest = self.matrix[own] - held.share[:, own].T @ held.share
+        score = self.score[own] - held.share[:, own].T @ held.pull
+        lower = np.linalg.cholesky(rest[:, own] + np.eye(3) / deviation**2)
+        more = sla.solve_triangular(lower, np.column_stack([rest, score]), lower=True)
+        return Held(np.concatenate([held.share, more[:, :-1]]), np.concatenate([held.pull, more[:, -1]]))
+
+
+def _courses(time: Floats, end: float, width: float, shapes: Floats) -> Floats:
+    """Return the courses of events of given shapes at given times, or averaged over a width about these, (k, S)."""
+    decay = end * shapes[:, 1:]
+    since = time - end * shapes[:, :1]
+    if not width:
+        return (since >= 0.0) * np.exp(-np.maximum(since, 0.0) / decay)
+    sums = [
+        np.where(np.isinf(decay), begun, -np.minimum(decay, 1e9) * np.expm1(-begun / decay))
+        for begun in (np.maximum(since + 0.5 * side * width, 0.0) for side in (-1.0, 1.0))
+    ]
+    return (sums[1] - sums[0]) / width

@@ -1,0 +1,1 @@
+"""The search through sets of causes: linearise, enumerate, refit, weigh."""

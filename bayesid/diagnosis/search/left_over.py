@@ -1,0 +1,100 @@
+"""What the most probable causes leave once they are fitted in full: evidence for something else beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid.diagnosis.evidence.set_probabilities import CauseSet, SetProbabilities
+from bayesid.diagnosis.noise.noise_tests import noise_tests
+from bayesid.diagnosis.noise.structure_tests import structure_tests
+from bayesid.diagnosis.outcome.extended_model import exactly_fitted
+from bayesid.diagnosis.search.cause_weighing import WeighedCauses
+from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
+from bayesid.simulation.effects.effect import Effect
+
+__all__ = ["LEFT_OVER", "log_odds_of_anything", "log_p_left", "with_left_over"]
+
+LEFT_OVER = "something beside the fitted causes"
+"""Generic candidate that has no form: whatever the fitted causes leave."""
+
+MOST_FITS = 4
+"""Most sets that are fitted in full, the most probable first."""
+
+LIKELY = 0.05
+"""Probability from which a set is fitted in full."""
+
+
+def with_left_over(
+    weighed: WeighedCauses, effects: Sequence[Effect]
+) -> tuple[WeighedCauses, dict[frozenset[str], Hypothesis]]:
+    """Fit the most probable sets of causes in full, and weigh that they do not suffice.
+
+    The probabilities come from linear signatures. A set that does not follow the data once its effects are simulated
+    gets a companion: the same causes beside something else, with as much more evidence as the p-value of what is left
+    allows at most (`log_odds_of_anything`). One with which no motion can be simulated is no explanation: its evidence
+    goes to something else alone.
+
+    Parameters
+    ----------
+    weighed : WeighedCauses
+    effects : sequence of Effect
+        Candidates of the catalogue.
+
+    Returns
+    -------
+    weighed : WeighedCauses
+        With such companions among the sets.
+    fitted : dict of frozenset of str to Hypothesis
+        Fits by the names of their causes.
+    """
+    fitted: dict[frozenset[str], Hypothesis] = {}
+    if weighed.alarm.silent:
+        return weighed, fitted
+    found = weighed.probabilities
+    generics = (*found.generics, LEFT_OVER)
+    found = SetProbabilities.of(found.sets, found.causes, generics, found.prior)
+    for _ in range(MOST_FITS):
+        known = (item for item in found.sets if item.causes and item.generic is None)
+        best = next((item for item in known if frozenset(item.causes) not in fitted), None)
+        if best is None or best.probability < LIKELY:
+            break
+        try:
+            hypothesis = fit_hypothesis(weighed.state(best.causes), best.causes, effects)
+        except InputError:
+            found = _without_motion(found, best)
+            continue
+        if weighed.state(best.causes).point.far:
+            hypothesis = exactly_fitted(hypothesis)
+        fitted[frozenset(best.causes)] = hypothesis
+        more = log_odds_of_anything(log_p_left(hypothesis))
+        companion = CauseSet(best.causes, LEFT_OVER, best.log_evidence + more)
+        found = SetProbabilities.of([*found.sets, companion], found.causes, generics, found.prior)
+    return replace(weighed, probabilities=found), fitted
+
+
+def _without_motion(found: SetProbabilities, refuted: CauseSet) -> SetProbabilities:
+    """Return the probabilities where the evidence of one set speaks for something else alone."""
+    alone = [item for item in found.sets if item.names == (LEFT_OVER,)]
+    others = [item for item in found.sets if item is not refuted and item not in alone]
+    most = max(item.log_evidence for item in (refuted, *alone))
+    return SetProbabilities.of([*others, CauseSet((), LEFT_OVER, most)], found.causes, found.generics, found.prior)
+
+
+def log_p_left(hypothesis: Hypothesis) -> float:
+    """Return the logarithm of the p-value of the loudest test of the residual, for the number of tests."""
+    tests = noise_tests(hypothesis.fit.posterior, hypothesis.fit) | structure_tests(hypothesis.fit)
+    return min(0.0, min(tests.values()) + float(np.log(len(tests))))
+
+
+def log_odds_of_anything(log_p: float) -> float:
+    """Return the largest log Bayes factor of any alternative that a p-value allows, ``-log(-e p log p)``.
+
+    It holds for every alternative under which the p-value's density decreases (Sellke, Bayarri & Berger 2001, The
+    American Statistician 55), and is zero from ``1 / e`` on.
+    """
+    return float(-1.0 - log_p - np.log(-log_p)) if log_p < -1.0 else 0.0
