@@ -38,7 +38,7 @@ WRITERS = (
     "design.loop_goals",
     "design.pose_trajectory",
     "design.step_review",
-    "diagnosis.diagnosis_file",
+    "diagnosis.result",
     "identifiability.advice",
     "identifiability.directions",
     "identifiability.parameter_table",

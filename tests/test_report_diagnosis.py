@@ -774,7 +774,7 @@ def test_a_report_is_written_where_the_extended_model_cannot_be_simulated(biased
         raise InputError("the simulation gives no finite readings")
 
     result = judged(biased, Status.EXPLAINED)
-    monkeypatch.setattr(import_module("bayesid.diagnosis.diagnosis_run"), "extended_posterior", refuse)
+    monkeypatch.setattr(import_module("bayesid.diagnosis.result"), "extended_posterior", refuse)
     diagnosis_report(result, None, "Lost motion", tmp_path / "report.pdf")
     text = PdfText.read(tmp_path / "report.pdf")
     assert "neither simulated in full nor sampled: the simulation gives no finite readings." in text

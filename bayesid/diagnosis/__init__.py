@@ -1,7 +1,7 @@
 """What the simulation gets wrong: candidates, their signatures, the probability of every set of causes, the gain."""
 
 from bayesid.diagnosis.candidates.candidate_effects import candidates
-from bayesid.diagnosis.diagnosis_run import Diagnosis, diagnose, identify_extended
+from bayesid.diagnosis.diagnose import diagnose, identify_extended
 from bayesid.diagnosis.evidence.cause_prior import CausePrior
 from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict
 from bayesid.diagnosis.evidence.set_probabilities import CauseSet, SetProbabilities
@@ -11,6 +11,7 @@ from bayesid.diagnosis.outcome.disturbing_wrench import Frame, Unexplained
 from bayesid.diagnosis.outcome.gain import Gain
 from bayesid.diagnosis.outcome.loop_review import DiagnosisReview
 from bayesid.diagnosis.outcome.torque_reading import TorqueCause, TorqueReading, Unread
+from bayesid.diagnosis.result import Diagnosis
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 
 __all__ = [

@@ -4,34 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from bayesid._io.phase_clock import PhaseClock
 from bayesid._io.progress import Progress, silent
-from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.candidate_effects import candidates
-from bayesid.diagnosis.diagnosis_file import diagnosis_dict
 from bayesid.diagnosis.evidence.cause_prior import CausePrior
-from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict
-from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
 from bayesid.diagnosis.evidence.status import Status
-from bayesid.diagnosis.evidence.verdict_sensitivity import VerdictSensitivity, verdict_sensitivity
-from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
-from bayesid.diagnosis.outcome.candidate_table import Candidate, candidate_table
-from bayesid.diagnosis.outcome.disturbing_wrench import Unexplained, unexplained_wrench
-from bayesid.diagnosis.outcome.extended_model import extended_posterior, extended_start
-from bayesid.diagnosis.outcome.gain import Gain, measure_gain
+from bayesid.diagnosis.evidence.verdict_sensitivity import verdict_sensitivity
+from bayesid.diagnosis.outcome.candidate_table import candidate_table
+from bayesid.diagnosis.outcome.disturbing_wrench import unexplained_wrench
+from bayesid.diagnosis.outcome.gain import measure_gain
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread, torque_candidates, torques_beside
 from bayesid.diagnosis.response.followed_motion import step_along_data, without_torque
 from bayesid.diagnosis.response.perturbed_fit import Engine
 from bayesid.diagnosis.response.present_fit import fit_present_model
-from bayesid.diagnosis.search.cause_weighing import WeighedCauses, weigh_causes
+from bayesid.diagnosis.result import Diagnosis
+from bayesid.diagnosis.search.cause_weighing import weigh_causes
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
 from bayesid.diagnosis.search.left_over import with_left_over
@@ -44,100 +36,7 @@ from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model
 
-__all__ = ["Diagnosis", "diagnose", "identify_extended"]
-
-
-@dataclass(frozen=True)
-class Diagnosis:
-    """Result of `diagnose`.
-
-    Attributes
-    ----------
-    before : Hypothesis
-        The present model.
-    after : Hypothesis
-        The extended model; the present one where nothing is named.
-    weighed : WeighedCauses
-        Every set of causes with its probability.
-    classes : tuple of tuples of str
-        Causes that change the model in the same way.
-    sensitivity : VerdictSensitivity
-        The verdict, and what it would be under other choices.
-    candidates : list of Candidate
-    gain : Gain
-        Present model against the extended one.
-    disturbance : Unexplained
-        What it would take in the present model.
-    unexplained : Unexplained
-        Left by the named causes, or by the present model where none is named.
-    torques : TorqueReading, Unread or None
-        What the joint torques say beyond the motion, or why they were not read; None where the study has none.
-    effects : tuple of Effect
-        Candidates of the catalogue.
-    bounds : mapping of str to tuple of PhysicalBound
-        Largest plausible size of each candidate.
-    seed : int
-    seconds : dict of str to float
-        Time by phase.
-    """
-
-    before: Hypothesis
-    after: Hypothesis
-    weighed: WeighedCauses
-    classes: tuple[tuple[str, ...], ...]
-    sensitivity: VerdictSensitivity
-    candidates: list[Candidate]
-    gain: Gain
-    disturbance: Unexplained
-    unexplained: Unexplained
-    torques: TorqueReading | Unread | None
-    effects: tuple[Effect, ...]
-    bounds: Mapping[str, tuple[PhysicalBound, ...]]
-    seed: int
-    seconds: dict[str, float]
-
-    @property
-    def verdict(self) -> ProbableVerdict:
-        """Status and named causes."""
-        return self.sensitivity.verdict
-
-    @property
-    def probabilities(self) -> SetProbabilities:
-        """Probabilities of all sets."""
-        return self.weighed.probabilities
-
-    @property
-    def alarm(self) -> FamilyAlarm:
-        """Whether data hold more than the declared noise."""
-        return self.weighed.alarm
-
-    @property
-    def held(self) -> bool:
-        """Whether every fit of the present model diverged, so that its bodies stay at their prior's centre."""
-        return self.weighed.base.held
-
-    @property
-    def evidence(self) -> SetEvidence:
-        """Evidence of sets of causes about the present model's fit."""
-        return self.weighed.base.evidence
-
-    @cached_property
-    def posterior(self) -> Posterior:
-        """The extended model's posterior, simulated in full."""
-        return extended_posterior(self.after)
-
-    @property
-    def start(self) -> Floats:
-        """The mode found, as a starting point for `posterior`."""
-        return extended_start(self.after, self.posterior)
-
-    def fitted(self, causes: Sequence[str]) -> Hypothesis:
-        """Fit the present model with some causes of the catalogue."""
-        return fit_hypothesis(self.weighed.state(causes), causes, self.effects) if causes else self.before
-
-    def to_dict(self, identification: Identification | None = None) -> dict[str, Any]:
-        """Content of diagnosis.json."""
-        return diagnosis_dict(self, identification)
+__all__ = ["diagnose", "identify_extended"]
 
 
 def diagnose(

@@ -1,0 +1,267 @@
+"""Result of a diagnosis: everything that a report or a user asks for, and the content of diagnosis.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from bayesid._math.arrays import Floats
+from bayesid.diagnosis.candidates.jump_instants import jump_instants
+from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
+from bayesid.diagnosis.evidence.verdict_sensitivity import VerdictSensitivity
+from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
+from bayesid.diagnosis.outcome.candidate_table import Candidate
+from bayesid.diagnosis.outcome.cause_amplitudes import amplitudes_of, amplitudes_of_others
+from bayesid.diagnosis.outcome.disturbing_wrench import Unexplained
+from bayesid.diagnosis.outcome.extended_model import extended_posterior, extended_start
+from bayesid.diagnosis.outcome.gain import Gain
+from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread
+from bayesid.diagnosis.search.cause_weighing import WeighedCauses
+from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
+from bayesid.inference import Identification
+from bayesid.inference.body_quantities import quantity
+from bayesid.inference.posterior import Posterior
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.mass_shift import MassShift
+from bayesid.simulation.effects.physical_bound import PhysicalBound
+
+__all__ = ["Diagnosis"]
+
+SHOWN = 0.01
+"""Probability down to which sets of causes are listed; the most probable one always is."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """Result of `diagnose`.
+
+    Attributes
+    ----------
+    before : Hypothesis
+        The present model.
+    after : Hypothesis
+        The extended model; the present one where nothing is named.
+    weighed : WeighedCauses
+        Every set of causes with its probability.
+    classes : tuple of tuples of str
+        Causes that change the model in the same way.
+    sensitivity : VerdictSensitivity
+        The verdict, and what it would be under other choices.
+    candidates : list of Candidate
+    gain : Gain
+        Present model against the extended one.
+    disturbance : Unexplained
+        What it would take in the present model.
+    unexplained : Unexplained
+        Left by the named causes, or by the present model where none is named.
+    torques : TorqueReading, Unread or None
+        What the joint torques say beyond the motion, or why they were not read; None where the study has none.
+    effects : tuple of Effect
+        Candidates of the catalogue.
+    bounds : mapping of str to tuple of PhysicalBound
+        Largest plausible size of each candidate.
+    seed : int
+    seconds : dict of str to float
+        Time by phase.
+    """
+
+    before: Hypothesis
+    after: Hypothesis
+    weighed: WeighedCauses
+    classes: tuple[tuple[str, ...], ...]
+    sensitivity: VerdictSensitivity
+    candidates: list[Candidate]
+    gain: Gain
+    disturbance: Unexplained
+    unexplained: Unexplained
+    torques: TorqueReading | Unread | None
+    effects: tuple[Effect, ...]
+    bounds: Mapping[str, tuple[PhysicalBound, ...]]
+    seed: int
+    seconds: dict[str, float]
+
+    @property
+    def verdict(self) -> ProbableVerdict:
+        """Status and named causes."""
+        return self.sensitivity.verdict
+
+    @property
+    def probabilities(self) -> SetProbabilities:
+        """Probabilities of all sets."""
+        return self.weighed.probabilities
+
+    @property
+    def alarm(self) -> FamilyAlarm:
+        """Whether data hold more than the declared noise."""
+        return self.weighed.alarm
+
+    @property
+    def held(self) -> bool:
+        """Whether every fit of the present model diverged, so that its bodies stay at their prior's centre."""
+        return self.weighed.base.held
+
+    @property
+    def evidence(self) -> SetEvidence:
+        """Evidence of sets of causes about the present model's fit."""
+        return self.weighed.base.evidence
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """The extended model's posterior, simulated in full."""
+        return extended_posterior(self.after)
+
+    @property
+    def start(self) -> Floats:
+        """The mode found, as a starting point for `posterior`."""
+        return extended_start(self.after, self.posterior)
+
+    def fitted(self, causes: Sequence[str]) -> Hypothesis:
+        """Fit the present model with some causes of the catalogue."""
+        return fit_hypothesis(self.weighed.state(causes), causes, self.effects) if causes else self.before
+
+    def to_dict(self, identification: Identification | None = None) -> dict[str, Any]:
+        """Return the content of diagnosis.json.
+
+        Parameters
+        ----------
+        identification : Identification, optional
+            Of the extended model, where it was sampled.
+        """
+        verdict, found = self.verdict, self.probabilities
+        inclusion = found.inclusion
+        fitted = {name: _fitted(self, name) for name in verdict.causes}
+        return {
+            "status": verdict.status.value,
+            "causes": [name for name in verdict.causes if name in inclusion and name in found.causes],
+            "equivalent_to": {cause: list(names) for cause, names in verdict.equivalent_to.items()},
+            "ambiguous_with": [list(names) for names in verdict.ambiguous_with],
+            "probability": {
+                "nothing": found.nothing,
+                "unknown": found.unknown,
+                "causes": {members[0]: found.of_any(members) for members in _ordered(self)},
+            },
+            "sets": _sets(self),
+            "candidates": [_candidate(row, fitted.get(row.name)) for row in self.candidates],
+            "unexplained": {
+                "file": "unexplained.csv",
+                "signal_to_noise": self.unexplained.signal_to_noise,
+                "fixed_in": None if self.unexplained.fixed_in is None else self.unexplained.fixed_in.value,
+            },
+            "joint_torques": _torques(self.torques),
+            "bodies_held": self.held,
+            "gain": _gain(self),
+            "p_value": self.alarm.p_value,
+            "most_significant": self.alarm.loudest,
+            "sensitivity": {
+                choice: {"status": other.status.value, "causes": list(other.causes)}
+                for choice, other in self.sensitivity.others.items()
+            },
+            "bounds": {
+                label: {item.unit: {"largest": item.largest, "reason": item.reason} for item in items}
+                for label, items in self.bounds.items()
+            },
+            "prior": {"one_more_cause": found.prior.one_more, "generic": found.prior.generic},
+            "seconds": dict(self.seconds),
+            "identification": None if identification is None else identification.to_dict(),
+        }
+
+
+def _ordered(result: Diagnosis) -> list[list[str]]:
+    """Return the classes of equivalents, of each the most probable name first."""
+    inclusion = result.probabilities.inclusion
+    named = result.verdict.causes
+    return [sorted(members, key=lambda name: (name not in named, -inclusion[name], name)) for members in result.classes]
+
+
+def _sets(result: Diagnosis) -> list[dict[str, Any]]:
+    sets = result.probabilities.sets
+    shown = [item for index, item in enumerate(sets) if index == 0 or item.probability >= SHOWN]
+    fitted = [frozenset(result.after.labels), frozenset()]
+    return [
+        {
+            "causes": list(item.causes),
+            "generic": [] if item.generic is None else [item.generic],
+            "probability": item.probability,
+            "log_evidence": item.log_evidence,
+            "refitted": item.generic is None and frozenset(item.causes) in fitted,
+        }
+        for item in shown
+    ]
+
+
+def _gain(result: Diagnosis) -> dict[str, Any]:
+    gain = result.gain
+    held = {
+        key: None if side.held_out is None else float(side.held_out.sum())
+        for key, side in (("before", gain.before), ("after", gain.after))
+    }
+    names = gain.before.bodies.names
+    return {
+        "chi2_per_sample": {"before": gain.before.chi2_per_sample, "after": gain.after.chi2_per_sample},
+        "held_out_log_score": held if held["before"] is not None else None,
+        "residual_rms_in_sigma": {"before": gain.before.rms, "after": gain.after.rms},
+        "within_one_sigma": {"before": gain.before.inside, "after": gain.after.inside},
+        "parameter_shift_in_sd": dict(zip(names, gain.shift.tolist(), strict=True)),
+        "parameter_sd_ratio": dict(zip(names, (gain.after.bodies.sd / gain.before.bodies.sd).tolist(), strict=True)),
+    }
+
+
+def _torques(found: TorqueReading | Unread | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    if isinstance(found, Unread):
+        return {"status": "not evaluated", "reason": found.reason}
+    before, after = found.chi2_per_sample
+    return {
+        "status": found.verdict.status.value,
+        "causes": [name for name in found.verdict.causes if name in found.probabilities.causes],
+        "ambiguous_with": [list(names) for names in found.verdict.ambiguous_with],
+        "probability": {"nothing": found.probabilities.nothing, "unknown": found.probabilities.unknown},
+        "candidates": [
+            {
+                "name": row.name,
+                "probability": row.probability,
+                "amplitude": {
+                    item.name: quantity(mean, sd, item.unit)
+                    for item, mean, sd in zip(row.quantities, row.mean.tolist(), row.sd.tolist(), strict=True)
+                },
+            }
+            for row in found.causes
+        ],
+        "p_value": found.p_value,
+        "chi2_per_sample": {"before": before, "after": after},
+    }
+
+
+def _fitted(result: Diagnosis, name: str) -> dict[str, Any]:
+    """Return what the extended model says of a named cause: its amplitudes, and of a jump the instants.
+
+    Of a cause with amplitudes in each recording the first recording's have plain keys.
+    """
+    found = amplitudes_of(result.after, name) + amplitudes_of_others(result.after, name)
+    if name == MassShift.name:
+        found += jump_instants(result.after)
+    return {"amplitude": {item.quantity.name: quantity(item.mean, item.sd, item.quantity.unit) for item in found}}
+
+
+def _candidate(row: Candidate, fitted: dict[str, Any] | None) -> dict[str, Any]:
+    """Return a candidate beside the present model alone, with its amplitudes in the extended model if it is named."""
+    entries = list(zip(row.quantities, row.mean.tolist(), row.sd.tolist(), row.upper_limit.tolist(), strict=True))
+    return {
+        "name": row.name,
+        "probability": row.probability,
+        "signal_to_noise": row.signal_to_noise,
+        "p_value": row.p_value,
+        "p_value_adjusted": row.p_value_adjusted,
+        "log_bayes_factor": row.log_bayes_factor,
+        "amplitude": {key: quantity(mean, sd, unit) for (key, unit), mean, sd, _ in entries},
+        "upper_limit_95": {key: limit for (key, _), _, _, limit in entries},
+        "power": row.power,
+        "generic": row.generic,
+        **(fitted or {}),
+    }
