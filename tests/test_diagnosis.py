@@ -20,7 +20,7 @@ from bayesid.diagnosis.noise.noise_faults import noise_fault
 from bayesid.diagnosis.noise.noise_tests import chi2_log_sf
 from bayesid.diagnosis.outcome.extended_model import extended_start
 from bayesid.diagnosis.outcome.gain import measure_gain
-from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.search.left_beside import LeftBeside
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
@@ -228,23 +228,23 @@ def test_slosh_in_basilisk_is_found(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def engine_and_fit(tmp_path_factory):
+def perturbed_and_fit(tmp_path_factory):
     study = Study.load(shortened(CASES["null, three joints"]).make(tmp_path_factory.mktemp("null"), 5))
     model = load_model(study)
-    engine = Engine(Posterior.of(model, load_manoeuvres(study, model.robot)))
-    return engine, engine.fit()
+    perturbed = PerturbedModel(Posterior.of(model, load_manoeuvres(study, model.robot)))
+    return perturbed, perturbed.fit()
 
 
 @pytest.mark.parametrize("label", ["aerodynamic-drag", pytest.param("encoder-offset:joint1", marks=pytest.mark.slow)])
-def test_a_push_is_the_effect_in_the_simulation(label, engine_and_fit):
+def test_a_push_is_the_effect_in_the_simulation(label, perturbed_and_fit):
     """A push on the model and the effect in the simulation give one residual, to 2 % of what the effect does."""
-    engine, fit = engine_and_fit
-    effect = create(label).attach(engine.posterior.model.robot)
+    perturbed, fit = perturbed_and_fit
+    effect = create(label).attach(perturbed.posterior.model.robot)
     coordinates = 0.03 * np.ones(len(effect.parameters))
-    pushed = engine.fit((effect,), (coordinates,), z=fit.z, operating=fit.operating, iterations=0)
-    posterior = Posterior.of(engine.posterior.model.extend(effect), engine.posterior.manoeuvres)
+    pushed = perturbed.fit((effect,), (coordinates,), z=fit.z, operating=fit.operating, iterations=0)
+    posterior = Posterior.of(perturbed.posterior.model.extend(effect), perturbed.posterior.manoeuvres)
     full = posterior.residuals(np.concatenate([fit.z, coordinates])).ravel()
-    change = full - engine.posterior.residuals(fit.z).ravel()
+    change = full - perturbed.posterior.residuals(fit.z).ravel()
     assert np.linalg.norm(change) > 1.0
     assert np.linalg.norm(pushed.residual - full) < 0.02 * np.linalg.norm(change) + 0.5
 
@@ -265,5 +265,5 @@ def test_an_event_is_no_outlier(tmp_path):
     """A mass that moves inside the base for two seconds leaves a few large residuals side by side."""
     study = Study.load(CASES["shifting-mass"].make(tmp_path, 246))
     model = load_model(study)
-    fit = Engine(Posterior.of(model, load_manoeuvres(study, model.robot))).fit()
+    fit = PerturbedModel(Posterior.of(model, load_manoeuvres(study, model.robot))).fit()
     assert noise_fault("outliers:accel", fit) is None

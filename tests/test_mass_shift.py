@@ -12,7 +12,7 @@ import pytest
 from bayesid._io.errors import InputError
 from bayesid.diagnosis import Status, diagnose
 from bayesid.diagnosis.candidates.mass_shift_signatures import sample_intervals
-from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
@@ -251,9 +251,9 @@ def flights_with_jumps(instants, ends, noise):
 def test_intervals_are_those_of_the_samples_and_not_of_their_padding():
     """One recording is four times as long as the others, whose grids are filled with copies of the last sample."""
     model, flights, _ = flights_with_jumps((16.3, 5.0, 5.0), (40.0, 10.0, 10.0), 1e-5)
-    engine = Engine(Posterior.of(model, flights))
-    z = engine.posterior.starting_point()
-    fit = SimpleNamespace(operating=engine.operating(z, ()))
+    perturbed = PerturbedModel(Posterior.of(model, flights))
+    z = perturbed.posterior.starting_point()
+    fit = SimpleNamespace(operating=perturbed.operating(z, ()))
     for steps, flight in zip(sample_intervals(fit), flights, strict=True):
         np.testing.assert_allclose(steps, np.diff(flight.recording.time))
 

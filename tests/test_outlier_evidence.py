@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bayesid.diagnosis.noise.noise_states import FaultyFit, faulty_fit
-from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.inference.posterior import Posterior
 from tests.conftest import SIGMA
 
@@ -24,11 +24,11 @@ def test_outliers_cost_what_their_density_says(planar_case, size):
     channels["accel.y"] = channels["accel.y"].copy()
     channels["accel.y"][rows] += size * SIGMA
     garbled = replace(manoeuvre, recording=replace(manoeuvre.recording, channels=channels))
-    engine = Engine(Posterior.of(posterior.model, [garbled], step=posterior.step))
-    fit = engine.fit()
-    declared = FaultyFit((), engine, fit, 0.0, False)
+    perturbed = PerturbedModel(Posterior.of(posterior.model, [garbled], step=posterior.step))
+    fit = perturbed.fit()
+    declared = FaultyFit((), perturbed, fit, 0.0, False)
     found = faulty_fit("outliers:accel", fit, declared, fit.log_evidence)
-    mask = found.engine.posterior.data.left_out[0]
+    mask = found.perturbed.posterior.data.left_out[0]
     assert mask.sum() == 2
     gone = fit.residual.reshape(fit.posterior.residual_shape)[0, : len(mask)][mask]
     fraction, width = 2.0 / len(manoeuvre.recording.time), np.ptp(channels["accel.y"])

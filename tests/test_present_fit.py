@@ -19,7 +19,7 @@ from bayesid import (
 )
 from bayesid.diagnosis import Status, diagnose
 from bayesid.diagnosis.response.followed_motion import follow, step_along_data, without_torque
-from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.response.present_fit import fit_present_model, strayed
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create
@@ -62,33 +62,33 @@ def spun(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def engine(spun):
-    return Engine(Posterior.of(*spun, step=0.1))
+def perturbed(spun):
+    return PerturbedModel(Posterior.of(*spun, step=0.1))
 
 
 @pytest.mark.slow
-def test_a_fit_that_strays_gives_way_to_one_with_its_body_held(engine):
-    assert strayed(engine.fit())
-    found = fit_present_model(engine)
+def test_a_fit_that_strays_gives_way_to_one_with_its_body_held(perturbed):
+    assert strayed(perturbed.fit())
+    found = fit_present_model(perturbed)
     assert found.held
-    assert not found.fit.z[engine.posterior.unknowns.layout.all_bodies].any()
-    assert found.fit.own.shape[1] == engine.posterior.size  # of which the derivatives are known all the same
+    assert not found.fit.z[perturbed.posterior.unknowns.layout.all_bodies].any()
+    assert found.fit.own.shape[1] == perturbed.posterior.size  # of which the derivatives are known all the same
 
 
 @pytest.mark.slow
-def test_a_free_torque_brings_the_held_model_to_the_data(engine):
-    assert step_along_data(engine.posterior) == pytest.approx(0.1)
-    along = follow(engine)
+def test_a_free_torque_brings_the_held_model_to_the_data(perturbed):
+    assert step_along_data(perturbed.posterior) == pytest.approx(0.1)
+    along = follow(perturbed)
     assert not strayed(along)
     assert along.chi2 < 1e-4 * without_torque(along).chi2
 
 
 @pytest.mark.slow
 def test_a_fit_that_follows_the_data_keeps_its_body(tmp_path):
-    engine = Engine(Posterior.of(*model_and_flight(tmp_path, np.zeros(24)), step=0.1))
-    found = fit_present_model(engine)
+    perturbed = PerturbedModel(Posterior.of(*model_and_flight(tmp_path, np.zeros(24)), step=0.1))
+    found = fit_present_model(perturbed)
     assert not found.held
-    assert found.fit.chi2 < 1.2 * engine.posterior.samples
+    assert found.fit.chi2 < 1.2 * perturbed.posterior.samples
 
 
 @pytest.mark.slow
@@ -107,11 +107,13 @@ def test_a_link_of_many_times_its_guess_is_found(share):
     link = robot.link("link2").inertial
     guess = InertialParameters(share * link.mass, np.zeros(3), share * link.inertia)
     sensors = (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT))
-    engine = Engine(Posterior.of(Model(robot, sensors, (BodyPrior("link2", guess, 2.0),)), [manoeuvre], step=0.5))
-    assert engine.fit().chi2 > 1e3 * engine.posterior.samples
-    found = fit_present_model(engine)
+    perturbed = PerturbedModel(
+        Posterior.of(Model(robot, sensors, (BodyPrior("link2", guess, 2.0),)), [manoeuvre], step=0.5)
+    )
+    assert perturbed.fit().chi2 > 1e3 * perturbed.posterior.samples
+    found = fit_present_model(perturbed)
     assert not found.held
-    assert found.fit.chi2 < 1.2 * engine.posterior.samples
+    assert found.fit.chi2 < 1.2 * perturbed.posterior.samples
 
 
 @pytest.mark.slow

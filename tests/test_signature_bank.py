@@ -19,7 +19,7 @@ from bayesid.diagnosis.candidates.vibration_signatures import PAIRS, slosh_entri
 from bayesid.diagnosis.evidence.body_evidence import MissingBodyPrior, body_log_evidence, outer_moments, rigid_moments
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.inference.importance import choose_parameterisation, importance_sample
 from bayesid.inference.mode import maximise
 from bayesid.inference.posterior import Posterior
@@ -32,20 +32,20 @@ CASES = {case.name: case for case in hidden_causes.CASES}
 
 @pytest.fixture(scope="module")
 def null(tmp_path_factory):
-    """Engine and fit of a study of MuJoCo that lacks nothing, with its candidates and their bounds."""
+    """PerturbedModel and fit of a study of MuJoCo that lacks nothing, with its candidates and their bounds."""
     study = Study.load(CASES["null, three joints"].make(tmp_path_factory.mktemp("null"), 5))
     model = load_model(study)
-    engine = Engine(Posterior.of(model, load_manoeuvres(study, model.robot)))
+    perturbed = PerturbedModel(Posterior.of(model, load_manoeuvres(study, model.robot)))
     effects = candidates(model, knows_latitude=False)
-    return engine, engine.fit(), effects, bounds_by_label(effects, model)
+    return perturbed, perturbed.fit(), effects, bounds_by_label(effects, model)
 
 
-def in_simulation(engine, fit, effects, size):
+def in_simulation(perturbed, fit, effects, size):
     """Central differences of the full simulation's residual in the parameters of the effects, divided by `size`."""
-    model = engine.posterior.model
+    model = perturbed.posterior.model
     for effect in effects:
         model = model.extend(effect)
-    posterior = Posterior.of(model, engine.posterior.manoeuvres, step=None)
+    posterior = Posterior.of(model, perturbed.posterior.manoeuvres, step=None)
     bare = np.zeros(posterior.size - len(fit.z))
     columns = []
     for k in range(len(bare)):
@@ -59,12 +59,12 @@ def in_simulation(engine, fit, effects, size):
 
 
 def check_columns(null, labels):
-    engine, fit, effects, bounds = null
+    perturbed, fit, effects, bounds = null
     chosen = [effect for effect in effects if effect.label in labels]
     linear = [effect.in_amplitudes() for effect in chosen]
-    expected, first = in_simulation(engine, fit, linear, 1e-3), 0
+    expected, first = in_simulation(perturbed, fit, linear, 1e-3), 0
     for effect, simple in zip(chosen, linear, strict=True):
-        bank = catalogue_signatures(engine, fit, [effect], bounds)
+        bank = catalogue_signatures(perturbed, fit, [effect], bounds)
         found = np.concatenate([item.columns for item in bank.signatures], axis=1)
         sigma = np.array([parameter.sigma for parameter in simple.parameters])
         own = expected[:, first : first + len(sigma)] / sigma
@@ -93,13 +93,13 @@ def test_all_signatures_are_what_the_simulation_does(null):
 
 @pytest.mark.slow
 def test_signatures_of_a_jump_are_what_the_simulation_does(null):
-    engine, fit, effects, bounds = null
-    bank = mass_shift_signatures(engine, fit, effects, bounds)
+    perturbed, fit, effects, bounds = null
+    bank = mass_shift_signatures(perturbed, fit, effects, bounds)
     end = float(np.asarray(fit.operating.node.environment.time)[0].max())
     instant = float(shift_instants(end)[7])
-    recordings = len(engine.posterior.manoeuvres)
-    shift = MassShift([instant] + [np.inf] * (recordings - 1)).attach(engine.posterior.model.robot)
-    expected = in_simulation(engine, fit, [shift], 1e-2)
+    recordings = len(perturbed.posterior.manoeuvres)
+    shift = MassShift([instant] + [np.inf] * (recordings - 1)).attach(perturbed.posterior.model.robot)
+    expected = in_simulation(perturbed, fit, [shift], 1e-2)
     found = bank.signatures[7].columns
     rows = len(found)
     assert bank.signatures[7].recording == 0
@@ -205,10 +205,10 @@ SETS = (
 
 @pytest.mark.usefixtures("slow")  # an extended model is sampled eleven times
 def test_evidence_of_the_gram_is_that_of_the_extended_model(null):
-    engine, fit, effects, bounds = null
+    perturbed, fit, effects, bounds = null
     wanted = {name for own in SETS for name in own}
     chosen = [effect for effect in effects if effect.label in wanted]
-    bank = catalogue_signatures(engine, fit, chosen, bounds)
+    bank = catalogue_signatures(perturbed, fit, chosen, bounds)
     gram = SignatureProducts.of(bank.signatures, fit).gram()
     scales = {name: 4.0 / np.sqrt(np.diag(gram.matrix)[own].max()) for name, own in gram.groups.items()}
     causes = [
@@ -219,9 +219,9 @@ def test_evidence_of_the_gram_is_that_of_the_extended_model(null):
         for cause in bank.causes
     ]
     evidence = SetEvidence(gram, causes)
-    base = sampled_evidence(engine, chosen, (), scales)
+    base = sampled_evidence(perturbed, chosen, (), scales)
     for names in SETS:
-        expected = sampled_evidence(engine, chosen, names, scales) - base
+        expected = sampled_evidence(perturbed, chosen, names, scales) - base
         assert evidence.log_evidence(names) == pytest.approx(expected, abs=0.3), names
 
 
@@ -235,16 +235,16 @@ def with_scales(effect, scales, factor):
     return changed
 
 
-def sampled_evidence(engine, effects, names, scales) -> float:
+def sampled_evidence(perturbed, effects, names, scales) -> float:
     """Log evidence by importance sampling in the full simulation, which is extended by all effects.
 
     The prior of those that are not named is a millionth as wide, so that one compiled model serves every set.
     """
     rng = np.random.default_rng(0)
-    model = engine.posterior.model
+    model = perturbed.posterior.model
     for effect in effects:
         model = model.extend(with_scales(effect, scales, 1.0 if effect.label in names else 1e-6))
-    posterior, optimum = maximise(Posterior.of(model, engine.posterior.manoeuvres), rng)
+    posterior, optimum = maximise(Posterior.of(model, perturbed.posterior.manoeuvres), rng)
     found = importance_sample(choose_parameterisation(posterior, optimum, rng), optimum, rng)
     assert found.error < 0.1
     return found.value

@@ -12,7 +12,7 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis.candidates.generic_signatures import generic_signatures
 from bayesid.diagnosis.outcome.disturbing_wrench import Frame, unexplained_wrench
 from bayesid.diagnosis.outcome.torque_events import EventCandidates, Held
-from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
@@ -86,11 +86,11 @@ def test_a_snap_in_mujoco_is_drawn_better_with_events(seed, tmp_path):
     study = Study.load(written.file)
     model = load_model(study)
     posterior = Posterior.of(model, load_manoeuvres(study, model.robot))
-    engine = Engine(posterior)
-    first = engine.fit()
-    engine = engine.with_posterior(relinearised(posterior, first.z))
-    hypothesis = Hypothesis(engine, engine.fit(z=first.z))
-    bank = generic_signatures(engine, hypothesis.fit)
+    perturbed = PerturbedModel(posterior)
+    first = perturbed.fit()
+    perturbed = perturbed.with_posterior(relinearised(posterior, first.z))
+    hypothesis = Hypothesis(perturbed, perturbed.fit(z=first.z))
+    bank = generic_signatures(perturbed, hypothesis.fit)
     smooth, sudden = (unexplained_wrench(hypothesis, bank, wanted) for wanted in (False, True))
     assert sudden.log_bayes_factor > smooth.log_bayes_factor + 10.0
 

@@ -13,7 +13,7 @@ from bayesid.diagnosis import Status, diagnose
 from bayesid.diagnosis.evidence.cause_prior import CausePrior
 from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread, read_torques, torques_beside
-from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.response.present_fit import fit_present_model
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.posterior import Posterior
@@ -58,8 +58,8 @@ def friction(planar_truth: mj.Truth) -> np.ndarray:
 
 def fitted(case: Case) -> Hypothesis:
     model, manoeuvres = case
-    engine = Engine(Posterior.of(model.without_torque, manoeuvres, step=STEP))
-    return Hypothesis(engine, fit_present_model(engine).fit)
+    perturbed = PerturbedModel(Posterior.of(model.without_torque, manoeuvres, step=STEP))
+    return Hypothesis(perturbed, fit_present_model(perturbed).fit)
 
 
 def read(case: Case) -> TorqueReading:

@@ -20,7 +20,7 @@ from bayesid.diagnosis.outcome.disturbing_wrench import unexplained_wrench
 from bayesid.diagnosis.outcome.gain import measure_gain
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread, torque_candidates, torques_beside
 from bayesid.diagnosis.response.followed_motion import step_along_data, without_torque
-from bayesid.diagnosis.response.perturbed_fit import Engine
+from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.response.present_fit import fit_present_model
 from bayesid.diagnosis.result import Diagnosis
 from bayesid.diagnosis.search.cause_weighing import weigh_causes
@@ -106,21 +106,21 @@ def _diagnose(
     refuse_wrong_units(posterior if whole.torque is None else Posterior.of(whole, manoeuvres))
     clock.ends("load")
     rates = posterior.unknowns.layout.all_rates
-    engine = Engine(posterior, range(rates.start, rates.stop) if at_rest else ())
+    perturbed = PerturbedModel(posterior, range(rates.start, rates.stop) if at_rest else ())
     progress(0.0, "compiling the simulation")
-    engine.compile()
+    perturbed.compile()
     clock.ends("compile")
     progress(0.1, "fitting the present model")
-    first = fit_present_model(engine)
+    first = fit_present_model(perturbed)
     if first.held and (step := step_along_data(posterior)) < posterior.step:
         posterior = Posterior.of(posterior.model, manoeuvres, step=step)
-        engine = Engine(posterior, engine.frozen)
-        first = fit_present_model(engine)
-    engine = engine.with_posterior(relinearised(posterior, first.fit.z))
-    present = fit_present_model(engine, first.fit.z)
-    before = Hypothesis(engine, present.fit)
+        perturbed = PerturbedModel(posterior, perturbed.frozen)
+        first = fit_present_model(perturbed)
+    perturbed = perturbed.with_posterior(relinearised(posterior, first.fit.z))
+    present = fit_present_model(perturbed, first.fit.z)
+    before = Hypothesis(perturbed, present.fit)
     clock.ends("fit")
-    weighed = weigh_causes(engine, before.fit, catalogue, limits, prior, rng, progress, held=present.held)
+    weighed = weigh_causes(perturbed, before.fit, catalogue, limits, prior, rng, progress, held=present.held)
     progress(0.65, "fitting the most probable causes")
     weighed, fitted = with_left_over(weighed, catalogue)
     classes = weighed.classes()
@@ -136,7 +136,7 @@ def _diagnose(
     gain = measure_gain(before, after, executor)
     progress(0.85, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
-    lacking = Hypothesis(engine, without_torque(weighed.base.fit)) if present.held else before
+    lacking = Hypothesis(perturbed, without_torque(weighed.base.fit)) if present.held else before
     disturbance = unexplained_wrench(lacking, weighed.base.bank, open_question)
     unexplained = unexplained_wrench(after, weighed.state(named).point.bank, False) if named else disturbance
     table = candidate_table(weighed, catalogue, rng)

@@ -18,7 +18,7 @@ from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict, probabl
 from bayesid.diagnosis.evidence.set_enumeration import enumerate_sets
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
-from bayesid.diagnosis.response.perturbed_fit import Fit
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.inference.posterior import Posterior
 
 __all__ = ["Limits", "limits_of", "simulated_naming", "what_is_left"]

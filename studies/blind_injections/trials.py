@@ -320,13 +320,13 @@ def _visible(case: hidden_causes.Case | BasiliskCase) -> bool:
 
 def _signal(result: Diagnosis, weaker: Study) -> Floats:
     """Return how what is hidden changes the whitened residual, from data with the same noise and less of it."""
-    fit, engine = result.before.fit, result.before.engine
+    fit, perturbed = result.before.fit, result.before.perturbed
     arrays, model = fit.posterior.data.arrays, fit.posterior.model
     # what is hidden may lie in the study's own words, such as the place of a sensor
     model = replace(model, sensors=load_model(weaker).sensors)
     like = Posterior.of(model, load_manoeuvres(weaker, model.robot), step=fit.posterior.step)
     other = like.data.arrays._replace(weights=arrays.weights, start=arrays.start)
-    return (engine.residual(fit.z, arrays) - residual_of(like, fit.z, other).ravel()) / (1.0 - WEAKER)
+    return (perturbed.residual(fit.z, arrays) - residual_of(like, fit.z, other).ravel()) / (1.0 - WEAKER)
 
 
 def _limits(result: Diagnosis, case: hidden_causes.Case | BasiliskCase, seed: int, change: Floats) -> Limits:

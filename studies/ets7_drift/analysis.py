@@ -182,7 +182,7 @@ def _amplitudes(world: World, result: Diagnosis) -> Iterator[Amplitude]:
 
 
 def _attitudes(model: Model, result: Diagnosis, rng: np.random.Generator) -> Iterator[Attitude]:
-    before, present = result.before.fit.z[result.before.engine.free], _watched(model, result)
+    before, present = result.before.fit.z[result.before.perturbed.free], _watched(model, result)
     extended = _watched(result.posterior.model, result)
     simulated = {
         "plain": _simulated(present, np.zeros_like(before)),

@@ -7,7 +7,7 @@ import numpy as np
 from bayesid._math.arrays import Integers
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 
 __all__ = ["burst_signatures"]
 
@@ -21,14 +21,14 @@ LARGEST = 1000.0
 """Largest error in a burst, in standard deviations of the noise; assumed."""
 
 
-def burst_signatures(engine: Engine, fit: Fit) -> SignatureBank:
+def burst_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
     """Return the bank of one burst per sensor, at the places where the residual is largest.
 
     A burst may begin at every sample, and has errors of any sign in all samples and channels of its length. All places
     are equally probable beforehand; only the strongest are evaluated, each with its share of the prior, so that the
     evidence is a lower bound. The choice depends on the residual: these candidates are no part of the alarm.
     """
-    posterior = engine.posterior
+    posterior = perturbed.posterior
     whole = fit.residual.reshape(posterior.residual_shape)
     banks = []
     for kind in posterior.model.channels.kinds:

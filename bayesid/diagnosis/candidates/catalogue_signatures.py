@@ -11,7 +11,7 @@ from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signature
 from bayesid.diagnosis.evidence.body_evidence import MissingBody, rigid_moments
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbation import tables_of
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.simulation.effects.arm_effects import Payload
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
@@ -46,13 +46,13 @@ def moment_spreads(units: Sequence[str], reach: float) -> list[Floats]:
 
 
 def catalogue_signatures(
-    engine: Engine, fit: Fit, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
+    perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
 ) -> SignatureBank:
     """Return the bank of the effects that have one form: neither a frequency nor an instant.
 
     Parameters
     ----------
-    engine : Engine
+    perturbed : PerturbedModel
     fit : Fit
         About which the signatures are taken.
     effects : sequence of Effect
@@ -63,13 +63,13 @@ def catalogue_signatures(
     causes = []
     wanted = [effect for effect in effects if not effect.modes_count and not isinstance(effect, MassShift)]
     others = [effect for effect in wanted if effect.amplitude_units != MOMENT_UNITS]
-    columns = iter(_linear(engine, fit, others))
+    columns = iter(_linear(perturbed, fit, others))
     for effect in wanted:
         sizes = {bound.unit: bound.largest for bound in bounds[effect.label]}
         if effect.amplitude_units == MOMENT_UNITS:
             name = group_names(effect)[MOMENT_UNITS[0]]
             if name not in signatures:
-                signatures[name] = Signatures(name, _moments(engine, fit, effect))
+                signatures[name] = Signatures(name, _moments(perturbed, fit, effect))
             units = [quantity.unit for quantity in effect.amplitude_quantities]
             reach = sizes["kg m"] / sizes["kg"]
             groups = [(AmplitudeGroup(name, sizes["kg"], spread=own),) for own in moment_spreads(units, reach)]
@@ -77,7 +77,7 @@ def catalogue_signatures(
             body = MissingBody(sizes["kg"], reach, radii, rigid_moments) if isinstance(effect, Payload) else None
             causes.append(CandidateCause(effect.label, groups[0], others=tuple(groups[1:]), body=body))
             continue
-        found = amplitude_signatures(effect, next(columns), len(engine.posterior.manoeuvres))
+        found = amplitude_signatures(effect, next(columns), len(perturbed.posterior.manoeuvres))
         signatures |= {item.name: item for item in found.values()}
         if not sizes:
             (item,) = found.values()
@@ -88,14 +88,14 @@ def catalogue_signatures(
     return SignatureBank(tuple(signatures.values()), tuple(causes))
 
 
-def _linear(engine: Engine, fit: Fit, effects: Sequence[Effect]) -> list[Floats]:
+def _linear(perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect]) -> list[Floats]:
     """Return the derivatives of the residual in the coordinates of each effect in amplitudes, (N, n)."""
-    points = [(effect.in_amplitudes(), _start(engine, effect.in_amplitudes())) for effect in effects]
-    return engine.columns(points, fit.operating, fit.z, fit.data)
+    points = [(effect.in_amplitudes(), _start(perturbed, effect.in_amplitudes())) for effect in effects]
+    return perturbed.columns(points, fit.operating, fit.z, fit.data)
 
 
-def _start(engine: Engine, linear: Effect) -> Floats:
-    return np.tile(linear.starts[0], len(engine.posterior.manoeuvres) if linear.per_recording else 1)
+def _start(perturbed: PerturbedModel, linear: Effect) -> Floats:
+    return np.tile(linear.starts[0], len(perturbed.posterior.manoeuvres) if linear.per_recording else 1)
 
 
 def amplitude_signatures(effect: Effect, columns: Floats, recordings: int) -> dict[str, Signatures]:
@@ -129,8 +129,8 @@ def group_names(effect: Effect) -> dict[str, str]:
     return {unit: f"{effect.label} [{unit}]" if len(units) > 1 else effect.label for unit in units}
 
 
-def _moments(engine: Engine, fit: Fit, effect: Effect) -> Floats:
+def _moments(perturbed: PerturbedModel, fit: Fit, effect: Effect) -> Floats:
     """Return the signatures of the ten linear parameters of a link."""
-    table = tables_of(effect, engine.posterior)
+    table = tables_of(effect, perturbed.posterior)
     rows, samples = np.moveaxis(table.node, -1, 0), np.moveaxis(table.sample, -1, 0)
-    return engine.respond(engine.perturbation(len(rows), node_rows=rows, sample_rows=samples), fit.z, fit.data)
+    return perturbed.respond(perturbed.perturbation(len(rows), node_rows=rows, sample_rows=samples), fit.z, fit.data)

@@ -9,7 +9,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.posterior import Posterior
 from bayesid.robot.robot_size import RobotSize
 
@@ -50,7 +50,7 @@ ERROR = 1000.0
 """Largest unknown error of a sensor, in standard deviations of its noise; assumed."""
 
 
-def generic_signatures(engine: Engine, fit: Fit) -> SignatureBank:
+def generic_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
     """Return the bank of candidates that name nothing.
 
     - disturbing torque and force: smooth courses in base axes, whose cosines have variances that fall beyond a corner,
@@ -58,26 +58,26 @@ def generic_signatures(engine: Engine, fit: Fit) -> SignatureBank:
     - pulse of torque: at one instant of one recording, about any axis;
     - error of each sensor: smooth courses of its channels.
     """
-    posterior = engine.posterior
+    posterior = perturbed.posterior
     kinds, size = posterior.model.channels.kinds, RobotSize.of(posterior.model.robot)
     force = ACCELERATION * size.mass
     torque = force * size.radius
     banks = [
-        _smooth(engine, fit, TORQUE, 3, torque),
-        *([_smooth(engine, fit, FORCE, 0, force)] if any(kind.feels_force for kind in kinds) else []),
-        _pulses(engine, fit, torque),
+        _smooth(perturbed, fit, TORQUE, 3, torque),
+        *([_smooth(perturbed, fit, FORCE, 0, force)] if any(kind.feels_force for kind in kinds) else []),
+        _pulses(perturbed, fit, torque),
         *(error_signatures(posterior, f"error of {kind.value}", posterior.model.channels.of(kind)) for kind in kinds),
     ]
     return SignatureBank.joined(banks)
 
 
-def _smooth(engine: Engine, fit: Fit, name: str, first: int, high: float) -> SignatureBank:
+def _smooth(perturbed: PerturbedModel, fit: Fit, name: str, first: int, high: float) -> SignatureBank:
     """Return the bank of a smooth torque (first = 3) or force (0) in base axes."""
 
     def waves(time: Floats, end: float) -> Floats:
         return np.cos(np.pi * np.arange(WAVES)[:, None] * time / end)
 
-    columns = _wrenches(engine, fit, WAVES, waves, first)
+    columns = _wrenches(perturbed, fit, WAVES, waves, first)
     recordings = len(columns)
     signatures = tuple(Signatures(name, own, r) for r, own in enumerate(columns))
     spreads = [np.tile(np.repeat(own, 3), recordings) for own in _courses(WAVES)]
@@ -103,7 +103,7 @@ def _courses(waves: int) -> list[Floats]:
     return [own / own.sum() for own in found]
 
 
-def _pulses(engine: Engine, fit: Fit, high: float) -> SignatureBank:
+def _pulses(perturbed: PerturbedModel, fit: Fit, high: float) -> SignatureBank:
     """Return the bank of one pulse of torque at an instant of a recording."""
 
     def pulses(time: Floats, end: float) -> Floats:
@@ -111,7 +111,7 @@ def _pulses(engine: Engine, fit: Fit, high: float) -> SignatureBank:
         return np.maximum(1.0 - np.abs(time - centres) * INSTANTS / end, 0.0)
 
     signatures = []
-    for r, columns in enumerate(_wrenches(engine, fit, INSTANTS, pulses, 3)):
+    for r, columns in enumerate(_wrenches(perturbed, fit, INSTANTS, pulses, 3)):
         for k in range(INSTANTS):
             name = f"pulse of torque {k + 1} of recording {r + 1}"
             signatures.append(Signatures(name, columns[:, 3 * k : 3 * k + 3], r))
@@ -120,7 +120,7 @@ def _pulses(engine: Engine, fit: Fit, high: float) -> SignatureBank:
 
 
 def _wrenches(
-    engine: Engine, fit: Fit, count: int, courses: Callable[[Floats, float], Floats], first: int
+    perturbed: PerturbedModel, fit: Fit, count: int, courses: Callable[[Floats, float], Floats], first: int
 ) -> list[Floats]:
     """Return the responses of each recording to ``count`` courses in time of a torque or force: (rows, 3 count).
 
@@ -138,8 +138,8 @@ def _wrenches(
         if first == 0:
             wrench[..., 3:] = np.cross(np.asarray(instant.body.com), wrench[..., :3])
         wrenches.append(wrench.reshape(3 * count, *time.shape, 6))
-    push = engine.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-    found = engine.respond(push, fit.z, fit.data)
+    push = perturbed.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
+    found = perturbed.respond(push, fit.z, fit.data)
     return list(found.reshape(len(times[0]), -1, 3 * count))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.perturbed_posterior import jacobian_of
 
 __all__ = ["INITIAL_RATE", "initial_rate_signatures"]
@@ -16,12 +16,12 @@ LARGEST = 0.1
 """Largest rate that passes for rest [rad/s], six degrees per second; assumed, since anyone would see more."""
 
 
-def initial_rate_signatures(engine: Engine, fit: Fit) -> SignatureBank:
+def initial_rate_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
     """Return the bank of the initial rates that the study takes to be zero; an empty one where they are unknown."""
-    frozen = engine.frozen
+    frozen = perturbed.frozen
     if not len(frozen):
         return SignatureBank()
-    derivatives = jacobian_of(engine.posterior, fit.z, fit.data).reshape(-1, engine.posterior.size)
-    columns = derivatives[:, frozen] / engine.posterior.unknowns.rate_sigma
+    derivatives = jacobian_of(perturbed.posterior, fit.z, fit.data).reshape(-1, perturbed.posterior.size)
+    columns = derivatives[:, frozen] / perturbed.posterior.unknowns.rate_sigma
     cause = CandidateCause(INITIAL_RATE, (AmplitudeGroup(INITIAL_RATE, LARGEST),))
     return SignatureBank((Signatures(INITIAL_RATE, columns),), (cause,))

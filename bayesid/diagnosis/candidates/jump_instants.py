@@ -70,7 +70,7 @@ def jump_instants(hypothesis: Hypothesis) -> list[CauseAmplitude]:
 def _weights(hypothesis: Hypothesis, moments: Floats, tried: Floats, recordings: Sequence[int]) -> list[Floats]:
     """Return the likelihood of each instant of some recordings relative to the best, shapes (K,)."""
     fit = hypothesis.fit
-    responses = jump_signatures(hypothesis.engine, fit, tried) @ moments  # (R, K, rows)
+    responses = jump_signatures(hypothesis.perturbed, fit, tried) @ moments  # (R, K, rows)
     rows = responses.shape[-1]
     weights = []
     for r in recordings:

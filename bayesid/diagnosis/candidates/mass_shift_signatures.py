@@ -9,7 +9,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
@@ -26,7 +26,7 @@ def shift_instants(end: float) -> Floats:
 
 
 def mass_shift_signatures(
-    engine: Engine, fit: Fit, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
+    perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
 ) -> SignatureBank:
     """Return the bank of jumps of the base's moments; an empty one where such a jump is no candidate.
 
@@ -35,7 +35,7 @@ def mass_shift_signatures(
 
     Parameters
     ----------
-    engine : Engine
+    perturbed : PerturbedModel
     fit : Fit
         About which the signatures are taken.
     effects : sequence of Effect
@@ -48,7 +48,7 @@ def mass_shift_signatures(
         return SignatureBank()
     ends = np.asarray(fit.operating.node.environment.time).max(axis=1)
     grid = np.stack([shift_instants(float(end)) for end in ends])
-    columns = jump_signatures(engine, fit, grid)
+    columns = jump_signatures(perturbed, fit, grid)
     size, spread = shift_spread(bounds[shift.label])
     signatures = [
         Signatures(
@@ -76,12 +76,12 @@ def shift_spread(bounds: Sequence[PhysicalBound]) -> tuple[float, Floats]:
     return sizes["kg m"], np.repeat([1.0, (sizes["kg m2"] / sizes["kg m"]) ** 2], [3, 6])
 
 
-def jump_signatures(engine: Engine, fit: Fit, instants: Floats) -> Floats:
+def jump_signatures(perturbed: PerturbedModel, fit: Fit, instants: Floats) -> Floats:
     """Return the responses of each recording to unit moments that jump at some instants of its own.
 
     Parameters
     ----------
-    engine : Engine
+    perturbed : PerturbedModel
     fit : Fit
     instants : (R, K) array
         Instants in each recording [s]; infinite ones change nothing.
@@ -97,6 +97,6 @@ def jump_signatures(engine: Engine, fit: Fit, instants: Floats) -> Floats:
         tables.append(np.moveaxis(np.array(own), -1, 1))  # (K, 9, R, T, 28)
     some, count = tables[0].shape[:2]
     rows = [part.reshape(some * count, *part.shape[2:]) for part in tables]
-    push = engine.perturbation(some * count, node_rows=rows[0], sample_rows=rows[1])
-    found = engine.respond(push, fit.z, fit.data)
+    push = perturbed.perturbation(some * count, node_rows=rows[0], sample_rows=rows[1])
+    found = perturbed.respond(push, fit.z, fit.data)
     return np.moveaxis(found.reshape(len(instants), -1, some, count), 2, 1)

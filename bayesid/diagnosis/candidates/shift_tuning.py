@@ -89,7 +89,7 @@ def with_tuned_shift(
         return point
     share = SHARE / (2.0 ** len(ends) - 1.0) / float(np.prod(samples, dtype=float))
     instants = tuple(np.inf if instant is None else instant for instant in chosen)
-    columns = jump_signatures(point.engine, point.fit, np.array(instants)[:, None])[:, 0]
+    columns = jump_signatures(point.perturbed, point.fit, np.array(instants)[:, None])[:, 0]
     name = f"{shift.label} at {', '.join(f'{instant:.5g}' for instant in instants)} s"
     item = Signatures(name, columns.reshape(-1, columns.shape[-1]), instants=instants)
     cause = next(cause for cause in point.bank.causes if cause.name == shift.label)
@@ -121,7 +121,7 @@ def _sought(
     """Return the best instant of each recording among some, or None where it does not jump."""
     most = max(map(len, choices))
     padded = np.array([[*row, *[np.inf] * (most - len(row))] for row in choices])
-    columns = jump_signatures(point.engine, point.fit, padded)
+    columns = jump_signatures(point.perturbed, point.fit, padded)
     items = [Signatures(f"{r},{k}", columns[r, k], r) for r, row in enumerate(choices) for k in range(len(row))]
     gram = _beside(point, items, others, shift.label)
     best = [None if now is None else int(np.argmin(np.abs(padded[r] - now))) for r, now in enumerate(chosen)]

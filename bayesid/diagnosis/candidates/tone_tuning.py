@@ -25,7 +25,7 @@ from bayesid.diagnosis.candidates.vibration_signatures import (
 )
 from bayesid.diagnosis.evidence.scale_integral import GroupSpectrum, log_evidences
 from bayesid.diagnosis.evidence.scale_prior import CandidateCause
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.search.left_beside import LeftBeside
 from bayesid.diagnosis.search.linearisation import Linearisation
 from bayesid.simulation.effects.effect import Effect
@@ -83,7 +83,7 @@ def with_tuned_tones(
     beside : mapping of str to sequence of str
         Labels of the vibrations to tune, with the other causes of the set in which they are tuned.
     """
-    couplings = _Couplings(point.engine, point.fit)
+    couplings = _Couplings(point.perturbed, point.fit)
     bank = point.bank
     for effect in effects:
         if effect.label in beside:
@@ -96,14 +96,14 @@ def with_tuned_tones(
 class _Couplings:
     """Responses to the coupling entries of tones, each computed once for all vibrations."""
 
-    def __init__(self, engine: Engine, fit: Fit) -> None:
-        self._engine, self._fit = engine, fit
+    def __init__(self, perturbed: PerturbedModel, fit: Fit) -> None:
+        self._perturbed, self._fit = perturbed, fit
         self._known: dict[Tone, Floats] = {}
 
     def at(self, tone: Tone) -> Floats:
         """Return the columns of one tone, (N, 21)."""
         if tone not in self._known:
-            self._known[tone] = tone_couplings(self._engine, self._fit, tone)
+            self._known[tone] = tone_couplings(self._perturbed, self._fit, tone)
         return self._known[tone]
 
 

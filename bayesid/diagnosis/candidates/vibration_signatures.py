@@ -11,7 +11,7 @@ from bayesid.diagnosis.candidates.catalogue_signatures import moment_spreads
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.body_evidence import MissingBody, outer_moments
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh
 from bayesid.simulation.effects.physical_bound import PhysicalBound
@@ -43,7 +43,7 @@ GRID = tuple((frequency, DAMPING) for frequency in FREQUENCIES)
 
 
 def vibration_signatures(
-    engine: Engine,
+    perturbed: PerturbedModel,
     fit: Fit,
     effects: Sequence[Effect],
     bounds: Mapping[str, Sequence[PhysicalBound]],
@@ -58,7 +58,7 @@ def vibration_signatures(
 
     Parameters
     ----------
-    engine : Engine
+    perturbed : PerturbedModel
     fit : Fit
         About which the signatures are taken.
     effects : sequence of Effect
@@ -72,7 +72,7 @@ def vibration_signatures(
     signatures: list[Signatures] = []
     groups: dict[str, list[Signatures]] = {effect.label: [] for effect in wanted}
     for tone in tones if wanted else ():
-        couplings = tone_couplings(engine, fit, tone)
+        couplings = tone_couplings(perturbed, fit, tone)
         for effect in wanted:
             item = tone_signature(effect, tone, couplings)
             signatures.append(item)
@@ -145,8 +145,8 @@ def slosh_entries() -> Floats:
     return np.array([[matrix[i, j] for matrix in matrices] for i, j in PAIRS])
 
 
-def tone_couplings(engine: Engine, fit: Fit, tone: tuple[float, float]) -> Floats:
+def tone_couplings(perturbed: PerturbedModel, fit: Fit, tone: tuple[float, float]) -> Floats:
     """Return the responses to unit entries of the coupling matrix at a frequency [Hz] and damping, (N, 21)."""
     rows = fit.operating.vibration.coupling_rows(*tone, PAIRS)
-    perturbation = engine.perturbation(len(PAIRS), node_rows=rows[0], sample_rows=rows[1])
-    return engine.respond(perturbation, fit.z, fit.data)
+    perturbation = perturbed.perturbation(len(PAIRS), node_rows=rows[0], sample_rows=rows[1])
+    return perturbed.respond(perturbation, fit.z, fit.data)

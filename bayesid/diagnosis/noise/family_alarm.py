@@ -9,7 +9,7 @@ import numpy as np
 from bayesid.diagnosis.evidence.evidence_alarm import FAMILY_LEVEL, EvidenceAlarm
 from bayesid.diagnosis.noise.encoder_fault import encoder_test
 from bayesid.diagnosis.noise.noise_tests import noise_tests, variance_tests
-from bayesid.diagnosis.response.perturbed_fit import Fit
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.linearisation import Linearisation
 
 __all__ = ["FamilyAlarm"]
@@ -36,7 +36,7 @@ class FamilyAlarm:
     @staticmethod
     def of(point: Linearisation, fit: Fit, rng: np.random.Generator, draws: int = 2000) -> FamilyAlarm:
         """Test the present model: candidates by its linearisation, the noise by its fit."""
-        posterior = point.engine.posterior
+        posterior = point.perturbed.posterior
         tests = noise_tests(posterior, fit) | variance_tests(posterior, fit) | encoder_test(posterior)
         return FamilyAlarm(EvidenceAlarm.of(point.evidence, rng, draws), tests)
 

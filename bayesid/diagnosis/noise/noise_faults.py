@@ -14,7 +14,7 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.noise.encoder_fault import ENCODER_NOISE, encoder_noise, with_encoder_noise
 from bayesid.diagnosis.noise.noise_tests import lattice, leverage
 from bayesid.diagnosis.noise.outlier_pattern import is_event
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.noise_changes import leaving_out, with_sensors
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect_parameters import Quantity
@@ -209,7 +209,7 @@ def _coloured_at(
     return NoiseFault(label, (Quantity("sigma", kind.unit), Quantity("time", "s")), mean, mean * relative, posterior)
 
 
-def refined(fault: NoiseFault, engine: Engine, fit: Fit) -> NoiseFault:
+def refined(fault: NoiseFault, perturbed: PerturbedModel, fit: Fit) -> NoiseFault:
     """Maximise the evidence over the size of coloured noise; other faults are returned as they are.
 
     The first estimate comes from a residual out of which the fit has taken slow waves, and is too small.
@@ -226,7 +226,7 @@ def refined(fault: NoiseFault, engine: Engine, fit: Fit) -> NoiseFault:
     def loss(logs: Floats) -> float:
         logs = np.array([logs[0], min(logs[1], longest)])
         posterior = _coloured_at(fault.label, kind, fit, logs, np.zeros(2), fault.posterior).posterior
-        again = engine.with_posterior(posterior).fit(fit.effects, fit.coordinates, z=fit.z, iterations=REFITS)
+        again = perturbed.with_posterior(posterior).fit(fit.effects, fit.coordinates, z=fit.z, iterations=REFITS)
         points.append(logs)
         values.append(-again.log_evidence)
         return values[-1]

@@ -11,7 +11,7 @@ from bayesid.diagnosis.noise.encoder_fault import ENCODER_NOISE
 from bayesid.diagnosis.noise.noise_faults import NoiseFault, noise_fault, refined
 from bayesid.diagnosis.noise.noise_tests import ON_LATTICE
 from bayesid.diagnosis.response.followed_motion import linearise_along_data
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.search.linearisation import Linearisation, linearise
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.simulation.effects.effect import Effect
@@ -60,15 +60,15 @@ class NoiseState:
         return self.point.log_nothing + self.log_charge
 
 
-def fault_names(engine: Engine) -> tuple[str, ...]:
+def fault_names(perturbed: PerturbedModel) -> tuple[str, ...]:
     """Return the names of all faults of the noise of a model's sensors and encoders."""
-    kinds = [sensor.kind.value for sensor in engine.posterior.model.sensors]
+    kinds = [sensor.kind.value for sensor in perturbed.posterior.model.sensors]
     found = [
         name
         for kind in kinds
         for name in (f"{kind}-noise", f"coloured-noise:{kind}", f"outliers:{kind}", f"quantisation:{kind}")
     ]
-    measured = any(isinstance(item.motion, MeasuredMotion) for item in engine.posterior.manoeuvres)
+    measured = any(isinstance(item.motion, MeasuredMotion) for item in perturbed.posterior.manoeuvres)
     return (*found, ENCODER_NOISE) if measured else tuple(found)
 
 
@@ -79,7 +79,7 @@ class FaultyFit:
     Attributes
     ----------
     faults : tuple of NoiseFault
-    engine : Engine
+    perturbed : PerturbedModel
     fit : Fit
     log_charge : float
         Logarithm of what the freedom of the faults costs.
@@ -88,7 +88,7 @@ class FaultyFit:
     """
 
     faults: tuple[NoiseFault, ...]
-    engine: Engine
+    perturbed: PerturbedModel
     fit: Fit
     log_charge: float
     held: bool
@@ -96,7 +96,7 @@ class FaultyFit:
     @staticmethod
     def declared(base: Linearisation) -> FaultyFit:
         """Return the fit with the noise as declared."""
-        return FaultyFit((), base.engine, base.fit, 0.0, base.held)
+        return FaultyFit((), base.perturbed, base.fit, 0.0, base.held)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -118,8 +118,8 @@ class FaultyFit:
         bounds : mapping of str to sequence of PhysicalBound
         """
         if self.held:
-            return NoiseState(self.faults, linearise_along_data(self.engine, effects, bounds), self.log_charge)
-        return NoiseState(self.faults, linearise(self.engine, self.fit, effects, bounds), self.log_charge)
+            return NoiseState(self.faults, linearise_along_data(self.perturbed, effects, bounds), self.log_charge)
+        return NoiseState(self.faults, linearise(self.perturbed, self.fit, effects, bounds), self.log_charge)
 
 
 def faulty_fit(
@@ -148,15 +148,15 @@ def faulty_fit(
     fault = noise_fault(label, residual, least - residual.log_evidence)
     if fault is None or (known is not None and _alike(fault, known)):
         return None
-    engine = before.engine.with_posterior(fault.posterior)
-    beside = engine.fit(residual.effects, residual.coordinates, z=residual.z, iterations=REFITS)
+    perturbed = before.perturbed.with_posterior(fault.posterior)
+    beside = perturbed.fit(residual.effects, residual.coordinates, z=residual.z, iterations=REFITS)
     if beside.log_evidence + _log_charge(fault) < least:
         return None
     if label.startswith("coloured-noise"):
-        fault = refined(fault, engine, residual)
-        engine = engine.with_posterior(fault.posterior)
-    fit = engine.fit(z=before.fit.z)
-    found = FaultyFit((*before.faults, fault), engine, fit, before.log_charge + _log_charge(fault), before.held)
+        fault = refined(fault, perturbed, residual)
+        perturbed = perturbed.with_posterior(fault.posterior)
+    fit = perturbed.fit(z=before.fit.z)
+    found = FaultyFit((*before.faults, fault), perturbed, fit, before.log_charge + _log_charge(fault), before.held)
     return None if alone and found.log_nothing < best - BEHIND else found
 
 

@@ -8,7 +8,7 @@ from scipy import stats
 from scipy.special import gammaln
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.response.perturbed_fit import Fit
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.sensors import Kind, Quantised
 

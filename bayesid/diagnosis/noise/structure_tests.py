@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.response.perturbed_fit import Fit
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.simulation.sensors import Kind
 
 __all__ = ["log_p_of_a_period", "log_p_of_an_event", "structure_tests"]

@@ -43,7 +43,7 @@ def amplitudes_of(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:
 def _initial_rates(hypothesis: Hypothesis) -> list[CauseAmplitude]:
     fit = hypothesis.fit
     posterior, sigma = fit.posterior, fit.posterior.unknowns.rate_sigma
-    free = hypothesis.engine.free.tolist()
+    free = hypothesis.perturbed.free.tolist()
     spread = np.sqrt(np.diag(fit.covariance))
     rates = posterior.unknowns.layout.all_rates
     amplitudes = []

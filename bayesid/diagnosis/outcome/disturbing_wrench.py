@@ -326,7 +326,7 @@ def _whole_columns(bank: SignatureBank, name: str, recordings: int) -> Floats:
 
 def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Floats:
     """Return the responses to cosines of a torque along the axes of frames, (N, R WAVES 3)."""
-    engine, fit = hypothesis.engine, hypothesis.fit
+    perturbed, fit = hypothesis.perturbed, hypothesis.fit
     operating = fit.operating
     ends = np.asarray(operating.node.environment.time).max(axis=1)
     wrenches = []
@@ -336,8 +336,8 @@ def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Float
         wrench = np.zeros((WAVES, 3, *time.shape, 6))
         wrench[..., 3:] = np.einsum("krt,rtba->kartb", waves, axes)
         wrenches.append(wrench.reshape(WAVES * 3, *time.shape, 6))
-    push = engine.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-    found = engine.respond(push, fit.z, fit.data)
+    push = perturbed.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
+    found = perturbed.respond(push, fit.z, fit.data)
     rows = len(found) // len(ends)
     whole = np.zeros((len(ends), rows, len(ends), WAVES * 3))
     for r, own in enumerate(found.reshape(len(ends), rows, WAVES * 3)):

@@ -15,7 +15,7 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.response.perturbed_fit import CLOSE
+from bayesid.diagnosis.response.perturbed_model import CLOSE
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
@@ -51,7 +51,7 @@ def extended_posterior(
     model = replace(fit.posterior.model, torque=torque)
     for effect in (*(effect.tuned(fit.values(index)) for index, effect in enumerate(fit.effects)), *added):
         model = model.extend(effect)
-    if hypothesis.engine.frozen.size:
+    if hypothesis.perturbed.frozen.size:
         model = replace(model, rate_sigma=0.0)
     manoeuvres = [_without(manoeuvre, fit.posterior, index) for index, manoeuvre in enumerate(fit.posterior.manoeuvres)]
     return Posterior.of(model, manoeuvres)
@@ -60,7 +60,7 @@ def extended_posterior(
 def extended_start(hypothesis: Hypothesis, posterior: Posterior) -> Floats:
     """Mode of a hypothesis in the coordinates of its own posterior."""
     fit = hypothesis.fit
-    z = np.delete(fit.z, hypothesis.engine.frozen)
+    z = np.delete(fit.z, hypothesis.perturbed.frozen)
     return np.concatenate([z, *fit.coordinates]) if posterior.size else np.zeros(0)
 
 
@@ -79,10 +79,10 @@ def exactly_fitted(hypothesis: Hypothesis) -> Hypothesis:
     coordinates = [mode[first:last] for first, last in pairwise(ends)]
     z = found.z.copy()
     z[np.setdiff1d(np.arange(len(z)), found.frozen)] = mode[:free]
-    engine, operating = hypothesis.engine, found.operating
+    perturbed, operating = hypothesis.perturbed, found.operating
     for _ in range(ROUNDS):
-        exact = engine.fit(found.effects, coordinates, z=z, operating=operating, iterations=0)
-        operating = engine.operating(z, engine.pushes(found.effects, coordinates, operating, vibrations=False))
+        exact = perturbed.fit(found.effects, coordinates, z=z, operating=operating, iterations=0)
+        operating = perturbed.operating(z, perturbed.pushes(found.effects, coordinates, operating, vibrations=False))
     if exact.cost > found.cost + CLOSE:
         return hypothesis
     columns = posterior.jacobian(mode)[: exact.residual.size]

@@ -103,7 +103,7 @@ def _bare_without(hypothesis: Hypothesis, number: int) -> float:
     fit = hypothesis.fit
     outputs = [item.outputs for item in fit.posterior.whitenings]
     masks = [own if i == number else np.zeros_like(own) for i, own in enumerate(outputs)]
-    without = hypothesis.engine.with_posterior(leaving_out(fit.posterior, masks))
+    without = hypothesis.perturbed.with_posterior(leaving_out(fit.posterior, masks))
     rest = without.fit(fit.effects, fit.coordinates, z=fit.z, operating=fit.operating)
     return _bare_fit(rest.cost, rest.hessian[0])
 
@@ -116,7 +116,7 @@ def body_figures(hypothesis: Hypothesis) -> BodyFigures:
     """Means and standard deviations of what is reported of the identified bodies."""
     fit = hypothesis.fit
     posterior = fit.posterior
-    free = hypothesis.engine.free
+    free = hypothesis.perturbed.free
     vector = posterior.unknowns.values_at(fit.z).inertial.reshape(-1, PARAMETERS)
     slope = posterior.unknowns.inertial_slope(fit.z).reshape(-1, PARAMETERS, len(fit.z))[..., free]
     covariance = fit.covariance[: len(free), : len(free)]

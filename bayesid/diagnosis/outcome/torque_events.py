@@ -137,13 +137,13 @@ class EventCandidates:
             default the grid.
         """
         shapes = GRID if finer is None else finer
-        engine, fit = hypothesis.engine, hypothesis.fit
+        perturbed, fit = hypothesis.perturbed, hypothesis.fit
         moments = (fit.operating.node, fit.operating.sample)
         times = [np.asarray(instant.environment.time) for instant in moments]
         ends = times[0].max(axis=1)
         count, recordings = len(shapes), len(ends)
         # between two nodes of the integration a jump would be lost: there it is averaged over a step
-        longest = np.asarray(engine.posterior.data.arrays.grid.step).max(axis=1)
+        longest = np.asarray(perturbed.posterior.data.arrays.grid.step).max(axis=1)
         pushed = [
             np.stack([_courses(*own, shapes) for own in zip(time, ends, width, strict=True)])
             for time, width in zip(times, (longest, np.zeros(recordings)), strict=True)
@@ -154,8 +154,8 @@ class EventCandidates:
             for axis in range(3):
                 wrench[:, axis, :, :, 3 + axis] = np.swapaxes(own, 0, 1)
             wrenches.append(wrench.reshape(3 * count, recordings, own.shape[2], 6))
-        push = engine.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-        blocks = engine.respond(push, fit.z, fit.data).reshape(recordings, -1, 3 * count)
+        push = perturbed.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
+        blocks = perturbed.respond(push, fit.z, fit.data).reshape(recordings, -1, 3 * count)
         known, residual = (x.reshape(recordings, blocks.shape[1], -1) for x in (fit.known, fit.residual))
         apart = smooth.reshape(recordings, blocks.shape[1], -1)
         cross = np.concatenate([known[r].T @ blocks[r] for r in range(recordings)], axis=1)

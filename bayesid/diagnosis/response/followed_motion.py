@@ -17,7 +17,7 @@ import numpy as np
 from jax import Array
 
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.response.present_fit import bodies_frozen
 from bayesid.diagnosis.search.linearisation import Linearisation, linearise
 from bayesid.inference.posterior import Posterior
@@ -58,42 +58,42 @@ class FollowingTorque(Effect):
         return Wrench(jnp.zeros(3), weight @ values.reshape(KNOTS, 3))
 
 
-def follow(engine: Engine) -> Fit:
+def follow(perturbed: PerturbedModel) -> Fit:
     """Fit the present model with a following torque and its bodies at their prior's centre.
 
     The prior of the torque is as wide as the data ask for: one standard deviation at one knot would change the residual
     by as much as all that the present model leaves.
     """
-    frozen = bodies_frozen(engine)
+    frozen = bodies_frozen(perturbed)
     z = frozen.start()
     operating = frozen.operating(z, ())
     end = float(np.asarray(operating.node.environment.time).max())
-    size = 3 * KNOTS * len(engine.posterior.manoeuvres)
-    data = engine.posterior.data.arrays
+    size = 3 * KNOTS * len(perturbed.posterior.manoeuvres)
+    data = perturbed.posterior.data.arrays
     unit = frozen.columns([(FollowingTorque(end, 1.0), np.zeros(size))], operating, z, data)[0]
     length = np.linalg.norm(unit, axis=0)
     sigma = float(np.linalg.norm(frozen.residual(z, data)) / np.median(length[length > 0.0]))
     torque = FollowingTorque(end, sigma)
     found = frozen.fit([torque])
-    whole = engine.fit([torque], found.coordinates, z=found.z, operating=found.operating, iterations=0)
+    whole = perturbed.fit([torque], found.coordinates, z=found.z, operating=found.operating, iterations=0)
     return replace(whole, converged=found.converged)
 
 
 def linearise_along_data(
-    engine: Engine, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
+    perturbed: PerturbedModel, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
 ) -> Linearisation:
     """Linearise the model and all candidates about the motion that the data show, bodies held at their prior.
 
     Parameters
     ----------
-    engine, effects, bounds
+    perturbed, effects, bounds
         As for `linearise`.
     """
-    fit = follow(engine)
+    fit = follow(perturbed)
     (torque,) = fit.effects
     columns = fit.added[0] / fit.effects[0].parameters[0].sigma
     return linearise(
-        engine, fit, effects, bounds, held=True, far=True, beside=SignatureBank((Signatures(torque.label, columns),))
+        perturbed, fit, effects, bounds, held=True, far=True, beside=SignatureBank((Signatures(torque.label, columns),))
     )
 
 

@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from bayesid._math.arrays import Floats
 from bayesid._math.least_squares import levenberg_marquardt
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 
 __all__ = ["PresentFit", "fit_present_model", "strayed", "with_bodies_held"]
 
@@ -24,7 +24,7 @@ IMPROBABLE = 1e-6
 """Prior probability of bodies as far from their centre as a fit has them, below which they stand in for something."""
 
 TOLERANCE = 1e-6
-"""Relative tolerance with which a fit is followed; the last steps are those of `Engine.fit`."""
+"""Relative tolerance with which a fit is followed; the last steps are those of `PerturbedModel.fit`."""
 
 EVALUATIONS = 300
 """Largest number of evaluations for that; a load of 37 times its guess takes 80."""
@@ -57,23 +57,23 @@ def strayed(fit: Fit) -> bool:
     return bool(far and fit.chi2 > MISFIT * fit.posterior.samples)
 
 
-def fit_present_model(engine: Engine, z: Floats | None = None) -> PresentFit:
+def fit_present_model(perturbed: PerturbedModel, z: Floats | None = None) -> PresentFit:
     """Fit the present model, from the start or from a point (size,), and hold its bodies where every fit strays."""
-    first = engine.fit(z=z)
+    first = perturbed.fit(z=z)
     if strayed(first) or not first.converged:
-        first = min(first, _followed(engine, engine.start() if z is None else z), key=lambda fit: fit.cost)
+        first = min(first, _followed(perturbed, perturbed.start() if z is None else z), key=lambda fit: fit.cost)
     if not strayed(first):
         return PresentFit(first, held=False)
-    held = _fit_beside_bodies(engine)
-    again = engine.fit(z=held.z)
+    held = _fit_beside_bodies(perturbed)
+    again = perturbed.fit(z=held.z)
     return PresentFit(held, held=True) if strayed(again) else PresentFit(again, held=False)
 
 
-def bodies_frozen(engine: Engine) -> Engine:
-    """Return the engine with all bodies at their prior's centre."""
-    layout = engine.posterior.unknowns.layout
+def bodies_frozen(perturbed: PerturbedModel) -> PerturbedModel:
+    """Return the model with all bodies at their prior's centre."""
+    layout = perturbed.posterior.unknowns.layout
     bodies = range(layout.all_bodies.start, layout.all_bodies.stop)
-    return Engine(engine.posterior, {*engine.frozen.tolist(), *bodies})
+    return PerturbedModel(perturbed.posterior, {*perturbed.frozen.tolist(), *bodies})
 
 
 def with_bodies_held(fit: Fit) -> Fit:
@@ -85,9 +85,9 @@ def with_bodies_held(fit: Fit) -> Fit:
     return replace(fit, own=own)
 
 
-def _followed(engine: Engine, start: Floats) -> Fit:
+def _followed(perturbed: PerturbedModel, start: Floats) -> Fit:
     """Return the fit that Levenberg-Marquardt with a trust region reaches from a point (size,)."""
-    posterior, free = engine.posterior, engine.free
+    posterior, free = perturbed.posterior, perturbed.free
 
     def at(values: Floats) -> Floats:
         z = np.array(start)
@@ -102,10 +102,10 @@ def _followed(engine: Engine, start: Floats) -> Fit:
             TOLERANCE,
             EVALUATIONS,
         )
-    return engine.fit(z=at(solution.x))
+    return perturbed.fit(z=at(solution.x))
 
 
-def _fit_beside_bodies(engine: Engine) -> Fit:
+def _fit_beside_bodies(perturbed: PerturbedModel) -> Fit:
     """Return the fit of everything but the bodies, with the derivatives in the bodies, too."""
-    held = bodies_frozen(engine).fit()
-    return replace(engine.fit(z=held.z, operating=held.operating, iterations=0), converged=held.converged)
+    held = bodies_frozen(perturbed).fit()
+    return replace(perturbed.fit(z=held.z, operating=held.operating, iterations=0), converged=held.converged)

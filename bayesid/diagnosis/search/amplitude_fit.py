@@ -12,7 +12,7 @@ from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.candidates.catalogue_signatures import group_names
 from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.evidence.set_evidence import precision_roots
-from bayesid.diagnosis.response.perturbed_fit import Fit
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.linearisation import Linearisation
 from bayesid.simulation.effects.effect import Effect
 
@@ -65,19 +65,19 @@ def fit_in_amplitudes(point: Linearisation, effects: Sequence[Effect], released:
         else:
             start.append(np.zeros(0))
         scaled.append(linear)
-    engine = point.engine.released() if released else point.engine
-    frozen = point.engine.frozen
+    perturbed = point.perturbed.released() if released else point.perturbed
+    frozen = point.perturbed.frozen
     z = point.fit.z.copy()
     if released:
-        z[frozen] = engine.posterior.starting_point()[frozen]
+        z[frozen] = perturbed.posterior.starting_point()[frozen]
     expected = predicted_cost(point) - gain
-    fit = engine.fit(scaled, start, z=z, operating=None if released else point.fit.operating)
+    fit = perturbed.fit(scaled, start, z=z, operating=None if released else point.fit.operating)
     if abs(fit.cost - expected) > FAR and not point.far:  # far from the data no fit finds them from the centre
-        fresh = engine.fit(scaled, [np.zeros_like(own) for own in start])
+        fresh = perturbed.fit(scaled, [np.zeros_like(own) for own in start])
         fit = fresh if fresh.cost < fit.cost else fit
     if not released:
         return fit, expected
-    known = np.delete(fit.own, np.searchsorted(engine.free, frozen), axis=1)
+    known = np.delete(fit.own, np.searchsorted(perturbed.free, frozen), axis=1)
     return replace(fit, own=known, released=np.zeros(0, dtype=int), frozen=frozen), expected
 
 

@@ -17,7 +17,7 @@ from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.noise.noise_states import FaultyFit, NoiseState, fault_names
 from bayesid.diagnosis.response.followed_motion import linearise_along_data
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.search.fault_weighing import weighed_states
 from bayesid.diagnosis.search.linearisation import Linearisation, linearise
 from bayesid.diagnosis.search.settled_sets import settled
@@ -96,7 +96,7 @@ class WeighedCauses:
 
 
 def weigh_causes(
-    engine: Engine,
+    perturbed: PerturbedModel,
     fit: Fit,
     effects: Sequence[Effect],
     bounds: Mapping[str, Sequence[PhysicalBound]],
@@ -110,7 +110,7 @@ def weigh_causes(
 
     Parameters
     ----------
-    engine : Engine
+    perturbed : PerturbedModel
     fit : Fit
         Of the present model.
     effects : sequence of Effect
@@ -125,10 +125,10 @@ def weigh_causes(
         Whether the bodies are held in the fit, which diverged: the model is then linearised along the data.
     """
     progress(0.2, "computing what each candidate would change")
-    base = linearise_along_data(engine, effects, bounds) if held else linearise(engine, fit, effects, bounds)
+    base = linearise_along_data(perturbed, effects, bounds) if held else linearise(perturbed, fit, effects, bounds)
     progress(0.4, "testing the present model")
     alarm = FamilyAlarm.of(base, fit, rng)
-    faults = fault_names(engine)
+    faults = fault_names(perturbed)
     if alarm.silent:
         single = enumerate_sets(base.evidence, prior, largest=1)
         return WeighedCauses(base, alarm, (NoiseState((), base),), _with_faults(single, faults))

@@ -13,7 +13,7 @@ from bayesid.diagnosis.evidence.cause_prior import CausePrior
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.noise.noise_states import FaultyFit, faulty_fit
 from bayesid.diagnosis.noise.noise_tests import noise_tests
-from bayesid.diagnosis.response.perturbed_fit import Fit
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.settled_sets import settled
 from bayesid.diagnosis.search.weighed_state import WeighedState
 from bayesid.simulation.effects.effect import Effect

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from bayesid.diagnosis.noise.noise_faults import NoiseFault
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 
 __all__ = ["Hypothesis"]
 
@@ -16,13 +16,13 @@ class Hypothesis:
 
     Attributes
     ----------
-    engine : Engine
+    perturbed : PerturbedModel
         Whose noise has the faults.
     fit : Fit
     faults : tuple of NoiseFault
     """
 
-    engine: Engine
+    perturbed: PerturbedModel
     fit: Fit
     faults: tuple[NoiseFault, ...] = ()
 

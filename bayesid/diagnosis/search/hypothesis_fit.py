@@ -15,7 +15,7 @@ from bayesid.diagnosis.candidates.vibration_signatures import coupling_matrix, s
 from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
 from bayesid.diagnosis.noise.noise_states import NoiseState
 from bayesid.diagnosis.response.effect_functions import physical
-from bayesid.diagnosis.response.perturbed_fit import Fit
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.diagnosis.search.linearisation import Linearisation
 from bayesid.simulation.effects.effect import Effect
@@ -55,10 +55,10 @@ def fit_hypothesis(
     point, names = state.point, [name for name in causes if name not in state.names]
     wanted = [effect for effect in effects if effect.label in names]
     chosen = [_settled(effect, point, names) for effect in wanted]
-    engine = point.engine.released() if INITIAL_RATE in names else point.engine
+    perturbed = point.perturbed.released() if INITIAL_RATE in names else point.perturbed
     z = point.fit.z.copy()
     if INITIAL_RATE in names:
-        z[point.engine.frozen] = engine.posterior.starting_point()[point.engine.frozen]
+        z[point.perturbed.frozen] = perturbed.posterior.starting_point()[point.perturbed.frozen]
     nearby = point.holding_bodies() if point.far else point  # about large causes free bodies would take their place
     starts = [_starts(effect, nearby, names) for effect in wanted]
     along = point.fit.operating if point.far else None
@@ -66,7 +66,7 @@ def fit_hypothesis(
     problem: InputError | None = None
     for start in list(product(*starts))[:MOST_STARTS]:
         try:
-            fit = engine.fit(chosen, start, z=z, operating=along, hopeless=hopeless)
+            fit = perturbed.fit(chosen, start, z=z, operating=along, hopeless=hopeless)
         except InputError as error:  # no motion from this start
             problem = error
             continue
@@ -74,7 +74,7 @@ def fit_hypothesis(
             best = fit
     if best is None:
         raise problem if problem is not None else InputError("a hypothesis cannot be fitted", remedy="Name another")
-    return Hypothesis(engine, best, state.faults)
+    return Hypothesis(perturbed, best, state.faults)
 
 
 def _starts(effect: Effect, point: Linearisation, names: Sequence[str]) -> Sequence[Floats]:
@@ -117,7 +117,7 @@ def _settled(effect: Effect, point: Linearisation, names: Sequence[str]) -> Effe
     group = point.evidence.causes[effect.label].variants[form].groups[0].name
     instants = next(item.instants for item in point.bank.signatures if item.name == group)
     assert instants is not None
-    return MassShift(instants).attach(point.engine.posterior.model.robot)
+    return MassShift(instants).attach(point.perturbed.posterior.model.robot)
 
 
 def _amplitudes(label: str, point: Linearisation, names: Sequence[str]) -> Floats:

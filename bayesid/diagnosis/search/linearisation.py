@@ -19,7 +19,7 @@ from bayesid.diagnosis.candidates.signature_products import SignatureProducts
 from bayesid.diagnosis.candidates.vibration_signatures import vibration_signatures
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.response.perturbed_fit import Engine, Fit
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.response.present_fit import with_bodies_held
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
@@ -33,7 +33,7 @@ class Linearisation:
 
     Attributes
     ----------
-    engine : Engine
+    perturbed : PerturbedModel
     fit : Fit
         With no effect or with some that are linear in their parameters.
     bank : SignatureBank
@@ -49,7 +49,7 @@ class Linearisation:
         Whether the present model's own fit diverged, so that fits find the data from the motion here alone.
     """
 
-    engine: Engine
+    perturbed: PerturbedModel
     fit: Fit
     bank: SignatureBank
     evidence: SetEvidence
@@ -60,7 +60,7 @@ class Linearisation:
 
     def with_bank(self, bank: SignatureBank) -> Linearisation:
         """Return the linearisation with another bank about the same fit."""
-        return _assembled(self.engine, self.fit, bank, self.held, self.far, self.products, self.evidence)
+        return _assembled(self.perturbed, self.fit, bank, self.held, self.far, self.products, self.evidence)
 
     def without_products(self) -> Linearisation:
         """Return the linearisation without the products, which take as much memory as the Gram."""
@@ -68,11 +68,11 @@ class Linearisation:
 
     def holding_bodies(self) -> Linearisation:
         """Return the linearisation about the same fit with the bodies held there."""
-        return _assembled(self.engine, with_bodies_held(self.fit), self.bank, True, self.far)
+        return _assembled(self.perturbed, with_bodies_held(self.fit), self.bank, True, self.far)
 
 
 def linearise(
-    engine: Engine,
+    perturbed: PerturbedModel,
     fit: Fit,
     effects: Sequence[Effect],
     bounds: Mapping[str, Sequence[PhysicalBound]],
@@ -89,7 +89,7 @@ def linearise(
 
     Parameters
     ----------
-    engine : Engine
+    perturbed : PerturbedModel
     fit : Fit
     effects : sequence of Effect
         Candidates of the catalogue.
@@ -104,19 +104,19 @@ def linearise(
         Further signatures, such as those of what the fit holds beside the candidates.
     """
     parts: list[Callable[[], SignatureBank]] = [
-        lambda: catalogue_signatures(engine, fit, effects, bounds),
-        lambda: initial_rate_signatures(engine, fit),
-        lambda: vibration_signatures(engine, fit, effects, bounds),
-        lambda: mass_shift_signatures(engine, fit, effects, bounds),
-        lambda: generic_signatures(engine, fit),
+        lambda: catalogue_signatures(perturbed, fit, effects, bounds),
+        lambda: initial_rate_signatures(perturbed, fit),
+        lambda: vibration_signatures(perturbed, fit, effects, bounds),
+        lambda: mass_shift_signatures(perturbed, fit, effects, bounds),
+        lambda: generic_signatures(perturbed, fit),
     ]
     bank = SignatureBank.joined([*in_threads(lambda part: part(), parts), beside or SignatureBank()])
     give_back_memory()  # of the responses
-    return _assembled(engine, with_bodies_held(fit) if held else fit, bank, held, far)
+    return _assembled(perturbed, with_bodies_held(fit) if held else fit, bank, held, far)
 
 
 def _assembled(
-    engine: Engine,
+    perturbed: PerturbedModel,
     fit: Fit,
     bank: SignatureBank,
     held: bool,
@@ -136,7 +136,9 @@ def _assembled(
     taken = gram.matrix @ amplitudes
     log_nothing = constant - cost + float(gram.score @ amplitudes - 0.5 * amplitudes @ taken)
     gram = replace(gram, score=gram.score - taken)
-    return Linearisation(engine, fit, bank, SetEvidence(gram, bank.causes, evidence), log_nothing, products, held, far)
+    return Linearisation(
+        perturbed, fit, bank, SetEvidence(gram, bank.causes, evidence), log_nothing, products, held, far
+    )
 
 
 def amplitudes_at(fit: Fit, gram: Gram) -> Floats:

@@ -17,7 +17,7 @@ from bayesid.diagnosis.candidates.tone_tuning import with_tuned_tones
 from bayesid.diagnosis.evidence.cause_prior import CausePrior
 from bayesid.diagnosis.evidence.set_enumeration import enumerate_sets
 from bayesid.diagnosis.evidence.set_probabilities import CauseSet, SetProbabilities
-from bayesid.diagnosis.response.perturbed_fit import Fit
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.amplitude_fit import fit_in_amplitudes
 from bayesid.diagnosis.search.linearisation import Linearisation, linearise
 from bayesid.diagnosis.search.vibration_fits import plausible_vibrations
@@ -79,7 +79,7 @@ def settled(
         best = fit
         if abs(fit.cost - expected) < AGREES:
             return point, found, best
-        point = _with_bursts(linearise(point.engine, best, effects, bounds))
+        point = _with_bursts(linearise(point.perturbed, best, effects, bounds))
         found = enumerate_sets(point.evidence, prior)
         point, found = _tuned(point, found, effects, bounds, prior)
     return point, found, best
@@ -127,7 +127,7 @@ def _settled_far(
         if not np.isfinite(fit.cost):
             break
         fitted.add(names)
-        point = _with_bursts(linearise(base.engine, fit, effects, bounds, far=True))
+        point = _with_bursts(linearise(base.perturbed, fit, effects, bounds, far=True))
         large = _large(point, names)
         near[large] = _Near(point, enumerate_sets(point.evidence, prior, beside=large))
         found = _nearest(_Near(base, along), near, point.log_nothing)
@@ -167,7 +167,7 @@ def _nearest(along: _Near, near: Mapping[frozenset[str], _Near], log_nothing: fl
 
 def _with_bursts(point: Linearisation) -> Linearisation:
     """Return the linearisation with bursts of the sensors among its candidates."""
-    found = point.with_bank(SignatureBank.joined([point.bank, burst_signatures(point.engine, point.fit)]))
+    found = point.with_bank(SignatureBank.joined([point.bank, burst_signatures(point.perturbed, point.fit)]))
     give_back_memory()
     return found
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid.diagnosis.evidence.set_probabilities import CauseSet, SetProbabilities
-from bayesid.diagnosis.response.perturbed_fit import Fit
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
 from bayesid.diagnosis.search.weighed_state import WeighedState
 from bayesid.simulation.effects.effect import Effect

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
 from bayesid.diagnosis.noise.noise_states import FaultyFit, NoiseState
-from bayesid.diagnosis.response.perturbed_fit import Fit
+from bayesid.diagnosis.response.perturbed_model import Fit
 
 __all__ = ["WeighedState"]
 

@@ -18,7 +18,7 @@ import numpy as np
 import scipy.linalg as sla
 from numpy.typing import NDArray
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid._math.threads import in_threads
 from bayesid.diagnosis.response.effect_functions import physical
 from bayesid.diagnosis.response.perturbation import (
@@ -42,7 +42,7 @@ from bayesid.inference.perturbed_posterior import (
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 
-__all__ = ["Engine", "Fit"]
+__all__ = ["Fit", "PerturbedModel"]
 
 ITERATIONS = 25
 
@@ -142,7 +142,7 @@ class Fit:
 
 
 ONE_AT_A_TIME = Lock()
-"""Held while the simulation is linearised; it belongs to no engine, since engines are sent to other processes."""
+"""Held while the simulation is linearised; it belongs to no model, since models are sent to other processes."""
 
 
 class _Point(NamedTuple):
@@ -157,7 +157,7 @@ class _Point(NamedTuple):
     cost: float
 
 
-class Engine:
+class PerturbedModel:
     """Fits and responses for one model and its recordings.
 
     Parameters
@@ -177,21 +177,21 @@ class Engine:
         self._tables: dict[str, Table] = {}
         self._linear: LinearResponses | None = None  # about the last point
 
-    def with_posterior(self, posterior: Posterior) -> Engine:
-        """Return an engine for the same data under another noise; tables are shared where the motion is the same."""
-        new = Engine(posterior, self.frozen, self._released)
+    def with_posterior(self, posterior: Posterior) -> PerturbedModel:
+        """Return the model for the same data under another noise; tables are shared where the motion is the same."""
+        new = PerturbedModel(posterior, self.frozen, self._released)
         if all(a.motion is b.motion for a, b in zip(posterior.manoeuvres, self.posterior.manoeuvres, strict=True)):
             new._tables = self._tables
         return new
 
     @property
-    def free(self) -> Floats:
+    def free(self) -> Integers:
         """Indices of the model's free coordinates."""
         return np.setdiff1d(np.arange(self.posterior.size), self.frozen)
 
-    def released(self) -> Engine:
-        """Return the engine with nothing frozen."""
-        new = Engine(self.posterior, released=self.frozen)
+    def released(self) -> PerturbedModel:
+        """Return the model with nothing frozen."""
+        new = PerturbedModel(self.posterior, released=self.frozen)
         new._tables = self._tables
         return new
 
