@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from bayesid.simulation.effects import Effect, Parameter, Wrench, register
     from bayesid.simulation.model import Manoeuvre, Model
     from bayesid.simulation.orbit import Orbit
-    from bayesid.simulation.sensors import Kind, Sensor, White
+    from bayesid.simulation.sensors import Sensor, SensorKind, White
 
 __all__ = [
     "BodyPrior",
@@ -42,7 +42,6 @@ __all__ = [
     "Identification",
     "InertialParameters",
     "InputError",
-    "Kind",
     "Load",
     "Manoeuvre",
     "MeasuredMotion",
@@ -53,6 +52,7 @@ __all__ = [
     "Recording",
     "Robot",
     "Sensor",
+    "SensorKind",
     "Study",
     "White",
     "Wrench",
@@ -70,7 +70,7 @@ _PLACES = {
     "Identification": "inference.identification",
     "InertialParameters": "robot.inertial_parameters",
     "InputError": "_io.errors",
-    "Kind": "simulation.sensors",
+    "SensorKind": "simulation.sensors",
     "Load": "robot.robot",
     "Manoeuvre": "simulation.model",
     "MeasuredMotion": "recording.joint_motion",

@@ -25,7 +25,7 @@ from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.effects.register import _REGISTER
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from studies.truth.urdf import moving_joints
 
@@ -175,7 +175,7 @@ def planar_posterior(noisy: Callable[..., Recording]) -> Callable[..., Posterior
         motion = MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODER})
         model = Model(
             robot,
-            (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT)),
+            (Sensor(SensorKind.RATE, White(SIGMA)), Sensor(SensorKind.ACCEL, White(SIGMA), position=POINT)),
             (BodyPrior("base_link", robot.link("base_link").inertial, spread),),
             Orbit(ORBIT.radius),
             (GravityGradient(),),

@@ -9,9 +9,9 @@ from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import create
 from bayesid.simulation.model import Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 
-SENSORS = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(1e-5), position=(0.4, 0.3, 0.8)))
+SENSORS = (Sensor(SensorKind.RATE, White(1e-5)), Sensor(SensorKind.ACCEL, White(1e-5), position=(0.4, 0.3, 0.8)))
 AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0")
 
 

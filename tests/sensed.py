@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from bayesid.simulation.dynamics import Samples
-from bayesid.simulation.sensors import Kind, Sensed
+from bayesid.simulation.sensors import Sensed, SensorKind
 
 
 def read(samples: Samples, point) -> SimpleNamespace:
@@ -16,5 +16,7 @@ def read(samples: Samples, point) -> SimpleNamespace:
     sensed = jax.vmap(Sensed, (0, 0, None, 0))(
         samples.instant, samples.quaternion, jnp.asarray(point), samples.specific_force[:, 0]
     )
-    rate, accel, attitude = (jax.vmap(kind.read)(sensed) for kind in (Kind.RATE, Kind.ACCEL, Kind.ATTITUDE))
+    rate, accel, attitude = (
+        jax.vmap(kind.read)(sensed) for kind in (SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE)
+    )
     return SimpleNamespace(time=samples.instant.environment.time, rate=rate, accel=accel, attitude=attitude)

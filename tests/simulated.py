@@ -10,7 +10,7 @@ from bayesid.recording.joint_motion import Motion
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import Effect
 from bayesid.simulation.model import Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from bayesid.simulation.simulator import ModelConstants, Simulator, Values
 from bayesid.simulation.time_grid import build_grid, pad_grids
 
@@ -31,7 +31,7 @@ def simulated(
 
     The accelerometer is at a point of the base, which has an initial rate and begins parallel to the orbit's axes.
     """
-    sensors = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(1e-5), position=point))
+    sensors = (Sensor(SensorKind.RATE, White(1e-5)), Sensor(SensorKind.ACCEL, White(1e-5), position=point))
     model = Model(robot, sensors, (), effects=() if effect is None else (effect,))
     if jumps is None:
         jumps = () if effect is None else tuple(effect.jumps(times[-1]))

@@ -14,7 +14,7 @@ from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import AttitudeMisalignment, Readings
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from studies.truth.urdf import SERVICER3
 
@@ -31,14 +31,14 @@ def test_the_reading_is_the_true_attitude_turned_in_base_axes(size):
     found = AttitudeMisalignment().read(jnp.asarray(vector), readings).attitude
     error = (Rotation.from_quat(np.asarray(found)).inv() * attitudes * Rotation.from_rotvec(vector)).magnitude()
     assert error.max() < 1e-9
-    differ = [Kind.ATTITUDE.residual(a, b) for a, b in zip(found, readings.attitude, strict=True)]
+    differ = [SensorKind.ATTITUDE.residual(a, b) for a, b in zip(found, readings.attitude, strict=True)]
     np.testing.assert_allclose(differ, np.broadcast_to(vector, (20, 3)), atol=1e-3 * size)
 
 
 def test_it_occurs_only_where_an_attitude_is_measured():
-    robot, rate = Robot.from_urdf(SERVICER3), Sensor(Kind.RATE, White(SIGMA))
+    robot, rate = Robot.from_urdf(SERVICER3), Sensor(SensorKind.RATE, White(SIGMA))
     assert not AttitudeMisalignment.instances(Model(robot, (rate,), ()))
-    assert AttitudeMisalignment.instances(Model(robot, (rate, Sensor(Kind.ATTITUDE, White(SIGMA))), ()))
+    assert AttitudeMisalignment.instances(Model(robot, (rate, Sensor(SensorKind.ATTITUDE, White(SIGMA))), ()))
 
 
 @pytest.mark.parametrize("attitude_sigma", [pytest.param(0.0, marks=pytest.mark.slow), 0.05])
@@ -57,7 +57,7 @@ def test_it_is_found_with_an_exact_and_with_an_unknown_start(attitude_sigma):
     manoeuvre = Manoeuvre(
         recording, MeasuredMotion.from_recording(recording, robot, sigma={0: 1e-6}), attitude_sigma=attitude_sigma
     )
-    sensors = tuple(Sensor(kind, White(SIGMA)) for kind in (Kind.RATE, Kind.ATTITUDE))
+    sensors = tuple(Sensor(kind, White(SIGMA)) for kind in (SensorKind.RATE, SensorKind.ATTITUDE))
     posterior = Posterior.of(Model(robot, sensors, (), effects=(AttitudeMisalignment(),)), [manoeuvre], step=0.5)
     refined, optimum = maximise(posterior, np.random.default_rng(0))
     start = refined.unknowns.names.index("attitude-misalignment.x")

@@ -21,14 +21,18 @@ from bayesid.simulation.effects import Effect, Parameter, PhysicalBound, Prior, 
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Model
 from bayesid.simulation.orbit import EARTH_RADIUS, Orbit
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import hidden_causes
 from studies.truth import mujoco as mj
 from studies.truth.hidden_causes.case import Case, circumstances, merge
 from studies.truth.mujoco.parts import Appendage
 from studies.truth.urdf import BRANCHED, SERVICER3, SERVICER4, link_body
 
-SENSORS = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(1e-5)), Sensor(Kind.ATTITUDE, White(1e-5)))
+SENSORS = (
+    Sensor(SensorKind.RATE, White(1e-5)),
+    Sensor(SensorKind.ACCEL, White(1e-5)),
+    Sensor(SensorKind.ATTITUDE, White(1e-5)),
+)
 ROBOTS = {
     "ets7": Robot.shipped("ets7"),
     "planar": Robot.shipped("planar"),

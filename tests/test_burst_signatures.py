@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from bayesid.diagnosis.candidates.burst_signatures import LENGTH, STRONGEST, burst_signatures
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 TIMES, CHANNELS = 30, 6
 
@@ -17,7 +17,7 @@ def bank_of(rates: int, accelerations: int):
     outputs = np.zeros((TIMES, CHANNELS), dtype=bool)
     outputs[: 2 * rates : 2, :3] = True
     outputs[: 2 * accelerations : 2, 3:] = True
-    columns = {Kind.RATE: slice(0, 3), Kind.ACCEL: slice(3, 6)}
+    columns = {SensorKind.RATE: slice(0, 3), SensorKind.ACCEL: slice(3, 6)}
     channels = SimpleNamespace(kinds=tuple(columns), of=columns.get)
     posterior = SimpleNamespace(
         model=SimpleNamespace(channels=channels),

@@ -27,7 +27,7 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.mass_property_change import BodyChange
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 
 NAMES = ("base_link", "load")
 
@@ -127,7 +127,7 @@ def laplace(posterior: Posterior) -> np.ndarray:
 def test_two_studies_in_turn_tell_what_one_tells_of_both():
     """The planar robot at rest; the second recording halves what the first left uncertain."""
     robot = Robot.from_urdf(PLANAR)
-    sensors = (Sensor(Kind.RATE, White(2e-5)), Sensor(Kind.ACCEL, White(2e-5), position=(0.1, -0.15, 0.3)))
+    sensors = (Sensor(SensorKind.RATE, White(2e-5)), Sensor(SensorKind.ACCEL, White(2e-5), position=(0.1, -0.15, 0.3)))
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.05)
     model = Model(robot, sensors, (prior,), rate_sigma=0.0)
     time = np.arange(0.0, 30.0, 0.5)

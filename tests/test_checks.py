@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from bayesid import (
     BodyPrior,
     Excitation,
-    Kind,
     Manoeuvre,
     MeasuredMotion,
     Model,
@@ -20,6 +19,7 @@ from bayesid import (
     Recording,
     Robot,
     Sensor,
+    SensorKind,
     White,
 )
 from bayesid.inference.recording_check import check_recording
@@ -33,9 +33,9 @@ TIME = np.arange(0.0, 140.01, 0.5)  # at rest from 100 s
 def model() -> Model:
     robot = Robot.shipped("planar")
     sensors = (
-        Sensor(Kind.RATE, White(SIGMA)),
-        Sensor(Kind.ACCEL, White(SIGMA), position=(0.1, -0.2, 0.3)),
-        Sensor(Kind.ATTITUDE, White(SIGMA)),
+        Sensor(SensorKind.RATE, White(SIGMA)),
+        Sensor(SensorKind.ACCEL, White(SIGMA), position=(0.1, -0.2, 0.3)),
+        Sensor(SensorKind.ATTITUDE, White(SIGMA)),
     )
     return Model(robot, sensors, (BodyPrior("base_link", robot.link("base_link").inertial, 1.0),))
 
@@ -71,7 +71,7 @@ def test_a_late_rate_sensor_is_noticed(model: Model, recording: Recording) -> No
 
 
 def test_an_understated_noise_is_noticed(model: Model, recording: Recording) -> None:
-    quiet = replace(model, sensors=(Sensor(Kind.RATE, White(0.3 * SIGMA)), *model.sensors[1:]))
+    quiet = replace(model, sensors=(Sensor(SensorKind.RATE, White(0.3 * SIGMA)), *model.sensors[1:]))
     assert any("noise of rate" in warning for warning in check(quiet, recording).warnings)
 
 

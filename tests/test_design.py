@@ -41,7 +41,7 @@ from bayesid.robot.regressors import balance_regressor
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import Effect, Parameter
 from bayesid.simulation.model import Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 
 BASE_INERTIA, WHEEL_INERTIA, MASS, SLIDER = 3.0, 0.5, 20.0, 5.0
 SIGMA = 1e-4
@@ -66,7 +66,7 @@ def plan(
     """Return a plan of quintic splines; only the rate is sensed and the base starts at rest."""
     own = robot(joint)
     priors = (BodyPrior("body", own.link("body").inertial, 0.5),) if unknown else ()
-    model = Model(own, (Sensor(Kind.RATE, White(SIGMA)),), priors, effects=effects, rate_sigma=0.0)
+    model = Model(own, (Sensor(SensorKind.RATE, White(SIGMA)),), priors, effects=effects, rate_sigma=0.0)
     return Plan(model, BSplines([0.0], [0], duration, points=4), 0.5, Tip.of(own), step=0.5)
 
 
@@ -358,7 +358,7 @@ def test_bodies_marginalised_only_are_not_judged() -> None:
     own = robot("flywheel")
     wheel = BodyPrior("part", own.link("part").inertial, 0.1, nuisance=True)
     base = BodyPrior("body", own.link("body").inertial, 0.5)
-    model = Model(own, (Sensor(Kind.RATE, White(SIGMA)),), (base, wheel), rate_sigma=0.0)
+    model = Model(own, (Sensor(SensorKind.RATE, White(SIGMA)),), (base, wheel), rate_sigma=0.0)
     shared = Plan(model, BSplines([0.0], [0], 10.0, points=4), 0.5, Tip.of(own), step=0.5)
     result = jax.jit(lambda q: DOptimal().cost(shared, shared.outcome(q, jnp.zeros(20))))(PARAMETERS)
     # of the ratio of both inertias only, which is as uncertain as the wheel's

@@ -15,7 +15,7 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Load, Robot
 from bayesid.simulation.effects import Effect, EncoderOffset, JointFlexibility, JointLatency, Parameter
 from bayesid.simulation.model import Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from bayesid.simulation.simulator import ModelConstants, Simulator, Values
 from bayesid.simulation.time_grid import build_grid, pad_grids
 from studies.truth import mujoco as mj
@@ -76,7 +76,7 @@ def simulated(
     motion: Motion, effect: Effect | None = None, values: tuple[float, ...] = (), mass: float = GUESSED
 ) -> np.ndarray:
     """Rate and acceleration where the load is unknown, ``mass`` in the robot, and gets its true parameters, (T, 6)."""
-    sensors = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(1e-5), position=POINT))
+    sensors = (Sensor(SensorKind.RATE, White(1e-5)), Sensor(SensorKind.ACCEL, White(1e-5), position=POINT))
     carrier = robot(mass)
     prior = BodyPrior("target", carrier.link("target").inertial, 1.0)
     model = Model(carrier, sensors, (prior,), effects=() if effect is None else (effect,))
@@ -109,7 +109,7 @@ def test_an_encoder_offset_displaces_the_unknown_load():
 
 def test_the_offset_of_a_slide_is_in_metres():
     carrier = Robot.from_urdf(BRANCHED)
-    model = Model(carrier, (Sensor(Kind.RATE, White(1e-5)),), (), effects=(EncoderOffset("slide", 0.01),))
+    model = Model(carrier, (Sensor(SensorKind.RATE, White(1e-5)),), (), effects=(EncoderOffset("slide", 0.01),))
     (effect,) = model.effects
     assert effect.parameters == (Parameter("offset", "m", 0.01),)
     assert [bound.unit for bound in effect.physical_bounds(model)] == ["m"]

@@ -24,16 +24,16 @@ from bayesid.simulation.effects.instant import Composite, Environment, Instant
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from bayesid.simulation.simulator import ModelConstants, Simulator, Values
 from bayesid.simulation.time_grid import build_grid, pad_grids
 
 ROBOT = Robot.from_urdf(Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / "planar.urdf")
 ORBIT = Orbit(6.9e6, 0.01, inclination=0.9, sun=(0.6, 0.0, 0.8))
 SENSORS = (
-    Sensor(Kind.RATE, White(1e-5)),
-    Sensor(Kind.ACCEL, White(1e-5), position=(0.1, -0.15, 0.3)),
-    Sensor(Kind.ATTITUDE, White(1e-5)),
+    Sensor(SensorKind.RATE, White(1e-5)),
+    Sensor(SensorKind.ACCEL, White(1e-5), position=(0.1, -0.15, 0.3)),
+    Sensor(SensorKind.ATTITUDE, White(1e-5)),
 )
 UNKNOWN = (BodyPrior("link2", ROBOT.link("link2").inertial, 0.1),)
 PLAIN = Model(ROBOT, SENSORS, UNKNOWN, ORBIT)

@@ -19,7 +19,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import Effect, Parameter, Wrench, create, register
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from studies.truth import stepwise as ref
 
@@ -39,7 +39,7 @@ PLANAR = Path(__file__).resolve().parents[1] / "bayesid" / "robot" / "models" / 
 def test_a_model_refuses_an_effect_that_could_not_act(name: str, orbit: Orbit | None, lacking: str):
     robot = Robot.shipped("planar")
     with pytest.raises(InputError, match=f"{name}' cannot act without {lacking}"):
-        Model(robot, (Sensor(Kind.RATE, White(1e-5)),), (), orbit, (create(name),))
+        Model(robot, (Sensor(SensorKind.RATE, White(1e-5)),), (), orbit, (create(name),))
 
 
 def test_a_stated_place_of_a_tank_is_kept_and_the_usual_one_is_the_spacecraft():
@@ -107,7 +107,7 @@ def posterior_of(rate: np.ndarray, accel: np.ndarray, motion: mj.Motion) -> Post
             channels[f"{family}.{axis}"] = values[:, index] + SIGMA * rng.normal(size=len(TIMES))
     recording, robot = Recording("own", None, TIMES, channels), Robot.from_urdf(PLANAR)
     smoothed = MeasuredMotion.from_recording(recording, robot, sigma={0: 1e-6})
-    sensors = (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT))
+    sensors = (Sensor(SensorKind.RATE, White(SIGMA)), Sensor(SensorKind.ACCEL, White(SIGMA), position=POINT))
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.1)
     return Posterior.of(Model(robot, sensors, (prior,)), [Manoeuvre(recording, smoothed)], step=0.5)
 

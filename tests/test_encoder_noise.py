@@ -9,7 +9,7 @@ import pytest
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from bayesid.simulation.time_grid import build_grid
 from studies.truth import mujoco as mj
 from tests.conftest import PLANAR, POINT
@@ -45,14 +45,14 @@ def test_an_error_of_position_turns_base_and_momentum(joint, formula_motion):
     grid = build_grid(robot, ("base_link",), motion, times, 0.1)
     environment = jax.tree.map(np.asarray, grid.sample.environment)
     sensors = (
-        Sensor(Kind.RATE, White(1e-5)),
-        Sensor(Kind.ACCEL, White(1e-5), position=POINT),
-        Sensor(Kind.ATTITUDE, White(1e-5)),
+        Sensor(SensorKind.RATE, White(1e-5)),
+        Sensor(SensorKind.ACCEL, White(1e-5), position=POINT),
+        Sensor(SensorKind.ATTITUDE, White(1e-5)),
     )
     seen = SampledMotion(before.attitude, before.rate, environment)
     slope = joint_sensitivity(robot, JointState(*motion.evaluate(times)), seen, sensors)[joint, :, 1]
     expected = slope.T @ bump(PEAK)
-    attitude = np.asarray(Kind.ATTITUDE.residual(after.attitude[1], before.attitude[1]))
+    attitude = np.asarray(SensorKind.ATTITUDE.residual(after.attitude[1], before.attitude[1]))
     changed = np.concatenate([after.rate[1] - before.rate[1], after.accel[1] - before.accel[1], attitude])
     for columns in (slice(0, 3), slice(3, 6), slice(6, 9)):
         # the motion of the base since the error began is left out, a part of its rate times the duration

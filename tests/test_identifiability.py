@@ -28,7 +28,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 
 KEYS = ("mass", "com.x", "com.y", "com.z", *(f"inertia.{pair}" for pair in ("xx", "yy", "zz", "xy", "xz", "yz")))
@@ -224,7 +224,7 @@ def test_an_added_swing_is_a_motion_within_the_joint_range() -> None:
     joints = {f"position.joint{number}": 0.3 * np.sin(0.1 * number * samples) for number in (1, 2)}
     recording = Recording("planar", None, samples, joints)
     manoeuvre = Manoeuvre(recording, MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODER}))
-    model = Model(robot, (Sensor(Kind.RATE, White(SIGMA)),), ())
+    model = Model(robot, (Sensor(SensorKind.RATE, White(SIGMA)),), ())
     flown = Experiment((manoeuvre,), model.sensors)
     swing = next(item for item in candidates(model) if item.name == "swing:joint2")
     changed = swing.change(flown).manoeuvres[0].motion
@@ -265,7 +265,7 @@ def whole_robot(rng: np.random.Generator) -> Model:
     links = ("base_link", "link1", "link2")
     return Model(
         robot,
-        (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT)),
+        (Sensor(SensorKind.RATE, White(SIGMA)), Sensor(SensorKind.ACCEL, White(SIGMA), position=POINT)),
         tuple(BodyPrior(name, robot.perturbed(name, 0.05, rng).link(name).inertial, 0.2) for name in links),
         Orbit(ORBIT.radius),
         (GravityGradient(),),

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 import bayesid
-from bayesid import BodyPrior, Excitation, Kind, Manoeuvre, Model, Posterior, Robot, Sensor, White
+from bayesid import BodyPrior, Excitation, Manoeuvre, Model, Posterior, Robot, Sensor, SensorKind, White
 from bayesid.inference import maximise
 from bayesid.inference.body_quantities import bodies_of
 from bayesid.inference.predicted_readings import integration_error_at
@@ -97,7 +97,7 @@ def test_truth_lies_inside_the_posterior_and_noise_is_all_that_is_left(name: str
 def test_the_error_of_an_integrated_attitude_is_its_angle_however_the_base_is_turned() -> None:
     robot, time = Robot.shipped("planar"), np.arange(0.0, 40.01, 0.5)
     body = BodyPrior("base_link", robot.link("base_link").inertial, 1.0)
-    model = Model(robot, (Sensor(Kind.ATTITUDE, White(1e-5)),), (body,))
+    model = Model(robot, (Sensor(SensorKind.ATTITUDE, White(1e-5)),), (body,))
     motion = Excitation([0.3, -0.5], [0.4, 0.6], 2.0 * np.pi / 12.0, periods=3)
     recording = simulate_manoeuvre(model, motion, time)
     errors = []

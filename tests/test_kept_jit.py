@@ -19,7 +19,7 @@ from bayesid._math.kept_jit import forget_executables, kept_jit
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.simulation.effects import AerodynamicDrag, WheelMomentum
 from bayesid.simulation.effects.effect_key import EffectKey
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 TRACED: list[object] = []
 
@@ -129,7 +129,7 @@ def test_effects_and_sensors_are_described_by_what_they_are(folder):
     class Own(AerodynamicDrag):
         """An effect of a user."""
 
-    keys = [EffectKey(WheelMomentum()), EffectKey(AerodynamicDrag()), (Kind.RATE, Kind.ACCEL)]
+    keys = [EffectKey(WheelMomentum()), EffectKey(AerodynamicDrag()), (SensorKind.RATE, SensorKind.ACCEL)]
     for key in keys:
         scaled(key, X)
     assert len(kept(folder)) == 3

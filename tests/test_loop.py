@@ -40,10 +40,10 @@ from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 
 ENCODER = {0: 1e-6}
-SENSORS = (Sensor(Kind.RATE, White(1e-5)), Sensor(Kind.ACCEL, White(2e-5), position=(0.1, -0.15, 0.3)))
+SENSORS = (Sensor(SensorKind.RATE, White(1e-5)), Sensor(SensorKind.ACCEL, White(2e-5), position=(0.1, -0.15, 0.3)))
 TRUE = InertialParameters(61.2, [0.0525, -0.028, 0.0015], [[2.42, 0.047, 0.0], [0.047, 2.64, 0.0], [0.0, 0.0, 2.82]])
 """As the prior has it, which is so narrow that normal approximations do: at 5 % they lose a tenth of some widths."""
 LIMITS = Limits(joint_speed=0.5, base_rotation=0.024)

@@ -25,7 +25,7 @@ from bayesid.robot.robot import Load, Robot
 from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects import MassShift, create
 from bayesid.simulation.model import BodyPrior, Manoeuvre, Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from studies.truth import stepwise as ref
 from studies.truth.urdf import SERVICER3
@@ -220,7 +220,7 @@ def test_instants_are_written_after_the_name():
 
 def test_bounds_are_those_of_a_part_of_the_base():
     robot = Robot.from_urdf(SERVICER3)
-    model = Model(robot, (Sensor(Kind.RATE, White(1e-5)),), ())
+    model = Model(robot, (Sensor(SensorKind.RATE, White(1e-5)),), ())
     first, second = MassShift().physical_bounds(model)
     assert np.abs(MOMENTS[:3]).max() < first.largest
     assert np.abs(MOMENTS[3:]).max() < second.largest
@@ -241,7 +241,7 @@ def flights_with_jumps(instants, ends, noise):
         columns |= {f"position.{joint.name}": angles[:, i] for i, joint in enumerate(robot.joints)}
         recordings.append(Recording(f"flight-{index + 1}", None, TIMES[rows], columns))
     guess = robot.perturbed("base_link", 0.1, np.random.default_rng(1))
-    sensors = Sensor(Kind.RATE, White(noise)), Sensor(Kind.ACCEL, White(noise), position=POINT)
+    sensors = Sensor(SensorKind.RATE, White(noise)), Sensor(SensorKind.ACCEL, White(noise), position=POINT)
     model = Model(guess, sensors, (BodyPrior("base_link", guess.link("base_link").inertial, 0.3),))
     flights = [Manoeuvre(one, MeasuredMotion.from_recording(one, guess, sigma={0: 1e-6})) for one in recordings]
     return model, flights, moments

@@ -26,7 +26,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Coloured, Kind, Sensor, White
+from bayesid.simulation.sensors import Coloured, Sensor, SensorKind, White
 from tests.conftest import PLANAR
 
 SUN = (0.6, 0.64, 0.48)
@@ -36,8 +36,8 @@ STEP = 0.25
 """Step of the integration [s]: where the ramps end, the jerk jumps, and longer steps cost accuracy."""
 
 
-@Kind.register
-class SunDirection(Kind):
+@SensorKind.register
+class SunDirection(SensorKind):
     """Direction of the Sun in the axes of a Sun sensor: a unit vector."""
 
     value, unit = "sun", "1"
@@ -48,8 +48,8 @@ class SunDirection(Kind):
         return sensed.instant.to_base(sensed.instant.environment.sun)
 
 
-@Kind.register
-class SecondGyro(Kind):
+@SensorKind.register
+class SecondGyro(SensorKind):
     """A gyro about two axes, recorded at times of its own."""
 
     value, unit = "gyro2", "rad/s"
@@ -77,9 +77,9 @@ def flown() -> tuple[Model, Posterior, np.ndarray]:
     """The planar robot with a Sun sensor, turned against the base, and the second gyro; recorded with noise."""
     robot = Robot.shipped("planar")
     sensors = (
-        Sensor(Kind.of("sun"), White(1e-5), mounting=(0.0, 0.0, 0.6, 0.8)),
-        Sensor(Kind.RATE, White(1e-5)),
-        Sensor(Kind.of("gyro2"), TwoAxes(1e-6)),
+        Sensor(SensorKind.of("sun"), White(1e-5), mounting=(0.0, 0.0, 0.6, 0.8)),
+        Sensor(SensorKind.RATE, White(1e-5)),
+        Sensor(SensorKind.of("gyro2"), TwoAxes(1e-6)),
     )
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.3)
     model = Model(robot, sensors, (prior,), Orbit(6.9e6, sun=SUN), (GravityGradient(),))
@@ -102,7 +102,7 @@ def flown() -> tuple[Model, Posterior, np.ndarray]:
 def test_it_reads_what_it_should(flown):
     """Against the geometry itself: the Sun turned into the base by the attitude, then into the sensor."""
     model, posterior, z = flown
-    star = Sensor(Kind.ATTITUDE, White(1e-5))
+    star = Sensor(SensorKind.ATTITUDE, White(1e-5))
     seen = Model(model.robot, (star, *model.sensors), model.priors, model.orbit, model.effects)
     channels = {**posterior.manoeuvres[0].recording.channels, **blank_channels((star,), len(TIME))}
     manoeuvre = Manoeuvre(Recording("sunny", None, TIME, channels), posterior.manoeuvres[0].motion)
@@ -163,10 +163,10 @@ def test_other_recordings_and_noise_draws(flown):
 
 
 PLUGIN = """
-from bayesid import Kind
+from bayesid import SensorKind
 
-@Kind.register
-class MagneticField(Kind):
+@SensorKind.register
+class MagneticField(SensorKind):
     value, unit = "field", "1"
     axes, rest, size, mounted = ("a", "b"), (0.0, 0.0), 2, False
     frame = "angular velocity about base x and z, in place of a field"
@@ -202,7 +202,7 @@ def study_of(folder: Path, sigma: str = "[1e-5, 2e-5]", plugin: str = '"field.py
 
 
 def test_a_study_file_names_it_by_its_plugin(tmp_path, monkeypatch):
-    monkeypatch.setattr(Kind, "_known", dict(Kind._known))
+    monkeypatch.setattr(SensorKind, "_known", dict(SensorKind._known))
     with pytest.raises(InputError, match="unknown sensor 'field'") as unknown:
         load_posterior(study_of(tmp_path, plugin=""))
     assert unknown.value.place == "sensors.other.field"
@@ -222,22 +222,22 @@ def test_a_study_file_names_it_by_its_plugin(tmp_path, monkeypatch):
 
 
 def test_the_noise_of_every_column_is_given(tmp_path, monkeypatch):
-    monkeypatch.setattr(Kind, "_known", dict(Kind._known))
+    monkeypatch.setattr(SensorKind, "_known", dict(SensorKind._known))
     with pytest.raises(InputError, match="got 3 numbers for 2 columns") as wrong:
         load_posterior(study_of(tmp_path, sigma="[1e-5, 1e-5, 1e-5]"))
     assert wrong.value.place == "sensors.other.field.sigma"
 
 
 def test_two_kinds_of_one_name_are_an_error():
-    class Impostor(Kind):
+    class Impostor(SensorKind):
         value = "sun"
 
     with pytest.raises(InputError, match="two kinds of sensor are named 'sun'"):
-        Kind.register(Impostor)
+        SensorKind.register(Impostor)
 
 
 def test_coloured_noise_is_drawn_with_its_correlation():
-    sensor = Sensor(Kind.RATE, White(1.0), coloured=Coloured((3.0, 0.0, 1.0), 4.0))
+    sensor = Sensor(SensorKind.RATE, White(1.0), coloured=Coloured((3.0, 0.0, 1.0), 4.0))
     time = np.arange(0.0, 20000.0, 1.0)
     noise = noise_of(sensor, time, np.zeros(3), np.random.default_rng(2))
     assert noise[:, 0].std() == pytest.approx(3.0, rel=0.05)
@@ -247,7 +247,7 @@ def test_coloured_noise_is_drawn_with_its_correlation():
 
 
 def test_the_noise_of_an_attitude_is_a_small_rotation():
-    kind, rng = Kind.ATTITUDE, np.random.default_rng(3)
+    kind, rng = SensorKind.ATTITUDE, np.random.default_rng(3)
     quaternion = rng.normal(size=(4000, 4))
     quaternion /= np.linalg.norm(quaternion, axis=1)[:, None]
     noise = 1e-4 * rng.normal(size=(4000, 3))

@@ -22,7 +22,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import GravityGradient, RateBias
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from tests.pdf_text import PdfText
 
@@ -48,7 +48,7 @@ def motion() -> mj.Motion:
 def predictor(motion, formula_motion) -> BasePredictor:
     robot = Robot.from_urdf(PLANAR)
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.01)
-    sensors = (Sensor(Kind.RATE, White(1e-5)),)
+    sensors = (Sensor(SensorKind.RATE, White(1e-5)),)
     model = Model(robot, sensors, (prior,), Orbit(ORBIT.radius), (GravityGradient(), RateBias()))
     time = np.linspace(0.0, DURATION, 81)
     planned = formula_motion(motion, PLANAR, robot)

@@ -8,13 +8,13 @@ import pytest
 from bayesid import (
     BodyPrior,
     InertialParameters,
-    Kind,
     Manoeuvre,
     MeasuredMotion,
     Model,
     Recording,
     Robot,
     Sensor,
+    SensorKind,
     White,
 )
 from bayesid.diagnosis import Status, diagnose
@@ -50,7 +50,7 @@ def model_and_flight(folder, momentum):
     channels = {f"rate.{axis}": column for axis, column in zip("xyz", (truth.rate + noise).T, strict=True)}
     robot = Robot.from_string(URDF)
     centre = InertialParameters(MASS, np.zeros(3), np.diag(INERTIA * [1.02, 0.99, 0.98]))
-    model = Model(robot, (Sensor(Kind.RATE, White((NOISE,) * 3)),), (BodyPrior("base_link", centre, 0.1),))
+    model = Model(robot, (Sensor(SensorKind.RATE, White((NOISE,) * 3)),), (BodyPrior("base_link", centre, 0.1),))
     recording = Recording("flight", None, times, channels)
     return model, [Manoeuvre(recording, MeasuredMotion.from_recording(recording, robot))]
 
@@ -106,7 +106,7 @@ def test_a_link_of_many_times_its_guess_is_found(share):
     manoeuvre = Manoeuvre(recording, MeasuredMotion.from_recording(recording, robot, sigma={0: ENCODER}))
     link = robot.link("link2").inertial
     guess = InertialParameters(share * link.mass, np.zeros(3), share * link.inertia)
-    sensors = (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT))
+    sensors = (Sensor(SensorKind.RATE, White(SIGMA)), Sensor(SensorKind.ACCEL, White(SIGMA), position=POINT))
     perturbed = PerturbedModel(
         Posterior.of(Model(robot, sensors, (BodyPrior("link2", guess, 2.0),)), [manoeuvre], step=0.5)
     )

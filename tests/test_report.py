@@ -42,7 +42,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import AccelBias, GravityGradient
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Filter, Kind, Sensor, White
+from bayesid.simulation.sensors import Filter, Sensor, SensorKind, White
 from tests.pdf_text import PdfText
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -74,16 +74,18 @@ def attitude_posterior():
     joints = len(robot.joints)
     motion = Excitation(np.full(joints, 0.2), np.full(joints, 0.4), 0.6, periods=1, ramp=5.0)
     sensors = (
-        Sensor(Kind.RATE, White(1e-4), mounting=(0.0, 0.0, 1.0, 0.0)),
-        Sensor(Kind.ACCEL, White(1e-4), position=(0.1, 0.0, 0.2), filter=Filter(0.5, 2)),
-        Sensor(Kind.ATTITUDE, White(1e-4)),
+        Sensor(SensorKind.RATE, White(1e-4), mounting=(0.0, 0.0, 1.0, 0.0)),
+        Sensor(SensorKind.ACCEL, White(1e-4), position=(0.1, 0.0, 0.2), filter=Filter(0.5, 2)),
+        Sensor(SensorKind.ATTITUDE, White(1e-4)),
     )
     prior = BodyPrior(robot.base, robot.link(robot.base).inertial, 0.2)
     link = next(name for name, link in robot.links.items() if name != robot.base and link.inertial.mass > 0.0)
     nuisance = BodyPrior(link, robot.link(link).inertial, 0.05, nuisance=True)
     model = Model(robot, sensors, (prior, nuisance), Orbit(7e6), (GravityGradient(), AccelBias()))
     time = np.arange(0.0, motion.duration, 0.4)
-    blank = {f"{kind.value}.{axis}": np.zeros(len(time)) for kind in (Kind.RATE, Kind.ACCEL) for axis in "xyz"}
+    blank = {
+        f"{kind.value}.{axis}": np.zeros(len(time)) for kind in (SensorKind.RATE, SensorKind.ACCEL) for axis in "xyz"
+    }
     blank |= {f"attitude.{axis}": np.full(len(time), float(axis == "w")) for axis in "xyzw"}
     recording = Recording("still", None, time, {**blank, **sample_joints(motion, robot, time)})
     return Posterior.of(model, [Manoeuvre(recording, motion, attitude_sigma=1e-3)], step=0.5)
@@ -243,7 +245,7 @@ def test_any_robot_can_be_drawn(file, tmp_path):
 def test_fits_are_those_of_the_posterior(attitude_posterior):
     z = np.zeros(attitude_posterior.size)
     fits = sensor_fits(attitude_posterior, z)[0]
-    assert [fit.kind for fit in fits] == [Kind.RATE, Kind.ACCEL, Kind.ATTITUDE]
+    assert [fit.kind for fit in fits] == [SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE]
     assert sum(fit.samples for fit in fits) == attitude_posterior.samples
     assert sum(fit.chi2 for fit in fits) == pytest.approx(float((attitude_posterior.residuals(z) ** 2).sum()))
     for fit in fits:
@@ -287,11 +289,11 @@ def test_the_spectrum_of_noise_is_flat_and_that_of_a_wave_has_a_peak(attitude_po
     noise = made_up_residuals(attitude_posterior, lambda time: rng.normal(size=len(time)))
     wave = made_up_residuals(attitude_posterior, lambda time: np.sin(2.0 * np.pi * 0.1 * time))
     for axis in range(3):
-        frequency, power, ordinates = noise.spectrum(Kind.RATE, axis)
+        frequency, power, ordinates = noise.spectrum(SensorKind.RATE, axis)
         assert np.average(power, weights=ordinates) == pytest.approx(1.0, abs=4.0 / np.sqrt(ordinates.sum()))
         # Parseval: the ordinates hold half the square sum, but for those at zero and at Nyquist
-        time, value = wave.series(0, Kind.RATE, axis)
-        frequency, power, ordinates = wave.spectrum(Kind.RATE, axis)
+        time, value = wave.series(0, SensorKind.RATE, axis)
+        frequency, power, ordinates = wave.spectrum(SensorKind.RATE, axis)
         assert power @ ordinates == pytest.approx(0.5 * value @ value, rel=0.05)
         width = frequency[1] - frequency[0]
         assert abs(frequency[np.argmax(power)] - 0.1) < width

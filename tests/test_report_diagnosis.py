@@ -62,7 +62,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.simulation.effects import known_effects
 from bayesid.simulation.effects.effect_parameters import Quantity
 from bayesid.simulation.model import Manoeuvre
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 from tests.conftest import POINT, SIGMA
 from tests.pdf_text import PdfText
 
@@ -444,7 +444,7 @@ def test_histories_and_spectra_draw_the_residuals_before_and_after(biased):
     assert labels == ["before: samples and their running mean", "after: samples and their running mean"]
     assert spectra.axes[0].get_legend_handles_labels()[1] == ["before", "after", NOISE_BAND]
     # the bias that was hidden stands in the lowest bins before, and is gone after
-    before, after = (side.spectrum(Kind.ACCEL, 0).power[0] for side in sides)
+    before, after = (side.spectrum(SensorKind.ACCEL, 0).power[0] for side in sides)
     assert before > 2.0 * after
 
 
@@ -567,7 +567,7 @@ def test_those_that_move_most_stand_in_their_usual_order(biased):
 
 def test_the_errors_are_in_the_units_of_the_sensors(biased):
     rate, accel = simulation_errors(biased)
-    assert (rate.kind, accel.kind) == (Kind.RATE, Kind.ACCEL)
+    assert (rate.kind, accel.kind) == (SensorKind.RATE, SensorKind.ACCEL)
     for item in (rate, accel):
         assert item.noise == pytest.approx(np.sqrt(3.0) * SIGMA)
         rms = [biased.gain.before.rms[f"{item.kind.value}.{axis}"] for axis in "xyz"]
@@ -685,8 +685,8 @@ def test_the_cause_is_drawn_where_it_acts(biased):
     assert (before.get_title(), after.get_title()) == ("acceleration x, before", "acceleration x, after")
     for axes, side in ((before, biased.before), (after, biased.after)):
         drawn = axes.lines[0].get_xydata()
-        np.testing.assert_array_equal(drawn, np.column_stack(residuals_of(side).series(0, Kind.ACCEL, 0)))
-    assert moved_axis([residuals_of(biased.before), residuals_of(biased.after)], 0) == (Kind.ACCEL, 0)
+        np.testing.assert_array_equal(drawn, np.column_stack(residuals_of(side).series(0, SensorKind.ACCEL, 0)))
+    assert moved_axis([residuals_of(biased.before), residuals_of(biased.after)], 0) == (SensorKind.ACCEL, 0)
 
 
 def test_no_cause_is_drawn_where_none_is_named(clean):

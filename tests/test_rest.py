@@ -19,7 +19,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from tests.conftest import ORBIT, PLANAR, POINT
 
@@ -54,7 +54,7 @@ def posterior_of(
         manoeuvres.append(Manoeuvre(recording, motion))
     model = Model(
         robot,
-        (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT)),
+        (Sensor(SensorKind.RATE, White(SIGMA)), Sensor(SensorKind.ACCEL, White(SIGMA), position=POINT)),
         (BodyPrior("base_link", robot.link("base_link").inertial, 0.3),),
         Orbit(ORBIT.radius),
         (GravityGradient(),),

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import periodogram
 
 from bayesid._io.errors import InputError
-from bayesid.simulation.sensors import AngleRandomWalk, Filter, Kind, NoiseDensity, Sensor, StarTracker, White
+from bayesid.simulation.sensors import AngleRandomWalk, Filter, NoiseDensity, Sensor, SensorKind, StarTracker, White
 
 AXES = (1.0e-5, 2.0e-5, 3.0e-5)
 
@@ -101,11 +101,11 @@ def test_a_cut_off_must_be_below_half_the_sampling_rate(low_pass):
 def test_mounting_turns_sensor_axes_into_base_axes():
     """A quarter turn about z: the sensor's x is the base's y."""
     half = np.sqrt(0.5)
-    sensor = Sensor(Kind.RATE, White(1e-5), mounting=(0.0, 0.0, half, half))
+    sensor = Sensor(SensorKind.RATE, White(1e-5), mounting=(0.0, 0.0, half, half))
     np.testing.assert_allclose(sensor.rotation @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=1e-15)
-    np.testing.assert_array_equal(Sensor(Kind.RATE, White(1e-5)).rotation, np.eye(3))
+    np.testing.assert_array_equal(Sensor(SensorKind.RATE, White(1e-5)).rotation, np.eye(3))
 
 
 def test_units():
-    shipped = (Kind.RATE, Kind.ACCEL, Kind.ATTITUDE)
+    shipped = (SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE)
     assert {kind.value: kind.unit for kind in shipped} == {"rate": "rad/s", "accel": "m/s2", "attitude": "rad"}

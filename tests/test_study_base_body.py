@@ -11,7 +11,7 @@ from bayesid.design.designed import sample_times
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.recording import Recording
 from bayesid.simulation.model import Manoeuvre
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 from studies import base_body
 from studies.base_body import noise_free, paper, setting
 from studies.base_body.report import goals_of, write_report
@@ -76,7 +76,7 @@ def test_the_poor_manoeuvre_hardly_excites_the_third_axis_and_costs_when_there_i
 
 
 def test_the_base_turns_slower_than_a_hundredth_of_a_radian_per_second(result):
-    assert result.fast.peak[Kind.RATE] < 0.01
+    assert result.fast.peak[SensorKind.RATE] < 0.01
     assert [joint for joint, _, _ in setting.limits_broken()] == [1, 2]
 
 

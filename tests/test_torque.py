@@ -28,7 +28,7 @@ from bayesid.simulation.effects.instant import Environment
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from studies.truth.urdf import moving_joints
 from tests.conftest import ROOT
@@ -58,7 +58,7 @@ def posterior_of(urdf, truth, motion, *, robot=None, priors=(), effects=GRADIENT
     channels |= {f"torque.{name}": truth.torque[:, urdf_joints.index(name)] for name in names}
     model = Model(
         robot,
-        (Sensor(Kind.RATE, White(1e-6)),),
+        (Sensor(SensorKind.RATE, White(1e-6)),),
         priors,
         Orbit(ORBIT.radius),
         effects,
@@ -132,8 +132,8 @@ def test_encoder_errors_reach_the_torques_as_differences_of_the_simulation(formu
     state = JointState(*(0.1 * np.random.default_rng(1).normal(size=(3, 4, 6))))
     environment = Environment(*np.zeros((10, 4)))  # far from everything: what acts is the arm
     seen = SampledMotion(np.tile([0.0, 0.0, 0.0, 1.0], (4, 1)), np.zeros((4, 3)), environment)
-    response = joint_sensitivity(robot, state, seen, (Sensor(Kind.RATE, White(1e-6)),), (1, 4))
-    torques = Channels((Kind.RATE,), ("joint2", "joint5")).torques
+    response = joint_sensitivity(robot, state, seen, (Sensor(SensorKind.RATE, White(1e-6)),), (1, 4))
+    torques = Channels((SensorKind.RATE,), ("joint2", "joint5")).torques
     for row in range(4):
         mass = _mass_matrix(robot.model, state.position[row])
         effective = mass[6:, 6:] - mass[6:, :6] @ np.linalg.solve(mass[:6, :6], mass[:6, 6:])

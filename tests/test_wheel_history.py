@@ -10,7 +10,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import WheelHistory, WheelMomentum, create
 from bayesid.simulation.effects.wheel_history import KNOTS
 from bayesid.simulation.model import Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from studies.truth import stepwise as ref
 from studies.truth.urdf import SERVICER3
@@ -56,7 +56,7 @@ def test_a_constant_history_is_a_wheel_momentum(formula_motion):
 
 def test_bound_and_prior_are_those_of_a_wheel():
     robot = Robot.from_urdf(SERVICER3)
-    model = Model(robot, (Sensor(Kind.RATE, White(1e-5)),), ())
+    model = Model(robot, (Sensor(SensorKind.RATE, White(1e-5)),), ())
     assert WheelHistory("x").physical_bounds(model) == WheelMomentum().physical_bounds(model)
     assert {p.sigma for p in WheelHistory("x").parameters} == {p.sigma for p in WheelMomentum().parameters}
     assert [effect.label for effect in WheelHistory.instances(model)] == [f"wheel-history:{axis}" for axis in "xyz"]

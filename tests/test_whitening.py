@@ -22,7 +22,7 @@ from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import Start, simulate
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Filter, Kind, Sensor, White
+from bayesid.simulation.sensors import Filter, Sensor, SensorKind, White
 from bayesid.simulation.time_grid import build_grid
 from studies.truth import mujoco as mj
 from tests.sensed import read
@@ -182,7 +182,7 @@ def loud_posterior(truth: mj.Truth, encoder: float, step: float | None = None) -
     recording = Recording("loud", None, truth.times, channels)
     robot = Robot.from_urdf(PLANAR)
     motion = MeasuredMotion.from_recording(recording, robot, sigma={0: encoder})
-    sensors = (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT))
+    sensors = (Sensor(SensorKind.RATE, White(SIGMA)), Sensor(SensorKind.ACCEL, White(SIGMA), position=POINT))
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.3)
     return Posterior.of(Model(robot, sensors, (prior,)), [Manoeuvre(recording, motion)], step=step)
 
@@ -227,7 +227,7 @@ def test_marginalised_encoder_noise_equals_errors_in_variables():
     def readings(z, grid):
         values = posterior.unknowns.values(z)
         start = Start(jnp.asarray(manoeuvre.attitude), values.rate[0])
-        point = jnp.asarray(model.sensor(Kind.ACCEL).position)
+        point = jnp.asarray(model.sensor(SensorKind.ACCEL).position)
         found = read(simulate(grid, values.inertial, start, model.effects, values.effects, point[None]), point)
         return jnp.concatenate([found.rate, found.accel], axis=1).ravel()
 

@@ -23,7 +23,7 @@ from bayesid.robot.body_prior import BodyPrior, draw_inertial
 from bayesid.robot.robot import Robot
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from tests.conftest import ENCODER, PLANAR, POINT, SIGMA, STEP
 
@@ -67,7 +67,7 @@ def model(torque: bool) -> Model:
     priors = tuple(
         BodyPrior(name, link.inertial, SPREAD) for name, link in robot.links.items() if link.inertial.mass > 0.0
     )
-    sensors = (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=POINT))
+    sensors = (Sensor(SensorKind.RATE, White(SIGMA)), Sensor(SensorKind.ACCEL, White(SIGMA), position=POINT))
     bare = Model(robot, sensors, priors)
     return replace(bare, torque=TorqueSensor(JOINTS, (TORQUE,) * 2)) if torque else bare
 

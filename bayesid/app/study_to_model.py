@@ -28,7 +28,7 @@ from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.own_effects import check_own_effect
-from bayesid.simulation.sensors import Filter, Kind, Sensor, White
+from bayesid.simulation.sensors import Filter, Sensor, SensorKind, White
 
 __all__ = ["load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
 
@@ -224,12 +224,12 @@ def _sensors(study: Study) -> tuple[Sensor, ...]:
     rate, accel, attitude = study.sensors.rate, study.sensors.accel, study.sensors.attitude
     if rate is not None:
         sensors.append(
-            Sensor(Kind.RATE, rate.noise, mounting=rate.mounting, filter=Filter(rate.low_pass, rate.decimate))
+            Sensor(SensorKind.RATE, rate.noise, mounting=rate.mounting, filter=Filter(rate.low_pass, rate.decimate))
         )
     if accel is not None:
         sensors.append(
             Sensor(
-                Kind.ACCEL,
+                SensorKind.ACCEL,
                 accel.noise,
                 mounting=accel.mounting,
                 position=accel.position,
@@ -237,7 +237,7 @@ def _sensors(study: Study) -> tuple[Sensor, ...]:
             )
         )
     if attitude is not None:
-        sensors.append(Sensor(Kind.ATTITUDE, attitude.noise, filter=Filter(attitude.low_pass, attitude.decimate)))
+        sensors.append(Sensor(SensorKind.ATTITUDE, attitude.noise, filter=Filter(attitude.low_pass, attitude.decimate)))
     return (*sensors, *(_other_sensor(name, section) for name, section in study.sensors.other.items()))
 
 
@@ -245,7 +245,7 @@ def _other_sensor(name: str, section: OtherSensor) -> Sensor:
     """Return a sensor of a kind that a plugin has registered."""
     place = f"sensors.other.{name}"
     try:
-        kind = Kind.of(name)
+        kind = SensorKind.of(name)
     except InputError as error:
         raise error.within(place=place) from None
     sigma = section.sigma if isinstance(section.sigma, tuple) else (section.sigma,) * kind.size

@@ -26,11 +26,11 @@ from bayesid.recording.recording import Recording
 from bayesid.robot.end_effector import Tip
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 
 __all__ = ["BasePredictor", "Prediction", "last_link", "predict"]
 
-ATTITUDE = Sensor(Kind.ATTITUDE, White(1e-6))
+ATTITUDE = Sensor(SensorKind.ATTITUDE, White(1e-6))
 """Sensor that sets the integration step, whose error stays below a hundredth of the sensor's noise [rad]."""
 
 INSTANTS = 121
@@ -206,7 +206,7 @@ def _planned(recording: Recording) -> Recording:
 
 
 def _first_rate(model: Model, recording: Recording) -> Floats:
-    sensor = model.sensor(Kind.RATE)
+    sensor = model.sensor(SensorKind.RATE)
     if model.rate_sigma == 0.0 or sensor is None or "rate.x" not in recording.channels:
         return np.zeros(3)
     return first_rate(sensor, recording.vector("rate")[1])

@@ -47,7 +47,7 @@ from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["Loop", "NotFlown"]
 
@@ -276,7 +276,7 @@ def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
     of joints that are recorded by speed alone are those of the plan.
     """
     attitude, sigma = plan.attitude, plan.attitude_sigma
-    star = plan.model.sensor(Kind.ATTITUDE)
+    star = plan.model.sensor(SensorKind.ATTITUDE)
     if star is not None and star.kind.columns[0] in recording.channels:
         time, values = recording.vector(star.kind.value, star.kind.axes)
         if time[0] == 0.0:

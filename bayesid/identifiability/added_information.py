@@ -27,7 +27,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind, Sensor
+from bayesid.simulation.sensors import Sensor, SensorKind
 
 __all__ = ["AddedMeasurement", "NotEvaluated", "Swung", "candidates"]
 
@@ -89,7 +89,7 @@ def candidates(model: Model) -> list[AddedMeasurement]:
         AddedMeasurement(
             f"add-{kind.value}",
             f"added {kind.value} sensor of {float(sensor.noise.sigma(1.0)[0]):g} {kind.unit} per sample"
-            + (" at the base origin" if kind is Kind.ACCEL else ""),
+            + (" at the base origin" if kind is SensorKind.ACCEL else ""),
             partial(_added, sensor),
         )
         for kind, sensor in TYPICAL.items()
@@ -129,7 +129,7 @@ def candidates(model: Model) -> list[AddedMeasurement]:
 # ---- sensors and knowledge ----
 
 
-def _better(kind: Kind, experiment: Experiment) -> Experiment:
+def _better(kind: SensorKind, experiment: Experiment) -> Experiment:
     changed = (scaled(sensor, FINEST) if sensor.kind is kind else sensor for sensor in experiment.sensors)
     return replace(experiment, sensors=tuple(changed))
 

@@ -16,14 +16,14 @@ from bayesid.inference.posterior import Posterior
 from bayesid.recording.recording import Recording
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind, Noise, Scaled, Sensor, White
+from bayesid.simulation.sensors import Noise, Scaled, Sensor, SensorKind, White
 
 __all__ = ["TYPICAL", "Experiment", "InformationPredictor", "blanked", "rescaled", "typical_torque"]
 
-TYPICAL: dict[Kind, Sensor] = {
-    Kind.RATE: Sensor(Kind.RATE, White(1e-5)),
-    Kind.ACCEL: Sensor(Kind.ACCEL, White(1e-5)),
-    Kind.ATTITUDE: Sensor(Kind.ATTITUDE, White(2.4e-5)),
+TYPICAL: dict[SensorKind, Sensor] = {
+    SensorKind.RATE: Sensor(SensorKind.RATE, White(1e-5)),
+    SensorKind.ACCEL: Sensor(SensorKind.ACCEL, White(1e-5)),
+    SensorKind.ATTITUDE: Sensor(SensorKind.ATTITUDE, White(2.4e-5)),
 }
 """Sensors that could be added, with typical noise per sample: 1e-5 rad/s, 1e-5 m/s2 (1 micro-g) and 5 arcsec."""
 
@@ -98,7 +98,7 @@ class InformationPredictor:
         if experiment.manoeuvres is not self.flown.manoeuvres:
             blank = with_manoeuvres(self.posterior, self._read(experiment.manoeuvres))
             # the Jacobian depends on the readings only for attitudes
-            posterior = blank if Kind.ATTITUDE not in there else simulated(blank, self.z)
+            posterior = blank if SensorKind.ATTITUDE not in there else simulated(blank, self.z)
         sensors = [there.get(kind) or scaled(sensor, ABSENT) for kind, sensor in self._plain.items()]
         torque = experiment.torque
         if torque is None and self._torque is not None:
@@ -132,7 +132,7 @@ def blanked(manoeuvre: Manoeuvre, sensors: tuple[Sensor, ...], torque: TorqueSen
     return replace(manoeuvre, recording=Recording(recording.name, recording.file, recording.time, channels))
 
 
-def has(recording: Recording, kind: Kind) -> bool:
+def has(recording: Recording, kind: SensorKind) -> bool:
     """Return whether a recording holds the channels of a kind of sensor."""
     return kind.columns[0] in recording.channels
 

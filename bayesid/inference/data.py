@@ -18,7 +18,7 @@ from bayesid.recording.actions import Actions
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.effects.instant import Readings
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 from bayesid.simulation.time_grid import build_grid, lengthened, pad_grids, rounded
 
 __all__ = ["Data", "attitudes_of", "grids_of", "stacked", "with_whitenings"]
@@ -68,7 +68,7 @@ class Data:
         """Return the times at which any sensor of a recording was sampled, shape (T,) [s]."""
         return self.recorded[index].time
 
-    def measured(self, index: int, kind: Kind) -> Series:
+    def measured(self, index: int, kind: SensorKind) -> Series:
         """Return the recorded times and values of one sensor in one recording."""
         return self.recorded[index].series[kind]
 
@@ -76,11 +76,11 @@ class Data:
         """Return the recorded times (n,) and joint torques (n, joints) of one recording."""
         return self.recorded[index].torque
 
-    def sigma(self, index: int, kind: Kind) -> Floats:
+    def sigma(self, index: int, kind: SensorKind) -> Floats:
         """Return the standard deviations of the white noise of one sensor in one recording, shape (size,)."""
         return self.recorded[index].sigma(kind)
 
-    def left_out_times(self, index: int) -> dict[Kind, Floats]:
+    def left_out_times(self, index: int) -> dict[SensorKind, Floats]:
         """Return, for each sensor, the times of the samples that the likelihood leaves out of one recording [s]."""
         mask, rows = self.left_out[index], self.whitenings[index].rows
         result = {}

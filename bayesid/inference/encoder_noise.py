@@ -30,7 +30,7 @@ from bayesid.simulation.channels import Channels
 from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects.instant import Environment, Instant
 from bayesid.simulation.joint_torques import BaseMotion, Beyond, beyond_joints, joint_torques, no_joints
-from bayesid.simulation.sensors import Kind, Sensed, Sensor
+from bayesid.simulation.sensors import Sensed, Sensor, SensorKind
 from bayesid.simulation.time_grid import lengthened, rounded
 
 __all__ = ["SampledMotion", "joint_sensitivity"]
@@ -136,7 +136,7 @@ _turned = kept_jit()(jax.vmap(tilted))
 
 
 @kept_jit(static=1)
-def _difference(kinds: tuple[Kind, ...], before: _Reading, after: _Reading) -> Array:
+def _difference(kinds: tuple[SensorKind, ...], before: _Reading, after: _Reading) -> Array:
     """Return the changes of all readings in the columns of `Channels`, with the torques of all joints, (T, C)."""
     parts = [
         jax.vmap(kind.residual)(new, old) for kind, new, old in zip(kinds, after.readings, before.readings, strict=True)
@@ -146,7 +146,7 @@ def _difference(kinds: tuple[Kind, ...], before: _Reading, after: _Reading) -> A
 
 @kept_jit(static=1)
 def _read(
-    kinds: tuple[Kind, ...],
+    kinds: tuple[SensorKind, ...],
     mounted: _Mounted,
     environment: Environment,
     rows: Array,
@@ -159,7 +159,7 @@ def _read(
 
 
 def _read_one(
-    kinds: tuple[Kind, ...],
+    kinds: tuple[SensorKind, ...],
     mounted: _Mounted,
     environment: Environment,
     row: Array,

@@ -17,7 +17,7 @@ from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.recording.recording import Recording
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 from bayesid.simulation.time_grid import pad_grids, rounded
 
 __all__ = ["choose_step", "integration_error", "simulate_padded", "step_error"]
@@ -72,10 +72,10 @@ def step_error(model: Model, manoeuvres: Sequence[Manoeuvre]) -> InputError:
     found: list[tuple[float, str, Recording, str]] = []
     for manoeuvre in manoeuvres:
         recording = manoeuvre.recording
-        for column in Kind.RATE.columns:
+        for column in SensorKind.RATE.columns:
             if column in recording.channels:
                 rate = float(np.nanmax(np.abs(recording.channels[column])))
-                found.append((rate, Kind.RATE.unit, recording, column))
+                found.append((rate, SensorKind.RATE.unit, recording, column))
         speeds = np.abs(manoeuvre.motion.evaluate(recording.time).velocity).max(axis=0)
         for joint, speed in zip(model.robot.joints, speeds, strict=True):
             family = "position" if f"position.{joint.name}" in recording.channels else "velocity"

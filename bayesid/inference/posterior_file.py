@@ -13,7 +13,7 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of, reported_effect
 from bayesid.inference.identification import Identification
 from bayesid.inference.predicted_readings import noisy, predicted_readings
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 if TYPE_CHECKING:
     import arviz as az
@@ -156,12 +156,12 @@ def _sensor_dims(result: Identification) -> dict[str, list[str]]:
     return dims
 
 
-def _axis(kind: Kind) -> str:
+def _axis(kind: SensorKind) -> str:
     """Return the name of the dimension of a sensor's components."""
     return {("x", "y", "z"): "axis", ("x", "y", "z", "w"): "quaternion"}.get(kind.axes, f"axis.{kind.value}")
 
 
-def _name(kind: Kind, recording: str) -> str:
+def _name(kind: SensorKind, recording: str) -> str:
     return f"{kind.value}.{recording}"
 
 

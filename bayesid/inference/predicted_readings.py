@@ -13,7 +13,7 @@ from bayesid.inference.compiled import Simulated
 from bayesid.inference.data import grids_of
 from bayesid.inference.integration_step import integration_error, simulate_padded
 from bayesid.inference.posterior import Posterior
-from bayesid.simulation.sensors import Coloured, Kind, Sensor
+from bayesid.simulation.sensors import Coloured, Sensor, SensorKind
 
 __all__ = [
     "PredictedReadings",
@@ -32,14 +32,14 @@ class PredictedReadings(NamedTuple):
     ----------
     time : (T,) array
         Sample times of all sensors [s].
-    channels : dict of Kind to (T, axes) array
+    channels : dict of SensorKind to (T, axes) array
         Readings of each sensor.
     torque : (T, n) array
         Torques of the n joints that have a torque sensor [N m], or forces of prismatic joints [N].
     """
 
     time: Floats
-    channels: dict[Kind, Floats]
+    channels: dict[SensorKind, Floats]
     torque: Floats
 
     def __getattr__(self, family: str) -> Floats:

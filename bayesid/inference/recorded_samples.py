@@ -19,7 +19,7 @@ from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.joint_friction import STANDSTILL, JointFriction
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Filter, Kind, Sensor
+from bayesid.simulation.sensors import Filter, Sensor, SensorKind
 
 __all__ = ["RecordedSamples", "Series", "first_rate"]
 
@@ -42,7 +42,7 @@ class RecordedSamples:
     torque_sensor : TorqueSensor or None
     time : (T,) array
         Times of the grid [s].
-    series : mapping of Kind to Series
+    series : mapping of SensorKind to Series
         Recorded times and readings of each sensor.
     torque : Series
         Recorded times and torques of the joints that have a torque sensor.
@@ -55,7 +55,7 @@ class RecordedSamples:
     sensors: tuple[Sensor, ...]
     torque_sensor: TorqueSensor | None
     time: Floats
-    series: Mapping[Kind, Series]
+    series: Mapping[SensorKind, Series]
     torque: Series
     torque_rows: tuple[Integers, ...]
 
@@ -84,11 +84,11 @@ class RecordedSamples:
         """Return the same samples with other noise of the sensors."""
         return replace(self, sensors=tuple(sensors), torque_sensor=torque)
 
-    def rows(self, kind: Kind) -> Integers:
+    def rows(self, kind: SensorKind) -> Integers:
         """Return the rows of the grid at which a sensor was sampled."""
         return np.searchsorted(self.time, self.series[kind][0])
 
-    def gridded(self, kind: Kind) -> Floats:
+    def gridded(self, kind: SensorKind) -> Floats:
         """Return the readings of a sensor on the grid, (T, axes), with its reading at rest where it was not sampled."""
         values = np.tile(np.array(kind.rest), (len(self.time), 1))
         values[self.rows(kind)] = self.series[kind][1]
@@ -105,11 +105,11 @@ class RecordedSamples:
     def first_rate(self) -> Floats:
         """Rate of the base at the start from the first samples, base axes [rad/s]; zero if no rate is measured."""
         for sensor in self.sensors:
-            if sensor.kind == Kind.RATE:
-                return first_rate(sensor, self.series[Kind.RATE][1])
+            if sensor.kind == SensorKind.RATE:
+                return first_rate(sensor, self.series[SensorKind.RATE][1])
         return np.zeros(3)
 
-    def sigma(self, kind: Kind) -> Floats:
+    def sigma(self, kind: SensorKind) -> Floats:
         """Return the standard deviations of the white noise of a sensor, shape (size,)."""
         sensor = next(sensor for sensor in self.sensors if sensor.kind == kind)
         return sensor.noise.sigma(float(np.median(np.diff(self.series[kind][0]))))

@@ -15,7 +15,7 @@ from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind, Sensor
+from bayesid.simulation.sensors import Sensor, SensorKind
 
 __all__ = ["ChannelSampling", "JointCheck", "RecordingCheck", "SensorCheck", "check_recording"]
 
@@ -89,7 +89,7 @@ class SensorCheck:
 
     Attributes
     ----------
-    kind : Kind
+    kind : SensorKind
     sigma : (3,) array
         Declared standard deviation of the white noise.
     measured_sigma : (3,) array or None
@@ -101,7 +101,7 @@ class SensorCheck:
         to determine it.
     """
 
-    kind: Kind
+    kind: SensorKind
     sigma: Floats
     measured_sigma: Floats | None
     sigma_error: float
@@ -212,7 +212,7 @@ def _unused(recording: Recording, model: Model) -> tuple[str, ...]:
     """Return the sensors that a recording holds and the model does not have."""
     held = {column.partition(".")[0] for column in recording.channels}
     read = {sensor.kind.value for sensor in model.sensors} | ({"torque"} if model.torque is not None else set())
-    known = [Kind.RATE.value, Kind.ACCEL.value, Kind.ATTITUDE.value, "torque"]
+    known = [SensorKind.RATE.value, SensorKind.ACCEL.value, SensorKind.ATTITUDE.value, "torque"]
     return tuple(family for family in known if family in held - read)
 
 
@@ -270,7 +270,7 @@ def _sensor(sensor: Sensor, manoeuvre: Manoeuvre, predicted: PredictedReadings) 
 def _is_differenced(manoeuvre: Manoeuvre, model: Model) -> bool:
     """Return whether the rate repeats the noise of the attitude, by a backward, forward or central difference."""
     sensors = {sensor.kind: sensor for sensor in model.sensors}
-    if not {Kind.RATE, Kind.ATTITUDE} <= set(sensors):
+    if not {SensorKind.RATE, SensorKind.ATTITUDE} <= set(sensors):
         return False
     time, quaternion = manoeuvre.recording.vector("attitude", ("x", "y", "z", "w"))
     rate_time, rate = manoeuvre.recording.vector("rate")
@@ -280,10 +280,10 @@ def _is_differenced(manoeuvre: Manoeuvre, model: Model) -> bool:
     turned = Rotation.from_quat(quaternion[here])
     step = np.diff(common)[:, None]
     difference = (turned[:-1].inv() * turned[1:]).as_rotvec() / step
-    in_base = rate[there] @ sensors[Kind.RATE].rotation.T
+    in_base = rate[there] @ sensors[SensorKind.RATE].rotation.T
     central = 0.5 * (difference[1:] + difference[:-1])
     candidates = (in_base[:-1] - difference, in_base[1:] - difference, in_base[1:-1] - central)
-    noise = np.sqrt(2.0) * sensors[Kind.ATTITUDE].noise.sigma(1.0).max() / float(np.median(step))
+    noise = np.sqrt(2.0) * sensors[SensorKind.ATTITUDE].noise.sigma(1.0).max() / float(np.median(step))
     return min(float(np.sqrt((miss**2).mean())) for miss in candidates) < 0.3 * noise
 
 

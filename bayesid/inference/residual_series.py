@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.posterior import Posterior
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["ResidualSpectrum", "Residuals"]
 
@@ -63,7 +63,7 @@ class Residuals:
         return cls(posterior, posterior.residuals(z).reshape(posterior.residual_shape))
 
     @property
-    def kinds(self) -> tuple[Kind, ...]:
+    def kinds(self) -> tuple[SensorKind, ...]:
         """Kinds of the sensors, in the order of the channels."""
         return self.posterior.model.channels.kinds
 
@@ -72,20 +72,20 @@ class Residuals:
         """Number of recordings."""
         return len(self.posterior.manoeuvres)
 
-    def series(self, recording: int, kind: Kind, axis: int) -> tuple[Floats, Floats]:
+    def series(self, recording: int, kind: SensorKind, axis: int) -> tuple[Floats, Floats]:
         """Return the times [s] and residuals of one sensor axis in one recording, where it has samples."""
         item, channel = self.posterior.whitenings[recording], self.posterior.model.channels.of(kind).start + axis
         present = np.flatnonzero(item.outputs[:, channel])
         time = self.posterior.data.times(recording)[item.rows[present]]
         return time, self.values[recording, present, channel]
 
-    def pooled(self, kind: Kind) -> Floats:
+    def pooled(self, kind: SensorKind) -> Floats:
         """Return the residuals of all axes of one sensor in all recordings, shape (n,)."""
         return np.concatenate(
             [self.series(recording, kind, axis)[1] for recording in range(self.recordings) for axis in range(kind.size)]
         )
 
-    def spectrum(self, kind: Kind, axis: int) -> ResidualSpectrum:
+    def spectrum(self, kind: SensorKind, axis: int) -> ResidualSpectrum:
         """Return the spectrum of one sensor axis, all recordings pooled, in bins of equal width."""
         parts = [_periodogram(*self.series(recording, kind, axis)) for recording in range(self.recordings)]
         frequency, power = (np.concatenate(columns) for columns in zip(*parts, strict=True))

@@ -9,7 +9,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import predicted_readings
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["SensorFit", "TorqueFit", "sensor_fits", "torque_fits"]
 
@@ -21,14 +21,14 @@ class SensorFit:
     Attributes
     ----------
     time, measured, predicted : (n,), (n, k), (n, k) array
-        Times [s] and readings as they are drawn (`Kind.shown`), in sensor axes. An attitude is the rotation vector from
-        the first sample, in base axes.
+        Times [s] and readings as they are drawn (`SensorKind.shown`), in sensor axes. An attitude is the rotation
+        vector from the first sample, in base axes.
     residual_time, residual : (m,), (m, k) array
         Times [s] and whitened residuals, which are independent and of unit variance if the model is right; NaN where
         an axis has no sample.
     """
 
-    kind: Kind
+    kind: SensorKind
     time: Floats
     measured: Floats
     predicted: Floats

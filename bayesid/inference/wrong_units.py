@@ -31,7 +31,7 @@ from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.joint_state import JointState
 from bayesid.simulation.model import Manoeuvre
-from bayesid.simulation.sensors import Kind, White
+from bayesid.simulation.sensors import SensorKind, White
 
 __all__ = ["refuse_wrong_units"]
 
@@ -86,7 +86,7 @@ class _Comparison:
     ----------
     index : int
         Number of the recording.
-    kind : Kind or None
+    kind : SensorKind or None
         Sensor of the base, None for a joint torque.
     column, unit : str
         Name and unit of the columns in error messages.
@@ -101,7 +101,7 @@ class _Comparison:
     """
 
     index: int
-    kind: Kind | None
+    kind: SensorKind | None
     column: str
     unit: str
     mistaken: str
@@ -218,7 +218,7 @@ def _suspected(factors: Sequence[float]) -> str | None:
 def _refuse_gravities(posterior: Posterior, compared: Sequence[Sequence[_Comparison]]) -> None:
     felt, turning = (
         [comparison for seen in compared for comparison in seen if comparison.kind == kind]
-        for kind in (Kind.ACCEL, Kind.RATE)
+        for kind in (SensorKind.ACCEL, SensorKind.RATE)
     )
     # nearer to 1/9.8 than to one, where rates are nearer to one; the fits, which take longer, are for these alone
     small = [comparison for comparison in felt if abs(comparison.factor) < GRAVITY**-0.5]
@@ -239,13 +239,13 @@ def _refuse_gravities(posterior: Posterior, compared: Sequence[Sequence[_Compari
 def _misfit(posterior: Posterior, compared: Sequence[Sequence[_Comparison]], unit: float) -> float:
     """Return chi-square per sample of a fit to rough readings, with accelerations in a unit [m/s2]."""
     model = posterior.model
-    loudness: dict[Kind, float] = {}
+    loudness: dict[SensorKind, float] = {}
     for item in (item for seen in compared for item in seen):
         if item.kind is not None:
             size = float(np.sqrt((item.measured**2).mean()))
             loudness[item.kind] = max(loudness.get(item.kind, 0.0), size)
     sensors = tuple(
-        replace(sensor, noise=White(ROUGH * (unit if sensor.kind == Kind.ACCEL else 1.0) * loudness[sensor.kind]))
+        replace(sensor, noise=White(ROUGH * (unit if sensor.kind == SensorKind.ACCEL else 1.0) * loudness[sensor.kind]))
         if sensor.kind in loudness
         else sensor
         for sensor in model.sensors
@@ -258,7 +258,8 @@ def _misfit(posterior: Posterior, compared: Sequence[Sequence[_Comparison]], uni
 def _in_unit(manoeuvre: Manoeuvre, unit: float) -> Manoeuvre:
     recording = manoeuvre.recording
     channels = {
-        name: values * unit if name in Kind.ACCEL.columns else values for name, values in recording.channels.items()
+        name: values * unit if name in SensorKind.ACCEL.columns else values
+        for name, values in recording.channels.items()
     }
     return replace(manoeuvre, recording=Recording(recording.name, recording.file, recording.time, channels))
 

@@ -12,7 +12,7 @@ from bayesid.diagnosis.outcome.cause_amplitudes import amplitudes_of
 from bayesid.report.vector_size import vector_size
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["CauseMark", "cause_marks"]
 
@@ -69,9 +69,9 @@ def _place(hypothesis: Hypothesis, label: str) -> Floats | None:
 def _origin(hypothesis: Hypothesis, effect: Effect | None) -> Floats:
     """Return where the accelerometer is, for what is wrong with it, and the base origin otherwise."""
     model = hypothesis.fit.posterior.model
-    if effect is not None and effect.name.startswith(f"{Kind.ACCEL.value}-"):
+    if effect is not None and effect.name.startswith(f"{SensorKind.ACCEL.value}-"):
         for sensor in model.sensors:
-            if sensor.kind is Kind.ACCEL:
+            if sensor.kind is SensorKind.ACCEL:
                 return np.asarray(sensor.position, dtype=float)
     return np.zeros(3)
 

@@ -19,7 +19,7 @@ from bayesid.simulation.effects.register import known_effects
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Kind, Sensor, White
+from bayesid.simulation.sensors import Sensor, SensorKind, White
 
 __all__ = ["CatalogueEntry", "catalogue", "entry_of", "example_model"]
 
@@ -96,7 +96,7 @@ def example_model(*, torque: bool = False) -> Model:
     joints = tuple(joint.name for joint in robot.joints)
     return Model(
         robot,
-        tuple(Sensor(kind, White(1e-5)) for kind in (Kind.RATE, Kind.ACCEL, Kind.ATTITUDE)),
+        tuple(Sensor(kind, White(1e-5)) for kind in (SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE)),
         (BodyPrior(robot.base, robot.link(robot.base).inertial, 1.0),),
         Orbit(6.916e6, inclination=0.6, sun=(1.0, 0.0, 0.0)),
         torque=TorqueSensor(joints, (0.1,) * len(joints)) if torque else None,
@@ -178,7 +178,7 @@ def _sizes(effect: Effect, model: Model) -> tuple[str, ...]:
     )
 
 
-def _without(kind: Kind) -> Callable[[Model], Model]:
+def _without(kind: SensorKind) -> Callable[[Model], Model]:
     return lambda model: replace(model, sensors=tuple(sensor for sensor in model.sensors if sensor.kind != kind))
 
 
@@ -190,9 +190,9 @@ TAKEN_AWAY: dict[str, Callable[[Model], Model]] = {
     "[orbit]": lambda model: replace(model, orbit=None),
     "inclination in [orbit]": _in_orbit(lambda orbit: replace(orbit, inclination=None)),
     "sun in [orbit]": _in_orbit(lambda orbit: replace(orbit, sun=None)),
-    "[sensors.rate]": _without(Kind.RATE),
-    "[sensors.accel]": _without(Kind.ACCEL),
-    "[sensors.attitude]": _without(Kind.ATTITUDE),
+    "[sensors.rate]": _without(SensorKind.RATE),
+    "[sensors.accel]": _without(SensorKind.ACCEL),
+    "[sensors.attitude]": _without(SensorKind.ATTITUDE),
     "[sensors.torque]": lambda model: replace(model, torque=None),
 }
 """Parts of a study, and how a model loses them."""

@@ -9,7 +9,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Diagnosis
 from bayesid.inference.posterior import Posterior
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["SimulationError", "simulation_errors", "strongest_recording"]
 
@@ -21,14 +21,14 @@ class SimulationError(NamedTuple):
 
     Attributes
     ----------
-    kind : Kind
+    kind : SensorKind
     before, after : float
         After is that of before where no cause is named.
     noise : float
         What the declared noise alone makes of it.
     """
 
-    kind: Kind
+    kind: SensorKind
     before: float
     after: float
     noise: float
@@ -69,7 +69,7 @@ def _chi2(residual: Floats, result: Diagnosis) -> Floats:
     return np.asarray((whole**2).sum(axis=1))
 
 
-def _sigma(posterior: Posterior, kind: Kind) -> Floats:
+def _sigma(posterior: Posterior, kind: SensorKind) -> Floats:
     """Root mean square over the recordings of the noise per sample of each axis."""
     widths = [posterior.data.sigma(index, kind) for index in range(len(posterior.manoeuvres))]
     return np.sqrt(np.mean(np.square(widths), axis=0))

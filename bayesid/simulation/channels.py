@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["Channels"]
 
@@ -16,16 +16,16 @@ class Channels:
 
     Parameters
     ----------
-    kinds : tuple of Kind
+    kinds : tuple of SensorKind
         Kinds of the sensors.
     joints : tuple of str
         Names of the joints whose torque is measured.
     """
 
-    kinds: tuple[Kind, ...]
+    kinds: tuple[SensorKind, ...]
     joints: tuple[str, ...] = ()
 
-    def of(self, kind: Kind) -> slice:
+    def of(self, kind: SensorKind) -> slice:
         """Return the columns of one kind of sensor."""
         first = 0
         for other in self.kinds:

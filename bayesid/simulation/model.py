@@ -19,7 +19,7 @@ from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.own_effects import check_own_effect
-from bayesid.simulation.sensors import Kind, Sensor
+from bayesid.simulation.sensors import Sensor, SensorKind
 
 __all__ = ["Manoeuvre", "Model"]
 
@@ -152,7 +152,7 @@ class Model:
         joints = () if self.torque is None else self.torque.joints
         return Channels(tuple(sensor.kind for sensor in self.sensors), joints)
 
-    def sensor(self, kind: Kind) -> Sensor | None:
+    def sensor(self, kind: SensorKind) -> Sensor | None:
         """Return the sensor of a kind, or None if none is declared."""
         return next((sensor for sensor in self.sensors if sensor.kind == kind), None)
 

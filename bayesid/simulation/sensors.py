@@ -1,7 +1,7 @@
 """Sensors on the base: the quantity that each kind measures, and the mounting and noise of a sensor.
 
 A kind of sensor is one class, which defines its channels in recordings, its reading at an instant of the simulation,
-and the residual of a measured and a predicted reading. `Kind.register` makes it known by the name of its channels.
+and the residual of a measured and a predicted reading. `SensorKind.register` makes it known by its channels' name.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ __all__ = [
     "AngleRandomWalk",
     "Coloured",
     "Filter",
-    "Kind",
     "Noise",
     "NoiseDensity",
     "Quantised",
     "Scaled",
     "Sensed",
     "Sensor",
+    "SensorKind",
     "StarTracker",
     "White",
 ]
@@ -71,8 +71,8 @@ class Sensed(NamedTuple):
     specific_force: Array
 
 
-class Kind:
-    """Kind of sensor. To add one, subclass it, set the attributes, define `read`, and decorate it with `Kind.register`.
+class SensorKind:
+    """Kind of sensor. To add one, subclass it, set the attributes, define `read`, and apply `SensorKind.register`.
 
     Attributes
     ----------
@@ -106,28 +106,28 @@ class Kind:
     size: ClassVar[int] = 3
     """Number of components of the residual."""
 
-    RATE: ClassVar[Kind]
-    ACCEL: ClassVar[Kind]
-    ATTITUDE: ClassVar[Kind]
+    RATE: ClassVar[SensorKind]
+    ACCEL: ClassVar[SensorKind]
+    ATTITUDE: ClassVar[SensorKind]
 
-    _known: ClassVar[dict[str, Kind]] = {}
+    _known: ClassVar[dict[str, SensorKind]] = {}
 
     @staticmethod
     def register(kind: type[K]) -> type[K]:
         """Make a kind known by the family of its channels; a class decorator."""
-        known = Kind._known.get(kind.value)
+        known = SensorKind._known.get(kind.value)
         if known is not None and type(known).__qualname__ != kind.__qualname__:
             raise InputError(f"two kinds of sensor are named {kind.value!r}", remedy="Give each different channels")
         declare_family(kind.value, kind.axes)
-        Kind._known[kind.value] = kind()
+        SensorKind._known[kind.value] = kind()
         return kind
 
     @staticmethod
-    def of(value: str) -> Kind:
+    def of(value: str) -> SensorKind:
         """Return the registered kind whose channels have this name."""
-        if value not in Kind._known:
-            raise InputError(f"unknown sensor {value!r}", remedy=f"Choose from {', '.join(sorted(Kind._known))}")
-        return Kind._known[value]
+        if value not in SensorKind._known:
+            raise InputError(f"unknown sensor {value!r}", remedy=f"Choose from {', '.join(sorted(SensorKind._known))}")
+        return SensorKind._known[value]
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -162,14 +162,14 @@ class Kind:
         return hash(type(self))
 
     def __repr__(self) -> str:
-        return f"Kind.of({self.value!r})"
+        return f"SensorKind.of({self.value!r})"
 
 
-K = TypeVar("K", bound=Kind)
+K = TypeVar("K", bound=SensorKind)
 
 
-@Kind.register
-class AngularRate(Kind):
+@SensorKind.register
+class AngularRate(SensorKind):
     """Angular velocity of the base relative to inertial space."""
 
     value, unit = "rate", "rad/s"
@@ -181,8 +181,8 @@ class AngularRate(Kind):
         return sensed.instant.rate
 
 
-@Kind.register
-class SpecificForce(Kind):
+@SensorKind.register
+class SpecificForce(SensorKind):
     """Specific force (non-gravitational acceleration) at the mounting point."""
 
     value, unit = "accel", "m/s2"
@@ -199,8 +199,8 @@ class SpecificForce(Kind):
         return instant.acceleration + rotating + sensed.specific_force
 
 
-@Kind.register
-class StarAttitude(Kind):
+@SensorKind.register
+class StarAttitude(SensorKind):
     """Attitude of the base as a quaternion x, y, z, w from base to orbit axes, whose residual is a small rotation."""
 
     value, unit = "attitude", "rad"
@@ -233,7 +233,11 @@ class StarAttitude(Kind):
         return (Rotation.from_quat(reference).inv() * Rotation.from_quat(readings)).as_rotvec()
 
 
-Kind.RATE, Kind.ACCEL, Kind.ATTITUDE = Kind.of("rate"), Kind.of("accel"), Kind.of("attitude")
+SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE = (
+    SensorKind.of("rate"),
+    SensorKind.of("accel"),
+    SensorKind.of("attitude"),
+)
 
 
 @dataclass(frozen=True)
@@ -242,7 +246,7 @@ class Sensor:
 
     Parameters
     ----------
-    kind : Kind
+    kind : SensorKind
     noise : Noise
         White noise.
     mounting : (4,) array_like
@@ -255,7 +259,7 @@ class Sensor:
         Correlated noise in addition to the white noise.
     """
 
-    kind: Kind
+    kind: SensorKind
     noise: Noise
     mounting: ArrayLike = (0.0, 0.0, 0.0, 1.0)
     position: ArrayLike = (0.0, 0.0, 0.0)

@@ -20,7 +20,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, predicted_readings
 from bayesid.inference.simulated_recordings import simulate_recordings
 from bayesid.recording.joint_motion import Excitation
-from bayesid.simulation.sensors import ARCSEC, Kind
+from bayesid.simulation.sensors import ARCSEC, SensorKind
 from studies.base_body import paper
 from studies.base_body.noise_free import STEP
 from studies.base_body.setting import planned
@@ -28,7 +28,7 @@ from studies.common.models import ARM_SPREAD, base_model
 
 __all__ = ["ACCEL_BIAS", "ARM", "INITIAL_RATE", "STAR", "TILT", "Information"]
 
-KINDS = (Kind.RATE, Kind.ACCEL, Kind.ATTITUDE)
+KINDS = (SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE)
 """Sensors whose information is computed."""
 
 UNIT = 1e-5
@@ -50,7 +50,7 @@ class Information:
 
     Attributes
     ----------
-    by_sensor : mapping of Kind to (n, n) array
+    by_sensor : mapping of SensorKind to (n, n) array
         Rows equivalent to the whitened Jacobian of each sensor with a noise of `UNIT` per sample.
     prior : Knowledge
         Knowledge of the base's quantities before the manoeuvre.
@@ -60,7 +60,7 @@ class Information:
         Readings of the sensors without noise.
     """
 
-    by_sensor: Mapping[Kind, Floats]
+    by_sensor: Mapping[SensorKind, Floats]
     prior: Knowledge
     names: tuple[str, ...]
     truth: PredictedReadings
@@ -79,12 +79,12 @@ class Information:
         prior = Knowledge(*linearise(posterior, z), np.eye(posterior.size))
         return cls(rows, prior, posterior.unknowns.names, predicted_readings(simulator, z)[0])
 
-    def relative_sd(self, sigma: Mapping[Kind, float], known: Collection[str] = ()) -> Floats:
+    def relative_sd(self, sigma: Mapping[SensorKind, float], known: Collection[str] = ()) -> Floats:
         """Return the posterior standard deviations of the base's quantities relative to the truth, shape (10,).
 
         Parameters
         ----------
-        sigma : mapping of Kind to float
+        sigma : mapping of SensorKind to float
             Standard deviation per sample of the sensors used.
         known : collection of str
             Groups of unknowns that are known exactly: `ARM`, `INITIAL_RATE`, `TILT`, `ACCEL_BIAS`.
@@ -98,8 +98,8 @@ class Information:
         return self.prior.having(np.concatenate(rows)).fixing(exact).sd / np.abs(paper.TRUTH)
 
     @property
-    def peak(self) -> dict[Kind, float]:
+    def peak(self) -> dict[SensorKind, float]:
         """Largest rate [rad/s], acceleration [m/s2] and rotation since the start [rad] about any axis."""
         turned = 2.0 * self.truth.attitude[:, :3]
-        values = {Kind.RATE: self.truth.rate, Kind.ACCEL: self.truth.accel, Kind.ATTITUDE: turned}
+        values = {SensorKind.RATE: self.truth.rate, SensorKind.ACCEL: self.truth.accel, SensorKind.ATTITUDE: turned}
         return {kind: float(np.abs(reading).max()) for kind, reading in values.items()}

@@ -17,7 +17,7 @@ from bayesid.recording.joint_motion import Excitation
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 from studies.base_body import paper
 from studies.base_body.setting import POOR, heavy_arm, planned
 from studies.common.ets7 import ets7, excitation
@@ -72,7 +72,7 @@ class NoiseFree:
 def guess_model(robot: Robot | None = None, *, gradient: bool = True, rate_sigma: float = 0.0) -> Model:
     """Return the model whose prior is centred on the paper's initial guess, where fits start."""
     return base_model(
-        {Kind.RATE: WEIGHT, Kind.ACCEL: WEIGHT},
+        {SensorKind.RATE: WEIGHT, SensorKind.ACCEL: WEIGHT},
         robot=robot,
         centre=paper.body(paper.GUESS),
         gradient=gradient,

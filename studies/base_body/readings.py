@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 from studies.base_body import paper
 from studies.base_body.information import ACCEL_BIAS, ARM, TILT, UNIT, Information
 from studies.common.quantities import MASS, MOMENTS
@@ -17,11 +17,11 @@ CLAIM = 0.02
 """Error of the solution that the paper reports for sigma 0.04."""
 
 UNITS = (
-    ("deg/s", Kind.RATE, np.pi / 180.0),
-    ("rad/s", Kind.RATE, 1.0),
-    ("m/s2", Kind.ACCEL, 1.0),
-    ("rad, of attitude", Kind.ATTITUDE, 1.0),
-    ("deg, of attitude", Kind.ATTITUDE, np.pi / 180.0),
+    ("deg/s", SensorKind.RATE, np.pi / 180.0),
+    ("rad/s", SensorKind.RATE, 1.0),
+    ("m/s2", SensorKind.ACCEL, 1.0),
+    ("rad, of attitude", SensorKind.ATTITUDE, 1.0),
+    ("deg, of attitude", SensorKind.ATTITUDE, np.pi / 180.0),
 )
 """Units that a sigma may have: name, sensor, and size in the SI unit; the first is the one that studies take."""
 
@@ -60,15 +60,15 @@ def read_sigmas(information: Information) -> list[Reading]:
     for sigma in paper.SIGMAS:
         for unit, kind, scale in UNITS:
             readings.append(_reading(information, sigma, unit, sigma * scale / information.peak[kind], kind))
-        readings.append(_reading(information, sigma, "of the peak", sigma, Kind.RATE))
+        readings.append(_reading(information, sigma, "of the peak", sigma, SensorKind.RATE))
     return readings
 
 
-def _reading(information: Information, sigma: float, unit: str, fraction: float, kind: Kind) -> Reading:
-    motion = Kind.ATTITUDE if kind is Kind.ATTITUDE else Kind.RATE
+def _reading(information: Information, sigma: float, unit: str, fraction: float, kind: SensorKind) -> Reading:
+    motion = SensorKind.ATTITUDE if kind is SensorKind.ATTITUDE else SensorKind.RATE
     peak = information.peak
     # computed where the prior does not matter, then scaled: standard deviations are proportional to the noise
     small = UNIT / peak[motion]
-    noise = {motion: small * peak[motion], Kind.ACCEL: small * peak[Kind.ACCEL]}
+    noise = {motion: small * peak[motion], SensorKind.ACCEL: small * peak[SensorKind.ACCEL]}
     width = information.relative_sd(noise, (ARM, TILT, ACCEL_BIAS)) * fraction / small
     return Reading(sigma, unit, fraction, float(width[MASS]), float(width[MOMENTS].max()))

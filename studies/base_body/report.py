@@ -10,7 +10,7 @@ from scipy import stats
 from bayesid.report import Document
 from bayesid.report.figures import robot_pose
 from bayesid.report.numbers import format_fixed, format_number, format_percent
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 from studies.base_body import figures, paper, rows
 from studies.base_body.readings import CLAIM
 from studies.base_body.result import GRADES, BaseBody
@@ -134,10 +134,10 @@ def _setup(result: BaseBody) -> Setup:
         robot="ETS-VII: the paper's base, and an arm of six joints and 140 kg from public models.",
         manoeuvre=f"The paper's optimum of (26). At the permitted speed it takes {motion.duration:.0f} s and the tip "
         f"moves with {1e3 * fastest:.0f} mm/s (rule: {1e3 * TIP_SPEED:.0f} mm/s); the base then turns with "
-        f"{format_number(1e3 * result.slow.peak[Kind.RATE], 2)} mrad/s at most. The faster one, "
+        f"{format_number(1e3 * result.slow.peak[SensorKind.RATE], 2)} mrad/s at most. The faster one, "
         f"{format_fixed(result.slowness, 1)} times, breaks the rule; with it the base turns with "
-        f"{format_number(1e3 * result.fast.peak[Kind.RATE], 2)} mrad/s, below the paper's bound of 10. Cases without "
-        "noise and sampled posteriors are of the faster one.",
+        f"{format_number(1e3 * result.fast.peak[SensorKind.RATE], 2)} mrad/s, below the paper's bound of 10. Cases "
+        "without noise and sampled posteriors are of the faster one.",
         sensors=f"At 2 Hz: attitude of a star sensor with 2″, an accelerometer of {format_number(GRADES[0])} m/s² with "
         "an unknown constant bias (prior 10⁻⁴ m/s²), and joint encoders of 10⁻⁶ rad where the posterior is sampled.",
         known="Orbit, and the arm: exactly, or every link to 5 % of its mass (relative width 0.025).",

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.inference import Identification
-from bayesid.simulation.sensors import Kind, StarTracker
+from bayesid.simulation.sensors import SensorKind, StarTracker
 from studies.base_body import paper
 from studies.base_body.information import ARM, STAR, Information
 from studies.base_body.noise_free import NoiseFree, run_noise_free
@@ -61,7 +61,7 @@ class BaseBody:
     @property
     def precision(self) -> dict[str, Floats]:
         """Relative standard deviations (10,) by speed and knowledge of the arm, with the coarsest accelerometer."""
-        sigma = {Kind.ATTITUDE: STAR, Kind.ACCEL: GRADES[0]}
+        sigma = {SensorKind.ATTITUDE: STAR, SensorKind.ACCEL: GRADES[0]}
         return {
             f"{speed}, arm {arm}": information.relative_sd(sigma, known)
             for speed, information in (("permitted", self.slow), ("faster", self.fast))
@@ -74,9 +74,9 @@ def compute(*, full: bool, seed: int) -> BaseBody:
     fast = Information.of(excitation(paper.EXCITATION))
     slowness = slowest(paper.EXCITATION)
     grades = {
-        "exact": _grades(fast, Kind.ATTITUDE, STAR, (ARM,)),
-        "exact, differenced": _grades(fast, Kind.RATE, DIFFERENCED, (ARM,)),
-        "5 %": _grades(fast, Kind.ATTITUDE, STAR, ()),
+        "exact": _grades(fast, SensorKind.ATTITUDE, STAR, (ARM,)),
+        "exact, differenced": _grades(fast, SensorKind.RATE, DIFFERENCED, (ARM,)),
+        "5 %": _grades(fast, SensorKind.ATTITUDE, STAR, ()),
     }
     sampled = {}
     if full:
@@ -93,5 +93,5 @@ def compute(*, full: bool, seed: int) -> BaseBody:
     )
 
 
-def _grades(information: Information, kind: Kind, sigma: float, known: tuple[str, ...]) -> Floats:
-    return np.array([information.relative_sd({kind: sigma, Kind.ACCEL: grade}, known) for grade in GRADES])
+def _grades(information: Information, kind: SensorKind, sigma: float, known: tuple[str, ...]) -> Floats:
+    return np.array([information.relative_sd({kind: sigma, SensorKind.ACCEL: grade}, known) for grade in GRADES])

@@ -17,7 +17,7 @@ from bayesid.inference.simulated_recordings import simulate_recordings
 from bayesid.recording.joint_motion import sample_joints
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 from studies.base_body import paper
 from studies.base_body.information import STAR
 from studies.base_body.setting import planned
@@ -33,7 +33,7 @@ LONGEST = 500
 
 def _model(accel: float, centre: InertialParameters, arm_spread: float) -> Model:
     """Return the model of a star sensor, an accelerometer with an unknown bias and an unknown initial rate."""
-    return base_model({Kind.ACCEL: accel, Kind.ATTITUDE: STAR}, centre=centre, arm_spread=arm_spread)
+    return base_model({SensorKind.ACCEL: accel, SensorKind.ATTITUDE: STAR}, centre=centre, arm_spread=arm_spread)
 
 
 def _planned(seed: int) -> Manoeuvre:

@@ -7,7 +7,6 @@ import numpy as np
 from bayesid import (
     BodyPrior,
     Excitation,
-    Kind,
     Manoeuvre,
     MeasuredMotion,
     Model,
@@ -15,6 +14,7 @@ from bayesid import (
     Posterior,
     Robot,
     Sensor,
+    SensorKind,
     White,
 )
 from bayesid.design.designed import sample_times
@@ -63,7 +63,7 @@ def chain(links: int) -> Robot:
 
 def model_of(robot: Robot) -> Model:
     """Return the model with an unknown base, rate sensor, accelerometer and gravity gradient."""
-    sensors = (Sensor(Kind.RATE, White(SIGMA)), Sensor(Kind.ACCEL, White(SIGMA), position=(0.3, 0.2, 0.4)))
+    sensors = (Sensor(SensorKind.RATE, White(SIGMA)), Sensor(SensorKind.ACCEL, White(SIGMA), position=(0.3, 0.2, 0.4)))
     prior = BodyPrior(robot.base, robot.link(robot.base).inertial, 1.0)
     return Model(robot, sensors, (prior,), Orbit(RADIUS), (GravityGradient(),))
 

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from bayesid import BodyPrior, Kind, Model, Robot
+from bayesid import BodyPrior, Model, Robot, SensorKind
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.robot import Load
 from studies.common.ets7 import ACCEL, BASE, RATE, ets7
@@ -66,7 +66,7 @@ def model_of(case: Case) -> Model:
     robot = Robot.shipped("planar") if case in (Case.PLANAR, Case.PLANAR_REST) else ets7()
     robot = robot.with_load(LOAD) if case is Case.WHOLE else robot
     model = base_model(
-        {Kind.RATE: RATE, Kind.ACCEL: ACCEL},
+        {SensorKind.RATE: RATE, SensorKind.ACCEL: ACCEL},
         robot=robot,
         base_spread=BASE_SPREAD,
         arm_spread=ARM_SPREAD if case is Case.ARM else 0.0,

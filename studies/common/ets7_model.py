@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesid import BodyPrior, Effect, Kind, Model, Orbit, Robot, Sensor, White
+from bayesid import BodyPrior, Effect, Model, Orbit, Robot, Sensor, SensorKind, White
 from bayesid._math.arrays import Floats
 from bayesid.simulation.effects import GravityGradient
 from studies.common.ets7 import ACCEL, ACCELEROMETER, ENCODER, RADIUS, RATE, extended_wrist
@@ -20,7 +20,7 @@ NOISE = {"position": ENCODER, "rate": RATE, "accel": ACCEL}
 
 def motion_sensors(rate: float = RATE, accel: float = ACCEL) -> tuple[Sensor, Sensor]:
     """Return rate sensor and accelerometer with white noise per sample [rad/s, m/s2]."""
-    return Sensor(Kind.RATE, White(rate)), Sensor(Kind.ACCEL, White(accel), position=ACCELEROMETER)
+    return Sensor(SensorKind.RATE, White(rate)), Sensor(SensorKind.ACCEL, White(accel), position=ACCELEROMETER)
 
 
 def orbiting_model(robot: Robot, priors: Sequence[BodyPrior], *effects: Effect, **options: Any) -> Model:

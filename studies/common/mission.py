@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bayesid import Kind, Manoeuvre, Model, Robot
+from bayesid import Manoeuvre, Model, Robot, SensorKind
 from bayesid._math.arrays import Floats
 from bayesid.design import BSplines, Criterion, Limits, Plan, Problem, Tip, TrajectoryFamily
 from bayesid.design.designed import sample_times
@@ -95,7 +95,7 @@ def base_unknown(arm_spread: float = ARM_SPREAD, **options: Any) -> Model:
         Further arguments of `studies.common.models.base_model`.
     """
     options = {"robot": ship(), **options}
-    return base_model({Kind.RATE: RATE, Kind.ACCEL: ACCEL}, arm_spread=arm_spread, **options)
+    return base_model({SensorKind.RATE: RATE, SensorKind.ACCEL: ACCEL}, arm_spread=arm_spread, **options)
 
 
 def flight_manoeuvre(size: float = 1.0) -> FlightManoeuvre:

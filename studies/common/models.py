@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bayesid import BodyPrior, Kind, Model, Orbit, Robot, Sensor, White
+from bayesid import BodyPrior, Model, Orbit, Robot, Sensor, SensorKind, White
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.simulation.effects import AccelBias, GravityGradient
 from bayesid.simulation.model import RATE_SIGMA, spread_links
@@ -20,7 +20,7 @@ ARM_SPREAD = 0.025
 
 
 def base_model(
-    noise: Mapping[Kind, float],
+    noise: Mapping[SensorKind, float],
     *,
     robot: Robot | None = None,
     centre: InertialParameters | None = None,
@@ -34,7 +34,7 @@ def base_model(
 
     Parameters
     ----------
-    noise : mapping of Kind to float
+    noise : mapping of SensorKind to float
         Standard deviation of the white noise of each sensor, per sample [rad/s, m/s2, rad].
     robot : Robot, optional
         Robot with its nominal arm, by default ETS-VII as shipped.
@@ -54,7 +54,7 @@ def base_model(
     return Model(
         robot=robot,
         sensors=tuple(
-            Sensor(kind, White(sigma), position=ACCELEROMETER if kind is Kind.ACCEL else (0.0, 0.0, 0.0))
+            Sensor(kind, White(sigma), position=ACCELEROMETER if kind is SensorKind.ACCEL else (0.0, 0.0, 0.0))
             for kind, sigma in noise.items()
         ),
         priors=(BodyPrior(robot.base, centre, base_spread), *spread_links(robot, arm_spread, (robot.base,))),

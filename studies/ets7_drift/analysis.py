@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bayesid import Kind, Model, Posterior, Sensor, White
+from bayesid import Model, Posterior, Sensor, SensorKind, White
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import CauseSet, Diagnosis, Hypothesis, diagnose
@@ -217,7 +217,7 @@ def _angles(turned: Rotation) -> Floats:
 
 def _watched(model: Model, result: Diagnosis) -> Posterior:
     """Return the posterior of a model that has the attitude as a sensor too."""
-    sensors = (*model.sensors, Sensor(Kind.ATTITUDE, White(ATTITUDE_SIGMA)))
+    sensors = (*model.sensors, Sensor(SensorKind.ATTITUDE, White(ATTITUDE_SIGMA)))
     return Posterior.of(replace(model, sensors=sensors), result.posterior.manoeuvres)
 
 

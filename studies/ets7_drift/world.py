@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bayesid import BodyPrior, InertialParameters, Kind, Manoeuvre, Model, Orbit, Sensor, White
+from bayesid import BodyPrior, InertialParameters, Manoeuvre, Model, Orbit, Sensor, SensorKind, White
 from bayesid._math.arrays import Floats
 from studies.common.ets7 import BASE, RADIUS, FlightManoeuvre, ets7
 from studies.common.flight import ORBIT, fly, light_wheel, record
@@ -101,7 +101,7 @@ def model_of(spread: float) -> Model:
     robot = ets7()
     return Model(
         robot,
-        (Sensor(Kind.RATE, White(RATE_SIGMA)),),
+        (Sensor(SensorKind.RATE, White(RATE_SIGMA)),),
         (BodyPrior(BASE, robot.link(BASE).inertial, spread),),
         orbit=Orbit(RADIUS),
         rate_sigma=0.0,

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import brentq
 
-from bayesid import Kind, Sensor, White
+from bayesid import Sensor, SensorKind, White
 from bayesid._math.arrays import Floats
 from bayesid.design import planned_manoeuvre, planned_posterior
 from bayesid.design.designed import sample_times
@@ -126,7 +126,10 @@ class ManoeuvreInformation:
         """
         accel = ABSENT if grade.accel is None else grade.accel
         if (grade.rate, accel) not in self._kept:
-            sensors = (Sensor(Kind.RATE, grade.rate), Sensor(Kind.ACCEL, White(accel), position=ACCELEROMETER))
+            sensors = (
+                Sensor(SensorKind.RATE, grade.rate),
+                Sensor(SensorKind.ACCEL, White(accel), position=ACCELEROMETER),
+            )
             z = np.zeros(self.posterior.size)
             jacobian = with_sensors(self.posterior, sensors, z).jacobian(z)[: -self.posterior.size]
             self._kept[grade.rate, accel] = triangular(jacobian)

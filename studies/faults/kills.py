@@ -42,11 +42,11 @@ tip_speed = 0.15
 """Study of which manoeuvres are designed and flown."""
 
 SPACECRAFT = """
-from bayesid import Kind, Model, Robot, Sensor, White
+from bayesid import SensorKind, Model, Robot, Sensor, White
 from bayesid.design import SimulatedSpacecraft
 
 execute = SimulatedSpacecraft(
-    Model(Robot.shipped("planar"), (Sensor(Kind.RATE, White(1e-5)),), (), rate_sigma=0.0), encoder_sigma=1e-6
+    Model(Robot.shipped("planar"), (Sensor(SensorKind.RATE, White(1e-5)),), (), rate_sigma=0.0), encoder_sigma=1e-6
 ).execute
 """
 

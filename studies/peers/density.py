@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bayesid import BodyPrior, Kind, Manoeuvre, MeasuredMotion, Model, Posterior
+from bayesid import BodyPrior, Manoeuvre, MeasuredMotion, Model, Posterior, SensorKind
 from bayesid._math.arrays import Floats
 from bayesid.design.designed import sample_times
 from bayesid.inference import (
@@ -154,7 +154,7 @@ def _model(case: Case) -> Model:
         BodyPrior(BASE, robot.link(BASE).inertial, 1.0),
         *(BodyPrior(name, robot.link(name).inertial, ARM_SPREAD, nuisance=True) for name in links),
     )
-    model = base_model({Kind.RATE: RATE, Kind.ACCEL: ACCEL}, bias=0.0)
+    model = base_model({SensorKind.RATE: RATE, SensorKind.ACCEL: ACCEL}, bias=0.0)
     return replace(model, priors=priors, rate_sigma=model.rate_sigma if case.rates else 0.0, speed_errors=False)
 
 

@@ -14,7 +14,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid import Kind, Manoeuvre, MeasuredMotion, Posterior, Recording
+from bayesid import Manoeuvre, MeasuredMotion, Posterior, Recording, SensorKind
 from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
@@ -142,7 +142,7 @@ class Estimator:
 
     def solve(self, residual: Floats) -> Solved:
         """Estimate from each of N residuals (N, 6 T)."""
-        keep = [self.biased or not name.startswith(Kind.ACCEL.value) for name in self.linear.names]
+        keep = [self.biased or not name.startswith(SensorKind.ACCEL.value) for name in self.linear.names]
         slope, design = self.linear.slope[:, keep], self.weight @ self.linear.readings[:, keep]
         if self.nuisance is not None:
             design = np.concatenate([design, self.nuisance], axis=1)

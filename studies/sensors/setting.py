@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_simpson
 
-from bayesid import Kind, Model
+from bayesid import Model, SensorKind
 from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Excitation
 from bayesid.simulation.sensors import StarTracker
@@ -95,7 +95,7 @@ def fly(*, gradient: bool = True) -> Flight:
 
 def model_of(noise: Noise, *, biased: bool) -> Model:
     """Return the model: base and initial rate unknown, and where ``biased`` the accelerometer's constant error."""
-    return base_model({Kind.RATE: noise.rate, Kind.ACCEL: noise.accel}, bias=BIAS if biased else 0.0)
+    return base_model({SensorKind.RATE: noise.rate, SensorKind.ACCEL: noise.accel}, bias=BIAS if biased else 0.0)
 
 
 def levels(flown: Flight) -> dict[str, Noise]:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from bayesid import Kind, Recording
+from bayesid import Recording, SensorKind
 from studies.throws.data import INTERVAL, POLE_PAIRS, SMOOTH, WHEEL_INERTIA, Timing, read_raw
 from studies.throws.joint import Throw
 
@@ -168,8 +168,8 @@ def _residual(throw: Throw) -> tuple[Floats, Floats]:
     """Return times (n,) [s] and residual (n, 6) of the samples in physical units."""
     posterior = throw.posterior
     there = posterior.whitenings[0].outputs.all(axis=1)
-    sigma = np.concatenate([posterior.data.sigma(0, kind) * np.ones(3) for kind in (Kind.RATE, Kind.ACCEL)])
-    time, _ = posterior.data.measured(0, Kind.RATE)
+    sigma = np.concatenate([posterior.data.sigma(0, kind) * np.ones(3) for kind in (SensorKind.RATE, SensorKind.ACCEL)])
+    time, _ = posterior.data.measured(0, SensorKind.RATE)
     return time, (throw.residuals(throw.z) * throw.noise * sigma)[there]
 
 

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from bayesid import (
     BodyPrior,
     InertialParameters,
-    Kind,
     Manoeuvre,
     MeasuredMotion,
     Model,
     Recording,
     Robot,
     Sensor,
+    SensorKind,
     White,
 )
 from studies.throws.data import WHEEL_COUNT, WHEEL_INERTIA
@@ -65,7 +65,10 @@ def rigid(centre: InertialParameters, spread: float, recordings: Sequence[Record
     rate = quiet_noise(recordings, "rate")
     momentum = max(quiet_noise(recordings, "wheel_momentum")[2], WHEEL_INERTIA * RESOLUTION)
     rate[2] = np.hypot(rate[2], momentum / inertia[2, 2])
-    sensors = (Sensor(Kind.RATE, _white(rate)), Sensor(Kind.ACCEL, _white(quiet_noise(recordings, "accel"))))
+    sensors = (
+        Sensor(SensorKind.RATE, _white(rate)),
+        Sensor(SensorKind.ACCEL, _white(quiet_noise(recordings, "accel"))),
+    )
     return Model(robot, sensors, (BodyPrior("base_link", centre, spread),), effects=(ThrowBias(BIAS),), rate_sigma=RATE)
 
 

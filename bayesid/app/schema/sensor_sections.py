@@ -211,7 +211,7 @@ class TorqueSection(Section):
 
 
 class OtherSensor(Section):
-    """Section ``[sensors.other.NAME]``, a sensor of a kind that a plugin registers under that name (`Kind.register`).
+    """Section ``[sensors.other.NAME]``, a sensor of a kind that a plugin registers by `SensorKind.register`.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.noise_changes import leaving_out, with_sensors
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect_parameters import Quantity
-from bayesid.simulation.sensors import Coloured, Kind, Quantised, Scaled, Sensor
+from bayesid.simulation.sensors import Coloured, Quantised, Scaled, Sensor, SensorKind
 
 __all__ = ["SUMMARIES", "NoiseFault", "noise_fault", "refined"]
 
@@ -87,17 +87,17 @@ def noise_fault(label: str, fit: Fit, least: float = -np.inf) -> NoiseFault | No
     """
     name, _, place = label.partition(":")
     if name == "coloured-noise":
-        return _coloured(label, Kind.of(place), fit, least)
+        return _coloured(label, SensorKind.of(place), fit, least)
     if name == "outliers":
-        return _outliers(label, Kind.of(place), fit)
+        return _outliers(label, SensorKind.of(place), fit)
     if name == "quantisation":
-        return _quantisation(label, Kind.of(place), fit)
+        return _quantisation(label, SensorKind.of(place), fit)
     if name == ENCODER_NOISE:
         return _encoders(fit)
-    return _understated(label, Kind.of(name.removesuffix("-noise")), fit)
+    return _understated(label, SensorKind.of(name.removesuffix("-noise")), fit)
 
 
-def _understated(label: str, kind: Kind, fit: Fit) -> NoiseFault:
+def _understated(label: str, kind: SensorKind, fit: Fit) -> NoiseFault:
     slot = _slot(fit.posterior, kind)
     whole, taken = _shaped(fit)
     padded = _present(fit, slot)
@@ -120,7 +120,7 @@ def _encoders(fit: Fit) -> NoiseFault | None:
     return NoiseFault(ENCODER_NOISE, quantities, size, size * relative, posterior, found.log_gain(factor))
 
 
-def _coloured(label: str, kind: Kind, fit: Fit, least: float) -> NoiseFault | None:
+def _coloured(label: str, kind: SensorKind, fit: Fit, least: float) -> NoiseFault | None:
     spectra = _Spectra.of(fit, kind)
     shortest, longest = 0.2 * float(spectra.interval.min()), _longest(fit, kind)
 
@@ -175,7 +175,7 @@ class _Spectra:
     slow: NDArray[np.bool_]
 
     @staticmethod
-    def of(fit: Fit, kind: Kind) -> _Spectra:
+    def of(fit: Fit, kind: SensorKind) -> _Spectra:
         slot, data = _slot(fit.posterior, kind), fit.posterior.data
         whole, _ = _shaped(fit)
         rows: list[tuple[NDArray[Any], ...]] = []
@@ -191,7 +191,7 @@ class _Spectra:
         return _Spectra(*(np.concatenate(column) for column in zip(*rows, strict=True)))
 
 
-def _longest(fit: Fit, kind: Kind) -> float:
+def _longest(fit: Fit, kind: SensorKind) -> float:
     """Longest correlation time looked for [s]."""
     return LONGEST * max(
         float(np.ptp(fit.posterior.data.measured(r, kind)[0])) for r in range(len(fit.posterior.manoeuvres))
@@ -199,7 +199,7 @@ def _longest(fit: Fit, kind: Kind) -> float:
 
 
 def _coloured_at(
-    label: str, kind: Kind, fit: Fit, logs: Floats, relative: Floats, like: Posterior | None = None
+    label: str, kind: SensorKind, fit: Fit, logs: Floats, relative: Floats, like: Posterior | None = None
 ) -> NoiseFault:
     """Coloured noise with the logarithms of its level, in sigma, and of its correlation time."""
     level, time = np.exp(logs[0]) * fit.posterior.data.sigma(0, kind), float(np.exp(logs[1]))
@@ -217,7 +217,7 @@ def refined(fault: NoiseFault, perturbed: PerturbedModel, fit: Fit) -> NoiseFaul
     name, _, place = fault.label.partition(":")
     if name != "coloured-noise":
         return fault
-    kind = Kind.of(place)
+    kind = SensorKind.of(place)
     sigma = fit.posterior.data.sigma(0, kind)
     first = np.log([fault.mean[0] / sigma.mean(), fault.mean[1]])
     longest = np.log(_longest(fit, kind))
@@ -250,7 +250,7 @@ def _spread(points: Floats, values: Floats, otherwise: Floats) -> Floats:
     return np.sqrt(np.diag(np.linalg.inv(hessian)))
 
 
-def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault | None:
+def _outliers(label: str, kind: SensorKind, fit: Fit) -> NoiseFault | None:
     slot = _slot(fit.posterior, kind)
     whole, _ = _shaped(fit)
     masks = []
@@ -276,7 +276,7 @@ def _outliers(label: str, kind: Kind, fit: Fit) -> NoiseFault | None:
     )
 
 
-def _quantisation(label: str, kind: Kind, fit: Fit) -> NoiseFault:
+def _quantisation(label: str, kind: SensorKind, fit: Fit) -> NoiseFault:
     step = lattice(fit.posterior, kind)
     if step is None:
         raise ValueError(f"{label}: the values lie on no lattice")
@@ -284,12 +284,14 @@ def _quantisation(label: str, kind: Kind, fit: Fit) -> NoiseFault:
     return NoiseFault(label, (Quantity("step", kind.unit),), np.array([float(step.mean())]), np.zeros(1), posterior)
 
 
-def _with_sensor(fit: Fit, kind: Kind, change: Callable[[Sensor], Sensor], like: Posterior | None = None) -> Posterior:
+def _with_sensor(
+    fit: Fit, kind: SensorKind, change: Callable[[Sensor], Sensor], like: Posterior | None = None
+) -> Posterior:
     sensors = [change(sensor) if sensor.kind == kind else sensor for sensor in fit.posterior.model.sensors]
     return with_sensors(fit.posterior, sensors, fit.z, like)
 
 
-def _slot(posterior: Posterior, kind: Kind) -> slice:
+def _slot(posterior: Posterior, kind: SensorKind) -> slice:
     return posterior.model.channels.of(kind)
 
 

@@ -16,7 +16,7 @@ from bayesid.diagnosis.search.linearisation import Linearisation, linearise
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["FaultyFit", "NoiseState", "fault_names", "faulty_fit"]
 
@@ -175,11 +175,11 @@ def _log_charge(fault: NoiseFault) -> float:
     relative = np.maximum(fault.sd / np.maximum(fault.mean, np.finfo(float).tiny), 1e-6)
     charge = float(np.minimum(np.log(np.sqrt(2.0 * np.pi) * relative / width), 0.0).sum()) + fault.log_gain
     if name == "outliers":
-        charge += _contamination(fault, Kind.of(place))
+        charge += _contamination(fault, SensorKind.of(place))
     return charge
 
 
-def _contamination(fault: NoiseFault, kind: Kind) -> float:
+def _contamination(fault: NoiseFault, kind: SensorKind) -> float:
     """Return the logarithm of the probability density of the samples that count as outliers.
 
     A sample is contaminated with the probability that the fault states, and then uniform over the range of the readings

@@ -10,7 +10,7 @@ from scipy.special import gammaln
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.inference.posterior import Posterior
-from bayesid.simulation.sensors import Kind, Quantised
+from bayesid.simulation.sensors import Quantised, SensorKind
 
 __all__ = ["ON_LATTICE", "lattice", "leverage", "noise_tests", "variance_tests"]
 
@@ -71,7 +71,7 @@ def _coloured(pieces: list[Floats]) -> float:
     return float(min(0.0, best + np.log(len(CORRELATION))))
 
 
-def lattice(posterior: Posterior, kind: Kind) -> Floats | None:
+def lattice(posterior: Posterior, kind: SensorKind) -> Floats | None:
     """Step per axis of the lattice that a sensor's values lie on, (3,), or None where they lie on no coarse one."""
     if not kind.mounted:
         return None

@@ -9,7 +9,7 @@ from scipy import stats
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.response.perturbed_model import Fit
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["log_p_of_a_period", "log_p_of_an_event", "structure_tests"]
 
@@ -35,7 +35,7 @@ def structure_tests(fit: Fit) -> dict[str, float]:
     return found
 
 
-def _pieces(fit: Fit, kind: Kind) -> Iterator[tuple[Floats, Floats]]:
+def _pieces(fit: Fit, kind: SensorKind) -> Iterator[tuple[Floats, Floats]]:
     """Yield the times (n,) [s] and residuals (n, axes) of each recording, where all axes have a sample."""
     posterior = fit.posterior
     whole = fit.residual.reshape(posterior.residual_shape)

@@ -26,7 +26,7 @@ from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_key import EffectKey
 from bayesid.simulation.effects.instant import Instant, Readings
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = [
     "OperatingTrajectory",
@@ -157,7 +157,7 @@ class _Given(NamedTuple):
     point: Floats
 
 
-def _given(effect: Effect, operating: OperatingTrajectory) -> tuple[EffectKey, tuple[Kind, ...], _Given]:
+def _given(effect: Effect, operating: OperatingTrajectory) -> tuple[EffectKey, tuple[SensorKind, ...], _Given]:
     sensors = operating.posterior.model.sensors
     given = _Given(
         PriorConstants.of(effect),
@@ -178,7 +178,7 @@ def _acts(effect: Effect) -> bool:
 
 def _hooks(
     key: EffectKey,
-    kinds: tuple[Kind, ...],
+    kinds: tuple[SensorKind, ...],
     given: _Given,
     coordinates: Array,
     node: Instant,
@@ -214,7 +214,7 @@ def _hooks(
 
 def _reading(
     effect: Effect,
-    kinds: tuple[Kind, ...],
+    kinds: tuple[SensorKind, ...],
     given: _Given,
     values: Array,
     sample: Instant,
@@ -239,7 +239,7 @@ _evaluate = kept_jit(static=2)(_hooks)
 
 
 @kept_jit(static=2)
-def _differentiate(key: EffectKey, kinds: tuple[Kind, ...], *numbers: Any) -> dict[str, Array]:
+def _differentiate(key: EffectKey, kinds: tuple[SensorKind, ...], *numbers: Any) -> dict[str, Array]:
     return jax.jacfwd(partial(_hooks, key, kinds), argnums=1)(*numbers)
 
 

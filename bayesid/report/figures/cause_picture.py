@@ -14,7 +14,7 @@ from bayesid.report.figures.figure_style import BAND, COLOURS, axis_title, resid
 from bayesid.report.figures.residual_figures import SIDES, draw_history
 from bayesid.report.figures.robot_figures import VIEWS, draw_box, draw_sticks, equivalent_box, sticks_of
 from bayesid.robot.kinematics import kinematics
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["cause_picture", "moved_axis"]
 
@@ -56,10 +56,10 @@ def cause_picture(result: Diagnosis, recording: int) -> Figure:
     return figure
 
 
-def moved_axis(sides: list[Residuals], recording: int) -> tuple[Kind, int]:
+def moved_axis(sides: list[Residuals], recording: int) -> tuple[SensorKind, int]:
     """Return the sensor axis of a recording whose sum of squares decreases most, or is largest of a single side."""
 
-    def gain(kind: Kind, axis: int) -> float:
+    def gain(kind: SensorKind, axis: int) -> float:
         squares = [float(np.sum(side.series(recording, kind, axis)[1] ** 2)) for side in sides]
         return squares[0] - sum(squares[1:])
 

@@ -13,7 +13,7 @@ from matplotlib.ticker import ScalarFormatter
 from numpy.typing import ArrayLike
 
 from bayesid._math.arrays import Floats
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 __all__ = [
     "AFTER",
@@ -60,7 +60,7 @@ BAND: Any = {"color": "#e8e8e8", "linewidth": 0.0}
 LEAST_REACH = 4.5
 """Smallest half-height of a panel of residuals [σ]."""
 
-_TITLES = {Kind.RATE: "angular rate", Kind.ACCEL: "acceleration", Kind.ATTITUDE: "rotation"}
+_TITLES = {SensorKind.RATE: "angular rate", SensorKind.ACCEL: "acceleration", SensorKind.ATTITUDE: "rotation"}
 """Quantity that a sensor measures, where figures call it otherwise than files do."""
 
 _SETTINGS: Any = {
@@ -139,17 +139,17 @@ def decimal_scale(values: ArrayLike) -> tuple[float, str]:
     return 10.0**power, f"$10^{{{power}}}$ "
 
 
-def sensor_title(kind: Kind) -> str:
+def sensor_title(kind: SensorKind) -> str:
     """Return the quantity that a sensor measures, as figures call it."""
     return _TITLES.get(kind, kind.value)
 
 
-def axis_title(kind: Kind, axis: int) -> str:
+def axis_title(kind: SensorKind, axis: int) -> str:
     """Return the title of the panel of one axis of a sensor, such as ``angular rate x``."""
     return f"{sensor_title(kind)} {kind.axes[axis]}"
 
 
-def sensor_panels(figure: Figure, kinds: Sequence[Kind], sharex: bool = False) -> Any:
+def sensor_panels(figure: Figure, kinds: Sequence[SensorKind], sharex: bool = False) -> Any:
     """Return panels (sensors, axes) with a row for each sensor; those without an axis are hidden."""
     columns = max(kind.size for kind in kinds)
     panels = figure.subplots(len(kinds), columns, squeeze=False, sharex=sharex)

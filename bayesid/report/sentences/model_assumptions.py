@@ -11,7 +11,7 @@ from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.report.numbers import format_number, format_percent, format_range, format_unit, format_vector
 from bayesid.robot.inertial_parameters import PARAMETERS
 from bayesid.simulation.model import Model
-from bayesid.simulation.sensors import Filter, Kind, Sensor
+from bayesid.simulation.sensors import Filter, Sensor, SensorKind
 
 __all__ = ["model_sentences", "planning_sentences"]
 
@@ -112,7 +112,7 @@ def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:
         float(sigma) for index in range(len(posterior.manoeuvres)) for sigma in posterior.data.sigma(index, sensor.kind)
     )
     parts = [f"Sensor {sensor.kind.value}: white noise of {width} {format_unit(sensor.kind.unit)} per sample and axis"]
-    if sensor.kind is Kind.ACCEL:
+    if sensor.kind is SensorKind.ACCEL:
         parts.append(f"mounted at {format_vector(np.asarray(sensor.position, dtype=float))} m in the base frame")
     if not np.allclose(sensor.rotation, np.eye(3)):
         parts.append("turned against the base axes as declared")

@@ -12,7 +12,7 @@ from bayesid.simulation.effects.effect_parameters import Parameter
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.effects.register import register
 from bayesid.simulation.effects.sensor_faults import MISMOUNTED, SensorFault
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 if TYPE_CHECKING:
     from bayesid.simulation.model import Model
@@ -40,7 +40,7 @@ class AttitudeMisalignment(SensorFault):
     separated_by = (
         "It is the same rotation in base axes in every attitude: turn the base by large angles about each axis in turn."
     )
-    sensor = Kind.ATTITUDE
+    sensor = SensorKind.ATTITUDE
 
     def __init__(self, sigma: float = 0.03) -> None:
         self.parameters = tuple(Parameter(axis, "rad", sigma) for axis in "xyz")

@@ -16,7 +16,7 @@ from bayesid.simulation.effects.effect_parameters import Parameter
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.effects.register import register
 from bayesid.simulation.effects.sensor_faults import SensorFault
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 if TYPE_CHECKING:
     from bayesid.simulation.model import Model
@@ -79,7 +79,7 @@ class RateLatency(_Latency):
 
     name = "rate-latency"
     summary = "The rate sensor's samples are stamped late: each shows the past."
-    sensor = Kind.RATE
+    sensor = SensorKind.RATE
 
 
 @register
@@ -88,7 +88,7 @@ class AccelLatency(_Latency):
 
     name = "accel-latency"
     summary = "The accelerometer's samples are stamped late: each shows the past."
-    sensor = Kind.ACCEL
+    sensor = SensorKind.ACCEL
 
 
 @register
@@ -100,7 +100,7 @@ class RateClock(_Clock):
 
     name = "rate-clock"
     summary = "The rate sensor's clock runs fast or slow: its samples drift away from the motion of the arm."
-    sensor = Kind.RATE
+    sensor = SensorKind.RATE
 
 
 @register
@@ -112,4 +112,4 @@ class AccelClock(_Clock):
 
     name = "accel-clock"
     summary = "The accelerometer's clock runs fast or slow: its samples drift away from the motion of the arm."
-    sensor = Kind.ACCEL
+    sensor = SensorKind.ACCEL

@@ -17,7 +17,7 @@ from bayesid.simulation.effects.effect_parameters import Parameter
 from bayesid.simulation.effects.instant import Instant, Readings
 from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.register import register
-from bayesid.simulation.sensors import Kind
+from bayesid.simulation.sensors import SensorKind
 
 if TYPE_CHECKING:
     from bayesid.simulation.model import Model
@@ -55,11 +55,11 @@ class SensorFault(Effect):
 
     Attributes
     ----------
-    sensor : Kind
+    sensor : SensorKind
         Kind of the sensor that is faulty.
     """
 
-    sensor: ClassVar[Kind]
+    sensor: ClassVar[SensorKind]
 
     @classmethod
     def lacks(cls, model: Model) -> str | None:
@@ -142,7 +142,7 @@ class RateBias(_Bias):
 
     name = "rate-bias"
     summary = "The rate sensor reads a constant when the base is at rest."
-    sensor, unit, sigma = Kind.RATE, "rad/s", 5.0e-5
+    sensor, unit, sigma = SensorKind.RATE, "rad/s", 5.0e-5
     largest, reason = RATE_BIAS, "Gyroscopes of the poorest grade are wrong by 0.1 degree per second."
 
 
@@ -152,7 +152,7 @@ class AccelBias(_Bias):
 
     name = "accel-bias"
     summary = "The accelerometer reads a constant in free fall."
-    sensor, unit, sigma = Kind.ACCEL, "m/s2", 1.0e-4
+    sensor, unit, sigma = SensorKind.ACCEL, "m/s2", 1.0e-4
     largest, reason = ACCEL_BIAS, "Accelerometers of the poorest grade are wrong by 5 milli-g."
 
 
@@ -162,7 +162,7 @@ class RateDrift(_Drift):
 
     name = "rate-drift"
     summary = "The rate sensor's zero wanders steadily, as when it warms up."
-    sensor, unit, sigma = Kind.RATE, "rad/s2", 1.0e-6
+    sensor, unit, sigma = SensorKind.RATE, "rad/s2", 1.0e-6
     largest = RATE_BIAS / WARM_UP
     reason = "Gyroscopes of the poorest grade gain 0.1 degree per second within ten minutes of warming up."
 
@@ -173,7 +173,7 @@ class AccelDrift(_Drift):
 
     name = "accel-drift"
     summary = "The accelerometer's zero wanders steadily, as when it warms up."
-    sensor, unit, sigma = Kind.ACCEL, "m/s3", 2.0e-6
+    sensor, unit, sigma = SensorKind.ACCEL, "m/s3", 2.0e-6
     largest = ACCEL_BIAS / WARM_UP
     reason = "Accelerometers of the poorest grade gain 5 milli-g within ten minutes of warming up."
 
@@ -184,7 +184,7 @@ class RateScale(_Scale):
 
     name = "rate-scale"
     summary = "The rate sensor reads too much or too little in proportion to the rate."
-    sensor, sigma = Kind.RATE, 0.03
+    sensor, sigma = SensorKind.RATE, 0.03
 
 
 @register
@@ -193,7 +193,7 @@ class AccelScale(_Scale):
 
     name = "accel-scale"
     summary = "The accelerometer reads too much or too little in proportion to the acceleration."
-    sensor, sigma = Kind.ACCEL, 0.03
+    sensor, sigma = SensorKind.ACCEL, 0.03
 
 
 @register
@@ -202,7 +202,7 @@ class RateMisalignment(_Misalignment):
 
     name = "rate-misalignment"
     summary = "The rate sensor is turned against its stated mounting."
-    sensor, sigma = Kind.RATE, 0.03
+    sensor, sigma = SensorKind.RATE, 0.03
 
 
 @register
@@ -211,7 +211,7 @@ class AccelMisalignment(_Misalignment):
 
     name = "accel-misalignment"
     summary = "The accelerometer is turned against its stated mounting."
-    sensor, sigma = Kind.ACCEL, 0.03
+    sensor, sigma = SensorKind.ACCEL, 0.03
 
 
 @register
@@ -226,7 +226,7 @@ class AccelPosition(_Axes):
     separated_by = (
         "It grows with the base's rate squared and angular acceleration: turn the base faster about each axis in turn."
     )
-    sensor, unit, sigma = Kind.ACCEL, "m", 0.05
+    sensor, unit, sigma = SensorKind.ACCEL, "m", 0.05
 
     def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
         """Return the radius of the base, somewhere within which the accelerometer is."""
