@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -29,7 +31,8 @@ from bayesid.design import (
     TrajectoryFamily,
     design,
 )
-from bayesid.design.plan import PlannedOutcome, Trajectory
+from bayesid.design.flight import Flight, Outcome
+from bayesid.design.trajectory import Trajectory
 from bayesid.design.visible_directions import with_visible_directions
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import BodyPrior
@@ -140,7 +143,7 @@ def test_base_motion_of_a_flywheel_in_closed_form(flywheel: Problem) -> None:
 
 def test_base_motion_of_a_slider_in_closed_form() -> None:
     own = plan("slider")
-    trajectory = jax.jit(own.trajectory)(PARAMETERS, np.zeros(own.unknowns.size))
+    trajectory = jax.jit(lambda p: Flight(own, p, jnp.zeros(own.unknowns.size)).trajectory())(PARAMETERS)
     state = own.family.motion(PARAMETERS).evaluate(np.asarray(trajectory.time))
     share = SLIDER / (MASS + SLIDER)
     np.testing.assert_allclose(trajectory.excursion[:, 0], -share * state.position[:, 0], atol=1e-9)
@@ -148,13 +151,17 @@ def test_base_motion_of_a_slider_in_closed_form() -> None:
     np.testing.assert_allclose(trajectory.acceleration[:, 0], -share * state.acceleration[:, 0], atol=1e-9)
 
 
-def outcome(**parts: np.ndarray) -> PlannedOutcome:
+def outcome(**parts: np.ndarray) -> SimpleNamespace:
     """An outcome with given parts."""
     empty = Trajectory(*([np.zeros((1, 3))] * len(Trajectory._fields)))
     trajectory = empty._replace(excursion=jnp.asarray(parts.get("excursion", np.zeros((1, 6)))))
-    return PlannedOutcome(
-        trajectory, jnp.asarray(parts.get("information", np.zeros((1, 1)))), jnp.asarray(parts["regressor"])
-    )
+    return SimpleNamespace(trajectory=trajectory, regressor=jnp.asarray(parts["regressor"]))
+
+
+def flown(own: Plan) -> Outcome:
+    """The outcome of a plan along `PARAMETERS`, without what is not asked for."""
+    flight = Flight(own, jnp.asarray(PARAMETERS), jnp.zeros(own.unknowns.size))
+    return Outcome(flight, jax.jit(lambda p: Flight(own, p, flight.z).information())(PARAMETERS))
 
 
 def test_paper_26_as_printed_reduces_to_signed_squares() -> None:
@@ -206,7 +213,7 @@ def told_apart(own: Plan) -> np.ndarray:
 def test_separation_is_lambda_times_one_minus_rho_squared() -> None:
     own = plan(effects=(Steady(), Growing()), unknown=False)
     criterion = Separation(("steady", "growing"))
-    result = jax.jit(own.outcome)(PARAMETERS, np.zeros(own.unknowns.size))
+    result = flown(own)
     expected = told_apart(own)
     np.testing.assert_allclose(criterion.noncentrality(own, result), expected, rtol=1e-6)
     assert criterion.cost(own, result) == pytest.approx(-0.5 * np.log(expected.min()))
@@ -225,7 +232,7 @@ class Half(Steady):
 def test_separation_seeks_the_worst_direction_among_those_that_manoeuvres_show() -> None:
     own = plan(effects=(Half(), Growing()), unknown=False)
     everywhere = Separation(("half", "growing"))
-    result = jax.jit(own.outcome)(PARAMETERS, np.zeros(own.unknowns.size))
+    result = flown(own)
     assert everywhere.noncentrality(own, result)[0] == pytest.approx(0.0, abs=1e-6)
     rng = np.random.default_rng(1)
     problem = with_visible_directions(Problem(own, Limits(joint_speed=0.5), (DOptimal(), everywhere)), rng)
@@ -360,7 +367,7 @@ def test_bodies_marginalised_only_are_not_judged() -> None:
     base = BodyPrior("body", own.link("body").inertial, 0.5)
     model = Model(own, (Sensor(SensorKind.RATE, White(SIGMA)),), (base, wheel), rate_sigma=0.0)
     shared = Plan(model, BSplines([0.0], [0], 10.0, points=4), 0.5, Tip.of(own), step=0.5)
-    result = jax.jit(lambda q: DOptimal().cost(shared, shared.outcome(q, jnp.zeros(20))))(PARAMETERS)
+    result = DOptimal().cost(shared, flown(shared))
     # of the ratio of both inertias only, which is as uncertain as the wheel's
     known = 10 * np.log(0.5) - 0.5 * np.log1p(np.linalg.eigvalsh(seen(plan()))).sum()
     assert known < float(result) < 10 * np.log(0.5)

@@ -30,8 +30,8 @@ from bayesid.design import (
 )
 from bayesid.design.criteria import covariance
 from bayesid.design.excitation_loop import flown
+from bayesid.design.flight import Outcome
 from bayesid.design.knowledge_update import bodies_of_draws, known_of
-from bayesid.design.plan import PlannedOutcome
 from bayesid.design.simulated_spacecraft import plan_recording
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
@@ -68,7 +68,7 @@ class Swing:
     informed: ClassVar[bool] = False
     draws: int = 0
 
-    def cost(self, plan: Plan, outcome: PlannedOutcome) -> Array:
+    def cost(self, plan: Plan, outcome: Outcome) -> Array:
         return -jnp.mean(outcome.trajectory.excursion[:, 5] ** 2)
 
 
@@ -267,7 +267,7 @@ def test_what_is_known_takes_the_place_of_the_prior():
     draws = problem.draws(4000, rng)
     np.testing.assert_allclose(draws[:, :10].mean(axis=0), z[:, :10].mean(axis=0), atol=0.05)
     np.testing.assert_allclose(draws[:, :10].std(axis=0), z[:, :10].std(axis=0), atol=0.04)
-    nothing = PlannedOutcome(None, np.zeros((unknowns.size, unknowns.size)), None, known.precision)
+    nothing = Outcome(None, np.zeros((unknowns.size, unknowns.size)), known.precision)
     np.testing.assert_allclose(
         covariance(PROBLEM.plan, nothing), body.spread**2 * np.cov(z[:, :10].T), rtol=1e-6, atol=1e-12
     )

@@ -18,6 +18,7 @@ from bayesid._math.arrays import Floats
 from bayesid.design import DOptimal, Fourier, Limits, Problem, Search, Store, optimise
 from bayesid.design.designed import sample_times
 from bayesid.design.encoder_shadow import encoder_shadow
+from bayesid.design.flight import Flight
 from bayesid.design.go_no_go import plan_to_go
 from bayesid.design.polish import Shared, Task, fitted_to_fine_limits, polish
 from bayesid.design.predicted_posterior import planned_manoeuvre, planned_posterior, predict
@@ -57,7 +58,7 @@ def test_the_information_is_that_of_the_likelihood(planar: Problem) -> None:
     plan = replace(planar.plan, thinning=1)
     parameters = 0.3 * np.random.default_rng(1).normal(size=plan.family.size)
     time = sample_times(plan.family.duration, plan.interval)
-    information = np.asarray(jax.jit(lambda p, z: plan.outcome(p, z).information)(parameters, jnp.zeros(16)))
+    information = np.asarray(jax.jit(lambda p, z: Flight(plan, p, z).information())(parameters, jnp.zeros(16)))
     motion = plan.family.motion(parameters)
     manoeuvre = planned_manoeuvre(plan.model, motion, time, "own", {0: 1e-9}, plan.attitude)
     predicted = predict(planned_posterior(plan.model, [manoeuvre]))

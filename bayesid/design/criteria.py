@@ -18,7 +18,8 @@ from jax import Array
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.design.plan import Outcome, Plan
+from bayesid.design.flight import Outcome
+from bayesid.design.plan import Plan
 
 __all__ = [
     "AOptimal",

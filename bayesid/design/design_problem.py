@@ -21,9 +21,9 @@ from bayesid._math.arrays import Floats, Integers
 from bayesid._math.kept_jit import QUICKLY
 from bayesid.design.criteria import Criterion
 from bayesid.design.encoder_shadow import Encoder, encoder_shadow, likely_shadow, position_noise
-from bayesid.design.flight import Flight
+from bayesid.design.flight import Flight, Outcome
 from bayesid.design.motion_limits import ACTIVE, Limit, Limits, smooth_largest
-from bayesid.design.plan import FlightOutcome, Plan
+from bayesid.design.plan import Plan
 from bayesid.design.trajectory import Trajectory
 
 __all__ = ["FINER", "Known", "Problem", "Reached"]
@@ -136,7 +136,7 @@ class Problem:
     def limit_of_fraction(self) -> Integers:
         """Index of the limit to which each of `fractions` belongs."""
         shape = jax.eval_shape(
-            lambda p: self.plan.trajectory(p, jnp.asarray(self.centre))[1:], jnp.zeros(self.plan.family.size)
+            lambda p: Flight(self.plan, p, jnp.asarray(self.centre)).trajectory()[1:], jnp.zeros(self.plan.family.size)
         )
         empty = Trajectory(self.plan.instants, *(jnp.zeros(part.shape) for part in shape))
         counts = [len(smooth_largest(limit, empty, limit.bound)) for limit in self.applied]
@@ -314,7 +314,7 @@ class Problem:
         """Return the cost by one of the criteria that depend on the information, or of the others."""
 
         def branch(criterion: Criterion) -> Callable[[Array], Array]:
-            return lambda own: criterion.cost(self.plan, FlightOutcome(self.plan, flight, own, prior))
+            return lambda own: criterion.cost(self.plan, Outcome(flight, own, prior))
 
         own = [branch(criterion) for criterion in self.criteria if criterion.informed is informed]
         return jax.lax.switch(index, own, information)
@@ -339,4 +339,5 @@ class Problem:
 
     @cached_property
     def _fine_trajectory(self):  # type: ignore[no-untyped-def]
-        return jax.jit(replace(self.plan, step=self.plan.step / FINER).trajectory, compiler_options=QUICKLY)
+        fine = replace(self.plan, step=self.plan.step / FINER)
+        return jax.jit(lambda parameters, z: Flight(fine, parameters, z).trajectory(), compiler_options=QUICKLY)

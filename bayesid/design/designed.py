@@ -15,10 +15,10 @@ from bayesid._io.progress import Progress, part_of, silent
 from bayesid._math.arrays import Floats
 from bayesid.design.concurrently import Shares, each
 from bayesid.design.design_problem import Problem, Reached
-from bayesid.design.plan import Trajectory
 from bayesid.design.predicted_posterior import Encoder, Predicted, planned_manoeuvre, planned_posterior, predict
 from bayesid.design.search_store import Store
 from bayesid.design.trajectories import ParameterisedMotion
+from bayesid.design.trajectory import Trajectory
 from bayesid.design.trajectory_search import Found, Search, optimise
 from bayesid.design.visible_directions import with_visible_directions
 from bayesid.inference.posterior import Posterior

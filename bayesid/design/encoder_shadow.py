@@ -8,17 +8,14 @@ linearised along one motion, since it depends on the posture and hardly on how t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid.design.plan import Plan
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
 from bayesid.simulation.time_grid import time_tables
-
-if TYPE_CHECKING:
-    from bayesid.design.plan import Plan
 
 __all__ = ["Encoder", "encoder_shadow", "likely_shadow", "position_noise"]
 

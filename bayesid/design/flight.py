@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -17,10 +16,12 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.rotation import rotation, tilted
+from bayesid.design.plan import Plan
 from bayesid.design.trajectory import BaseAtStart, Trajectory, base_quantities, trajectory_of
 from bayesid.robot.composite_tables import ENTRIES
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import Kinematics, joint_motion, kinematics
+from bayesid.robot.regressors import balance_regressor
 from bayesid.robot.row_sensitivity import Screws, beyond, row_sensitivity, screws
 from bayesid.simulation.dynamics import Grid, Samples, Start, TimeTables, UnitSpeed
 from bayesid.simulation.effects.instant import Readings
@@ -28,10 +29,7 @@ from bayesid.simulation.simulator import Values
 from bayesid.simulation.time_grid import time_tables
 from bayesid.simulation.variation import Equations, propagate
 
-if TYPE_CHECKING:
-    from bayesid.design.plan import Plan
-
-__all__ = ["Flight"]
+__all__ = ["Flight", "Outcome"]
 
 
 @dataclass(frozen=True)
@@ -253,6 +251,44 @@ class Flight:
 
         along = jax.vmap(lambda *one: jax.jvp(residual, (plain, joined), one)[1], (2, 1), 2)
         return along(raw, changes)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Predicted outcome of a manoeuvre, of which only what a criterion asks for is computed, and so differentiated.
+
+    Parameters
+    ----------
+    flight : Flight
+        The manoeuvre.
+    information : (n, n) array
+        Fisher information of the unknowns' coordinates, without their prior.
+    prior : (n, n) array, optional
+        Precision of the unknowns' coordinates before the manoeuvre, by default the identity.
+    """
+
+    flight: Flight
+    information: Array
+    prior: Array | None = None
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Motion of the robot."""
+        return self.flight.trajectory()
+
+    @property
+    def regressor(self) -> Array:
+        """Derivative (6 T, b) of the base's balance with respect to the b coordinates of the bodies to identify [N].
+
+        Torques are divided by the radius of gyration.
+        """
+        plan, trajectory = self.flight.plan, self.trajectory
+        bodies = jnp.asarray(plan.bodies(), dtype=int)
+        per_coordinate = jax.jacfwd(lambda z: plan.unknowns.values(z).inertial)(self.flight.z)[:, bodies]
+        motion = (trajectory.rate, trajectory.rate_change, trajectory.acceleration)
+        wrench = balance_regressor(self.flight.tables, *motion)
+        wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / plan.gyration)])[:, None]
+        return (wrench @ per_coordinate).reshape(6 * len(wrench), len(bodies))
 
 
 def _joined(values: Sequence[Array]) -> Array:

@@ -1,103 +1,22 @@
-"""Planned manoeuvres: motion of the robot and information of its sensors, as functions that JAX differentiates."""
+"""Planned manoeuvres: a family of joint motions for the robot of a model, and the times at which it is simulated."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
 from bayesid._math.arrays import Floats
-from bayesid.design.flight import Flight
 from bayesid.design.trajectories import TrajectoryFamily
-from bayesid.design.trajectory import Trajectory
 from bayesid.inference.unknowns import Unknowns
 from bayesid.robot.end_effector import Tip
-from bayesid.robot.regressors import balance_regressor
 from bayesid.simulation.model import Model
 from bayesid.simulation.simulator import ModelConstants, Simulator
 
-__all__ = ["FlightOutcome", "Outcome", "Plan", "PlannedOutcome", "Trajectory"]
-
-
-class Outcome(Protocol):
-    """Interface of what the criteria evaluate, with the attributes of `PlannedOutcome`."""
-
-    @property
-    def trajectory(self) -> Trajectory: ...  # noqa: D102
-
-    @property
-    def information(self) -> Array: ...  # noqa: D102
-
-    @property
-    def regressor(self) -> Array: ...  # noqa: D102
-
-    @property
-    def prior(self) -> Array | None: ...  # noqa: D102
-
-
-class PlannedOutcome(NamedTuple):
-    """Predicted outcome of a plan.
-
-    Attributes
-    ----------
-    trajectory : Trajectory
-        Motion of the robot.
-    information : (n, n) array
-        Fisher information of the unknowns' coordinates, without their prior.
-    regressor : (6 T, b) array
-        Derivative of the base's balance with respect to the coordinates of the bodies to identify; torques are divided
-        by the radius of gyration [N].
-    prior : (n, n) array, optional
-        Precision of the unknowns' coordinates before the manoeuvre, by default the identity.
-    """
-
-    trajectory: Trajectory
-    information: Array
-    regressor: Array
-    prior: Array | None = None
-
-
-@dataclass(frozen=True)
-class FlightOutcome:
-    """Predicted outcome of which only what a criterion asks for is computed, and so differentiated.
-
-    Parameters
-    ----------
-    plan : Plan
-    flight : Flight
-        The manoeuvre.
-    information : (n, n) array
-        Fisher information of the unknowns' coordinates, without their prior.
-    prior : (n, n) array, optional
-        Precision of the unknowns' coordinates before the manoeuvre, by default the identity.
-    """
-
-    plan: Plan
-    flight: Flight
-    information: Array
-    prior: Array | None
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """Motion of the robot."""
-        return self.flight.trajectory()
-
-    @property
-    def regressor(self) -> Array:
-        """Derivative of the base's balance with respect to the coordinates of the bodies to identify [N]."""
-        own, unknowns, trajectory = self.plan, self.plan.unknowns, self.trajectory
-        bodies = jnp.asarray(own.bodies(), dtype=int)
-        per_coordinate = jax.jacfwd(lambda z: unknowns.values(z).inertial)(self.flight.z)[:, bodies]
-        motion = (trajectory.rate, trajectory.rate_change, trajectory.acceleration)
-        wrench = balance_regressor(self.flight.tables, *motion)
-        wrench = wrench * jnp.concatenate([jnp.ones(3), jnp.full(3, 1.0 / own.gyration)])[:, None]
-        return (wrench @ per_coordinate).reshape(6 * len(wrench), len(bodies))
+__all__ = ["Plan"]
 
 
 @dataclass(frozen=True)
@@ -192,22 +111,6 @@ class Plan:
     def effect(self, label: str) -> Sequence[int]:
         """Return the indices of an effect's coordinates."""
         return self.unknowns.effect_indices(label)
-
-    # ---- functions of the motion's parameters and of the unknowns, both of which JAX may trace ----
-
-    def trajectory(self, parameters: Array, z: Array) -> Trajectory:
-        """Return the motion of the robot, for parameters of the family and coordinates ``z`` of the unknowns."""
-        return Flight(self, parameters, z).trajectory()
-
-    def slopes(self, parameters: Array, z: Array) -> Array:
-        """Return derivatives of the readings, in standard deviations of a sample, shape (T, 3 sensors, n)."""
-        return Flight(self, parameters, z).reading_slopes()
-
-    def outcome(self, parameters: Array, z: Array, prior: Array | None = None) -> PlannedOutcome:
-        """Return the predicted outcome; ``prior`` is the coordinates' precision (n, n), by default the identity."""
-        flight = Flight(self, parameters, z)
-        lazy = FlightOutcome(self, flight, flight.information(), prior)
-        return PlannedOutcome(lazy.trajectory, lazy.information, lazy.regressor, prior)
 
     @property
     def gyration(self) -> float:

@@ -9,8 +9,7 @@ from jax import Array
 from bayesid._math.kept_jit import QUICKLY
 from bayesid.design.criteria import Separation
 from bayesid.design.design_problem import Problem
-from bayesid.design.flight import Flight
-from bayesid.design.plan import FlightOutcome
+from bayesid.design.flight import Flight, Outcome
 from bayesid.design.search_starts import random_start
 
 __all__ = ["with_visible_directions"]
@@ -42,7 +41,7 @@ def with_visible_directions(problem: Problem, rng: np.random.Generator) -> Probl
 
     def forms(parameters: Array, z: Array, prior: Array, shadow: Array) -> list[list[Array]]:
         flight = Flight(plan, parameters, z)
-        outcome = FlightOutcome(plan, flight, flight.information(shadow), prior)
+        outcome = Outcome(flight, flight.information(shadow), prior)
         return [item.unexplained(plan, outcome) for item in wanted]
 
     compiled = jax.jit(forms, compiler_options=QUICKLY)
