@@ -10,7 +10,7 @@ import scipy.linalg as sla
 from scipy import integrate
 
 from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
-from bayesid.diagnosis.evidence.gram import Gram
+from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram, covariance_roots
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause, scale_range
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from tests.gram_problem import LinearProblem
@@ -103,6 +103,42 @@ def test_kept_groups_keep_their_numbers():
     assert kept.score.tolist() == gram.score[[5, 0, 1]].tolist()
     assert kept.cosines("a", "c").tolist() == gram.cosines("a", "c").tolist()
     assert kept.signal_to_noise("a") == gram.signal_to_noise("a")
+
+
+def test_conditioning_on_columns_is_integrating_their_amplitudes_out():
+    """The amplitudes are observed as ``-A^-1 g`` with noise of covariance ``A^-1``, to which their prior adds."""
+    rng = np.random.default_rng(20)
+    gram = LinearProblem.random(rng, {"a": 2, "b": 3, "c": 2}).observed(rng).gram()
+    out, deviations, kept = gram.groups["b"], np.array([0.3, 2.0, 50.0]), gram.keeping(["c", "a"])
+    noise = np.linalg.inv(gram.matrix)
+    noise[np.ix_(out, out)] += np.diag(deviations**2)
+    precision = np.linalg.inv(noise)
+    order = np.concatenate([gram.groups["c"], gram.groups["a"]])
+    found = gram.conditioned(out, deviations, ["c", "a"])
+    expected = precision @ np.linalg.solve(gram.matrix, gram.score)
+    np.testing.assert_allclose(found.matrix, precision[np.ix_(order, order)], rtol=1e-9)
+    np.testing.assert_allclose(found.score, expected[order], rtol=1e-9)
+    assert {name: own.tolist() for name, own in found.groups.items()} == {
+        name: own.tolist() for name, own in kept.groups.items()
+    }
+    everything = gram.conditioned(out, deviations)
+    np.testing.assert_allclose(everything.matrix, precision, rtol=1e-9)
+    np.testing.assert_allclose(everything.score, expected, rtol=1e-9)
+
+
+def test_a_block_has_the_posterior_of_its_amplitudes():
+    rng = np.random.default_rng(21)
+    gram = LinearProblem.random(rng, {"a": 4}).observed(rng).gram()
+    deviations = np.array([1e-3, 0.5, 3.0, 1e4])
+    precision = gram.matrix + np.diag(deviations**-2)
+    block = GaussianBlock.of(gram.matrix, deviations)
+    np.testing.assert_allclose(block.covariance, np.linalg.inv(precision), rtol=1e-9)
+    np.testing.assert_allclose(block.mean(gram.score), -np.linalg.solve(precision, gram.score), rtol=1e-9)
+    scaled = np.eye(4) + deviations[:, None] * gram.matrix * deviations
+    assert block.half_log_det == pytest.approx(0.5 * np.linalg.slogdet(scaled)[1], rel=1e-12)
+    roots, half_log_det = covariance_roots(gram.matrix, np.stack([deviations, 2.0 * deviations]))
+    np.testing.assert_allclose(roots[0].T @ roots[0], block.covariance, rtol=1e-9)
+    assert half_log_det[0] == pytest.approx(block.half_log_det, rel=1e-12)
 
 
 def test_a_gram_refuses_what_is_not_finite_and_does_not_fit():

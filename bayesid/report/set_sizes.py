@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesid.diagnosis import CauseSet, Diagnosis
+from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup
-from bayesid.diagnosis.evidence.set_evidence import precision_roots
 
 __all__ = ["GroupSize", "set_sizes"]
 
@@ -58,8 +58,8 @@ def set_sizes(result: Diagnosis, item: CauseSet) -> list[GroupSize]:
         return found + rest
     forms = evidence.forms(ordered)
     columns, deviations = evidence.most_probable(ordered, forms)
-    roots, _ = precision_roots(evidence.gram.matrix[np.ix_(columns, columns)], deviations[None])
-    mean = -roots[0].T @ (roots[0] @ evidence.score_beside(ordered)[columns])
+    block = GaussianBlock.of(evidence.gram.matrix[np.ix_(columns, columns)], deviations)
+    mean = block.mean(evidence.score_beside(ordered)[columns])
     amplitude = dict(zip(columns.tolist(), mean.tolist(), strict=True))
     for name in ordered:
         cause = evidence.causes[name]

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from bayesid._math.arrays import Floats, Integers
-from bayesid.diagnosis.evidence.set_evidence import SetEvidence, precision_roots
+from bayesid.diagnosis.evidence.gram import covariance_roots
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 
 __all__ = ["AmplitudePosterior"]
 
@@ -68,7 +69,7 @@ class AmplitudePosterior:
             axis=1,
         )
         columns = np.concatenate([own.columns for own in spectra])
-        roots, _ = precision_roots(evidence.gram.matrix[np.ix_(columns, columns)], deviations)
+        roots, _ = covariance_roots(evidence.gram.matrix[np.ix_(columns, columns)], deviations)
         means = -(np.swapaxes(roots, 1, 2) @ (roots @ evidence.gram.score[columns])[..., None])[..., 0]
         amplitudes, first = {}, 0
         for (name, place), own in zip(places, spectra, strict=True):

@@ -16,12 +16,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg as sla
 from scipy.linalg.blas import dtrmm
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.threads import several_threads
 
-__all__ = ["Gram", "independent_directions"]
+__all__ = ["GaussianBlock", "Gram", "covariance_roots", "independent_directions"]
 
 LOST = 1e-10
 """Fraction of a column's length below which what the unknowns leave of it is rounding and is set to zero."""
@@ -53,6 +54,80 @@ def independent_directions(matrix: Floats) -> Floats:
     values, vectors = np.linalg.eigh(inverse[:, None] * matrix * inverse)
     kept = values > DEPENDENT * max(values.max(initial=0.0), np.finfo(float).tiny)
     return inverse[:, None] * vectors[:, kept] / np.sqrt(values[kept])
+
+
+def _scaled_factor(information: Floats, deviations: Floats) -> Floats:
+    """Return the Cholesky factor of ``1 + D A D``, whose eigenvalues are at least one, shape (..., m, m)."""
+    return np.linalg.cholesky(
+        deviations[..., :, None] * information * deviations[..., None, :] + np.eye(deviations.shape[-1])
+    )
+
+
+def covariance_roots(information: Floats, deviations: Floats) -> tuple[Floats, Floats]:
+    """Return roots of the posterior covariances of amplitudes, one for each of several priors.
+
+    Parameters
+    ----------
+    information : (m, m) array
+    deviations : (t, m) array
+        Prior standard deviations, one row for each combination of scales.
+
+    Returns
+    -------
+    roots : (t, m, m) array
+        ``L^-1 D`` in the words of `GaussianBlock`; the covariance is the transpose times the matrix itself.
+    half_log_det : (t,) array
+        Half of the logarithm of the determinant of ``1 + D A D``.
+    """
+    lower = _scaled_factor(information, deviations)
+    roots = np.linalg.solve(lower, np.eye(len(information)) * deviations[:, None, :])
+    return roots, np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
+
+
+@dataclass(frozen=True)
+class GaussianBlock:
+    """Amplitudes with a normal prior, which the data inform on, and which are integrated out.
+
+    With the information ``A`` on them, the diagonal ``D`` of their prior deviations and the Cholesky factor ``L`` of
+    ``1 + D A D``, their posterior covariance is ``D (1 + D A D)^-1 D``. Of columns that have the products ``C`` with
+    theirs they take the share ``S'S`` of the information and ``S'p`` of the score, where ``S = L^-1 D C`` and
+    ``p = L^-1 D g``: what is left is the Schur complement.
+
+    Attributes
+    ----------
+    lower : (m, m) array
+        Cholesky factor ``L``.
+    deviations : (m,) array
+    """
+
+    lower: Floats
+    deviations: Floats
+
+    @staticmethod
+    def of(information: Floats, deviations: Floats | None = None) -> GaussianBlock:
+        """Return the block of amplitudes with some information, (m, m), and prior deviations, (m,), by default one."""
+        deviations = np.ones(len(information)) if deviations is None else deviations
+        return GaussianBlock(_scaled_factor(information, deviations), deviations)
+
+    def share(self, products: Floats) -> Floats:
+        """Return ``L^-1 D C`` for products with the amplitudes' columns, such as their score, (m,) or (m, c)."""
+        scale = self.deviations if products.ndim == 1 else self.deviations[:, None]
+        return np.asarray(sla.solve_triangular(self.lower, scale * products, lower=True))
+
+    def mean(self, score: Floats) -> Floats:
+        """Return the posterior mean of the amplitudes, shape (m,), given their score, (m,)."""
+        return -self.deviations * sla.solve_triangular(self.lower, self.share(score), trans=1, lower=True)
+
+    @property
+    def covariance(self) -> Floats:
+        """Posterior covariance of the amplitudes, shape (m, m)."""
+        root = self.share(np.eye(len(self.lower)))
+        return root.T @ root
+
+    @property
+    def half_log_det(self) -> float:
+        """Half of the logarithm of the determinant of ``1 + D A D``."""
+        return float(np.log(np.diag(self.lower)).sum())
 
 
 @dataclass(frozen=True)
@@ -133,7 +208,7 @@ class Gram:
     def keeping(self, names: Iterable[str]) -> Gram:
         """Return the Gram of some of the groups, in the order of the names."""
         chosen = {name: self.groups[name] for name in names}
-        kept = np.concatenate([np.zeros(0, dtype=int), *chosen.values()])
+        kept = self._columns(chosen)
         groups, first = {}, 0
         for name, own in chosen.items():
             groups[name] = np.arange(first, first + len(own))
@@ -142,6 +217,31 @@ class Gram:
         for own in (matrix, score):
             own.setflags(write=False)  # finite like those that they are of
         return Gram(matrix, score, groups)
+
+    def conditioned(self, columns: Integers, deviations: Floats, names: Iterable[str] | None = None) -> Gram:
+        """Return the Gram of some groups after other columns have taken their share (`GaussianBlock`).
+
+        Parameters
+        ----------
+        columns : (k,) array of int
+            Columns that are integrated out.
+        deviations : (k,) array
+            Prior standard deviations of their amplitudes.
+        names : iterable of str, optional
+            Groups that are kept; by default all.
+        """
+        part = self if names is None else self.keeping(names)
+        kept = np.arange(len(self.score)) if names is None else self._columns(part.groups)
+        block = GaussianBlock.of(self.matrix[np.ix_(columns, columns)], deviations)
+        share, pull = block.share(self.matrix[np.ix_(columns, kept)]), block.share(self.score[columns])
+        matrix, score = part.matrix - share.T @ share, part.score - share.T @ pull
+        for own in (matrix, score):
+            own.setflags(write=False)  # finite, since the block is positive definite
+        return Gram(matrix, score, part.groups)
+
+    def _columns(self, names: Iterable[str]) -> Integers:
+        """Return the columns of some groups, one group after another."""
+        return np.concatenate([np.zeros(0, dtype=int), *(self.groups[name] for name in names)])
 
     def cosines(self, first: str, second: str) -> Floats:
         """Return the canonical correlations of two groups after projection, shape (k,), the largest first.

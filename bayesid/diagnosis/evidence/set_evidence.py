@@ -8,12 +8,11 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-import scipy.linalg as sla
 from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.log_sum import log_sum, log_sums
-from bayesid.diagnosis.evidence.gram import Gram
+from bayesid.diagnosis.evidence.gram import Gram, covariance_roots
 from bayesid.diagnosis.evidence.scale_integral import (
     MOST_NODES,
     GroupSpectrum,
@@ -24,7 +23,7 @@ from bayesid.diagnosis.evidence.scale_integral import (
 from bayesid.diagnosis.evidence.scale_nodes import LogNodes, thinning
 from bayesid.diagnosis.evidence.scale_prior import CandidateCause
 
-__all__ = ["SetEvidence", "near_best", "precision_roots"]
+__all__ = ["SetEvidence", "near_best"]
 
 FEW_COMBINATIONS = 8
 """Combinations of the forms of a set up to which all are integrated."""
@@ -40,32 +39,6 @@ _Spectra = tuple[tuple[GroupSpectrum, ...], ...]
 
 BLOCK = 4_000_000
 """Most numbers in one intermediate array where many scores are evaluated at once."""
-
-
-def precision_roots(matrix: Floats, deviations: Floats) -> tuple[Floats, Floats]:
-    """Return roots of the posterior covariance of amplitudes with known prior deviations.
-
-    With ``D`` the diagonal of the deviations, ``1 + D A D`` has eigenvalues of at least one whatever ``A`` is, and a
-    Cholesky factor ``L``; the posterior covariance is ``D (1 + D A D)^-1 D``.
-
-    Parameters
-    ----------
-    matrix : (m, m) array
-        Information ``A``.
-    deviations : (t, m) array
-        Prior standard deviations, one row for each combination of scales.
-
-    Returns
-    -------
-    roots : (t, m, m) array
-        ``L^-1 D``, of which the covariance is the transpose times the matrix itself.
-    half_log_det : (t,) array
-        Half of the logarithm of the determinant of ``1 + D A D``.
-    """
-    scaled = deviations[:, :, None] * matrix * deviations[:, None, :] + np.eye(len(matrix))
-    lower = np.linalg.cholesky(scaled)
-    roots = np.linalg.solve(lower, np.eye(len(matrix)) * deviations[:, None, :])
-    return roots, np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(axis=1)
 
 
 def near_best(values: Mapping[int, float]) -> list[int]:
@@ -301,20 +274,10 @@ class SetEvidence:
             Names of the groups in the Gram.
         """
         names = list(names)
-        part = self.gram.keeping(sorted(groups))
         if not names:
-            return part
-        kept = np.concatenate([np.zeros(0, dtype=int), *(self.gram.groups[name] for name in part.groups)])
-        score = self.score_beside(names)
-        held, deviations = self.most_probable(names, forms)
-        information = deviations[:, None] * self.gram.matrix[np.ix_(held, held)] * deviations + np.eye(len(held))
-        lower = np.linalg.cholesky(information)
-        shared = sla.solve_triangular(lower, deviations[:, None] * self.gram.matrix[np.ix_(held, kept)], lower=True)
-        pull = sla.solve_triangular(lower, deviations * score[held], lower=True)
-        matrix, left = part.matrix - shared.T @ shared, score[kept] - shared.T @ pull
-        for own in (matrix, left):
-            own.setflags(write=False)  # finite, since the set's information is positive definite
-        return Gram(matrix, left, part.groups)
+            return self.gram.keeping(sorted(groups))
+        gram = replace(self.gram, score=self.score_beside(names))
+        return gram.conditioned(*self.most_probable(names, forms), sorted(groups))
 
     def _log_weight(self, ordered: Sequence[str], forms: Sequence[int]) -> float:
         """Return the logarithm of the prior probability of a combination of forms."""
@@ -455,7 +418,7 @@ class SetEvidence:
         deviations = np.concatenate(
             [nodes.scales[:, place, None] * own.root for place, own in enumerate(spectra)], axis=1
         )
-        roots, half_log_det = precision_roots(self.gram.matrix[np.ix_(columns, columns)], deviations)
+        roots, half_log_det = covariance_roots(self.gram.matrix[np.ix_(columns, columns)], deviations)
         covariance = np.swapaxes(roots, 1, 2) @ roots
         upper = np.triu_indices(len(columns))
         weights = 0.5 * covariance[:, upper[0], upper[1]] * np.where(upper[0] == upper[1], 1.0, 2.0)

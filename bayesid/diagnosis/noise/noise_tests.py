@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.linalg as sla
 from scipy import stats
 from scipy.special import gammaln
 
@@ -96,9 +95,7 @@ def lattice(posterior: Posterior, kind: SensorKind) -> Floats | None:
 
 def leverage(fit: Fit) -> Floats:
     """Share of each scalar's variance that the fit has taken, (N,)."""
-    factor, lower = fit.hessian
-    half = sla.solve_triangular(factor, fit.known.T, trans=0 if lower else 1, lower=lower)
-    return (half**2).sum(axis=0)
+    return (fit.block.share(fit.known.T) ** 2).sum(axis=0)
 
 
 def variance_tests(posterior: Posterior, fit: Fit) -> dict[str, float]:

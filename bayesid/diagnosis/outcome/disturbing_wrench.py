@@ -8,15 +8,14 @@ from enum import Enum
 from pathlib import Path
 
 import numpy as np
-import scipy.linalg as sla
 
 from bayesid._io.files import write_text
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.candidates.generic_signatures import FORCE, TORQUE, WAVES
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank
-from bayesid.diagnosis.evidence.gram import Gram
+from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
 from bayesid.diagnosis.evidence.scale_prior import CandidateCause
-from bayesid.diagnosis.evidence.set_evidence import SetEvidence, precision_roots
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidates, Held
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 
@@ -107,14 +106,14 @@ def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: 
     gram = Gram(fit.project(columns), columns.T @ fit.residual, dict(zip(names, places, strict=True)))
     disturbance = _composed(hypothesis, gram, columns, [c for c in bank.causes if c.name in names], name_frame)
     held = disturbance.held
-    (root,), _ = precision_roots(disturbance.matrix, disturbance.deviations[None])
-    along = root @ disturbance.score
+    block = GaussianBlock.of(disturbance.matrix, disturbance.deviations)
+    pull, posterior = block.share(disturbance.score), block.covariance
     smooth, size = 2 * 3 * WAVES * count, len(disturbance.deviations)
     where = np.concatenate([held, smooth + np.arange(size - len(held))])
     amplitude, covariance = np.zeros(smooth + size - len(held)), np.zeros((smooth + size - len(held),) * 2)
-    amplitude[where], covariance[np.ix_(where, where)] = -root.T @ along, root.T @ root
-    freedom = float(np.einsum("ij,ji->", root.T @ root, disturbance.matrix))
-    snr = float(np.sqrt(max(float(along @ along) - freedom, 0.0)))
+    amplitude[where], covariance[np.ix_(where, where)] = block.mean(disturbance.score), posterior
+    freedom = float(np.einsum("ij,ji->", posterior, disturbance.matrix))
+    snr = float(np.sqrt(max(float(pull @ pull) - freedom, 0.0)))
     scale = float(disturbance.deviations[: len(held)][held < 3 * WAVES * count].max())  # of the torque's cosines
 
     time, torque, force, torque_sd, force_sd = [], [], [], [], []
@@ -237,10 +236,8 @@ def _composed(
         return best
     finer = EventCandidates.of(hypothesis, columns, largest, candidates.nearby(best.chosen))
     known = slice(0, len(best.held))
-    deviations = best.deviations[known]
-    lower, pull = _share(best.matrix[known, known], deviations, best.score[known])
-    shared = deviations[:, None] * finer.shared[:, best.held].T
-    beside = Held(sla.solve_triangular(lower, shared, lower=True), pull)
+    block = GaussianBlock.of(best.matrix[known, known], best.deviations[known])
+    beside = Held(block.share(finer.shared[:, best.held].T), block.share(best.score[known]))
     return replace(best, averaged=finer.averaged(beside, finer.like(candidates, best.chosen)))
 
 
@@ -249,27 +246,20 @@ def _with_events(
 ) -> list[_Composed]:
     """Return events beside a smooth disturbance, and a smooth disturbance beside events."""
     options = []
-    lower, pull = _share(smooth.matrix, smooth.deviations, smooth.score)
-    shared = smooth.deviations[:, None] * candidates.shared[:, smooth.held].T
-    beside = candidates.chosen(Held(sla.solve_triangular(lower, shared, lower=True), pull))
+    block = GaussianBlock.of(smooth.matrix, smooth.deviations)
+    beside = candidates.chosen(Held(block.share(candidates.shared[:, smooth.held].T), block.share(smooth.score)))
     if beside.places:
         total = smooth.log_evidence + beside.log_evidence
         options.append(_joined(gram, smooth.held, smooth.deviations, candidates, beside, total))
     alone = candidates.chosen(Held.nothing(len(candidates.score)))
     if alone.places:
         own = alone.columns
-        lower, pull = _share(candidates.matrix[np.ix_(own, own)], alone.deviations, candidates.score[own])
-        taken = sla.solve_triangular(lower, alone.deviations[:, None] * candidates.shared[own], lower=True)
+        block = GaussianBlock.of(candidates.matrix[np.ix_(own, own)], alone.deviations)
+        taken, pull = block.share(candidates.shared[own]), block.share(candidates.score[own])
         left = Gram(gram.matrix - taken.T @ taken, gram.score - taken.T @ pull, gram.groups)
         held, deviations, more = _most_probable(left, causes)
         options.append(_joined(gram, held, deviations, candidates, alone, alone.log_evidence + more))
     return options
-
-
-def _share(matrix: Floats, deviations: Floats, score: Floats) -> tuple[Floats, Floats]:
-    """Return the root of the information on scaled amplitudes with their prior, and its solution for the score."""
-    lower = np.linalg.cholesky(deviations[:, None] * matrix * deviations + np.eye(len(score)))
-    return lower, sla.solve_triangular(lower, deviations * score, lower=True)
 
 
 def _joined(
@@ -304,11 +294,7 @@ def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Intege
         total += own.log_evidence([cause.name])
         where, sigma = own.most_probable([cause.name], forms)
         held, deviations = np.concatenate([held, gram.groups[name][where]]), np.concatenate([deviations, sigma])
-        information = deviations[:, None] * gram.matrix[np.ix_(held, held)] * deviations + np.eye(len(held))
-        lower = np.linalg.cholesky(information)
-        shared = sla.solve_triangular(lower, deviations[:, None] * gram.matrix[held], lower=True)
-        pull = sla.solve_triangular(lower, deviations * gram.score[held], lower=True)
-        left = Gram(gram.matrix - shared.T @ shared, gram.score - shared.T @ pull, gram.groups)
+        left = gram.conditioned(held, deviations)
     return held, deviations, total
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.inference.noise_changes import leaving_out
@@ -95,7 +96,7 @@ def _held_out(hypothesis: Hypothesis, executor: Executor | None) -> Floats:
     numbers = range(len(fit.posterior.manoeuvres))
     each = map if executor is None else executor.map
     rest = np.array(list(each(_bare_without, [hypothesis] * len(numbers), numbers)))
-    return _bare_fit(fit.cost, fit.hessian[0]) - rest + fit.posterior.log_normalisation
+    return _bare(fit) - rest + fit.posterior.log_normalisation
 
 
 def _bare_without(hypothesis: Hypothesis, number: int) -> float:
@@ -104,12 +105,11 @@ def _bare_without(hypothesis: Hypothesis, number: int) -> float:
     outputs = [item.outputs for item in fit.posterior.whitenings]
     masks = [own if i == number else np.zeros_like(own) for i, own in enumerate(outputs)]
     without = hypothesis.perturbed.with_posterior(leaving_out(fit.posterior, masks))
-    rest = without.fit(fit.effects, fit.coordinates, z=fit.z, operating=fit.operating)
-    return _bare_fit(rest.cost, rest.hessian[0])
+    return _bare(without.fit(fit.effects, fit.coordinates, z=fit.z, operating=fit.operating))
 
 
-def _bare_fit(cost: float, factor: Floats) -> float:
-    return -cost - float(np.log(np.diag(factor)).sum())
+def _bare(fit: Fit) -> float:
+    return -fit.cost - fit.block.half_log_det
 
 
 def body_figures(hypothesis: Hypothesis) -> BodyFigures:

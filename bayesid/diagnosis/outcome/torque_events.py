@@ -15,6 +15,7 @@ import scipy.linalg as sla
 from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats, Integers
+from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 
 __all__ = ["ChosenEvents", "EventCandidates", "Held"]
@@ -159,13 +160,13 @@ class EventCandidates:
         known, residual = (x.reshape(recordings, blocks.shape[1], -1) for x in (fit.known, fit.residual))
         apart = smooth.reshape(recordings, blocks.shape[1], -1)
         cross = np.concatenate([known[r].T @ blocks[r] for r in range(recordings)], axis=1)
-        taken = sla.cho_solve(fit.hessian, cross).T
+        taken, of_smooth = fit.block.share(cross), fit.block.share(fit.known.T @ smooth)
         return EventCandidates(
             np.repeat(np.arange(recordings), count),
             shapes,
             tuple(own for time, end in zip(times[0], ends, strict=True) for own in _courses(time, end, 0.0, shapes)),
-            sla.block_diag(*(block.T @ block for block in blocks)) - taken @ cross,
-            np.concatenate([blocks[r].T @ apart[r] for r in range(recordings)]) - taken @ (fit.known.T @ smooth),
+            sla.block_diag(*(block.T @ block for block in blocks)) - taken.T @ taken,
+            np.concatenate([blocks[r].T @ apart[r] for r in range(recordings)]) - taken.T @ of_smooth,
             np.concatenate([(blocks[r].T @ residual[r]).ravel() for r in range(recordings)]),
             largest,
             recordings * len(GRID) * (1 if finer is None else 2 * FINER * FINER),
@@ -268,8 +269,8 @@ class EventCandidates:
         own = slice(3 * place, 3 * place + 3)
         rest = self.matrix[own] - held.share[:, own].T @ held.share
         score = self.score[own] - held.share[:, own].T @ held.pull
-        lower = np.linalg.cholesky(rest[:, own] + np.eye(3) / deviation**2)
-        more = sla.solve_triangular(lower, np.column_stack([rest, score]), lower=True)
+        block = GaussianBlock.of(rest[:, own], np.full(3, deviation))
+        more = block.share(np.column_stack([rest, score]))
         return Held(np.concatenate([held.share, more[:, :-1]]), np.concatenate([held.pull, more[:, -1]]))
 
 

@@ -22,6 +22,7 @@ from bayesid.diagnosis.candidates.signature_products import SignatureProducts
 from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
 from bayesid.diagnosis.evidence.cause_prior import CausePrior
 from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
+from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.evidence.probable_verdict import UNKNOWN, ProbableVerdict, probable_verdict
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_enumeration import enumerate_sets
@@ -160,9 +161,9 @@ class _TorqueFit:
     def chi2_per_sample(self, change: Floats | float = 0.0) -> float:
         """Return chi-square per sample of the torques after a change of the residual, the unknowns fitted anew."""
         residual = self.residual + change
-        pull = self.own.T @ residual + self.own_coordinates
-        step = np.linalg.solve(self.own.T @ self.own + np.eye(len(pull)), pull)
-        left = (residual - self.own @ step).reshape(self.posterior.residual_shape)
+        unknowns = GaussianBlock.of(self.own.T @ self.own)
+        step = unknowns.mean(self.own.T @ residual + self.own_coordinates)
+        left = (residual + self.own @ step).reshape(self.posterior.residual_shape)
         torques = self.posterior.model.channels.torques
         samples = sum(int(item.outputs[:, torques].sum()) for item in self.posterior.whitenings)
         return float((left[..., torques] ** 2).sum()) / samples

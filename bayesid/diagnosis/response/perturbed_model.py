@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.threads import in_threads
+from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.response.effect_functions import physical
 from bayesid.diagnosis.response.perturbation import (
     OperatingTrajectory,
@@ -114,25 +115,24 @@ class Fit:
         return np.concatenate([self.own, *self.added], axis=1)
 
     @cached_property
-    def hessian(self) -> tuple[Floats, bool]:
-        """Cholesky factor of the Gauss-Newton Hessian of all that is fitted."""
-        return sla.cho_factor(self.known.T @ self.known + np.eye(self.known.shape[1]))
+    def block(self) -> GaussianBlock:
+        """All that is fitted, with the Gauss-Newton Hessian."""
+        return GaussianBlock.of(self.known.T @ self.known)
 
     @property
     def covariance(self) -> Floats:
         """Of all that is fitted, in the order of `known`."""
-        return sla.cho_solve(self.hessian, np.eye(self.known.shape[1]))
+        return self.block.covariance
 
     @cached_property
     def log_evidence(self) -> float:
         """Laplace approximation of the log evidence under the priors of the unknowns and of the effects fitted."""
-        half_log_det = float(np.log(np.diag(self.hessian[0])).sum())
-        return -self.cost - half_log_det + float(self.posterior.log_normalisation.sum())
+        return -self.cost - self.block.half_log_det + float(self.posterior.log_normalisation.sum())
 
     def project(self, columns: Floats) -> Floats:
         """Inner products of columns after all that is fitted has taken its share, shape (n, n)."""
-        cross = self.known.T @ columns
-        return columns.T @ columns - cross.T @ sla.cho_solve(self.hessian, cross)
+        share = self.block.share(self.known.T @ columns)
+        return columns.T @ columns - share.T @ share
 
     def values(self, index: int) -> Floats:
         """Physical values of one effect's parameters."""

@@ -11,7 +11,7 @@ import numpy as np
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.candidates.catalogue_signatures import group_names
 from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
-from bayesid.diagnosis.evidence.set_evidence import precision_roots
+from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.linearisation import Linearisation
 from bayesid.simulation.effects.effect import Effect
@@ -85,8 +85,7 @@ def predicted_cost(point: Linearisation) -> float:
     """Return half of chi-square and squared unknowns of the present model at its mode, by the linear model."""
     own = point.fit.own
     constant = float(point.fit.posterior.log_normalisation.sum())
-    half_log_det = 0.5 * float(np.linalg.slogdet(own.T @ own + np.eye(own.shape[1]))[1])
-    return constant - half_log_det - point.log_nothing
+    return constant - GaussianBlock.of(own.T @ own).half_log_det - point.log_nothing
 
 
 def _places(linear: Effect, effect: Effect, groups: Mapping[str, Integers]) -> list[int]:
@@ -109,6 +108,6 @@ def _mode(point: Linearisation, names: Sequence[str], held: Integers, deviations
             gain -= float(evidence.gram.score[own].sum() + 0.5 * evidence.gram.matrix[np.ix_(own, own)].sum())
     if not len(held):
         return np.zeros(0), gain
-    roots, _ = precision_roots(evidence.gram.matrix[np.ix_(held, held)], deviations[None])
-    along = roots[0] @ score[held]
-    return -roots[0].T @ along, gain + 0.5 * float(along @ along)
+    block = GaussianBlock.of(evidence.gram.matrix[np.ix_(held, held)], deviations)
+    pull = block.share(score[held])
+    return block.mean(score[held]), gain + 0.5 * float(pull @ pull)

@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg as sla
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.evidence.gram import Gram
+from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
 from bayesid.diagnosis.search.linearisation import Linearisation, amplitudes_at
 
 __all__ = ["LeftBeside"]
@@ -65,10 +64,10 @@ class LeftBeside:
             residual[own] += item.columns @ shift[where]
             scaled[own, place[where][chosen]] = item.columns[:, chosen] * scale[where][chosen]
         whole = np.concatenate([fit.own, scaled], axis=1)
-        lower = np.linalg.cholesky(whole.T @ whole + np.eye(whole.shape[1]))
-        basis = sla.solve_triangular(lower, whole.T, lower=True).T
+        block = GaussianBlock.of(whole.T @ whole)
+        basis = block.share(whole.T).T
         pull = np.concatenate([fit.own_coordinates, np.zeros(len(held))])
-        moved = basis.T @ residual + sla.solve_triangular(lower, pull, lower=True)
+        moved = basis.T @ residual + block.share(pull)
         return LeftBeside(residual - basis @ moved, basis)
 
     def gram(self, columns: Floats, name: str) -> Gram:

@@ -17,7 +17,7 @@ from bayesid.diagnosis.candidates.mass_shift_signatures import mass_shift_signat
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank
 from bayesid.diagnosis.candidates.signature_products import SignatureProducts
 from bayesid.diagnosis.candidates.vibration_signatures import vibration_signatures
-from bayesid.diagnosis.evidence.gram import Gram
+from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.response.present_fit import with_bodies_held
@@ -127,12 +127,11 @@ def _assembled(
     products = SignatureProducts.of(bank.signatures, fit, products)
     gram = products.gram()
     amplitudes = amplitudes_at(fit, gram)
-    own = fit.own
-    pull = np.linalg.cholesky(own.T @ own + np.eye(own.shape[1]))
-    moved = np.linalg.solve(pull, own.T @ fit.residual + fit.own_coordinates)
+    unknowns = GaussianBlock.of(fit.own.T @ fit.own)
+    moved = unknowns.share(fit.own.T @ fit.residual + fit.own_coordinates)
     z = fit.own_coordinates
     cost = 0.5 * float(fit.residual @ fit.residual + z @ z - moved @ moved)
-    constant = float(fit.posterior.log_normalisation.sum() - np.log(np.diag(pull)).sum())
+    constant = float(fit.posterior.log_normalisation.sum()) - unknowns.half_log_det
     taken = gram.matrix @ amplitudes
     log_nothing = constant - cost + float(gram.score @ amplitudes - 0.5 * amplitudes @ taken)
     gram = replace(gram, score=gram.score - taken)
