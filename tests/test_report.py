@@ -16,7 +16,7 @@ from bayesid._io.words import abridged, counted, joined, ordinal
 from bayesid.inference import identify
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.residual_series import Residuals
+from bayesid.inference.residual_view import ResidualView
 from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.joint_motion import Excitation, sample_joints
 from bayesid.recording.recording import Recording
@@ -274,14 +274,14 @@ def test_readings_are_drawn_with_their_residuals_beneath(attitude_posterior):
     assert [axes.get_xlabel() for axes in panels[-1]] == ["time [s]"] * 3
 
 
-def made_up_residuals(posterior: Posterior, make) -> Residuals:
+def made_up_residuals(posterior: Posterior, make) -> ResidualView:
     """Residuals that a function of the sample times gives on every axis."""
     values = np.zeros(posterior.residual_shape)
     item, grid = posterior.whitenings[0], posterior.data.times(0)
     for channel in range(item.outputs.shape[1]):
         present = np.flatnonzero(item.outputs[:, channel])
         values[0, present, channel] = make(grid[item.rows[present]])
-    return Residuals(posterior, values)
+    return ResidualView(posterior, values)
 
 
 def test_the_spectrum_of_noise_is_flat_and_that_of_a_wave_has_a_peak(attitude_posterior):
@@ -301,7 +301,7 @@ def test_the_spectrum_of_noise_is_flat_and_that_of_a_wave_has_a_peak(attitude_po
 
 
 def test_spectra_and_distributions_are_drawn_for_every_sensor(attitude_posterior):
-    residuals = Residuals.at(attitude_posterior, np.zeros(attitude_posterior.size))
+    residuals = ResidualView.at(attitude_posterior, np.zeros(attitude_posterior.size))
     panels = np.reshape(figures.residual_statistics(residuals).axes, (3, 2))
     for kind, (left, right) in zip(residuals.kinds, panels, strict=True):
         for axis in range(3):

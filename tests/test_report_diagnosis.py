@@ -29,7 +29,7 @@ from bayesid.diagnosis import (
 from bayesid.diagnosis.evidence.cause_prior import CausePrior
 from bayesid.diagnosis.outcome.cause_amplitudes import CauseAmplitude, amplitudes_of
 from bayesid.diagnosis.outcome.wrench_correlations import torque_correlations
-from bayesid.inference.residual_series import Residuals
+from bayesid.inference.residual_view import ResidualView
 from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.recording import Recording
 from bayesid.report import diagnosis_report, figures
@@ -145,9 +145,8 @@ def candidate(**changes) -> Candidate:
     return Candidate(**{**fields, **changes})
 
 
-def residuals_of(hypothesis: Hypothesis) -> Residuals:
-    posterior = hypothesis.fit.posterior
-    return Residuals(posterior, hypothesis.fit.residual.reshape(posterior.residual_shape))
+def residuals_of(hypothesis: Hypothesis) -> ResidualView:
+    return hypothesis.fit.view
 
 
 def test_sentences_name_the_cause_its_probability_its_size_and_what_it_gains(biased):
@@ -422,7 +421,7 @@ def test_residuals_are_those_of_the_fit(biased):
             time, value = side.series(0, kind, axis)
             assert len(time) == len(value) > 70
             assert np.diff(time).min() > 0.0
-    again = Residuals.at(biased.before.fit.posterior, biased.before.fit.z)
+    again = ResidualView.at(biased.before.fit.posterior, biased.before.fit.z)
     np.testing.assert_allclose(again.values, side.values, atol=1e-6)
 
 

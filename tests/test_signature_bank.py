@@ -157,7 +157,7 @@ def test_products_of_signatures_that_join_others_are_those_of_all_together():
     """Signatures of all recordings and of one, of which some are known; those that are left out are forgotten."""
     rng, rows = np.random.default_rng(4), 30
     fit = SimpleNamespace(
-        posterior=SimpleNamespace(manoeuvres=[0, 1, 2]),
+        posterior=SimpleNamespace(manoeuvres=[0, 1, 2], residual_shape=(3, rows, 1)),
         residual=rng.normal(size=3 * rows),
         own=rng.normal(size=(3 * rows, 4)),
         own_coordinates=rng.normal(size=4),

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesid.inference.identification import Identification
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.residual_series import Residuals
+from bayesid.inference.residual_view import ResidualView
 from bayesid.inference.sensor_fit import sensor_fits, torque_fits
 from bayesid.report import figures
 from bayesid.report.document import Document
@@ -135,7 +135,7 @@ def _add_fit(document: Document, result: Identification) -> None:
         )
     _add_torques(document, result)
     document.figure(
-        figures.residual_statistics(Residuals.at(posterior, z)),
+        figures.residual_statistics(ResidualView.at(posterior, z)),
         "Residuals of all recordings. Left: mean power by frequency, one for noise alone. Right: distribution, with "
         "the standard normal one.",
     )

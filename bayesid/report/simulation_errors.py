@@ -9,6 +9,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Diagnosis
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.residual_view import by_recording
 from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["SimulationError", "simulation_errors", "strongest_recording"]
@@ -65,8 +66,7 @@ def strongest_recording(result: Diagnosis) -> int:
 
 def _chi2(residual: Floats, result: Diagnosis) -> Floats:
     """Chi-square of each recording, shape (R,)."""
-    whole = residual.reshape(len(result.before.fit.posterior.manoeuvres), -1)
-    return np.asarray((whole**2).sum(axis=1))
+    return np.asarray((by_recording(result.before.fit.posterior, residual) ** 2).sum(axis=1))
 
 
 def _sigma(posterior: Posterior, kind: SensorKind) -> Floats:

@@ -8,6 +8,7 @@ from bayesid._math.arrays import Integers
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
+from bayesid.inference.residual_view import ResidualView
 
 __all__ = ["burst_signatures"]
 
@@ -29,16 +30,16 @@ def burst_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
     evidence is a lower bound. The choice depends on the residual: these candidates are no part of the alarm.
     """
     posterior = perturbed.posterior
-    whole = fit.residual.reshape(posterior.residual_shape)
+    view = ResidualView.of(posterior, fit.residual)
     banks = []
     for kind in posterior.model.channels.kinds:
         columns = posterior.model.channels.of(kind)
         places: list[tuple[float, int, Integers]] = []
-        for r, item in enumerate(posterior.whitenings):
-            there = np.flatnonzero(item.outputs[:, columns].any(axis=1))
+        for r in range(view.recordings):
+            there = np.flatnonzero(view.mask[r, :, columns].any(axis=1))
             if len(there) < LENGTH:  # a burst needs as many samples as it lasts
                 continue
-            energy = (whole[r, there, columns] ** 2).sum(axis=1)
+            energy = (view.values[r, there, columns] ** 2).sum(axis=1)
             sums = np.convolve(energy, np.ones(LENGTH), "valid")
             places += [(float(value), r, there[k : k + LENGTH]) for k, value in enumerate(sums)]
         if not places:
@@ -50,7 +51,7 @@ def burst_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
             mask = np.zeros((*posterior.residual_shape[1:], len(rows), columns.stop - columns.start))
             for k, row in enumerate(rows):
                 for c in range(columns.start, columns.stop):
-                    mask[row, c, k, c - columns.start] = float(posterior.whitenings[r].outputs[row, c])
+                    mask[row, c, k, c - columns.start] = float(view.mask[r, row, c])
             signatures.append(Signatures(f"{name}, place {number + 1}", mask.reshape(len(mask) * mask.shape[1], -1), r))
         forms = [(AmplitudeGroup(item.name, LARGEST),) for item in signatures]
         shares = (1.0 / len(places),) * len(forms)

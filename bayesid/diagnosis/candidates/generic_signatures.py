@@ -11,6 +11,7 @@ from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signature
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.residual_view import by_recording
 from bayesid.robot.robot_size import RobotSize
 
 __all__ = ["FORCE", "TORQUE", "WAVES", "error_signatures", "generic_signatures"]
@@ -139,8 +140,7 @@ def _wrenches(
             wrench[..., 3:] = np.cross(np.asarray(instant.body.com), wrench[..., :3])
         wrenches.append(wrench.reshape(3 * count, *time.shape, 6))
     push = perturbed.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-    found = perturbed.respond(push, fit.z, fit.data)
-    return list(found.reshape(len(times[0]), -1, 3 * count))
+    return list(by_recording(fit.posterior, perturbed.respond(push, fit.z, fit.data)))
 
 
 def error_signatures(posterior: Posterior, name: str, channels: slice) -> SignatureBank:

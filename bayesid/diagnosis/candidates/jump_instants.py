@@ -10,6 +10,7 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.mass_shift_signatures import jump_signatures, sample_intervals
 from bayesid.diagnosis.outcome.cause_amplitudes import CauseAmplitude
 from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.inference.residual_view import rows_of
 from bayesid.simulation.effects.effect import Quantity
 from bayesid.simulation.effects.mass_shift import MassShift
 
@@ -71,11 +72,10 @@ def _weights(hypothesis: Hypothesis, moments: Floats, tried: Floats, recordings:
     """Return the likelihood of each instant of some recordings relative to the best, shapes (K,)."""
     fit = hypothesis.fit
     responses = jump_signatures(hypothesis.perturbed, fit, tried) @ moments  # (R, K, rows)
-    rows = responses.shape[-1]
     weights = []
     for r in recordings:
         change = np.zeros((len(fit.residual), tried.shape[1]))
-        change[r * rows : (r + 1) * rows] = (responses[r] - responses[r, POINTS]).T
+        change[rows_of(fit.posterior, r)] = (responses[r] - responses[r, POINTS]).T
         cost = fit.residual @ change + 0.5 * np.diag(fit.project(change))
         weights.append(np.exp(cost.min() - cost))
     return weights

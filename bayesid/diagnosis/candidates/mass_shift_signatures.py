@@ -10,6 +10,7 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
+from bayesid.inference.residual_view import by_recording
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.effects.physical_bound import PhysicalBound
@@ -98,5 +99,5 @@ def jump_signatures(perturbed: PerturbedModel, fit: Fit, instants: Floats) -> Fl
     some, count = tables[0].shape[:2]
     rows = [part.reshape(some * count, *part.shape[2:]) for part in tables]
     push = perturbed.perturbation(some * count, node_rows=rows[0], sample_rows=rows[1])
-    found = perturbed.respond(push, fit.z, fit.data)
-    return np.moveaxis(found.reshape(len(instants), -1, some, count), 2, 1)
+    found = by_recording(fit.posterior, perturbed.respond(push, fit.z, fit.data))
+    return np.moveaxis(found.reshape(*found.shape[:2], some, count), 2, 1)

@@ -13,6 +13,7 @@ from bayesid._math.threads import several_threads
 from bayesid.diagnosis.candidates.signature_bank import Signatures
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.residual_view import rows_of
 
 __all__ = ["Fitted", "SignatureProducts"]
 
@@ -109,9 +110,8 @@ class SignatureProducts:
         matrix, score, shared = np.zeros((size, size)), np.zeros(size), np.zeros((fit.own.shape[1], size))
         matrix[:old, :old], score[:old], shared[:, :old] = self.matrix, self.score, self.shared
         ends = old + np.cumsum([sum(item.columns.shape[1] for item in part) for part in parts])
-        rows = len(fit.residual) // recordings
         for r in range(recordings):
-            block = slice(r * rows, (r + 1) * rows)
+            block = rows_of(fit.posterior, r)
             known = [item for item in self.signatures if item.recording in (None, r)]
             at = self._at
             before = np.concatenate([np.arange(0), *(at[id(item)] for item in known)])

@@ -17,6 +17,7 @@ from bayesid.diagnosis.noise.outlier_pattern import is_event
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.noise_changes import leaving_out, with_sensors
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.residual_view import ResidualView
 from bayesid.simulation.effects.effect_parameters import Quantity
 from bayesid.simulation.sensors import Coloured, Quantised, Scaled, Sensor, SensorKind
 
@@ -98,11 +99,8 @@ def noise_fault(label: str, fit: Fit, least: float = -np.inf) -> NoiseFault | No
 
 
 def _understated(label: str, kind: SensorKind, fit: Fit) -> NoiseFault:
-    slot = _slot(fit.posterior, kind)
-    whole, taken = _shaped(fit)
-    padded = _present(fit, slot)
-    energy = float((whole[..., slot][padded] ** 2).sum())
-    degrees = float(padded.sum() - taken[..., slot][padded].sum())
+    residual, taken = fit.view.pooled(kind), ResidualView.of(fit.posterior, leverage(fit)).pooled(kind)
+    energy, degrees = float((residual**2).sum()), float(len(residual) - taken.sum())
     factor = float(np.sqrt(energy / degrees))
     posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Scaled(s.noise, (factor,) * kind.size)))
     return NoiseFault(
@@ -176,18 +174,17 @@ class _Spectra:
 
     @staticmethod
     def of(fit: Fit, kind: SensorKind) -> _Spectra:
-        slot, data = _slot(fit.posterior, kind), fit.posterior.data
-        whole, _ = _shaped(fit)
+        view, data = fit.view, fit.posterior.data
         rows: list[tuple[NDArray[Any], ...]] = []
-        for r, item in enumerate(fit.posterior.whitenings):
+        for r in range(view.recordings):
             interval = float(np.median(np.diff(data.measured(r, kind)[0])))
             relative = (data.sigma(0, kind) / data.sigma(r, kind)) ** 2
-            for c in range(slot.start, slot.stop):
-                own = whole[r, np.flatnonzero(item.outputs[:, c]), c]
+            for axis, channel in enumerate(view.columns(kind)):
+                own = view.samples(r, channel)
                 power = np.abs(np.fft.rfft(own)[1:]) ** 2 / len(own)
                 angle = 2.0 * np.pi * np.fft.rfftfreq(len(own))[1:]
                 same = np.ones_like(power)
-                rows.append((power, angle, interval * same, relative[c - slot.start] * same, np.arange(len(power)) < 3))
+                rows.append((power, angle, interval * same, relative[axis] * same, np.arange(len(power)) < 3))
         return _Spectra(*(np.concatenate(column) for column in zip(*rows, strict=True)))
 
 
@@ -251,8 +248,7 @@ def _spread(points: Floats, values: Floats, otherwise: Floats) -> Floats:
 
 
 def _outliers(label: str, kind: SensorKind, fit: Fit) -> NoiseFault | None:
-    slot = _slot(fit.posterior, kind)
-    whole, _ = _shaped(fit)
+    slot, whole = fit.posterior.model.channels.of(kind), fit.view.values
     masks = []
     outlying: list[Floats] = []
     measured: list[Floats] = []
@@ -289,20 +285,3 @@ def _with_sensor(
 ) -> Posterior:
     sensors = [change(sensor) if sensor.kind == kind else sensor for sensor in fit.posterior.model.sensors]
     return with_sensors(fit.posterior, sensors, fit.z, like)
-
-
-def _slot(posterior: Posterior, kind: SensorKind) -> slice:
-    return posterior.model.channels.of(kind)
-
-
-def _shaped(fit: Fit) -> tuple[Floats, Floats]:
-    shape = fit.posterior.residual_shape
-    return fit.residual.reshape(shape), leverage(fit).reshape(shape)
-
-
-def _present(fit: Fit, slot: slice) -> NDArray[np.bool_]:
-    recordings, outputs, _ = fit.posterior.residual_shape
-    mask = np.zeros((recordings, outputs, slot.stop - slot.start), dtype=bool)
-    for r, item in enumerate(fit.posterior.whitenings):
-        mask[r, : len(item.outputs)] = item.outputs[:, slot]
-    return mask

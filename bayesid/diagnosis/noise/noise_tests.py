@@ -9,6 +9,7 @@ from scipy.special import gammaln
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.residual_view import ResidualView
 from bayesid.simulation.sensors import Quantised, SensorKind
 
 __all__ = ["ON_LATTICE", "lattice", "leverage", "noise_tests", "variance_tests"]
@@ -28,19 +29,15 @@ ON_LATTICE = 0.02
 
 def noise_tests(posterior: Posterior, fit: Fit) -> dict[str, float]:
     """Logarithms of the p-values of the noise faults' tests, by the faults' names."""
-    whole = fit.residual.reshape(posterior.residual_shape)
-    taken = leverage(fit).reshape(posterior.residual_shape)
+    whole, taken = fit.view, ResidualView.of(posterior, leverage(fit))
     found = {}
     for sensor in posterior.model.sensors:
-        name, columns = sensor.kind.value, posterior.model.channels.of(sensor.kind)
+        name = sensor.kind.value
         energy, degrees, pieces = 0.0, 0.0, []
-        for r, item in enumerate(posterior.whitenings):
-            for c in range(columns.start, columns.stop):
-                there = np.flatnonzero(item.outputs[:, c])
-                own = whole[r, there, c]
-                energy += float((own**2).sum())
-                degrees += len(there) - float(taken[r, there, c].sum())
-                pieces.append(own / np.sqrt(np.maximum(1.0 - taken[r, there, c], 0.05)))
+        for residual, share in zip(whole.each(sensor.kind), taken.each(sensor.kind), strict=True):
+            energy += float((residual**2).sum())
+            degrees += len(residual) - float(share.sum())
+            pieces.append(residual / np.sqrt(np.maximum(1.0 - share, 0.05)))
         if degrees <= 0.0:
             continue
         found[f"{name}-noise"] = chi2_log_sf(energy, degrees)
@@ -100,18 +97,13 @@ def leverage(fit: Fit) -> Floats:
 
 def variance_tests(posterior: Posterior, fit: Fit) -> dict[str, float]:
     """Logarithms of p-values of the variance in each recording and sensor axis, pooled into one test."""
-    whole = fit.residual.reshape(posterior.residual_shape)
-    taken = leverage(fit).reshape(whole.shape)
+    whole, taken = fit.view, ResidualView.of(posterior, leverage(fit))
     smallest, count = 0.0, 0
-    for r, item in enumerate(posterior.whitenings):
-        for c in range(whole.shape[2]):
-            there = np.flatnonzero(item.outputs[:, c])
-            if len(there) == 0:
-                continue
-            degrees = len(there) - taken[r, there, c].sum()
-            energy = float((whole[r, there, c] ** 2).sum())
-            both = 2.0 * min(stats.chi2.sf(energy, degrees), stats.chi2.cdf(energy, degrees))
-            smallest, count = min(smallest, float(np.log(max(both, 1e-300)))), count + 1
+    for recording, channel in np.argwhere(whole.mask.any(axis=1)).tolist():
+        residual, share = whole.samples(recording, channel), taken.samples(recording, channel)
+        degrees, energy = len(residual) - share.sum(), float((residual**2).sum())
+        both = 2.0 * min(stats.chi2.sf(energy, degrees), stats.chi2.cdf(energy, degrees))
+        smallest, count = min(smallest, float(np.log(max(both, 1e-300)))), count + 1
     # the smallest of n independent p-values
     return {"variance by axis": float(np.log(-np.expm1(count * np.log1p(-np.exp(smallest)))))} if smallest < 0.0 else {}
 

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from scipy import stats
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.response.perturbed_model import Fit
-from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["log_p_of_a_period", "log_p_of_an_event", "structure_tests"]
 
@@ -28,22 +25,13 @@ def structure_tests(fit: Fit) -> dict[str, float]:
     """
     found = {}
     for kind in fit.posterior.model.channels.kinds:
-        pieces = list(_pieces(fit, kind))
+        view = fit.view
+        parts = [view.complete(kind, recording) for recording in range(view.recordings)]
+        pieces = [(time, residual) for time, residual in parts if len(time) > 4]
         if pieces:
             found[f"period in {kind.value}"] = log_p_of_a_period(pieces)
             found[f"event in {kind.value}"] = log_p_of_an_event([residual for _, residual in pieces])
     return found
-
-
-def _pieces(fit: Fit, kind: SensorKind) -> Iterator[tuple[Floats, Floats]]:
-    """Yield the times (n,) [s] and residuals (n, axes) of each recording, where all axes have a sample."""
-    posterior = fit.posterior
-    whole = fit.residual.reshape(posterior.residual_shape)
-    columns = posterior.model.channels.of(kind)
-    for r, item in enumerate(posterior.whitenings):
-        there = np.flatnonzero(item.outputs[:, columns].all(axis=1))
-        if len(there) > 4:
-            yield posterior.data.recorded[r].time[item.rows[there]], whole[r, there, columns]
 
 
 def log_p_of_a_period(pieces: list[tuple[Floats, Floats]]) -> float:

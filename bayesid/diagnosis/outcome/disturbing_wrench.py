@@ -18,6 +18,7 @@ from bayesid.diagnosis.evidence.scale_prior import CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidates, Held
 from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.inference.residual_view import by_recording
 
 __all__ = ["Frame", "Unexplained", "unexplained_wrench"]
 
@@ -300,14 +301,8 @@ def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Intege
 
 def _whole_columns(bank: SignatureBank, name: str, recordings: int) -> Floats:
     """Return the columns of a group that acts in each recording by itself, (N, R k), zero in the others."""
-    parts = [item for item in bank.signatures if item.name == name]
-    rows = len(parts[0].columns)
-    whole = np.zeros((recordings, rows, sum(item.columns.shape[1] for item in parts)))
-    first = 0
-    for item in parts:
-        whole[item.recording, :, first : first + item.columns.shape[1]] = item.columns
-        first += item.columns.shape[1]
-    return whole.reshape(recordings * rows, -1)
+    parts = {item.recording: item.columns for item in bank.signatures if item.name == name}
+    return sla.block_diag(*(parts[recording] for recording in range(recordings)))
 
 
 def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Floats:
@@ -323,12 +318,7 @@ def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Float
         wrench[..., 3:] = np.einsum("krt,rtba->kartb", waves, axes)
         wrenches.append(wrench.reshape(WAVES * 3, *time.shape, 6))
     push = perturbed.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-    found = perturbed.respond(push, fit.z, fit.data)
-    rows = len(found) // len(ends)
-    whole = np.zeros((len(ends), rows, len(ends), WAVES * 3))
-    for r, own in enumerate(found.reshape(len(ends), rows, WAVES * 3)):
-        whole[r, :, r] = own
-    return whole.reshape(len(ends) * rows, -1)
+    return sla.block_diag(*by_recording(fit.posterior, perturbed.respond(push, fit.z, fit.data)))
 
 
 def _fixed_in(hypothesis: Hypothesis, rotations: dict[Frame, tuple[Floats, Floats]], scale: float) -> Frame | None:

@@ -71,14 +71,10 @@ def measure_gain(before: Hypothesis, after: Hypothesis, executor: Executor | Non
 def _side(hypothesis: Hypothesis, executor: Executor | None) -> Side:
     fit = hypothesis.fit
     posterior = fit.posterior
-    whole = fit.residual.reshape(posterior.residual_shape)
-    names = posterior.model.channels.names
-    there = np.zeros(posterior.residual_shape, dtype=bool)
-    for r, item in enumerate(posterior.whitenings):
-        there[r, : len(item.outputs)] = item.outputs
+    whole, there = fit.view.values, fit.view.mask
     rms = {
         name: float(np.sqrt((whole[..., c][there[..., c]] ** 2).mean()))
-        for c, name in enumerate(names)
+        for c, name in enumerate(posterior.model.channels.names)
         if there[..., c].any()
     }
     return Side(

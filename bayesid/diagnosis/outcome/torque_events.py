@@ -17,6 +17,7 @@ from scipy.special import logsumexp
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.inference.residual_view import by_recording
 
 __all__ = ["ChosenEvents", "EventCandidates", "Held"]
 
@@ -156,9 +157,8 @@ class EventCandidates:
                 wrench[:, axis, :, :, 3 + axis] = np.swapaxes(own, 0, 1)
             wrenches.append(wrench.reshape(3 * count, recordings, own.shape[2], 6))
         push = perturbed.perturbation(3 * count, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-        blocks = perturbed.respond(push, fit.z, fit.data).reshape(recordings, -1, 3 * count)
-        known, residual = (x.reshape(recordings, blocks.shape[1], -1) for x in (fit.known, fit.residual))
-        apart = smooth.reshape(recordings, blocks.shape[1], -1)
+        blocks = by_recording(fit.posterior, perturbed.respond(push, fit.z, fit.data))
+        known, residual, apart = (by_recording(fit.posterior, x) for x in (fit.known, fit.residual, smooth))
         cross = np.concatenate([known[r].T @ blocks[r] for r in range(recordings)], axis=1)
         taken, of_smooth = fit.block.share(cross), fit.block.share(fit.known.T @ smooth)
         return EventCandidates(

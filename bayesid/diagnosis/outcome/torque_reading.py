@@ -33,6 +33,7 @@ from bayesid.diagnosis.outcome.extended_model import extended_posterior, extende
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.residual_view import ResidualView
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Quantity
 from bayesid.simulation.effects.physical_bound import PhysicalBound, bounds_by_label
@@ -163,10 +164,9 @@ class _TorqueFit:
         residual = self.residual + change
         unknowns = GaussianBlock.of(self.own.T @ self.own)
         step = unknowns.mean(self.own.T @ residual + self.own_coordinates)
-        left = (residual + self.own @ step).reshape(self.posterior.residual_shape)
+        left = ResidualView.of(self.posterior, residual + self.own @ step)
         torques = self.posterior.model.channels.torques
-        samples = sum(int(item.outputs[:, torques].sum()) for item in self.posterior.whitenings)
-        return float((left[..., torques] ** 2).sum()) / samples
+        return float((left.values[..., torques] ** 2).sum()) / int(left.mask[..., torques].sum())
 
 
 def torque_candidates(model: Model) -> list[Effect]:

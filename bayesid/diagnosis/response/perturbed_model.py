@@ -41,6 +41,7 @@ from bayesid.inference.perturbed_posterior import (
     trace,
 )
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.residual_view import ResidualView
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["Fit", "PerturbedModel"]
@@ -103,6 +104,11 @@ class Fit:
     def own_coordinates(self) -> Floats:
         """The model's free unknowns in prior standard deviations, in the order of `own`."""
         return np.delete(self.z, self.frozen)
+
+    @property
+    def view(self) -> ResidualView:
+        """The residual by recording, sensor and axis."""
+        return ResidualView.of(self.posterior, self.residual)
 
     @property
     def chi2(self) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
 from bayesid.diagnosis.search.linearisation import Linearisation, amplitudes_at
+from bayesid.inference.residual_view import rows_of
 
 __all__ = ["LeftBeside"]
 
@@ -52,7 +53,6 @@ class LeftBeside:
         place = np.full(len(shift), -1)
         place[held] = np.arange(len(held))
         residual, scaled = fit.residual.copy(), np.zeros((len(fit.residual), len(held)))
-        rows = len(fit.residual) // len(fit.posterior.manoeuvres)
         first = dict.fromkeys(evidence.gram.groups, 0)
         for item in point.bank.signatures:
             columns = slice(first[item.name], first[item.name] + item.columns.shape[1])
@@ -60,7 +60,7 @@ class LeftBeside:
             chosen = place[where] >= 0
             if not (chosen.any() or shift[where].any()):
                 continue
-            own = slice(None) if item.recording is None else slice(item.recording * rows, (item.recording + 1) * rows)
+            own = slice(None) if item.recording is None else rows_of(fit.posterior, item.recording)
             residual[own] += item.columns @ shift[where]
             scaled[own, place[where][chosen]] = item.columns[:, chosen] * scale[where][chosen]
         whole = np.concatenate([fit.own, scaled], axis=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bayesid.diagnosis import Diagnosis, Hypothesis
-from bayesid.inference.residual_series import Residuals
+from bayesid.inference.residual_view import ResidualView
 from bayesid.report import figures
 from bayesid.report.document import Document
 from bayesid.report.sentences.diagnosis_sentences import alarm_sentence, gain_sentence
@@ -75,15 +75,14 @@ def _add_gain(document: Document, result: Diagnosis) -> None:
     )
 
 
-def _sides(result: Diagnosis) -> list[Residuals]:
+def _sides(result: Diagnosis) -> list[ResidualView]:
     sides = [_residuals(result.before)]
     return [*sides, _residuals(result.after)] if result.verdict.causes else sides
 
 
-def _residuals(hypothesis: Hypothesis) -> Residuals:
+def _residuals(hypothesis: Hypothesis) -> ResidualView:
     """Return the residuals of a hypothesis at its mode."""
-    posterior = hypothesis.fit.posterior
-    return Residuals(posterior, hypothesis.fit.residual.reshape(posterior.residual_shape))
+    return hypothesis.fit.view
 
 
 def _names(result: Diagnosis) -> list[str]:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Diagnosis, Hypothesis
-from bayesid.inference.residual_series import Residuals
+from bayesid.inference.residual_view import ResidualView
 from bayesid.report.cause_marks import CauseMark, cause_marks
 from bayesid.report.figures.figure_style import BAND, COLOURS, axis_title, residual_limits, styled, wide_figure
 from bayesid.report.figures.residual_figures import SIDES, draw_history
@@ -56,7 +56,7 @@ def cause_picture(result: Diagnosis, recording: int) -> Figure:
     return figure
 
 
-def moved_axis(sides: list[Residuals], recording: int) -> tuple[SensorKind, int]:
+def moved_axis(sides: list[ResidualView], recording: int) -> tuple[SensorKind, int]:
     """Return the sensor axis of a recording whose sum of squares decreases most, or is largest of a single side."""
 
     def gain(kind: SensorKind, axis: int) -> float:
@@ -66,9 +66,8 @@ def moved_axis(sides: list[Residuals], recording: int) -> tuple[SensorKind, int]
     return max(((kind, axis) for kind in sides[0].kinds for axis in range(kind.size)), key=lambda item: gain(*item))
 
 
-def _residuals(hypothesis: Hypothesis) -> Residuals:
-    posterior = hypothesis.fit.posterior
-    return Residuals(posterior, hypothesis.fit.residual.reshape(posterior.residual_shape))
+def _residuals(hypothesis: Hypothesis) -> ResidualView:
+    return hypothesis.fit.view
 
 
 def _draw_robot(axes: Axes, result: Diagnosis, recording: int) -> None:

@@ -11,7 +11,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from scipy import stats
 
 from bayesid._math.arrays import Floats
-from bayesid.inference.residual_series import Residuals, ResidualSpectrum
+from bayesid.inference.residual_view import ResidualSpectrum, ResidualView
 from bayesid.report.figures.figure_style import (
     BAND,
     COLOURS,
@@ -39,12 +39,12 @@ NOISE_BAND = "95 % of bins, were it only noise"
 
 
 @styled
-def residual_histories(sides: Sequence[Residuals], recording: int) -> Figure:
+def residual_histories(sides: Sequence[ResidualView], recording: int) -> Figure:
     """Draw the residuals of one recording over time, one panel per sensor axis.
 
     Parameters
     ----------
-    sides : sequence of Residuals
+    sides : sequence of ResidualView
         Residuals before, and after where causes are named.
     recording : int
         Index of the recording.
@@ -87,12 +87,12 @@ def _running_mean(time: Floats, value: Floats) -> tuple[Floats, Floats]:
 
 
 @styled
-def residual_spectra(sides: Sequence[Residuals]) -> Figure:
+def residual_spectra(sides: Sequence[ResidualView]) -> Figure:
     """Draw the spectra of the residuals, one panel per sensor axis; noise alone has level one.
 
     Parameters
     ----------
-    sides : sequence of Residuals
+    sides : sequence of ResidualView
         Residuals before, and after where causes are named.
     """
     kinds = sides[0].kinds
@@ -115,7 +115,7 @@ def residual_spectra(sides: Sequence[Residuals]) -> Figure:
 
 
 @styled
-def residual_statistics(residuals: Residuals) -> Figure:
+def residual_statistics(residuals: ResidualView) -> Figure:
     """Draw the spectrum of each sensor axis and the distribution of each sensor's residuals, one row per sensor.
 
     If the model is right, the spectra are flat at one and the distributions are standard normal.
