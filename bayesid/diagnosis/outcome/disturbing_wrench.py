@@ -8,6 +8,7 @@ from enum import Enum
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from bayesid._io.files import write_text
 from bayesid._math.arrays import Floats, Integers
@@ -302,7 +303,7 @@ def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Intege
 def _whole_columns(bank: SignatureBank, name: str, recordings: int) -> Floats:
     """Return the columns of a group that acts in each recording by itself, (N, R k), zero in the others."""
     parts = {item.recording: item.columns for item in bank.signatures if item.name == name}
-    return sla.block_diag(*(parts[recording] for recording in range(recordings)))
+    return block_diag(*(parts[recording] for recording in range(recordings)))
 
 
 def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Floats:
@@ -318,7 +319,7 @@ def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Float
         wrench[..., 3:] = np.einsum("krt,rtba->kartb", waves, axes)
         wrenches.append(wrench.reshape(WAVES * 3, *time.shape, 6))
     push = perturbed.perturbation(WAVES * 3, node_wrench=wrenches[0], sample_wrench=wrenches[1])
-    return sla.block_diag(*by_recording(fit.posterior, perturbed.respond(push, fit.z, fit.data)))
+    return block_diag(*by_recording(fit.posterior, perturbed.respond(push, fit.z, fit.data)))
 
 
 def _fixed_in(hypothesis: Hypothesis, rotations: dict[Frame, tuple[Floats, Floats]], scale: float) -> Frame | None:
