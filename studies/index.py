@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from bayesid._io.files import write_text
-from studies.common.goals import Verdict
+from studies.common.study import Verdict
 from studies.validation import BESIDE, SUBJECTS
 
 __all__ = ["index_text"]

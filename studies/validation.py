@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bayesid.report import Document
-from studies.common.goals import Goal, Verdict
+from studies.common.study import Goal, Verdict
 
 __all__ = ["BESIDE", "SUBJECTS", "judged", "write_validation"]
 

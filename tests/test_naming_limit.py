@@ -13,7 +13,7 @@ from bayesid.diagnosis.evidence.status import Status
 from studies.blind_injections import Trial
 from studies.blind_injections.goals import _relative
 from studies.blind_injections.limits import simulated_naming
-from studies.common.goals import Verdict
+from studies.common.study import Verdict
 from tests.gram_problem import LinearProblem
 
 SCALE, HIDDEN, DRAWS = 3.0, 1.0, 1500

@@ -16,7 +16,7 @@ from studies import base_body
 from studies.base_body import noise_free, paper, setting
 from studies.base_body.report import goals_of, write_report
 from studies.common.ets7 import ACCELEROMETER, BASE, RADIUS, ets7, excitation, tip_speed
-from studies.common.goals import Verdict
+from studies.common.study import Verdict
 from studies.truth import stepwise as reference
 from tests.report_rules import broken_rules
 

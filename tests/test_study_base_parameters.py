@@ -13,7 +13,7 @@ from studies.base_parameters import Result, run
 from studies.base_parameters.peers import compare
 from studies.base_parameters.report import goals_of, write_report
 from studies.base_parameters.texts import regrouping_rows, symbol, unchanged
-from studies.common.goals import Verdict
+from studies.common.study import Verdict
 from tests.report_rules import broken_rules
 
 

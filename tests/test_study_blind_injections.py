@@ -26,8 +26,8 @@ from studies.blind_injections.record import record_of
 from studies.blind_injections.rows import confusion, confusion_matrix, rates, reliability, scores, statements
 from studies.blind_injections.snap_limit import snap_limit
 from studies.blind_injections.trials import Plan, read
-from studies.common.goals import Verdict
 from studies.common.monte_carlo import read_store
+from studies.common.study import Verdict
 from studies.truth import hidden_causes
 from studies.truth.basilisk.cases import BASILISK_CASES
 from tests.report_rules import broken_rules

@@ -17,8 +17,8 @@ from studies.calibration.outcomes import Replicates
 from studies.calibration.replicate import Method
 from studies.calibration.report import goals_of
 from studies.calibration.uniformity import POINTS, coverage, holm, uniform_p_value
-from studies.common.goals import Verdict
 from studies.common.monte_carlo import run_trials
+from studies.common.study import Verdict
 from tests.pdf_text import PdfText
 from tests.report_rules import broken_rules
 

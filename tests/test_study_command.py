@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.common.command import Command
+from studies.common.study import Command
 
 STUDIES = sorted(file.parent.name for file in (Path(__file__).resolve().parents[1] / "studies").glob("*/__main__.py"))
 PLAIN = Command("load", "Identify a load.")

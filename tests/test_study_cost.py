@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.common.goals import Verdict
+from studies.common.study import Verdict
 from studies.cost.commands import Run, run_command
 from studies.cost.growth import Floor
 from studies.cost.nested import Nested

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from studies.common.errors_in_deviations import squared_distances
+from studies.common.quantities import squared_distances
 
 
 def test_distances_are_those_of_the_inverse_covariance_whatever_the_units():

@@ -12,8 +12,8 @@ from bayesid import Robot
 from bayesid.design import Search, Store
 from studies.base_body import paper
 from studies.common import mission
-from studies.common.goals import Verdict
 from studies.common.repeated_fits import Realised, Reference
+from studies.common.study import Verdict
 from studies.excitation import run
 from studies.excitation.cloud import Cloud
 from studies.excitation.contest import paper_problem, shrunk

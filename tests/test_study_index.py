@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from studies.common.goals import Verdict
+from studies.common.study import Verdict
 from studies.index import index_text
 from tests.pdf_text import PdfText
 

@@ -11,11 +11,9 @@ from bayesid.design import BSplines, Search
 from bayesid.inference.body_quantities import BodyDraws
 from studies.common import mission
 from studies.common.ets7 import TIP_SPEED
-from studies.common.tip_watch import flown_along
+from studies.common.flight import flown_along
 from studies.load import paper
-from studies.load.noise_free import iterate
-from studies.load.safe_loop import Flight
-from studies.load.setting import SAFE, load_unknown, ship
+from studies.load.loops import SAFE, Flight, iterate, load_unknown, ship
 
 
 def test_only_one_reading_of_the_printed_inertia_is_a_body():

@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 from bayesid.inference.proposal import StudentT
-from studies.common.goals import Verdict
 from studies.common.monte_carlo import run_trials
+from studies.common.study import Verdict
 from studies.peers.contest import REFERENCE, attempt, tasks
 from studies.peers.recipes import with_scipy, with_sysid
 from studies.peers.reference import bridge

@@ -11,7 +11,7 @@ import pytest
 from bayesid.report.verdict_record import Share
 from bayesid.robot.body_prior import coordinates_of
 from studies.common import mission
-from studies.common.goals import Verdict
+from studies.common.study import Verdict
 from studies.planning import run
 from studies.planning.planner import Planner, miss_of
 from studies.planning.report import _verdict, goals, write_report

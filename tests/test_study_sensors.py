@@ -8,8 +8,8 @@ import pytest
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.base_body import paper
 from studies.common.ets7 import INTERVAL
-from studies.common.goals import Verdict
 from studies.common.quantities import JUDGED
+from studies.common.study import Verdict
 from studies.sensors import Effort, run
 from studies.sensors.draws import Draws
 from studies.sensors.integration import scalars

@@ -10,7 +10,7 @@ import pytest
 from bayesid.report.verdict_record import Share
 from bayesid.robot.joint_state import JointState
 from studies.common import mission
-from studies.common.goals import Verdict
+from studies.common.study import Verdict
 from studies.separating.analysis import expectations, flown, realise, references
 from studies.separating.linear_evidence import Expected, Linearised
 from studies.separating.report import LAST, RIVALRY, _decided, _shown

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bayesid import InputError
-from studies.common.goals import Verdict
+from studies.common.study import Verdict
 from studies.throws import run
 from studies.throws.body_result import BodyResult
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from studies.common.goals import Verdict
+from studies.common.study import Verdict
 from studies.validation import SUBJECTS, judged, write_validation
 from tests.pdf_text import PdfText
 from tests.report_rules import broken_rules

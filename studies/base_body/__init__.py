@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from bayesid.app.compilation_cache import keep_compiled
 from studies.base_body.report import write_report
 from studies.base_body.result import BaseBody, compute
-from studies.common.command import Command
 from studies.common.provenance import study_origin
+from studies.common.study import Command
 
 __all__ = ["BaseBody", "main", "run"]
 

@@ -16,9 +16,9 @@ from studies.base_body.readings import CLAIM
 from studies.base_body.result import GRADES, BaseBody
 from studies.base_body.setting import limits_broken
 from studies.common.ets7 import PERIOD, RAMP, TIP_SPEED, ets7, excitation, extended_wrist, tip_speed
-from studies.common.goals import Goal, Verdict
 from studies.common.quantities import MASS, MOMENTS
 from studies.common.report_parts import columns
+from studies.common.study import Goal, Verdict
 from studies.common.template import (
     Finding,
     Setup,

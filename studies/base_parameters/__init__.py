@@ -19,9 +19,9 @@ from studies.base_parameters.recovery import identify_by_torques
 from studies.base_parameters.report import Result, write_report
 from studies.base_parameters.scale import scale_cases
 from studies.base_parameters.structure import equations_at, structure
-from studies.common.command import Command
 from studies.common.ets7 import ets7
 from studies.common.provenance import MODELS, study_origin
+from studies.common.study import Command
 
 __all__ = ["Result", "main", "run"]
 

@@ -16,8 +16,8 @@ from studies.base_parameters.recovery import STATES, WRONG, Recovery
 from studies.base_parameters.scale import ScaleCase
 from studies.base_parameters.structure import Equations, Structure
 from studies.base_parameters.texts import regrouping_rows, symbol, unchanged
-from studies.common.goals import Goal, Verdict
-from studies.common.tables import add_number_table
+from studies.common.report_parts import add_number_table
+from studies.common.study import Goal, Verdict
 from studies.common.template import (
     Finding,
     Setup,

@@ -17,10 +17,9 @@ from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figur
 from bayesid.report.numbers import format_number, format_text
 from studies.benchmark.run import RUNS, Benchmark, run
 from studies.benchmark.timing import EVALUATED
-from studies.common.command import Command
-from studies.common.goals import Goal, Verdict
 from studies.common.provenance import processor, study_origin
 from studies.common.report_parts import columns
+from studies.common.study import Command, Goal, Verdict
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 
 __all__ = ["goals_of", "main", "write_report"]

@@ -9,7 +9,7 @@ from scipy import stats
 
 from bayesid.report.verdict_record import Share
 from studies.blind_injections.trials import CASES, Trial
-from studies.common.goals import Goal, Verdict
+from studies.common.study import Goal, Verdict
 from studies.truth.basilisk.cases import BasiliskCase
 
 __all__ = ["CLEAR", "LEFT", "TORQUES", "barely_left", "goals_of", "in_basilisk", "share_text", "wrongly_explained"]

@@ -32,10 +32,9 @@ from studies.blind_injections.reliability import reliability_figure
 from studies.blind_injections.rows import confusion, confusion_matrix, errors, rates, reliability, scores
 from studies.blind_injections.snap_limit import snap_limit
 from studies.blind_injections.trials import Trial, plan, read, run
-from studies.common.command import WORKERS, Command
-from studies.common.goals import Verdict
 from studies.common.provenance import study_origin
-from studies.common.tables import add_number_table
+from studies.common.report_parts import add_number_table
+from studies.common.study import WORKERS, Command, Verdict
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 
 __all__ = ["main", "write_report"]

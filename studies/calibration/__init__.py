@@ -15,9 +15,9 @@ from bayesid.app.compilation_cache import keep_compiled
 from studies.calibration.outcomes import Replicates, read
 from studies.calibration.replicate import make, plan
 from studies.calibration.report import write_report
-from studies.common.command import TRIALS, Command
 from studies.common.monte_carlo import run_trials
 from studies.common.provenance import study_origin
+from studies.common.study import TRIALS, Command
 
 __all__ = ["Replicates", "main", "make", "plan", "read", "write_report"]
 

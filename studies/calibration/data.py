@@ -21,8 +21,8 @@ from bayesid.simulation.effects import AccelBias
 from bayesid.simulation.model import Model
 from studies.calibration.cases import INDEPENDENT, Case, model_of
 from studies.common.ets7 import BIAS, ENCODER, INTERVAL
-from studies.common.ets7_model import NOISE
 from studies.common.flight import prescribed, readings, smoothed, true_robot
+from studies.common.models import NOISE
 from studies.truth.mujoco import smooth_motion
 
 __all__ = ["Recorded", "Truth", "draw_truth", "point", "record"]

@@ -21,9 +21,9 @@ from studies.calibration.outcomes import Replicates
 from studies.calibration.replicate import ARMS, LOG_LIKELIHOOD, Method
 from studies.calibration.uniformity import POINTS, coverage, holm, uniform_p_value
 from studies.common.ets7 import START, ets7
-from studies.common.goals import Goal, Verdict
-from studies.common.robot_outline import robot_outline
-from studies.common.tables import add_number_table
+from studies.common.figures import robot_outline
+from studies.common.report_parts import add_number_table
+from studies.common.study import Goal, Verdict
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 
 __all__ = ["FAMILYWISE", "goals_of", "write_report"]

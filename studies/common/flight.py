@@ -1,32 +1,46 @@
-"""Flights of ETS-VII in MuJoCo, and what its sensors record of them."""
+"""Flights of ETS-VII in MuJoCo: what its sensors record of them, and what they use of the limits of a design."""
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import MeasuredMotion, Motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre
-from studies.common.ets7 import ACCELEROMETER, RADIUS
+from studies.common.ets7 import ACCELEROMETER, RADIUS, TIP
 from studies.truth.motions import Motion as TrueMotion
 from studies.truth.mujoco import Orbit, Rotor, Truth, TruthModel
 from studies.truth.numerics import substeps
 from studies.truth.recordings import by_axis
 
-__all__ = ["ORBIT", "fly", "light_wheel", "prescribed", "readings", "record", "smoothed", "true_robot"]
-
-Floats = NDArray[np.floating]
+__all__ = [
+    "ORBIT",
+    "Flown",
+    "flown_along",
+    "fly",
+    "light_wheel",
+    "prescribed",
+    "readings",
+    "record",
+    "smoothed",
+    "true_robot",
+]
 
 ORBIT = Orbit(radius=RADIUS)
+
+WATCH_STEP = 0.2
+"""Interval at which the robot is looked at, which is also the largest step of the integration [s]."""
 
 
 def light_wheel(momentum: Floats) -> Rotor:
@@ -173,3 +187,72 @@ def record(
     joints = [joint.name for joint in robot.joints]
     channels = readings(truth, joints, sigmas, rng, **options)
     return smoothed(name, truth.times, channels, robot, sigmas["position"])
+
+
+class _Watched(TruthModel):
+    """Robot in MuJoCo that notes the poses of base and tip whenever it is read."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.base_poses: list[Floats] = []
+        self.tip_poses: list[Floats] = []
+
+    def _read(self, *arguments: Any) -> tuple[Any, ...]:
+        row: tuple[Any, ...] = super()._read(*arguments)
+        w, x, y, z = self.data.qpos[3:7]
+        body = self.data.body(TIP)
+        self.base_poses.append(_pose(Rotation.from_quat([x, y, z, w]).as_matrix(), self.data.qpos[:3]))
+        self.tip_poses.append(_pose(np.array(body.xmat).reshape(3, 3), body.xpos))
+        return row
+
+
+@dataclass(frozen=True)
+class Flown:
+    """Course of the limited quantities.
+
+    Attributes
+    ----------
+    time : (T,) array
+        Times [s].
+    tip_speed, tip_rate : (T,) array
+        Speed [m/s] and angular rate [rad/s] of the tip, the larger of those relative to the base and to inertial space,
+        as in `bayesid.design.Limits`.
+    base_rotation : (T,) array
+        Rotation of the base since the start [rad].
+    """
+
+    time: Floats
+    tip_speed: Floats
+    tip_rate: Floats
+    base_rotation: Floats
+
+    def largest(self, name: str) -> float:
+        """Return the largest value of a quantity, by the name of its limit."""
+        return float(getattr(self, name).max())
+
+
+def flown_along(robot: Robot, motion: Motion, duration: float) -> Flown:
+    """Fly a manoeuvre from rest and return the course of the limited quantities."""
+    with tempfile.TemporaryDirectory() as folder:
+        urdf = Path(folder) / "robot.urdf"
+        robot.write_urdf(urdf)
+        model = _Watched(urdf, orbit=ORBIT)
+        times = WATCH_STEP * np.arange(round(duration / WATCH_STEP) + 1)
+        model.run(prescribed(motion, times, WATCH_STEP), times, step=WATCH_STEP)
+    base, tip = np.array(model.base_poses), np.array(model.tip_poses)
+    poses = tip, np.linalg.inv(base) @ tip
+    speeds = [np.linalg.norm(np.gradient(pose[:, :3, 3], WATCH_STEP, axis=0), axis=1) for pose in poses]
+    rates = [np.append(0.0, _turns(pose[:-1], pose[1:]) / WATCH_STEP) for pose in poses]
+    rotation = _turns(np.broadcast_to(base[0], base.shape), base)
+    return Flown(times, np.maximum(*speeds), np.maximum(*rates), rotation)
+
+
+def _pose(rotation: Floats, position: Floats) -> Floats:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, position
+    return pose
+
+
+def _turns(before: Floats, after: Floats) -> Floats:
+    """Return the angles between pairs of attitudes [rad]."""
+    return np.asarray(Rotation.from_matrix(before[:, :3, :3].transpose(0, 2, 1) @ after[:, :3, :3]).magnitude())

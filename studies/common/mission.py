@@ -34,23 +34,12 @@ from studies.common.ets7 import (
     TIP,
     FlightManoeuvre,
     ets7,
+    extended_wrist,
 )
-from studies.common.ets7_model import extended_start
-from studies.common.models import ARM_SPREAD, base_model
+from studies.common.models import ARM_SPREAD, NOISE, base_model
 from studies.truth.mujoco import Truth
 
-__all__ = [
-    "DURATION",
-    "ENCODERS",
-    "POINTS",
-    "REACH",
-    "ROWS",
-    "TRUTH_STEP",
-    "base_unknown",
-    "fly",
-    "problem",
-    "recorded",
-]
+__all__ = ["DURATION", "ENCODERS", "POINTS", "REACH", "ROWS", "TRUTH_STEP", "base_unknown", "flight_manoeuvre", "fly"]
 __all__ += ["problem", "recorded", "ship", "splines", "start", "true_arm"]
 
 DURATION = 120.0
@@ -81,7 +70,7 @@ def ship() -> Robot:
 
 def start() -> Floats:
     """Return the joint positions before and after every manoeuvre, with the wrist extended, shape (6,) [rad]."""
-    return extended_start()
+    return np.array([0.0, 0.0, 0.0, *extended_wrist()])
 
 
 def base_unknown(arm_spread: float = ARM_SPREAD, **options: Any) -> Model:
@@ -147,5 +136,4 @@ def fly(
 def recorded(truth: Truth, rng: np.random.Generator, name: str = "manoeuvre", bias: Floats | None = None) -> Manoeuvre:
     """Record a flight with fresh noise of sensors and encoders and a bias of the accelerometer, fresh by default."""
     bias = BIAS * rng.standard_normal(3) if bias is None else bias
-    sigmas = {"position": ENCODER, "rate": RATE, "accel": ACCEL}
-    return flight.record(truth._replace(accel=truth.accel + bias), name, ship(), sigmas, rng)
+    return flight.record(truth._replace(accel=truth.accel + bias), name, ship(), NOISE, rng)

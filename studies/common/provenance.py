@@ -36,7 +36,7 @@ def study_origin(name: str, options: argparse.Namespace, inputs: Sequence[Path] 
     name : str
         Name of the study.
     options : argparse.Namespace
-        Options of the command as `studies.common.command.Command.parse` gives them.
+        Options of the command as `studies.common.study.Command.parse` gives them.
     inputs : sequence of Path
         Files that the study reads, by default the robot ETS-VII.
     """

@@ -1,17 +1,15 @@
-"""The ten reported quantities of a body, in the order of `bayesid.inference.body_quantities.BODY_QUANTITIES`."""
+"""The ten quantities of a body, in the order of `bayesid.inference.body_quantities.BODY_QUANTITIES`; their errors."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report.numbers import format_unit
 from bayesid.robot.inertial_parameters import InertialParameters
 
-__all__ = ["HEADINGS", "JUDGED", "LABELS", "MASS", "MOMENTS", "body_of", "inertia_matrix"]
-
-Floats = NDArray[np.floating]
+__all__ = ["HEADINGS", "JUDGED", "LABELS", "MASS", "MOMENTS", "body_of", "inertia_matrix", "squared_distances"]
 
 MASS, MOMENTS = 0, [4, 5, 6]
 """Indices of the mass and of the three moments of inertia."""
@@ -35,3 +33,14 @@ def inertia_matrix(quantities: Floats) -> Floats:
 def body_of(quantities: Floats) -> InertialParameters:
     """Return the body with these ten quantities, whose inertia is about the centre of mass."""
     return InertialParameters(quantities[0], quantities[1:4], inertia_matrix(quantities))
+
+
+def squared_distances(errors: Floats, covariance: Floats) -> Floats:
+    """Return squared Mahalanobis distances, shape (...,), of errors, shape (..., n).
+
+    Errors are divided by their standard deviations first, so that units of very different size cost no accuracy.
+    """
+    scale = np.sqrt(np.diag(covariance))
+    scaled = errors / scale
+    solved = np.linalg.solve(covariance / np.outer(scale, scale), scaled[..., None])[..., 0]
+    return np.asarray((scaled * solved).sum(axis=-1))

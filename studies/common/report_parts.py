@@ -1,20 +1,69 @@
-"""Parts that the reports of several studies share."""
+"""Parts that the reports of several studies share: tables, small sections, and the meanings of terms."""
 
 from __future__ import annotations
 
-from bayesid.inference.body_quantities import BODY_QUANTITIES
+import re
+from collections.abc import Sequence
+
 from bayesid.report import Document
-from bayesid.report.numbers import format_unit
 
-__all__ = ["QUANTITY_TITLES", "columns", "not_evaluated"]
+__all__ = ["TERMS", "add_number_table", "columns", "glossary", "not_evaluated"]
 
-QUANTITY_TITLES = tuple(f"{name} [{format_unit(unit)}]" for name, unit in BODY_QUANTITIES.items())
-"""Titles of the ten reported quantities of a body, each with its unit."""
+TERMS = {
+    "a-optimal": "smallest sum of the posterior variances",
+    "chi-square": "sum of squared residuals in standard deviations, per sample 1 where the model is right",
+    "condition number": "largest over smallest singular value of the columns to be identified",
+    "d-optimal": "smallest determinant of the posterior covariance",
+    "e-optimal": "smallest variance in the worst direction",
+    "(26)": "the paper's criterion for manoeuvres",
+    "effective samples": "independent samples that would tell as much",
+    "emcee": "ensemble sampler of the posterior",
+    "family-wise": "for all tests together",
+    "importance sampling": "weighted draws from the Laplace approximation",
+    "Laplace": "the normal distribution at the posterior's mode",
+    "ln B": "logarithm of the ratio of two models' evidences",
+    "NUTS": "Hamiltonian Monte Carlo without U-turns",
+    "rank": "place of the truth among posterior draws",
+    "sd": "standard deviation",
+    "rms": "root mean square",
+}
+"""Meanings by term, as reports write it."""
+
+
+def glossary(document: Document) -> str:
+    """Return the meanings of the terms that a document holds as whole words, in one sentence; nothing without any."""
+    meanings = [
+        f"{term}: {meaning}" for term, meaning in TERMS.items() if document.mentions(rf"(?<!\w){re.escape(term)}(?!\w)")
+    ]
+    return f"Terms. {'; '.join(meanings)}." if meanings else ""
 
 
 def columns(letters: str) -> list[str]:
     """Return the alignment of a table's columns, one letter each: ``l`` for left and ``r`` for right."""
     return [{"l": "left", "r": "right"}[letter] for letter in letters]
+
+
+def add_number_table(
+    document: Document,
+    header: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    caption: str | None = None,
+    words: int = 1,
+) -> None:
+    """Add a table with words in its leading columns, aligned to the left, and numbers in the others, to the right.
+
+    Parameters
+    ----------
+    document : Document
+    header : sequence of str
+        Title of each column.
+    rows : sequence of sequence of str
+        Cells, row by row.
+    caption : str, optional
+    words : int
+        Number of leading columns that hold words.
+    """
+    document.table(header, rows, caption, ["left"] * words + ["right"] * (len(header) - words))
 
 
 def not_evaluated(document: Document, title: str | None = None) -> None:

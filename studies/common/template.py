@@ -7,18 +7,16 @@ it comes from, and writes it.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
-from enum import StrEnum
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from bayesid._io.files import complete_file, write_json
+from bayesid._io.files import write_json
 from bayesid.report import Document
-from studies.common.glossary import glossary
-from studies.common.goals import Goal, add_goals
+from studies.common.report_parts import glossary
+from studies.common.study import CsvTable, Finding, Goal, Setup, Statement
 
 __all__ = ["Finding", "Setup", "Statement", "Summary", "add_first_page", "add_setup", "add_statements"]
 __all__ += ["write_study", "write_table"]
@@ -46,48 +44,14 @@ class Summary:
     full: bool
 
 
-@dataclass(frozen=True)
-class Setup:
-    """Conditions of a study, one sentence or two each.
-
-    Attributes
-    ----------
-    robot, manoeuvre, sensors, known, unknown, replicates : str
-        The manoeuvre states its speed beside the flight's rule; the replicates say what a full run repeats.
-    """
-
-    robot: str
-    manoeuvre: str
-    sensors: str
-    known: str
-    unknown: str
-    replicates: str
-
-
-class Finding(StrEnum):
-    """What a study finds of a statement in the paper."""
-
-    CONFIRMED = "confirmed"
-    REFUTED = "refuted"
-    NOT_TESTABLE = "not testable"
-
-
-@dataclass(frozen=True)
-class Statement:
-    """A statement of the paper, what is found of it, and why."""
-
-    text: str
-    finding: Finding
-    reason: str
-
-
 def add_first_page(document: Document, summary: Summary, figure: Figure | None = None, caption: str = "") -> None:
     """Add the answer in a box, the figure that decides if there is one, and the table of goals."""
     run = "full run" if summary.full else "not run in full: read it as an example, not as the result"
     document.decision(summary.answer, [("Question", summary.question), ("Valid when", summary.valid), ("Effort", run)])
     if figure is not None:
         document.figure(figure, caption)
-    add_goals(document, summary.goals)
+    rows = [[goal.text, goal.reached, goal.verdict.value] for goal in summary.goals]
+    document.table(["goal", "reached", "verdict"], rows, "Goals.", ["left"] * 3)
 
 
 def add_setup(
@@ -135,7 +99,4 @@ def write_study(document: Document, summary: Summary, output: Path, origin: str 
 
 def write_table(output: Path, name: str, header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """Write a table as CSV beside a report, ``REPORT-NAME.csv``, and return the name of the file."""
-    file = output.with_name(f"{output.stem}-{name}.csv")
-    with complete_file(file) as part, part.open("w", encoding="utf-8", newline="") as stream:
-        csv.writer(stream, lineterminator="\n").writerows([header, *rows])
-    return file.name
+    return CsvTable(name, header, rows).write(output)

@@ -15,10 +15,9 @@ from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, BEFORE, styled, wide_figure
 from bayesid.report.numbers import format_number
 from studies.benchmark.timing import EVALUATED
-from studies.common.command import Command
-from studies.common.goals import Goal, Verdict
 from studies.common.provenance import MODELS, processor, study_origin
 from studies.common.report_parts import columns
+from studies.common.study import Command, Goal, Verdict
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 from studies.cost.cases import COMMANDS, DIAGNOSES
 from studies.cost.commands import AFTER_VERDICT

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 from bayesid._io.progress import Progress, silent
 from bayesid.app.compilation_cache import keep_compiled
-from studies.common.command import Command
 from studies.common.provenance import study_origin
+from studies.common.study import Command
 from studies.ets7_drift.analysis import CAUSES, Case, analyse
 from studies.ets7_drift.report import write_report
 from studies.ets7_drift.world import DURATION, KNOWN, draw_world

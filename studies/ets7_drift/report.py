@@ -21,8 +21,9 @@ from bayesid.report.numbers import (
 )
 from bayesid.report.sentences.set_words import set_text
 from studies.common.ets7 import RADIUS, RAMPS, TIP_SPEED, ets7, tip_speed
-from studies.common.goals import Goal, Verdict
-from studies.common.report_parts import QUANTITY_TITLES, columns
+from studies.common.quantities import HEADINGS
+from studies.common.report_parts import columns
+from studies.common.study import Goal, Verdict
 from studies.common.template import (
     Finding,
     Setup,
@@ -251,7 +252,7 @@ def _quantities(case: Case) -> list[Amplitude]:
     """Return the amplitudes of the named causes and the parameters of the base beside the truth."""
     after, truth = case.diagnosis.gain.after.bodies, case.world.base
     quantities = [*case.amplitudes]
-    for k, title in enumerate(QUANTITY_TITLES):
+    for k, title in enumerate(HEADINGS):
         name, unit = title.rstrip("]").split(" [")
         quantities.append(Amplitude(name, unit, float(truth[k]), float(after.mean[k]), float(after.sd[k])))
     return quantities

@@ -17,8 +17,8 @@ import numpy as np
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.recording.joint_motion import Motion
 from studies.common import mission
-from studies.common.command import Command
 from studies.common.quantities import HEADINGS
+from studies.common.study import Command
 from studies.ets7_limits.analysis import (
     ACCELS,
     DESIGN,

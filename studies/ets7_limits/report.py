@@ -22,11 +22,10 @@ from studies.common.ets7 import (
     START,
     ets7,
 )
-from studies.common.goals import Goal, Verdict
-from studies.common.manoeuvre_figure import manoeuvre_figure
+from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.quantities import HEADINGS
-from studies.common.robot_outline import robot_outline
-from studies.common.tables import add_number_table
+from studies.common.report_parts import add_number_table
+from studies.common.study import Goal, Verdict
 from studies.common.template import (
     Finding,
     Setup,

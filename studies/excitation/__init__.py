@@ -19,9 +19,9 @@ import numpy as np
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import THOROUGH, DOptimal, Search, Store
 from studies.common import mission
-from studies.common.command import TRIALS, Command
 from studies.common.monte_carlo import Workers
 from studies.common.repeated_fits import Realised, repeat
+from studies.common.study import TRIALS, Command
 from studies.excitation.cloud import Cloud, random_cloud
 from studies.excitation.contest import Contest, compete, contest_problem, sparse
 from studies.excitation.rivals import Rivals, other_robots

@@ -14,11 +14,10 @@ from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent
 from studies.common import mission
 from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, ets7
-from studies.common.goals import Goal, Verdict
-from studies.common.manoeuvre_figure import manoeuvre_figure
+from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.quantities import HEADINGS, LABELS
-from studies.common.robot_outline import robot_outline
-from studies.common.tables import add_number_table
+from studies.common.report_parts import add_number_table
+from studies.common.study import Goal, Verdict
 from studies.common.template import (
     Finding,
     Setup,

@@ -11,11 +11,10 @@ from typing import Any
 
 from bayesid._io.words import counted
 from bayesid.report import Document
-from studies.common.command import TRIALS, Command
-from studies.common.goals import Goal, Verdict
 from studies.common.monte_carlo import read_store, run_trials
 from studies.common.provenance import study_origin
-from studies.common.tables import add_number_table
+from studies.common.report_parts import add_number_table
+from studies.common.study import TRIALS, Command, Goal, Verdict
 from studies.common.template import Summary, add_first_page, write_study
 from studies.faults.figure import OUTCOMES, answer_figure
 from studies.faults.fuzz import KINDS

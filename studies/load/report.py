@@ -1,38 +1,44 @@
-"""Report of the study."""
+"""The study: how it runs, what it is judged by, and what its report shows."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from scipy.stats import chi2
 
+from bayesid._io.progress import Progress, silent
 from bayesid._io.words import counted, joined
+from bayesid.design import Search
 from bayesid.report import Document, figures, format_quantity
+from bayesid.report.figures.figure_style import AFTER, BEFORE, COLOURS, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_signed
 from studies.common import mission
 from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE
-from studies.common.goals import Goal, Verdict
-from studies.common.quantities import HEADINGS, MASS
-from studies.common.tables import add_number_table
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
+from studies.common.quantities import HEADINGS, LABELS, MASS
+from studies.common.report_parts import add_number_table
+from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.load import paper
+from studies.load.loops import (
+    AT_MOST,
+    GOAL,
+    LIMITED,
+    LOAD,
+    SAFE,
+    SPREAD,
+    TRUTH_STEP,
+    Flight,
+    Iteration,
+    excitation,
+    fly_again,
+    fly_loop,
+    iterate,
+    ship,
 )
-from studies.load import Result, paper
-from studies.load.figures import LIMIT_TITLES, TITLES, error_figure, loop_figure
-from studies.load.noise_free import TRUTH_STEP
-from studies.load.safe_loop import AT_MOST, GOAL, SPREAD, Flight
-from studies.load.setting import LOAD, SAFE, excitation, ship
 
-__all__ = ["goals", "write_report"]
+__all__ = ["STUDY", "Result", "run"]
 
 NOISE_FREE = 1e-6
 """Relative error to reach without noise."""
@@ -40,15 +46,57 @@ NOISE_FREE = 1e-6
 REGION = float(chi2.ppf(0.99, 10))
 """Squared distance from the mean within which ten parameters lie with 99 %, in standard deviations."""
 
+TITLES = {"loop": "arm known to 5 %", "exact": "arm known exactly"}
+"""What is known of the arm, the headline first."""
 
-def _flights(result: Result) -> dict[str, Flight]:
-    return {"loop": result.loop, "exact": result.exact}
+LIMIT_TITLES = {"tip_speed": "tip speed", "tip_rate": "tip rate", "base_rotation": "base rotation"}
+"""Titles of the limits."""
 
 
-def goals(result: Result) -> tuple[Goal, ...]:
+@dataclass(frozen=True)
+class Result:
+    """Outcome of the study.
+
+    Attributes
+    ----------
+    iterations : list of Iteration
+        The paper's two iterations without noise.
+    flights : dict of str to Flight
+        By the keys of `TITLES`: the safe loop, and its manoeuvres flown again with the arm known exactly.
+    full : bool
+    """
+
+    iterations: list[Iteration]
+    flights: dict[str, Flight]
+    full: bool
+
+
+def run(folder: Path, *, full: bool = False, seed: int = 0, progress: Progress = silent) -> Result:
+    """Run the study.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the loop's files, one for each effort; an interrupted run goes on there.
+    full : bool
+        True for the default effort of each search.
+    seed : int
+        Seed of all random numbers.
+    progress : Progress
+        Receiver of the fraction of the loop that is done.
+    """
+    folder = folder / ("full" if full else "quick")
+    folder.mkdir(parents=True, exist_ok=True)
+    search = Search() if full else Search(starts=2, iterations=25)
+    loop = fly_loop(folder, seed=seed, search=search, progress=progress)
+    flights = {"loop": loop, "exact": fly_again(folder, loop, seed=seed)}
+    return Result(iterate(seed=seed, search=search), flights, full)
+
+
+def _goals(result: Result) -> list[Goal]:
     """Return the goals of the study with what was reached."""
-    rows = []
-    for name, flight in _flights(result).items():
+    loop, rows = result.flights["loop"], []
+    for name, flight in result.flights.items():
         mass, sd = abs(flight.error(-1)[MASS]), flight.relative(-1)[MASS]
         reached = (
             f"{format_percent(mass, 2)} off with a sd of {format_percent(sd, 2)} after {len(flight.bodies)}; mass and "
@@ -59,23 +107,23 @@ def goals(result: Result) -> tuple[Goal, ...]:
     rows.append(
         Goal(
             "The loop flies every step and never ends in no go",
-            f"{len(result.loop.bodies)} manoeuvres flown, each within 99 % quantiles",
-            Verdict.of(result.loop.status != "no-go"),
+            f"{len(loop.bodies)} manoeuvres flown, each within 99 % quantiles",
+            Verdict.of(loop.status != "no-go"),
         )
     )
-    trusted = sum(review["trusted"] for review in result.loop.reviews)
+    trusted = sum(review["trusted"] for review in loop.reviews)
     rows.append(
         Goal(
             "The model, which is right, is trusted after every manoeuvre, from a diagnosis of all recordings so far",
-            f"after {trusted} of {len(result.loop.reviews)}",
-            Verdict.of(trusted == len(result.loop.reviews)),
+            f"after {trusted} of {len(loop.reviews)}",
+            Verdict.of(trusted == len(loop.reviews)),
         )
     )
-    for name, flight in _flights(result).items():
+    for name, flight in result.flights.items():
         used = ", ".join(f"{LIMIT_TITLES[key]} {format_percent(part, 4)}" for key, part in flight.used.items())
         text = f"Every limit kept in MuJoCo, {TITLES[name]}"
         rows.append(Goal(text, f"used at most: {used}", Verdict.of(max(flight.used.values()) <= 1.0)))
-    for name, flight in _flights(result).items():
+    for name, flight in result.flights.items():
         distance = flight.distance(-1)
         text = f"Truth within the 99 % region of the last posterior, ten parameters, {TITLES[name]}"
         reached = f"squared distance {format_fixed(distance, 1)} where {format_fixed(REGION, 1)} is the limit"
@@ -88,85 +136,68 @@ def goals(result: Result) -> tuple[Goal, ...]:
             Verdict.of(error <= NOISE_FREE),
         )
     )
-    return tuple(rows)
+    return rows
 
 
-def write_report(result: Result, output: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, and its tables beside it."""
-    loop, exact = result.loop, result.exact
-    document = Document("A load of 370 kg on ETS-VII", "Section 4.2 of Lampariello and Hirzinger (IDETC 2005)")
+def _report(result: Result) -> Report[Result]:
+    loop, exact = result.flights["loop"], result.flights["exact"]
+    reached, ideal = (format_quantity(flight.bodies[-1].mean[0], flight.bodies[-1].sd[0]) for flight in (loop, exact))
     kept = "kept" if max(loop.used.values()) <= 1.0 else "did not keep"
-    summary = Summary(
-        question="Does a loop that plans, flies and identifies find a load of 370 kg from a guess of 10 kg, safely?",
-        answer=(
-            f"From the guess of 10 kg the loop found {format_quantity(loop.bodies[-1].mean[0], loop.bodies[-1].sd[0])} "
-            f"kg in {len(loop.bodies)} manoeuvres that {kept} every limit; the arm, known to 5 % of each link's mass, "
-            f"sets that uncertainty, for with the arm known exactly the same manoeuvres give "
-            f"{format_quantity(exact.bodies[-1].mean[0], exact.bodies[-1].sd[0])} kg."
-        ),
-        goals=goals(result),
-        valid=(
-            "the base is known exactly and rests before each manoeuvre, the load is rigid and held rigidly, and "
-            "nothing but the gravity gradient acts, as the diagnosis of each step was to find."
-        ),
-        full=result.full,
-    )
-    add_first_page(
-        document,
-        summary,
-        loop_figure(_flights(result)),
-        "Left: error and standard deviation (sd) of the load's mass over 370 kg after every manoeuvre. Right: largest "
-        "tip speed, tip rate and rotation of the base over their limits, as MuJoCo flew them; the loop plans them for "
-        "99 % of what it holds possible.",
-    )
     motion = excitation().motion(result.iterations[-1].parameters)
-    times = np.array([0.0, 0.5 * mission.DURATION])
-    add_setup(
-        document,
-        _setup(result),
-        figures.robot_pose(ship(paper.TRUTH), motion, times),
-        "ETS-VII with the load at rest and in the middle of the paper's manoeuvre, which is flown without noise; the "
-        "loop's own manoeuvres are not drawn.",
-    )
-    _failures(document, result)
-    _evidence(document, result)
-    add_statements(document, _statements(result))
-    tables = _write_tables(result, output)
-    document.paragraph(f"Tables beside this report: {', '.join(tables)}.")
-    write_study(document, summary, output, origin)
-
-
-def _setup(result: Result) -> Setup:
-    return Setup(
-        robot=f"ETS-VII with the published base and a load of 370 kg on link 6; joints within ±{mission.REACH:g} rad.",
-        manoeuvre=(
-            f"Quintic splines of all six joints, {mission.DURATION:g} s each, d-optimal for the load from what the "
-            f"steps before told. At most 50 mm/s and 5 degrees per second at the tip, the flight's rule, and "
-            f"{SAFE.base_rotation:g} rad of rotation of the base, each with 99 % probability."
+    return Report(
+        title="A load of 370 kg on ETS-VII",
+        subtitle="Section 4.2 of Lampariello and Hirzinger (IDETC 2005)",
+        question="Does a loop that plans, flies and identifies find a load of 370 kg from a guess of 10 kg, safely?",
+        answer=f"From the guess of 10 kg the loop found {reached} kg in {len(loop.bodies)} manoeuvres that {kept} "
+        "every limit; the arm, known to 5 % of each link's mass, sets that uncertainty, for with the arm known exactly "
+        f"the same manoeuvres give {ideal} kg.",
+        goals=_goals(result),
+        valid="the base is known exactly and rests before each manoeuvre, the load is rigid and held rigidly, and "
+        "nothing but the gravity gradient acts, as the diagnosis of each step was to find.",
+        full=result.full,
+        figure=Picture(
+            _loop_figure(result.flights),
+            "Left: error and standard deviation (sd) of the load's mass over 370 kg after every manoeuvre. Right: "
+            "largest tip speed, tip rate and rotation of the base over their limits, as MuJoCo flew them; the loop "
+            "plans them for 99 % of what it holds possible.",
         ),
-        sensors=(
-            f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with {format_number(ACCEL)} "
-            f"m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant bias of the accelerometer."
+        setup=Setup(
+            robot=f"ETS-VII with the published base and a load of 370 kg on link 6; joints within ±{mission.REACH:g} "
+            "rad.",
+            manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s each, d-optimal for the load from "
+            "what the steps before told. At most 50 mm/s and 5 degrees per second at the tip, the flight's rule, and "
+            f"{SAFE.base_rotation:g} rad of rotation of the base, each with 99 % probability.",
+            sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
+            f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant "
+            "bias of the accelerometer.",
+            known="The base, the orbit, the attitude at the start, and the arm to 5 % of the mass of each link.",
+            unknown=f"The load, with a prior about 10 kg in which its mass may be {np.exp(2.0 * SPREAD):.0f} times "
+            f"larger or smaller within one sd; the rate at the start; the bias within {format_number(BIAS)} m/s²; the "
+            "links.",
+            replicates=f"One loop with one drawn arm; at most {AT_MOST} manoeuvres. Posteriors are normal "
+            "approximations.",
         ),
-        known="The base, the orbit, the attitude at the start, and the arm to 5 % of the mass of each link.",
-        unknown=(
-            f"The load, with a prior about 10 kg in which its mass may be {np.exp(2.0 * SPREAD):.0f} times larger or "
-            f"smaller within one sd; the rate at the start; the bias within {format_number(BIAS)} m/s²; the links."
+        picture=Picture(
+            figures.robot_pose(ship(paper.TRUTH), motion, np.array([0.0, 0.5 * mission.DURATION])),
+            "ETS-VII with the load at rest and in the middle of the paper's manoeuvre, which is flown without noise; "
+            "the loop's own manoeuvres are not drawn.",
         ),
-        replicates=f"One loop with one drawn arm; at most {AT_MOST} manoeuvres. Posteriors are normal approximations.",
+        sections=[_failures, _evidence],
+        statements=_statements(result),
+        tables=_tables(result),
     )
 
 
 def _failures(document: Document, result: Result) -> None:
     document.section("Calibration and failures")
-    loop = result.loop
+    loop = result.flights["loop"]
     floor = ship().link("link6").inertial.mass * 0.05
     share = format_percent(floor / paper.TRUTH[MASS], 2)
     left = format_number(float(loop.bodies[-1].sd[MASS]), 2)
     document.paragraph(
         f"A precision of {format_percent(GOAL, 2)} is out of reach of any manoeuvre with this arm: link 6 and the load "
-        f"move as one body, and 5 % of the link's mass are {format_number(floor, 2)} kg, {share} of the load. "
-        f"After the last manoeuvre {left} kg are left."
+        f"move as one body, and 5 % of the link's mass are {format_number(floor, 2)} kg, {share} of the load. After "
+        f"the last manoeuvre {left} kg are left."
     )
     attempts = []
     for number, plan in enumerate(loop.plans, start=1):
@@ -202,7 +233,7 @@ def _evidence(document: Document, result: Result) -> None:
     rows = []
     for k, title in enumerate(HEADINGS):
         cells = [
-            format_quantity(flight.bodies[-1].mean[k], flight.bodies[-1].sd[k]) for flight in _flights(result).values()
+            format_quantity(flight.bodies[-1].mean[k], flight.bodies[-1].sd[k]) for flight in result.flights.values()
         ]
         printed = [format_number(quantities[k], 5) for quantities in paper.RESULTS]
         rows.append([title, format_number(paper.TRUTH[k], 4), format_number(paper.GUESS[k], 3), *printed, *cells])
@@ -214,7 +245,7 @@ def _evidence(document: Document, result: Result) -> None:
         "manoeuvre of the loop.",
     )
     document.figure(
-        error_figure(result.iterations),
+        _error_figure(result.iterations),
         "The paper's case repeated without noise, within the flight's rule: relative errors of the ten quantities, "
         "those of products of inertia relative to the moments. MuJoCo flew the motion (27) that maximises (26) as "
         "intended; least squares without prior.",
@@ -246,22 +277,82 @@ def _statements(result: Result) -> list[Statement]:
     ]
 
 
-def _write_tables(result: Result, output: Path) -> list[str]:
+def _tables(result: Result) -> list[CsvTable]:
     steps = [
         [name, step + 1, HEADINGS[k], paper.TRUTH[k], float(body.mean[k]), float(body.sd[k])]
-        for name, flight in _flights(result).items()
+        for name, flight in result.flights.items()
         for step, body in enumerate(flight.bodies)
         for k in range(10)
     ]
     limits = [
         [name, step + 1, key, row[key], getattr(SAFE, key)]
-        for name, flight in _flights(result).items()
+        for name, flight in result.flights.items()
         for step, row in enumerate(flight.largest)
         for key in row
     ]
     without = [[number, *map(float, item.estimate)] for number, item in enumerate(result.iterations, start=1)]
     return [
-        write_table(output, "steps", ["arm", "manoeuvre", f"{LOAD}'s quantity", "true", "mean", "sd"], steps),
-        write_table(output, "limits", ["arm", "manoeuvre", "limit", "largest in MuJoCo", "allowed"], limits),
-        write_table(output, "without-noise", ["iteration", *HEADINGS], without),
+        CsvTable("steps", ["arm", "manoeuvre", f"{LOAD}'s quantity", "true", "mean", "sd"], steps),
+        CsvTable("limits", ["arm", "manoeuvre", "limit", "largest in MuJoCo", "allowed"], limits),
+        CsvTable("without-noise", ["iteration", *HEADINGS], without),
     ]
+
+
+@styled
+def _loop_figure(flights: dict[str, Flight]) -> Figure:
+    """Draw the error and the standard deviation of the mass after every manoeuvre, and what it used of the limits."""
+    figure = wide_figure(2.6)
+    left, right = figure.subplots(1, 2)
+    for index, (name, flight) in enumerate(flights.items()):
+        steps = np.arange(1, len(flight.bodies) + 1)
+        error = [abs(flight.error(step)[0]) for step in range(len(steps))]
+        sd = [flight.relative(step)[0] for step in range(len(steps))]
+        colour = COLOURS[index]
+        left.plot(steps, 100.0 * np.array(sd), "-", color=colour, label=f"sd, {TITLES[name]}")
+        left.plot(steps, 100.0 * np.array(error), "o", color=colour, markersize=4, label=f"error, {TITLES[name]}")
+    left.axhline(100.0 * GOAL, color="#888888", linestyle=":")
+    left.text(0.55, 110.0 * GOAL, "wanted", fontsize=8, va="bottom")
+    flown = next(iter(flights.values()))
+    steps = np.arange(1, len(flown.bodies) + 1)
+    left.set(yscale="log", xlabel="manoeuvre", ylabel="error or sd of the mass [%]", xlim=(0.5, steps[-1] + 0.5))
+    left.set_xticks(steps)
+    for index, name in enumerate(LIMITED):
+        part = 100.0 * np.array([row[name] for row in flown.largest]) / getattr(SAFE, name)
+        right.bar(steps + 0.25 * (index - 1), part, 0.22, color=COLOURS[index + 2], label=LIMIT_TITLES[name])
+    right.axhline(100.0, color="black", linewidth=0.8)
+    right.set(xlabel="manoeuvre", ylabel="share of the limit [%]", ylim=(0.0, 145.0))
+    right.set_xticks(steps)
+    right.legend(loc="upper left", ncols=2)
+    shared_legend(figure, left, 4, place="outside lower center")
+    return figure
+
+
+@styled
+def _error_figure(iterations: list[Iteration]) -> Figure:
+    """Draw the relative errors of the ten quantities, as printed in the paper and as reached here."""
+    figure = wide_figure(2.4)
+    axes = figure.subplots()
+    place = np.arange(len(LABELS))
+    series = {"paper": list(paper.RESULTS), "here, no noise": [item.estimate for item in iterations]}
+    for colour, (name, estimates) in zip((BEFORE, AFTER), series.items(), strict=True):
+        for number, estimate in enumerate(estimates):
+            error = np.abs(paper.errors(estimate))
+            error[error == 0.0] = np.nan  # printed exactly
+            fill = "full" if number else "none"
+            label = f"{name}, iteration {number + 1}"
+            axes.plot(place, error, "os"[number], color=colour, fillstyle=fill, markersize=4, label=label)
+    axes.set(yscale="log", ylabel="relative error")
+    axes.set_xticks(place, LABELS)
+    shared_legend(figure, axes, 4, place="outside lower center")
+    return figure
+
+
+STUDY = Study(
+    "load",
+    "Identify a load on the arm of ETS-VII.",
+    run=run,
+    report=_report,
+    full="the default effort of each search",
+    seed=0,
+    extra={"--folder": {"type": Path, "default": Path("out/load"), "help": "folder that keeps the loop's files"}},
+)

@@ -15,7 +15,7 @@ from pathlib import Path
 import typst
 
 from bayesid._io.files import complete_file
-from studies.common.command import Command
+from studies.common.study import Command
 from studies.manual.content import content
 
 __all__ = ["main", "run"]

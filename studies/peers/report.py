@@ -16,13 +16,12 @@ from bayesid._math.arrays import Floats
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_signed
-from studies.common.command import TRIALS, Command
 from studies.common.ets7 import START, ets7
-from studies.common.goals import Goal, Verdict
+from studies.common.figures import robot_outline
 from studies.common.monte_carlo import read_store, run_trials
 from studies.common.provenance import study_origin
-from studies.common.robot_outline import robot_outline
-from studies.common.tables import add_number_table
+from studies.common.report_parts import add_number_table
+from studies.common.study import TRIALS, Command, Goal, Verdict
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 from studies.peers.contest import EFFECTIVE, LIMITS, LONG, NESTED, REFERENCE, attempt, tasks
 from studies.peers.density import CASES

@@ -17,9 +17,9 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.app.compilation_cache import keep_compiled
 from studies.common import mission
-from studies.common.command import TRIALS, Command
+from studies.common.flight import Flown, flown_along
 from studies.common.monte_carlo import Workers
-from studies.common.tip_watch import Flown, flown_along
+from studies.common.study import TRIALS, Command
 from studies.planning.planner import Planner
 from studies.planning.ships import Row, Trip, row_of, trip_of
 from studies.planning.world import planners_model

@@ -15,9 +15,9 @@ from bayesid.report.numbers import format_fixed, format_number, format_percent, 
 from bayesid.report.verdict_record import Share
 from studies.common import mission
 from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, TIP_RATE, TIP_SPEED, ets7
-from studies.common.goals import Goal, Verdict
-from studies.common.robot_outline import robot_outline
-from studies.common.tables import add_number_table
+from studies.common.figures import robot_outline
+from studies.common.report_parts import add_number_table
+from studies.common.study import Goal, Verdict
 from studies.common.template import (
     Finding,
     Setup,

@@ -18,8 +18,8 @@ from bayesid.inference.posterior import Posterior
 from bayesid.report.verdict_record import Share
 from bayesid.robot.body_prior import coordinates_of
 from studies.common import mission
-from studies.common.errors_in_deviations import squared_distances
 from studies.common.monte_carlo import Workers, run_trials
+from studies.common.quantities import squared_distances
 from studies.common.repeated_fits import Reference
 from studies.planning.planner import Planner, miss_of
 from studies.planning.world import FlownPose, fly, planners_model, true_ship

@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bayesid.app.compilation_cache import keep_compiled
-from studies.common.command import TRIALS, Command
 from studies.common.monte_carlo import Workers
 from studies.common.provenance import study_origin
+from studies.common.study import TRIALS, Command
 from studies.sensors.report import write_report
 from studies.sensors.result import REALISTIC, Effort, Result, compute
 

@@ -13,9 +13,9 @@ from bayesid.report.figures import robot_pose
 from bayesid.report.numbers import format_fixed, format_percent, format_range, format_text
 from studies.base_body import paper
 from studies.common.ets7 import ACCELEROMETER, INTERVAL, TIP_SPEED, ets7, tip_speed
-from studies.common.goals import Goal, Verdict
 from studies.common.quantities import JUDGED, MASS
 from studies.common.report_parts import columns
+from studies.common.study import Goal, Verdict
 from studies.common.template import (
     Finding,
     Setup,

@@ -15,7 +15,7 @@ from bayesid.app.compilation_cache import keep_compiled
 from bayesid.design import THOROUGH, Search, Store
 from bayesid.recording.joint_motion import Motion
 from studies.common import mission
-from studies.common.command import TRIALS, Command
+from studies.common.study import TRIALS, Command
 from studies.separating.analysis import Realised, expectations, realise, references
 from studies.separating.linear_evidence import Expected
 from studies.separating.manoeuvres import Designed, design_both, separating_problem

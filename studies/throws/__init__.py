@@ -15,8 +15,8 @@ import numpy as np
 
 from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis import Diagnosis
-from studies.common.command import Command
 from studies.common.provenance import study_origin
+from studies.common.study import Command
 from studies.throws.analysis import Analysis, analyse, prepare
 from studies.throws.body_result import BodyResult
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws, read_truth

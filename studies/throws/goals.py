@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from bayesid.diagnosis import Diagnosis
 from bayesid.diagnosis.evidence.probable_verdict import NAMED
 from bayesid.report.verdict_record import Share
-from studies.common.goals import Goal, Verdict
+from studies.common.study import Goal, Verdict
 from studies.throws.body_result import BodyResult
 from studies.throws.smooth_widths import LARGEST
 

@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bayesid.app.compilation_cache import keep_compiled
-from studies.common.command import Command
 from studies.common.provenance import study_origin
+from studies.common.study import Command
 from studies.whole_system.contest import contest
 from studies.whole_system.coverage import covered
 from studies.whole_system.information import informed

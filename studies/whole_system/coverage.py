@@ -15,8 +15,8 @@ from bayesid.inference.mode import fit
 from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.robot.body_prior import draw_inertial
-from studies.common.errors_in_deviations import squared_distances
 from studies.common.monte_carlo import run_trials
+from studies.common.quantities import squared_distances
 from studies.whole_system.sampled import true_point
 from studies.whole_system.setting import bodies, groups, model_of, spreads
 from studies.whole_system.world import fly, record

@@ -17,9 +17,9 @@ from bayesid.report.figures.figure_style import AFTER, COLOURS, TRUTH, shared_le
 from bayesid.report.numbers import format_fixed, format_number, format_percent
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.common.ets7 import ACCEL, ENCODER, RATE, START, TIP_SPEED, ets7
-from studies.common.goals import Goal, Verdict
+from studies.common.figures import robot_outline
 from studies.common.report_parts import columns
-from studies.common.robot_outline import robot_outline
+from studies.common.study import Goal, Verdict
 from studies.common.template import (
     Finding,
     Setup,

@@ -11,7 +11,7 @@ from scipy import stats
 from bayesid import Identification, Manoeuvre, Posterior, Robot, identify
 from bayesid._math.arrays import Floats
 from bayesid.robot.inertial_parameters import mass_com_inertia
-from studies.common.errors_in_deviations import squared_distances
+from studies.common.quantities import squared_distances
 from studies.whole_system.setting import COULOMB, VISCOUS, bodies, model_of
 from studies.whole_system.world import START_RATE
 

@@ -9,9 +9,7 @@ from bayesid.robot.robot import Load
 from bayesid.simulation.effects import JointFriction
 from bayesid.simulation.joint_torques import TorqueSensor
 from studies.common.ets7 import BASE, ets7
-from studies.common.ets7_model import orbiting_model
-from studies.common.guesses import guess_about
-from studies.common.models import ARM_SPREAD
+from studies.common.models import ARM_SPREAD, guess_about, orbiting_model
 
 __all__ = ["LOAD", "bodies", "drawn", "groups", "model_of", "spreads", "true_robot"]
 

@@ -14,19 +14,8 @@ from matplotlib.figure import Figure
 from bayesid.report import Document
 from bayesid.report.figures.figure_height import fitted_height
 from bayesid.report.figures.figure_style import styled, wide_figure
-from studies.common.goals import Goal, Verdict
 from studies.common.provenance import study_origin
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
-)
+from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict, show
 from tests.pdf_text import PdfText
 from tests.report_rules import badly_written, broken_rules
 
@@ -35,7 +24,6 @@ GOALS = (
     Goal("error at most 1 %", "1.2 % (1.1 to 1.5 %)", Verdict.of(False)),
     Goal("speed", "not run", Verdict.of(None)),
 )
-SUMMARY = Summary("How heavy is it?", "It weighs 3.1 kg.", GOALS, "the arm is known.", full=False)
 
 
 @styled
@@ -45,17 +33,35 @@ def picture(height: float) -> Figure:
     return figure
 
 
+def weighed(result: float) -> Report[float]:
+    return Report(
+        title="Weighing",
+        subtitle="An example",
+        question="How heavy is it?",
+        answer=f"It weighs {result:g} kg.",
+        valid="the arm is known.",
+        goals=GOALS,
+        full=False,
+        figure=Picture(picture(4.0), "What decides."),
+        setup=Setup("a box", "slow", "rate", "arm", "base", "3 recordings"),
+        picture=Picture(picture(2.0), "The box."),
+        sections=[lambda document, mass: document.figure(picture(3.0), f"More on {mass:g} kg.")],
+        statements=[Statement("It is heavy.", Finding.REFUTED, "It weighs 3.1 kg.")],
+        tables=[CsvTable("all", ["body", "mass [kg]"], [["a, b", 0.1], ["c", 2]])],
+    )
+
+
+STUDY = Study("weighing", "Weigh a box.", run=lambda seed, progress: float(seed), report=weighed, seed=4)
+
+
 def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
-    document = Document("Weighing", "An example")
-    add_first_page(document, SUMMARY, picture(4.0), "What decides.")
-    add_setup(document, Setup("a box", "slow", "rate", "arm", "base", "3 recordings"), picture(2.0), "The box.")
-    add_statements(document, [Statement("It is heavy.", Finding.REFUTED, "It weighs 3.1 kg.")])
-    document.figure(picture(3.0), "More.")
     origin = study_origin("weighing", argparse.Namespace(full=True, seed=4, output=tmp_path))
-    write_study(document, SUMMARY, tmp_path / "weighing.pdf", origin)
+    STUDY.write(3.1, tmp_path / "weighing.pdf", origin)
     text = PdfText.read(tmp_path / "weighing.pdf")
     for words in (
         "It weighs 3.1 kg.",
+        "More on 3.1 kg.",
+        "Tables beside this report: weighing-all.csv.",
         "How heavy is it?",
         "the arm is known.",
         "not run in full",
@@ -68,16 +74,22 @@ def test_a_report_has_every_part_and_keeps_the_rules(tmp_path: Path):
     assert text.row("It is heavy.", "refuted", "It weighs 3.1 kg.")
     assert broken_rules(tmp_path / "weighing.pdf") == []
     kept = json.loads((tmp_path / "weighing.json").read_text())
-    assert kept["answer"] == SUMMARY.answer
+    assert kept["answer"] == "It weighs 3.1 kg."
     assert kept["origin"] == origin
     assert [goal["verdict"] for goal in kept["goals"]] == ["PASS", "FAIL", "NOT TESTED"]
 
-
-def test_a_table_beside_a_report_can_be_read_back(tmp_path: Path):
-    name = write_table(tmp_path / "weighing.pdf", "all", ["body", "mass [kg]"], [["a, b", 0.1], ["c", 2]])
-    assert name == "weighing-all.csv"
-    with (tmp_path / name).open(newline="") as stream:
+    with (tmp_path / "weighing-all.csv").open(newline="") as stream:
         assert list(csv.reader(stream)) == [["body", "mass [kg]"], ["a, b", "0.1"], ["c", "2"]]
+
+
+def test_a_study_runs_with_the_options_of_its_command(tmp_path: Path, capsys):
+    STUDY.main(["--output", str(tmp_path), "--seed", "7"])
+    assert capsys.readouterr().out == f"Wrote {tmp_path / 'weighing.pdf'}.\n"
+    summary = json.loads((tmp_path / "weighing.json").read_text())
+    assert summary["answer"] == "It weighs 7 kg."
+    assert "python -m studies.weighing --seed 7" in summary["origin"]
+    show(0.25, "designs")
+    assert capsys.readouterr().out == "25%: designs\n"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,323 @@
+"""The one base of all studies: command line, report with its parts in one order, summary, tables beside it, origin.
+
+A study states how it runs (`Study.run`) and what its report holds (`Report`); `Study.main` does the rest. The report is
+a `bayesid.report.Document` of two to four pages: answer, deciding figure and goals on the first, then the setup, the
+study's own sections, the paper's statements and the names of the tables beside it. The summary beside it, as JSON, is
+what `studies.index` and `studies.validation` read.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from matplotlib.figure import Figure
+
+from bayesid._io.files import complete_file, write_json
+from bayesid.app.compilation_cache import keep_compiled
+from bayesid.app.scheduler import executor_at
+from bayesid.report import Document
+from studies.common.provenance import MODELS, study_origin
+from studies.common.report_parts import glossary
+
+__all__ = ["MADE", "TRIALS", "WORKERS", "Command", "CsvTable", "Finding", "Goal", "Picture", "Report", "Setup"]
+__all__ += ["Statement", "Study", "Verdict", "show"]
+
+R = TypeVar("R")
+
+WORKERS: Mapping[str, Mapping[str, Any]] = {
+    "--workers": {"type": int, "default": 1, "help": "number of processes that run the trials"},
+    "--scheduler": {
+        "metavar": "ADDRESS",
+        "dest": "workers",
+        "type": executor_at,
+        "help": "scheduler of dask.distributed whose workers run the trials, in place of processes of this machine",
+    },
+}
+"""Options of what runs the trials: ``workers`` of `studies.common.monte_carlo.run_trials`."""
+
+TRIALS: Mapping[str, Mapping[str, Any]] = {
+    "--trials": {"type": Path, "help": "file that keeps the Monte Carlo trials, for an interrupted run"},
+    **WORKERS,
+}
+"""Options of a study with `studies.common.monte_carlo.run_trials`, for `Command.extra`."""
+
+MADE: Mapping[str, Mapping[str, Any]] = {
+    "--made": {"action": "store_true", "help": "report the trials made so far, make no more"}
+}
+"""Option of a study whose trials are made by many runs."""
+
+
+class Verdict(StrEnum):
+    """What is said of a goal."""
+
+    PASS = "PASS"
+    FAIL = "FAIL"
+    OPEN = "NOT DECIDED"
+    NOT_TESTED = "NOT TESTED"
+
+    @classmethod
+    def of(cls, passed: object) -> Verdict:
+        """Return PASS or FAIL, or NOT TESTED where nothing was computed (None)."""
+        return cls.NOT_TESTED if passed is None else cls.PASS if passed else cls.FAIL
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A goal of a study.
+
+    Attributes
+    ----------
+    text : str
+        What is to be reached, with its number.
+    reached : str
+        What was reached, with its interval where there is one.
+    verdict : Verdict
+        NOT DECIDED where the interval holds values on both sides of the goal.
+    """
+
+    text: str
+    reached: str
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class Setup:
+    """Conditions of a study, one sentence or two each.
+
+    The manoeuvre states its speed beside the flight's rule; the replicates say what a full run repeats.
+    """
+
+    robot: str
+    manoeuvre: str
+    sensors: str
+    known: str
+    unknown: str
+    replicates: str
+
+
+class Finding(StrEnum):
+    """What a study finds of a statement in the paper."""
+
+    CONFIRMED = "confirmed"
+    REFUTED = "refuted"
+    NOT_TESTABLE = "not testable"
+
+
+class Statement(NamedTuple):
+    """A statement of the paper, what is found of it, and why."""
+
+    text: str
+    finding: Finding
+    reason: str
+
+
+class Picture(NamedTuple):
+    """A figure with its caption."""
+
+    figure: Figure
+    caption: str
+
+
+class CsvTable(NamedTuple):
+    """A table written beside the report, ``REPORT-NAME.csv``."""
+
+    name: str
+    header: Sequence[str]
+    rows: Iterable[Sequence[object]]
+
+    def write(self, output: Path) -> str:
+        """Write the table beside a report and return the name of its file."""
+        file = output.with_name(f"{output.stem}-{self.name}.csv")
+        with complete_file(file) as part, part.open("w", encoding="utf-8", newline="") as stream:
+            csv.writer(stream, lineterminator="\n").writerows([self.header, *self.rows])
+        return file.name
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report(Generic[R]):
+    """What a report holds, in the order in which it is printed.
+
+    Attributes
+    ----------
+    title, subtitle : str
+    question, answer, valid : str
+        What is asked, the answer, and the conditions under which it is right; one sentence each.
+    goals : sequence of Goal
+    full : bool
+        Whether the study was run in full.
+    figure : Picture, optional
+        Figure that decides, on the first page.
+    setup : Setup, optional
+    outline : Figure, optional
+        Drawing of the robot inside the box of the setup.
+    picture : Picture, optional
+        Figure below the setup, as of the motion.
+    sections : sequence of callables
+        Each adds to a document what it shows of a result: failures, evidence, calibration.
+    statements : sequence of Statement
+        What is found of the paper's statements.
+    tables : sequence of CsvTable
+        Tables beside the report.
+    beside : str
+        Sentence on these tables; ``{all}`` stands for all names of files, ``{0}`` for the first.
+    credit : str
+        Sentence added to where the report comes from.
+    """
+
+    title: str
+    subtitle: str
+    question: str
+    answer: str
+    valid: str
+    goals: Sequence[Goal]
+    full: bool
+    figure: Picture | None = None
+    setup: Setup | None = None
+    outline: Figure | None = None
+    picture: Picture | None = None
+    sections: Sequence[Callable[[Document, R], None]] = ()
+    statements: Sequence[Statement] = ()
+    tables: Sequence[CsvTable] = ()
+    beside: str = "Tables beside this report: {all}."
+    credit: str = ""
+
+    def document(self, result: R, output: Path) -> Document:
+        """Return the printed report without its foot; the tables are written beside the output."""
+        document = Document(self.title, self.subtitle)
+        effort = "full run" if self.full else "not run in full: read it as an example, not as the result"
+        entries = [("Question", self.question), ("Valid when", self.valid), ("Effort", effort)]
+        document.decision(self.answer, entries)
+        if self.figure is not None:
+            document.figure(*self.figure)
+        rows = [[goal.text, goal.reached, goal.verdict.value] for goal in self.goals]
+        document.table(["goal", "reached", "verdict"], rows, "Goals.", ["left"] * 3)
+        if self.setup is not None:
+            document.section("Setup")
+            conditions = [(name.capitalize(), text) for name, text in asdict(self.setup).items()]
+            document.decision("Conditions", conditions, self.outline)
+        if self.picture is not None:
+            document.figure(*self.picture)
+        for section in self.sections:
+            section(document, result)
+        if self.statements:
+            document.section("What the paper states, and what is found here")
+            rows = [[item.text, item.finding.value, item.reason] for item in self.statements]
+            document.table(["the paper", "finding", "why"], rows, "Statements of the paper.", ["left"] * 3)
+        files = [table.write(output) for table in self.tables]
+        if files and self.beside:
+            document.paragraph(self.beside.format(*files, all=", ".join(files)))
+        return document
+
+    def summary(self, origin: str | None) -> dict[str, Any]:
+        """Return what the JSON file beside the report holds."""
+        goals = [asdict(goal) for goal in self.goals]
+        said = {"question": self.question, "answer": self.answer, "goals": goals, "valid": self.valid}
+        return {**said, "full": self.full, "origin": origin}
+
+
+@dataclass(frozen=True)
+class Command:
+    """What a study understands on the command line, ``python -m studies.NAME [--full] [--output FILE] [--seed N]``.
+
+    Attributes
+    ----------
+    name : str
+        Name of the study, and of its report.
+    description : str
+        One sentence that says what the study does.
+    full : str, optional
+        What ``--full`` adds; the study has no such option where left out.
+    seed : int, optional
+        Seed of all random numbers unless another is given; the study has no such option where left out.
+    extra : mapping
+        Further options -> keywords of ``argparse.ArgumentParser.add_argument``.
+    """
+
+    name: str
+    description: str
+    full: str | None = None
+    seed: int | None = None
+    extra: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def parse(self, arguments: Sequence[str] | None = None) -> argparse.Namespace:
+        """Return the options given, those of the command line where no arguments are; the report's folder is made."""
+        parser = argparse.ArgumentParser(prog=f"python -m studies.{self.name}", description=self.description)
+        if self.full is not None:
+            parser.add_argument("--full", action="store_true", help=self.full)
+        report = Path("reports") / f"{self.name}.pdf"
+        parser.add_argument("--output", type=Path, default=report, help="PDF file, or folder, of the report")
+        if self.seed is not None:
+            parser.add_argument("--seed", type=int, default=self.seed, help="seed of all random numbers")
+        for option, keywords in self.extra.items():
+            parser.add_argument(option, **keywords)
+        options = parser.parse_args(arguments)
+        if options.output.is_dir() or not options.output.suffix:
+            options.output /= report.name
+        summary = options.output.with_suffix(".json")  # written beside the report
+        for name, value in vars(options).items():
+            if isinstance(value, Path) and value == summary:
+                parser.error(f"--{name} {value} is the file of the report's summary: give another name")
+        options.output.parent.mkdir(parents=True, exist_ok=True)
+        return options
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study(Command, Generic[R]):
+    """A study: its command, how it runs, and what its report says.
+
+    Attributes
+    ----------
+    run : callable
+        Takes every option of the command but ``output`` as keyword, and ``progress`` as `show`; returns the result.
+    report : callable
+        Result -> `Report`.
+    inputs : callable
+        Options -> files that the study reads, for the report's origin; by default the robot ETS-VII.
+    """
+
+    run: Callable[..., R]
+    report: Callable[[R], Report[R]]
+    inputs: Callable[[argparse.Namespace], Sequence[Path]] = lambda options: [MODELS / "ets7.urdf"]
+
+    def main(self, arguments: Sequence[str] | None = None) -> None:
+        """Run the study with the options given, by default those of the command line, and write its report."""
+        options = self.parse(arguments)
+        keep_compiled()
+        chosen = {name: value for name, value in vars(options).items() if name != "output"}
+        result = self.run(**chosen, progress=show)
+        self.write(result, options.output, study_origin(self.name, options, self.inputs(options)))
+        show(f"Wrote {options.output}.")
+
+    def write(self, result: R, output: Path, origin: str | None = None) -> None:
+        """Write the report as PDF, and beside it its summary as JSON and its tables as CSV.
+
+        The meanings of the terms that it uses stand at the foot of its last page, which is filled to one half where the
+        figures' heights permit.
+
+        Parameters
+        ----------
+        result : object
+            What `run` returned.
+        output : Path
+            File of the PDF; the other files have its name but for their endings.
+        origin : str, optional
+            Where the report comes from, `studies.common.provenance.study_origin`.
+        """
+        report = self.report(result)
+        document = report.document(result, output)
+        if origin is not None and report.credit:
+            origin = f"{origin.rstrip('.')}. {report.credit}"
+        document.foot(origin or "", glossary(document))
+        document.write(output, filled=True)
+        write_json(output.with_suffix(".json"), report.summary(origin))
+
+
+def show(*said: float | str) -> None:
+    """Print a line on what is being done, after the fraction that is done where that is given first."""
+    print(": ".join(part if isinstance(part, str) else f"{part:.0%}" for part in said), flush=True)
