@@ -11,7 +11,7 @@ from scipy import stats
 
 from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm, NullTail
 from bayesid.diagnosis.evidence.gram import Gram
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.outcome.cause_power import cause_power

@@ -11,7 +11,7 @@ from scipy import integrate
 
 from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
 from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram, covariance_roots
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause, scale_range
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause, scale_range
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from tests.gram_problem import LinearProblem
 

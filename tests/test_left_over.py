@@ -11,7 +11,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import CauseSet, Status, diagnose
 from bayesid.diagnosis.candidates.candidate_effects import candidates
-from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
+from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.search import left_over
 from bayesid.diagnosis.search.left_over import LEFT_OVER, log_odds_of_anything, log_p_left, with_left_over
 from studies.truth import hidden_causes

@@ -15,7 +15,7 @@ import bayesid
 from bayesid.app.command_line import app
 from bayesid.app.schema.design_section import CriterionName
 from bayesid.app.schema.editor_schema import editor_schema
-from bayesid.diagnosis.evidence.status import Status
+from bayesid.diagnosis.evidence.verdict import Status
 from bayesid.inference.recording_check import ChannelSampling, JointCheck, RecordingCheck, SensorCheck
 from bayesid.report.effect_catalogue import catalogue
 from bayesid.simulation.effects.register import known_effects

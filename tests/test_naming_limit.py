@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
-from bayesid.diagnosis.evidence.probable_verdict import NAMED, ProbableVerdict
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.cause_sets import CausePrior
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.status import Status
+from bayesid.diagnosis.evidence.verdict import NAMED, ProbableVerdict, Status
 from studies.blind_injections import Trial
 from studies.blind_injections.goals import _relative
 from studies.blind_injections.limits import simulated_naming

@@ -26,7 +26,7 @@ from bayesid.diagnosis import (
     candidates,
     diagnose,
 )
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.diagnosis.outcome.cause_amplitudes import CauseAmplitude, amplitudes_of
 from bayesid.diagnosis.outcome.wrench_correlations import torque_correlations
 from bayesid.inference.residual_view import ResidualView

@@ -8,17 +8,12 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
-from bayesid.diagnosis.evidence.equivalent_causes import classes_of_equivalents
+from bayesid.diagnosis.evidence.cause_sets import CausePrior, CauseSet, SetProbabilities, enumerate_sets
 from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
 from bayesid.diagnosis.evidence.gram import Gram
-from bayesid.diagnosis.evidence.probable_verdict import probable_verdict
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.evidence.set_enumeration import enumerate_sets
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.set_probabilities import CauseSet, SetProbabilities
-from bayesid.diagnosis.evidence.status import Status
-from bayesid.diagnosis.evidence.verdict_sensitivity import verdict_sensitivity
+from bayesid.diagnosis.evidence.verdict import Status, classes_of_equivalents, probable_verdict, verdict_sensitivity
 from tests.gram_problem import LinearProblem
 
 LOW, HIGH = 0.02, 5.0
@@ -122,7 +117,7 @@ def test_a_triple_is_found_though_something_generic_takes_the_place_of_two_of_it
 
 def test_bounds_that_are_too_high_do_not_hide_other_sets(monkeypatch):
     """Bounds of bodies far above their evidence: what comes near the best set is evaluated all the same."""
-    monkeypatch.setattr("bayesid.diagnosis.evidence.set_enumeration.FEW", 0)
+    monkeypatch.setattr("bayesid.diagnosis.evidence.cause_sets.FEW", 0)
     rng = np.random.default_rng(7)
     names = [*"abcdefgh"]
     problem = LinearProblem.random(rng, dict.fromkeys(names, 1)).observed(rng, {"a": np.array([2.0])})

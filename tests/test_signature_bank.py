@@ -17,7 +17,7 @@ from bayesid.diagnosis.candidates.signature_bank import Signatures
 from bayesid.diagnosis.candidates.signature_products import SignatureProducts
 from bayesid.diagnosis.candidates.vibration_signatures import PAIRS, slosh_entries
 from bayesid.diagnosis.evidence.body_evidence import MissingBodyPrior, body_log_evidence, outer_moments, rigid_moments
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.inference.importance import choose_parameterisation, importance_sample

@@ -10,8 +10,8 @@ import pytest
 
 from bayesid import InputError, MeasuredMotion, Robot
 from bayesid.diagnosis import Status, diagnose
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
-from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict
+from bayesid.diagnosis.evidence.cause_sets import CausePrior
+from bayesid.diagnosis.evidence.verdict import ProbableVerdict
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread, read_torques, torques_beside
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.response.present_fit import fit_present_model

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayesid.app.schema import Study
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 if TYPE_CHECKING:

@@ -2,10 +2,8 @@
 
 from bayesid.diagnosis.candidates.candidate_effects import candidates
 from bayesid.diagnosis.diagnose import diagnose, identify_extended
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
-from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict
-from bayesid.diagnosis.evidence.set_probabilities import CauseSet, SetProbabilities
-from bayesid.diagnosis.evidence.status import Status
+from bayesid.diagnosis.evidence.cause_sets import CausePrior, CauseSet, SetProbabilities
+from bayesid.diagnosis.evidence.verdict import ProbableVerdict, Status
 from bayesid.diagnosis.outcome.candidate_table import Candidate
 from bayesid.diagnosis.outcome.disturbing_wrench import Frame, Unexplained
 from bayesid.diagnosis.outcome.gain import Gain

@@ -12,9 +12,8 @@ from threadpoolctl import threadpool_limits
 from bayesid._io.phase_clock import PhaseClock
 from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis.candidates.candidate_effects import candidates
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
-from bayesid.diagnosis.evidence.status import Status
-from bayesid.diagnosis.evidence.verdict_sensitivity import verdict_sensitivity
+from bayesid.diagnosis.evidence.cause_sets import CausePrior
+from bayesid.diagnosis.evidence.verdict import Status, verdict_sensitivity
 from bayesid.diagnosis.outcome.candidate_table import candidate_table
 from bayesid.diagnosis.outcome.disturbing_wrench import unexplained_wrench
 from bayesid.diagnosis.outcome.gain import measure_gain

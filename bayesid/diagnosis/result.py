@@ -9,10 +9,9 @@ from typing import Any
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.jump_instants import jump_instants
-from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict
+from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
-from bayesid.diagnosis.evidence.verdict_sensitivity import VerdictSensitivity
+from bayesid.diagnosis.evidence.verdict import ProbableVerdict, VerdictSensitivity
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.outcome.candidate_table import Candidate
 from bayesid.diagnosis.outcome.cause_amplitudes import amplitudes_of, amplitudes_of_others

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bayesid.diagnosis import Diagnosis
-from bayesid.diagnosis.evidence.probable_verdict import UNKNOWN
-from bayesid.diagnosis.evidence.set_probabilities import CauseSet
+from bayesid.diagnosis.evidence.cause_sets import CauseSet
+from bayesid.diagnosis.evidence.verdict import UNKNOWN
 
 __all__ = ["alternative_probability", "alternatives", "cause_probability", "class_of"]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from bayesid.diagnosis import CauseSet, Diagnosis
 from bayesid.diagnosis.evidence.gram import GaussianBlock
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup
 
 __all__ = ["GroupSize", "set_sizes"]
 

@@ -11,12 +11,10 @@ from scipy import stats
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis import Diagnosis
 from bayesid.diagnosis.candidates.signature_products import SignatureProducts
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
-from bayesid.diagnosis.evidence.equivalent_causes import classes_of_equivalents
+from bayesid.diagnosis.evidence.cause_sets import CausePrior, enumerate_sets
 from bayesid.diagnosis.evidence.gram import Gram, independent_directions
-from bayesid.diagnosis.evidence.probable_verdict import ProbableVerdict, probable_verdict
-from bayesid.diagnosis.evidence.set_enumeration import enumerate_sets
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.evidence.verdict import ProbableVerdict, classes_of_equivalents, probable_verdict
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.inference.posterior import Posterior

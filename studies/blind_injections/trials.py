@@ -18,7 +18,7 @@ from bayesid.app.compilation_cache import keep_compiled
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Frame, Status, diagnose
-from bayesid.diagnosis.evidence.probable_verdict import UNKNOWN, ProbableVerdict
+from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict
 from bayesid.diagnosis.outcome.cause_amplitudes import effect_amplitude
 from bayesid.inference.perturbed_posterior import residual_of
 from bayesid.inference.posterior import Posterior

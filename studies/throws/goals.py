@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from bayesid.diagnosis import Diagnosis
-from bayesid.diagnosis.evidence.probable_verdict import NAMED
+from bayesid.diagnosis.evidence.verdict import NAMED
 from bayesid.report.verdict_record import Share
 from studies.common.study import Goal, Verdict
 from studies.throws.body_result import BodyResult

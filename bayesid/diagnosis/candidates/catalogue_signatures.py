@@ -9,7 +9,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.body_evidence import MissingBody, rigid_moments
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbation import tables_of
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.simulation.effects.arm_effects import Payload

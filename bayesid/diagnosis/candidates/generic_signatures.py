@@ -8,7 +8,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_view import by_recording

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.perturbed_posterior import jacobian_of
 

@@ -21,10 +21,10 @@ from bayesid.diagnosis.candidates.mass_shift_signatures import (
     shift_spread,
 )
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
+from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.scale_integral import GroupSpectrum, log_evidences
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup
-from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup
 from bayesid.diagnosis.search.linearisation import Linearisation
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.evidence.scale_prior import CandidateCause
+from bayesid.diagnosis.evidence.scales import CandidateCause
 
 __all__ = ["SignatureBank", "Signatures"]
 

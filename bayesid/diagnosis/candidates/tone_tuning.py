@@ -24,7 +24,7 @@ from bayesid.diagnosis.candidates.vibration_signatures import (
     tone_signature,
 )
 from bayesid.diagnosis.evidence.scale_integral import GroupSpectrum, log_evidences
-from bayesid.diagnosis.evidence.scale_prior import CandidateCause
+from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.search.left_beside import LeftBeside
 from bayesid.diagnosis.search.linearisation import Linearisation

@@ -10,7 +10,7 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.catalogue_signatures import moment_spreads
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.body_evidence import MissingBody, outer_moments
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh

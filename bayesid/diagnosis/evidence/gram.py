@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy.linalg as sla
@@ -24,15 +25,9 @@ from bayesid._math.threads import several_threads
 
 __all__ = ["GaussianBlock", "Gram", "covariance_roots", "independent_directions"]
 
-LOST = 1e-10
-"""Fraction of a column's length below which what the unknowns leave of it is rounding and is set to zero."""
-
-DEPENDENT = 1e-10
-"""Fraction of the largest eigenvalue, among columns of unit length, below which a direction counts as dependent."""
-
-
-JITTER = 1e-10
-"""Fraction of the diagonal that makes the matrix of columns of unit length, which may be singular, definite."""
+LOST = 1e-10  # share of a column's length below which what the unknowns leave of it is rounding
+DEPENDENT = 1e-10  # share of the largest eigenvalue, of columns of unit length, below which a direction is dependent
+JITTER = 1e-10  # share of the diagonal that makes a singular matrix of columns of unit length definite
 
 
 def independent_directions(matrix: Floats) -> Floats:
@@ -49,11 +44,16 @@ def independent_directions(matrix: Floats) -> Floats:
         Matrix ``W`` with ``W' matrix W = 1``, where ``k`` is the numerical rank, judged after each column has been
         brought to unit length, so that units do not matter.
     """
-    length = np.sqrt(np.diag(matrix))
-    inverse = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
+    _, inverse = _lengths(matrix)
     values, vectors = np.linalg.eigh(inverse[:, None] * matrix * inverse)
     kept = values > DEPENDENT * max(values.max(initial=0.0), np.finfo(float).tiny)
     return inverse[:, None] * vectors[:, kept] / np.sqrt(values[kept])
+
+
+def _lengths(matrix: Floats) -> tuple[Floats, Floats]:
+    """Return the lengths of the columns behind a Gram matrix, and their inverses, zero for columns of no length."""
+    length = np.sqrt(np.diag(matrix))
+    return length, np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
 
 
 def _scaled_factor(information: Floats, deviations: Floats) -> Floats:
@@ -152,12 +152,8 @@ class Gram:
     def __post_init__(self) -> None:
         for name in ("matrix", "score"):
             given = getattr(self, name)
-            if isinstance(given, np.ndarray) and not given.flags.writeable and given.dtype == float:
-                continue  # locked by another Gram or by `owning`, which have seen to it
-            locked = np.array(given, dtype=float)
-            _check_finite(name, locked)
-            locked.setflags(write=False)
-            object.__setattr__(self, name, locked)
+            if not isinstance(given, np.ndarray) or given.flags.writeable or given.dtype != float:
+                object.__setattr__(self, name, _locked(name, np.array(given, dtype=float)))
         size = len(self.score)
         if self.matrix.shape != (size, size):
             raise ValueError(f"a score of length {size} needs a matrix of that size, received {self.matrix.shape}")
@@ -166,10 +162,7 @@ class Gram:
     @staticmethod
     def owning(matrix: Floats, score: Floats, groups: Mapping[str, Integers]) -> Gram:
         """Return the Gram of arrays that nobody else keeps: they are locked instead of copied."""
-        for name, array in (("matrix", matrix), ("score", score)):
-            _check_finite(name, array)
-            array.setflags(write=False)
-        return Gram(matrix, score, groups)
+        return Gram(_locked("matrix", matrix), _locked("score", score), groups)
 
     @staticmethod
     def of(columns: Mapping[str, Floats], residual: Floats, fitted: Floats, coordinates: Floats | None = None) -> Gram:
@@ -192,31 +185,21 @@ class Gram:
         rows, unknowns = fitted.shape
         z = -fitted.T @ residual if coordinates is None else coordinates
         basis = np.linalg.qr(np.concatenate([fitted, np.eye(unknowns)]))[0]
-        sizes = [array.shape[1] for array in columns.values()]
-        left = np.empty((rows + unknowns, sum(sizes)))
-        groups, first = {}, 0
-        for (name, array), size in zip(columns.items(), sizes, strict=True):
+        groups = _side_by_side({name: array.shape[1] for name, array in columns.items()})
+        left = np.empty((rows + unknowns, sum(map(len, groups.values()))))
+        for name, array in columns.items():
             share = basis[:rows].T @ array
-            own = left[:, first : first + size]
-            np.subtract(array, basis[:rows] @ share, out=own[:rows])
-            own[rows:] = -basis[rows:] @ share
-            own[:, np.linalg.norm(own, axis=0) <= LOST * np.linalg.norm(array, axis=0)] = 0.0
-            groups[name] = np.arange(first, first + size)
-            first += size
+            part = np.concatenate([array - basis[:rows] @ share, -basis[rows:] @ share])
+            part[:, np.linalg.norm(part, axis=0) <= LOST * np.linalg.norm(array, axis=0)] = 0.0
+            left[:, groups[name]] = part
         return Gram.owning(left.T @ left, left.T @ np.concatenate([residual, z]), groups)
 
     def keeping(self, names: Iterable[str]) -> Gram:
         """Return the Gram of some of the groups, in the order of the names."""
-        chosen = {name: self.groups[name] for name in names}
-        kept = self._columns(chosen)
-        groups, first = {}, 0
-        for name, own in chosen.items():
-            groups[name] = np.arange(first, first + len(own))
-            first += len(own)
-        matrix, score = self.matrix[np.ix_(kept, kept)], self.score[kept]
-        for own in (matrix, score):
-            own.setflags(write=False)  # finite like those that they are of
-        return Gram(matrix, score, groups)
+        names = list(names)
+        kept = self.columns(names)
+        groups = _side_by_side({name: len(self.groups[name]) for name in names})
+        return Gram.owning(self.matrix[np.ix_(kept, kept)], self.score[kept], groups)
 
     def conditioned(self, columns: Integers, deviations: Floats, names: Iterable[str] | None = None) -> Gram:
         """Return the Gram of some groups after other columns have taken their share (`GaussianBlock`).
@@ -231,15 +214,12 @@ class Gram:
             Groups that are kept; by default all.
         """
         part = self if names is None else self.keeping(names)
-        kept = np.arange(len(self.score)) if names is None else self._columns(part.groups)
+        kept = np.arange(len(self.score)) if names is None else self.columns(part.groups)
         block = GaussianBlock.of(self.matrix[np.ix_(columns, columns)], deviations)
         share, pull = block.share(self.matrix[np.ix_(columns, kept)]), block.share(self.score[columns])
-        matrix, score = part.matrix - share.T @ share, part.score - share.T @ pull
-        for own in (matrix, score):
-            own.setflags(write=False)  # finite, since the block is positive definite
-        return Gram(matrix, score, part.groups)
+        return Gram.owning(part.matrix - share.T @ share, part.score - share.T @ pull, part.groups)
 
-    def _columns(self, names: Iterable[str]) -> Integers:
+    def columns(self, names: Iterable[str]) -> Integers:
         """Return the columns of some groups, one group after another."""
         return np.concatenate([np.zeros(0, dtype=int), *(self.groups[name] for name in names)])
 
@@ -260,7 +240,7 @@ class Gram:
 
         The improvement includes that of the unknowns' prior. Where it is below the rank, the ratio is zero.
         """
-        own = np.concatenate([self.groups[name] for name in names])
+        own = self.columns(names)
         fitted = independent_directions(self.matrix[np.ix_(own, own)]).T @ self.score[own]
         return float(np.sqrt(max(fitted @ fitted - len(fitted), 0.0)))
 
@@ -275,10 +255,8 @@ class Gram:
         """
         drawn = rng.normal(size=(draws, len(self.score)))
         root = self._root()
-        with several_threads(len(self.score)):
-            # a triangular product takes half of the operations of a full one
-            scores: Floats = dtrmm(1.0, root.T, drawn.T, lower=0, trans_a=1, overwrite_b=1).T
-        return scores
+        with several_threads(len(self.score)):  # a triangular product takes half of the operations of a full one
+            return np.asarray(dtrmm(1.0, root.T, drawn.T, lower=0, trans_a=1, overwrite_b=1).T)
 
     def _root(self) -> Floats:
         """Return the lower triangle, (m, m), whose product with its transpose is ``A`` up to 1e-10 of its diagonal.
@@ -287,8 +265,7 @@ class Gram:
         then the nearest matrix that is not. One thread factorises: two lose several times what they gain as soon as
         another process keeps one of the cores busy.
         """
-        length = np.sqrt(np.diag(self.matrix))
-        inverse = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0.0)
+        length, inverse = _lengths(self.matrix)
         scaled = inverse[:, None] * self.matrix
         scaled *= inverse
         scaled[np.diag_indices(len(length))] += JITTER
@@ -296,13 +273,20 @@ class Gram:
             root = np.linalg.cholesky(scaled)
         except np.linalg.LinAlgError:
             values, vectors = np.linalg.eigh(scaled)
-            values = values - JITTER
-            root = np.transpose(np.linalg.qr((vectors * np.sqrt(np.maximum(values, 0.0))).T, mode="r"))
+            root = np.linalg.qr((vectors * np.sqrt(np.maximum(values - JITTER, 0.0))).T, mode="r").T
         root *= length[:, None]
         return root
 
 
-def _check_finite(name: str, array: Floats) -> None:
-    """Refuse an array of a Gram that holds anything but finite numbers."""
+def _locked(name: str, array: Floats) -> Floats:
+    """Lock an array of a Gram, which must be finite."""
     if not np.isfinite(array).all():
         raise ValueError(f"the {name} of a Gram must be finite; a signature or the residual is not")
+    array.setflags(write=False)
+    return array
+
+
+def _side_by_side(sizes: Mapping[str, int]) -> dict[str, Integers]:
+    """Return the columns of groups of some sizes, one group after another."""
+    ends = np.cumsum([0, *sizes.values()])
+    return {name: np.arange(*pair) for name, pair in zip(sizes, pairwise(ends), strict=True)}

@@ -21,8 +21,15 @@ import numpy as np
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.log_sum import log_sum
 from bayesid.diagnosis.evidence.gram import Gram
-from bayesid.diagnosis.evidence.scale_nodes import LogNodes, log_nodes, log_nodes_of_many, thinning
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, ScaleRange, range_of
+from bayesid.diagnosis.evidence.scales import (
+    AmplitudeGroup,
+    LogNodes,
+    ScaleRange,
+    log_nodes,
+    log_nodes_of_many,
+    range_of,
+    thinning,
+)
 
 __all__ = ["GroupSpectrum", "ScaleAverage", "average_over_scales", "log_evidences", "log_ratios"]
 

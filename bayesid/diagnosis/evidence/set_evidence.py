@@ -20,8 +20,7 @@ from bayesid.diagnosis.evidence.scale_integral import (
     average_over_scales,
     log_evidences,
 )
-from bayesid.diagnosis.evidence.scale_nodes import LogNodes, thinning
-from bayesid.diagnosis.evidence.scale_prior import CandidateCause
+from bayesid.diagnosis.evidence.scales import CandidateCause, LogNodes, thinning
 
 __all__ = ["SetEvidence", "near_best"]
 

@@ -15,7 +15,7 @@ from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.candidates.generic_signatures import FORCE, TORQUE, WAVES
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank
 from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
-from bayesid.diagnosis.evidence.scale_prior import CandidateCause
+from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidates, Held
 from bayesid.diagnosis.search.hypothesis import Hypothesis

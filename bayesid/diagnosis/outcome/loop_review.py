@@ -9,7 +9,7 @@ from pathlib import Path
 from bayesid._io.files import write_json
 from bayesid.design.step_review import Review
 from bayesid.diagnosis.diagnose import diagnose
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.model import Manoeuvre, Model
 

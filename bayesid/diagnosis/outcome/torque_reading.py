@@ -20,15 +20,12 @@ from bayesid.diagnosis.candidates.generic_signatures import error_signatures
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank
 from bayesid.diagnosis.candidates.signature_products import SignatureProducts
 from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.diagnosis.evidence.cause_sets import CausePrior, SetProbabilities, enumerate_sets
 from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
 from bayesid.diagnosis.evidence.gram import GaussianBlock
-from bayesid.diagnosis.evidence.probable_verdict import UNKNOWN, ProbableVerdict, probable_verdict
-from bayesid.diagnosis.evidence.scale_prior import AmplitudeGroup, CandidateCause
-from bayesid.diagnosis.evidence.set_enumeration import enumerate_sets
+from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
-from bayesid.diagnosis.evidence.status import Status
+from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Status, probable_verdict
 from bayesid.diagnosis.outcome.extended_model import extended_posterior, extended_start
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.mode import fit

@@ -9,11 +9,9 @@ import numpy as np
 
 from bayesid._io.progress import Progress, silent
 from bayesid._math.memory import give_back_memory
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
-from bayesid.diagnosis.evidence.equivalent_causes import classes_of_equivalents
-from bayesid.diagnosis.evidence.set_enumeration import enumerate_sets
+from bayesid.diagnosis.evidence.cause_sets import CausePrior, SetProbabilities, enumerate_sets
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
+from bayesid.diagnosis.evidence.verdict import classes_of_equivalents
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.noise.noise_states import FaultyFit, NoiseState, fault_names
 from bayesid.diagnosis.response.followed_motion import linearise_along_data

@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesid._io.progress import Progress
 from bayesid._math.memory import give_back_memory
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
+from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.noise.noise_states import FaultyFit, faulty_fit
 from bayesid.diagnosis.noise.noise_tests import noise_tests

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayesid._io.errors import InputError
-from bayesid.diagnosis.evidence.set_probabilities import CauseSet, SetProbabilities
+from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.noise.noise_tests import noise_tests
 from bayesid.diagnosis.noise.structure_tests import structure_tests
 from bayesid.diagnosis.outcome.extended_model import exactly_fitted

@@ -14,9 +14,7 @@ from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.candidates.shift_tuning import plausible_shift, with_tuned_shift
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank
 from bayesid.diagnosis.candidates.tone_tuning import with_tuned_tones
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
-from bayesid.diagnosis.evidence.set_enumeration import enumerate_sets
-from bayesid.diagnosis.evidence.set_probabilities import CauseSet, SetProbabilities
+from bayesid.diagnosis.evidence.cause_sets import CausePrior, CauseSet, SetProbabilities, enumerate_sets
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.amplitude_fit import fit_in_amplitudes
 from bayesid.diagnosis.search.linearisation import Linearisation, linearise

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bayesid._io.errors import InputError
-from bayesid.diagnosis.evidence.set_probabilities import CauseSet, SetProbabilities
+from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
 from bayesid.diagnosis.search.weighed_state import WeighedState

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bayesid.diagnosis.evidence.set_probabilities import SetProbabilities
+from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.noise.noise_states import FaultyFit, NoiseState
 from bayesid.diagnosis.response.perturbed_model import Fit
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bayesid.diagnosis import Diagnosis
-from bayesid.diagnosis.evidence.probable_verdict import COVERED, MOST_ALTERNATIVES, NAMED
+from bayesid.diagnosis.evidence.verdict import COVERED, MOST_ALTERNATIVES, NAMED
 from bayesid.report.numbers import format_number
 
 __all__ = ["GLOSSARY", "computation_sentence", "method_sentences"]

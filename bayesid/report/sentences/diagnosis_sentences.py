@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, Status, Unexplained
 from bayesid.diagnosis.candidates.jump_instants import jump_instants
-from bayesid.diagnosis.evidence.probable_verdict import COVERED, NAMED, UNKNOWN
+from bayesid.diagnosis.evidence.verdict import COVERED, NAMED, UNKNOWN
 from bayesid.diagnosis.noise.noise_faults import SUMMARIES
 from bayesid.diagnosis.outcome.cause_amplitudes import amplitudes_of
 from bayesid.report.class_probabilities import alternative_probability, alternatives, cause_probability

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, Status
 from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
-from bayesid.diagnosis.evidence.probable_verdict import UNKNOWN
+from bayesid.diagnosis.evidence.verdict import UNKNOWN
 from bayesid.report.class_probabilities import alternatives
 from bayesid.report.sentences.next_experiment import advice
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayesid.diagnosis.evidence.probable_verdict import UNKNOWN, ProbableVerdict
+from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict
 from bayesid.report.numbers import format_probability, relation
 
 __all__ = ["NOTHING", "SOMETHING", "probability_text", "set_text", "verdict_text"]

@@ -1,19 +1,19 @@
-"""Enumeration of the sets of causes that could be at work."""
+"""Sets of causes that could be at work: their prior and posterior probabilities, and which of them are weighed."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import logsumexp
 
 from bayesid._math.log_sum import log_sum
 from bayesid._math.threads import in_threads
-from bayesid.diagnosis.evidence.cause_prior import CausePrior
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence, near_best
-from bayesid.diagnosis.evidence.set_probabilities import CauseSet, SetProbabilities
 
-__all__ = ["enumerate_sets"]
+__all__ = ["CausePrior", "CauseSet", "SetProbabilities", "enumerate_sets"]
 
 MOST_CAUSES = 3
 """Most causes of the catalogue in one set; a generic candidate may stand beside them."""
@@ -36,6 +36,158 @@ NEAR = 6.0
 """Logarithm of the probability relative to the most probable set so far down to which a set that the screening has
 weighed is evaluated in full. The screening is off by about one nat at most in such sets, bodies apart, where it is an
 upper bound."""
+
+
+@dataclass(frozen=True)
+class CausePrior:
+    """How many causes a study has, and whether something generic is at work.
+
+    The number of causes is geometric: one more is at work with one probability, however many there are. All sets of
+    one size are equally probable. The default of 0.1 keeps the promise of the alarm in the names as well: a cause with
+    a probability of 0.9 leaves nothing with less than 0.1, and the average evidence of any set where nothing is lacking
+    is 1, so that by Markov's inequality at most one such study in ``9 * 0.81 / 0.1 = 73`` names a cause without rivals,
+    however many candidates there are. Among 40, one has to earn 8.2 nats beyond nothing for that, and a second one 7.5
+    beyond the first.
+
+    Something generic is at work, beside any causes, with the other probability, shared equally among the generic
+    candidates. Its default of 0.1 says that what is lacking lies outside the catalogue as often as it is one of its
+    causes: the least presumptuous choice for a catalogue whose completeness nobody knows.
+
+    Attributes
+    ----------
+    one_more : float
+        Probability that a study has one more cause.
+    generic : float
+        Probability that something generic is at work.
+    """
+
+    one_more: float = 0.1
+    generic: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in ("one_more", "generic"):
+            if not 0.0 < getattr(self, name) < 1.0:
+                raise ValueError(f"{name} is a probability in (0, 1), received {getattr(self, name)}")
+
+    def log_probability(self, size: int, causes: int, generic: bool, generics: int) -> float:
+        """Return the logarithm of the prior probability of one set.
+
+        Parameters
+        ----------
+        size, causes : int
+            Number of causes in the set and in the catalogue.
+        generic : bool
+            Whether the set holds a generic candidate.
+        generics : int
+            Number of generic candidates.
+        """
+        found = np.log1p(-self.one_more) + size * np.log(self.one_more) - np.log(math.comb(causes, size))
+        if generic:
+            found += np.log(self.generic / generics)
+        elif generics:
+            found += np.log1p(-self.generic)
+        return float(found)
+
+
+@dataclass(frozen=True)
+class CauseSet:
+    """One set of causes.
+
+    Attributes
+    ----------
+    causes : tuple of str
+        Causes of the catalogue, sorted.
+    generic : str or None
+        Generic candidate beside them.
+    log_evidence : float
+        Relative to nothing.
+    log_prior : float
+        Logarithm of its prior probability.
+    probability : float
+        Posterior probability among all sets considered.
+    """
+
+    causes: tuple[str, ...]
+    generic: str | None
+    log_evidence: float
+    log_prior: float = 0.0
+    probability: float = 0.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All candidates in the set."""
+        return self.causes if self.generic is None else (*self.causes, self.generic)
+
+
+@dataclass(frozen=True)
+class SetProbabilities:
+    """Probabilities of all sets considered.
+
+    Attributes
+    ----------
+    sets : tuple of CauseSet
+        Sets, the most probable first. The empty one is always among them.
+    causes, generics : tuple of str
+        Names of all candidates of the catalogue and of all generic ones, sorted.
+    prior : CausePrior
+    """
+
+    sets: tuple[CauseSet, ...]
+    causes: tuple[str, ...]
+    generics: tuple[str, ...]
+    prior: CausePrior
+
+    @staticmethod
+    def of(
+        sets: Iterable[CauseSet], causes: Iterable[str], generics: Iterable[str], prior: CausePrior
+    ) -> SetProbabilities:
+        """Return the probabilities of sets of known evidence, the empty one among them."""
+        causes, generics = tuple(sorted(causes)), tuple(sorted(generics))
+        sets = list(sets)
+        sizes = [(len(item.causes), item.generic is not None) for item in sets]
+        log_priors = {own: prior.log_probability(own[0], len(causes), own[1], len(generics)) for own in set(sizes)}
+        own_priors = [log_priors[own] for own in sizes]
+        totals = [log_prior + item.log_evidence for log_prior, item in zip(own_priors, sets, strict=True)]
+        shares = np.exp(np.array(totals) - logsumexp(totals)).tolist()
+        order = sorted(range(len(sets)), key=lambda index: (-totals[index], sets[index].names))
+        found = tuple(
+            CauseSet(item.causes, item.generic, item.log_evidence, own_priors[index], shares[index])
+            for index, item in ((index, sets[index]) for index in order)
+        )
+        return SetProbabilities(found, causes, generics, prior)
+
+    def under(self, prior: CausePrior) -> SetProbabilities:
+        """Return the probabilities of the same sets under another prior of causes; no evidence is computed anew."""
+        return SetProbabilities.of(self.sets, self.causes, self.generics, prior)
+
+    @property
+    def nothing(self) -> float:
+        """Probability that nothing is lacking."""
+        return _total(item for item in self.sets if not item.names)
+
+    @property
+    def unknown(self) -> float:
+        """Probability that something generic is at work, whatever causes accompany it."""
+        return _total(item for item in self.sets if item.generic is not None)
+
+    def of_any(self, names: Collection[str]) -> float:
+        """Return the probability that at least one of some candidates is at work, such as a class of equivalents."""
+        wanted = set(names)
+        return _total(item for item in self.sets if not wanted.isdisjoint(item.names))
+
+    @property
+    def inclusion(self) -> dict[str, float]:
+        """Probability of each candidate, generic ones included, to be at work, whatever accompanies it."""
+        holding: dict[str, list[CauseSet]] = {name: [] for name in (*self.causes, *self.generics)}
+        for item in self.sets:
+            for name in item.names:
+                holding[name].append(item)
+        return {name: _total(sets) for name, sets in holding.items()}
+
+
+def _total(sets: Iterable[CauseSet]) -> float:
+    """Return the probability of any of some sets, which rounding does not lift above one."""
+    return min(math.fsum(item.probability for item in sets), 1.0)
 
 
 def enumerate_sets(

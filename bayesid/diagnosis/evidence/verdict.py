@@ -1,0 +1,267 @@
+"""From the probabilities of sets of causes to the verdict, and how it rests on what had to be chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+import numpy as np
+
+from bayesid._math.arrays import Floats, Integers
+from bayesid.diagnosis.evidence.cause_sets import CausePrior, SetProbabilities
+from bayesid.diagnosis.evidence.gram import Gram, independent_directions
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+
+__all__ = [
+    "UNKNOWN",
+    "ProbableVerdict",
+    "Status",
+    "VerdictSensitivity",
+    "classes_of_equivalents",
+    "probable_verdict",
+    "verdict_sensitivity",
+]
+
+NAMED = 0.9
+"""Probability of its class from which on a cause is named without rivals."""
+
+COVERED = 0.95
+"""Probability that the alternatives of an ambiguous verdict hold together."""
+
+MOST_ALTERNATIVES = 4
+"""Most alternatives that are named; among more, none is."""
+
+UNKNOWN = "unknown"
+"""Name of the generic candidates among the alternatives."""
+
+
+DECADE = 10.0
+"""Factor by which the ranges of the scales are widened, at either end."""
+
+
+SEEN = 1.0
+"""Information on the amplitudes in units of their largest scale, in the most visible direction, from which on the data
+see a difference."""
+
+ROUNDING = 1e-9
+"""Fraction of a cause's whole information below which what another leaves of it is rounding."""
+
+
+class Status(Enum):
+    """Verdicts, as in diagnosis.json."""
+
+    ADEQUATE = "adequate"
+    EXPLAINED = "explained"
+    AMBIGUOUS = "ambiguous"
+    UNRESOLVED = "unresolved"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class ProbableVerdict:
+    """What the probabilities say.
+
+    Attributes
+    ----------
+    status : Status
+    causes : tuple of str
+        Best set of causes, one for each class, the most probable first; empty unless explained or ambiguous.
+    equivalent_to : dict of str to tuple of str
+        Other names for the same change of the model, by cause; only causes that have any.
+    ambiguous_with : tuple of tuples of str
+        Other alternatives, the most probable first. An empty one says that nothing may be lacking, and the name
+        "unknown" stands for any generic candidate.
+    """
+
+    status: Status
+    causes: tuple[str, ...] = ()
+    equivalent_to: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    ambiguous_with: tuple[tuple[str, ...], ...] = ()
+
+
+def probable_verdict(
+    probabilities: SetProbabilities, classes: Sequence[Sequence[str]], silent: bool
+) -> ProbableVerdict:
+    """Return the verdict on sets of causes.
+
+    Sets are first merged: equivalent causes count as one class, and all generic candidates as one more, the unknown.
+
+    - adequate: the alarm is silent.
+    - unknown: generic candidates hold the majority.
+    - explained: every class of the best set has a probability of 0.9 or more, whatever accompanies it. The best set is
+      the most probable one without anything generic.
+    - ambiguous: two to four alternatives hold 0.95. They are merged sets, taken in the order of their probability; each
+      holds whatever includes it, so that the many improbable companions of a cause count for it and not against it, and
+      what an earlier one holds is no alternative of its own. Nothing and the unknown may be among them.
+    - unresolved: more than four would be needed, or nothing is the most probable in spite of the alarm.
+
+    Parameters
+    ----------
+    probabilities : SetProbabilities
+    classes : sequence of sequences of str
+        Classes of equivalent causes, which hold every cause of the catalogue once.
+    silent : bool
+        Whether the alarm is silent.
+    """
+    if silent:
+        return ProbableVerdict(Status.ADEQUATE)
+    if probabilities.unknown > 0.5:
+        return ProbableVerdict(Status.UNKNOWN)
+    merged = _merged(probabilities, classes)
+    alternatives = _alternatives(merged)
+    best = next(item for item in merged if UNKNOWN not in item)
+    inclusion = probabilities.inclusion
+    ordered = [sorted(members, key=lambda name: (-inclusion[name], name)) for members in classes]
+    names = {members[0]: ordered[index] for index, members in enumerate(map(sorted, classes))}
+    held = dict.fromkeys(names, 0.0)
+    for item, probability in merged.items():
+        for key in item - {UNKNOWN}:
+            held[key] += probability
+
+    def named(item: frozenset[str]) -> tuple[str, ...]:
+        known = sorted(item - {UNKNOWN}, key=lambda key: (-held[key], key))
+        return (*(names[key][0] for key in known), *([UNKNOWN] if UNKNOWN in item else []))
+
+    explained = bool(best) and all(held[key] >= NAMED for key in best)
+    if not explained and (not best or not 2 <= len(alternatives) <= MOST_ALTERNATIVES):
+        return ProbableVerdict(Status.UNRESOLVED)
+    others = () if explained else tuple(named(item) for item in alternatives if item != best)
+    mentioned = {name for item in (named(best), *others) for name in item}
+    equivalent = {members[0]: tuple(members[1:]) for members in ordered if len(members) > 1 and members[0] in mentioned}
+    return ProbableVerdict(Status.EXPLAINED if explained else Status.AMBIGUOUS, named(best), equivalent, others)
+
+
+def _merged(probabilities: SetProbabilities, classes: Sequence[Sequence[str]]) -> dict[frozenset[str], float]:
+    """Return the probabilities of sets of classes, each by its first name, the most probable first."""
+    key = {name: min(members) for members in classes for name in members}
+    total: dict[frozenset[str], float] = {}
+    for item in probabilities.sets:
+        own = frozenset([*(key[name] for name in item.causes), *([UNKNOWN] if item.generic is not None else [])])
+        total[own] = total.get(own, 0.0) + item.probability
+    return dict(sorted(total.items(), key=lambda pair: (-pair[1], sorted(pair[0]))))
+
+
+def _alternatives(merged: dict[frozenset[str], float]) -> list[frozenset[str]]:
+    """Return the fewest of the most probable sets that hold 0.95 with all that include one of them."""
+    chosen: list[frozenset[str]] = []
+    covered = 0.0
+    left = dict(merged)
+    while left and covered < COVERED:
+        item = next(iter(left))
+        chosen.append(item)
+        within = [other for other in left if other == item or (item and item <= other)]
+        covered += sum(left.pop(other) for other in within)
+    return chosen
+
+
+@dataclass(frozen=True)
+class VerdictSensitivity:
+    """The verdict, and what it would have been under other choices.
+
+    Attributes
+    ----------
+    verdict : ProbableVerdict
+    others : mapping of str to ProbableVerdict
+        Verdicts under the other choices, by a description of the choice.
+    """
+
+    verdict: ProbableVerdict
+    others: Mapping[str, ProbableVerdict]
+
+    @property
+    def changes(self) -> tuple[str, ...]:
+        """Choices under which the status, or the set of causes that are named, is another."""
+        base = (self.verdict.status, frozenset(self.verdict.causes))
+        return tuple(name for name, other in self.others.items() if (other.status, frozenset(other.causes)) != base)
+
+
+def verdict_sensitivity(
+    probabilities: SetProbabilities,
+    classes: Sequence[Sequence[str]],
+    silent: bool,
+    widened: Callable[[float, float], SetProbabilities],
+) -> VerdictSensitivity:
+    """Return the verdict with each prior number halved and doubled, and with scales a decade wider at either end.
+
+    The prior numbers only weigh the sets anew; other ranges of the scales need their evidence once more.
+
+    Parameters
+    ----------
+    probabilities : SetProbabilities
+    classes : sequence of sequences of str
+        Classes of equivalent causes.
+    silent : bool
+        Whether the alarm is silent.
+    widened : callable
+        Probabilities with the bounds and the floors of all scales multiplied by two factors.
+    """
+    others = {
+        name: probable_verdict(probabilities.under(changed), classes, silent)
+        for name, changed in _other_priors(probabilities.prior).items()
+    }
+    for name, factors in {
+        "bounds a decade higher": (DECADE, 1.0),
+        "floors a decade lower": (1.0, 1.0 / DECADE),
+    }.items():
+        others[name] = probable_verdict(widened(*factors), classes, silent)
+    return VerdictSensitivity(probable_verdict(probabilities, classes, silent), others)
+
+
+def _other_priors(prior: CausePrior) -> dict[str, CausePrior]:
+    """Return the prior with each of its numbers halved and doubled; a probability stays below one."""
+    found = {}
+    for number, words in (("one_more", "causes"), ("generic", "unknown")):
+        for factor, verb in ((0.5, "half"), (2.0, "twice")):
+            value = getattr(prior, number) * factor
+            changed = min(value, 0.5 * (1.0 + getattr(prior, number)))
+            found[f"{words} {verb} as probable"] = replace(prior, **{number: changed})
+    return found
+
+
+def classes_of_equivalents(evidence: SetEvidence) -> tuple[tuple[str, ...], ...]:
+    """Return the causes of the catalogue in classes, each sorted, in the order of their first names.
+
+    Two causes are equivalent where neither offers anything visible, at the bounds of its scales, beyond what amplitudes
+    of any size of the other can imitate. A joint effect of two causes is not compared with a third. What the data
+    cannot see at all is equivalent to nothing, and each such cause is a class of its own. A cause joins a class if it
+    is equivalent to every member.
+    """
+    columns, units, directions = {}, {}, {}
+    for name in evidence.catalogue:
+        spectra = evidence.spectra([name])
+        columns[name] = np.concatenate([own.columns for own in spectra])
+        units[name] = np.concatenate([own.root * own.range.high for own in spectra])
+        directions[name] = independent_directions(evidence.gram.matrix[np.ix_(columns[name], columns[name])])
+    visible = {name for name in evidence.catalogue if _largest(evidence.gram, columns[name], units[name]) >= SEEN}
+
+    def imitated(name: str, other: str) -> bool:
+        left = _largest(evidence.gram, columns[name], units[name], columns[other], directions[other])
+        return left < max(SEEN, ROUNDING * _largest(evidence.gram, columns[name], units[name]))
+
+    classes: list[list[str]] = []
+    for name in evidence.catalogue:
+        fitting = (
+            members
+            for members in classes
+            if name in visible
+            and members[0] in visible
+            and all(imitated(name, other) and imitated(other, name) for other in members)
+        )
+        joined = next(fitting, None)
+        if joined is None:
+            classes.append([name])
+        else:
+            joined.append(name)
+    return tuple(tuple(members) for members in classes)
+
+
+def _largest(
+    gram: Gram, columns: Integers, units: Floats, others: Integers | None = None, directions: Floats | None = None
+) -> float:
+    """Return the largest eigenvalue of the information on columns, after others have taken their share."""
+    matrix = gram.matrix[np.ix_(columns, columns)]
+    if others is not None and directions is not None:
+        shared = gram.matrix[np.ix_(columns, others)] @ directions
+        matrix = matrix - shared @ shared.T
+    return float(np.linalg.eigvalsh(units[:, None] * matrix * units).max(initial=0.0))
