@@ -13,11 +13,8 @@ import typst
 
 from bayesid._io.files import complete_file
 
-SHOWN = "176mm"
-"""Height of what is shown of the first page: decision, figure and first table."""
-
-RESOLUTION = 100
-"""Resolution of the picture [dots per inch]."""
+SHOWN = "176mm"  # height of what is shown of the first page: decision, figure and first table
+RESOLUTION = 100  # resolution of the picture [dots per inch]
 
 
 def run(report: Path, output: Path) -> None:

@@ -47,8 +47,7 @@ SUBJECTS = (
 )
 """Subjects in the order in which they are reported."""
 
-ORDER = (Verdict.FAIL, Verdict.OPEN, Verdict.NOT_TESTED, Verdict.PASS)
-"""Verdicts, misses first."""
+ORDER = (Verdict.FAIL, Verdict.OPEN, Verdict.NOT_TESTED, Verdict.PASS)  # verdicts, misses first
 
 SECTIONS = {
     Verdict.FAIL: "Where it falls short",
@@ -58,8 +57,7 @@ SECTIONS = {
 }
 """Section of each verdict."""
 
-BESIDE = ("manual", "validation")
-"""Files among the reports that are no studies."""
+BESIDE = ("manual", "validation")  # files among the reports that are no studies
 
 
 class Judged(NamedTuple):

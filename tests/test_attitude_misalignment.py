@@ -16,7 +16,7 @@ from bayesid.simulation.effects import AttitudeMisalignment, Readings
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
-from studies.truth.urdf import SERVICER3
+from studies.truth.bodies import SERVICER3
 
 TRUE = np.array([0.02, -0.035, 0.015])
 TIMES = np.arange(0.0, 60.01, 1.0)

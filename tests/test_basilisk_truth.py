@@ -24,6 +24,7 @@ from studies.truth.basilisk import (
     true_base,
     write_basilisk_study,
 )
+from studies.truth.bodies import SERVICER4
 from studies.truth.mujoco import (
     Appendage,
     Body,
@@ -36,7 +37,6 @@ from studies.truth.mujoco import (
     rotation_from_rpy,
     smooth_motion,
 )
-from studies.truth.urdf import SERVICER4
 
 ACCEL_POSITION = (0.1, -0.15, 0.3)
 SHORT = Manoeuvres(count=2, duration=80.0)

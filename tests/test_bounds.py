@@ -24,9 +24,10 @@ from bayesid.simulation.orbit import EARTH_RADIUS, Orbit
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import hidden_causes
 from studies.truth import mujoco as mj
-from studies.truth.hidden_causes.case import Case, circumstances, merge
+from studies.truth.bodies import BRANCHED, SERVICER3, SERVICER4, link_body
+from studies.truth.hidden_causes.catalogue import Case, circumstances
+from studies.truth.hidden_causes.causes import merge
 from studies.truth.mujoco.parts import Appendage
-from studies.truth.urdf import BRANCHED, SERVICER3, SERVICER4, link_body
 
 SENSORS = (
     Sensor(SensorKind.RATE, White(1e-5)),

@@ -19,8 +19,8 @@ import bayesid
 from bayesid import app as app_room
 from bayesid.app.command_line import app
 from bayesid.report.numbers import format_fixed, format_number, format_quantity
+from studies.truth.bodies import SERVICER4
 from studies.truth.mujoco import Manoeuvres, TruthModel, write_study
-from studies.truth.urdf import SERVICER4
 from tests.pdf_text import PdfText
 
 

@@ -11,7 +11,7 @@ from bayesid._math.resampling import resampled
 from bayesid.simulation.effects import AccelClock, AccelLatency, RateClock, RateLatency, Readings
 from bayesid.simulation.effects.effect import Effect
 from studies.truth import mujoco as mj
-from studies.truth.urdf import SERVICER3
+from studies.truth.bodies import SERVICER3
 
 RNG = np.random.default_rng(7)
 UNEVEN = np.cumsum(RNG.uniform(0.05, 0.4, 200))

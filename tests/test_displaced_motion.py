@@ -19,7 +19,7 @@ from bayesid.simulation.sensors import Sensor, SensorKind, White
 from bayesid.simulation.simulator import ModelConstants, Simulator, Values
 from bayesid.simulation.time_grid import build_grid, pad_grids
 from studies.truth import mujoco as mj
-from studies.truth.urdf import BRANCHED, link_body
+from studies.truth.bodies import BRANCHED, link_body
 
 SERVICER = Path(__file__).resolve().parents[1] / "studies" / "truth" / "robots" / "servicer3.urdf"
 POINT = (0.2, -0.1, 0.3)

@@ -21,7 +21,7 @@ from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.time_grid import build_grid, pad_grids
 from studies.truth import mujoco as mj
 from studies.truth import stepwise as ref
-from studies.truth.urdf import moving_joints
+from studies.truth.bodies import moving_joints
 from tests.sensed import read
 
 ROOT = Path(__file__).resolve().parents[1]

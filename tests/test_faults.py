@@ -20,8 +20,8 @@ from bayesid.app.study_to_model import load_model
 from bayesid.simulation.own_effects import check_own_effect
 from studies.faults.fuzz import Spoilt, answer_to, spoilt
 from studies.faults.surroundings import with_plugin
+from studies.truth.bodies import SERVICER4
 from studies.truth.mujoco import Manoeuvres, write_study
-from studies.truth.urdf import SERVICER4
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -14,10 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from studies.truth import hidden_causes
 from studies.truth import mujoco as mj
-from studies.truth.bodies import join
+from studies.truth.bodies import SERVICER3, SERVICER4, join, link_body
 from studies.truth.hidden_causes import causes as hide
-from studies.truth.hidden_causes.case import merge
-from studies.truth.urdf import SERVICER3, SERVICER4, link_body
+from studies.truth.hidden_causes.causes import merge
 
 REST = (np.zeros(3), np.zeros(3), np.zeros(3))
 CATALOGUE = {

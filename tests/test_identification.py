@@ -15,8 +15,8 @@ from bayesid.inference import maximise
 from bayesid.inference.body_quantities import bodies_of
 from bayesid.inference.predicted_readings import integration_error_at
 from bayesid.inference.simulated_recordings import simulate_manoeuvre
+from studies.truth.bodies import BRANCHED, SERVICER4
 from studies.truth.mujoco import Hidden, Manoeuvres, Rotor, Sensors, Thrust, write_study
-from studies.truth.urdf import BRANCHED, SERVICER4
 
 SHIPPED = Path(bayesid.__file__).parent / "robot" / "models"
 EXAMPLES = Path(__file__).parents[2] / "shared" / "examples"

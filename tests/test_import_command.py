@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 
 from bayesid.app.command_line import app
 from bayesid.recording.recording import Recording
+from studies.truth.bodies import SERVICER4
 from studies.truth.mujoco import Manoeuvres, Sensors, write_study
-from studies.truth.urdf import SERVICER4
 
 pytest.importorskip("rosbags", reason="the extra ros is not installed")
 from tests.ros_bags import FORMATS, BagWriter

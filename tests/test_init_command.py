@@ -16,8 +16,8 @@ from bayesid.app.noise_estimates import channel_noise
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.recording.recording import Recording
+from studies.truth.bodies import SERVICER3
 from studies.truth.mujoco import Manoeuvres, Sensors, write_study
-from studies.truth.urdf import SERVICER3
 
 SENSORS = Sensors(rate_sigma=2e-5, accel_sigma=5e-5, attitude_sigma=1e-4, attitude_period=0.5, encoder_sigma=3e-6)
 

@@ -12,9 +12,9 @@ from bayesid.diagnosis.noise.encoder_fault import noise_of
 from bayesid.recording.integrated_process import HIGHER, IntegratedProcess, Jump
 from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
+from studies.truth.bodies import SERVICER3
 from studies.truth.motions import ProfiledManoeuvres, smooth_motion, trapezoid
 from studies.truth.mujoco import write_study
-from studies.truth.urdf import SERVICER3
 from tests.test_smoothing import swing
 
 TIME = np.arange(0.0, 160.01, 0.5)

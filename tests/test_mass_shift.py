@@ -28,7 +28,7 @@ from bayesid.simulation.model import BodyPrior, Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from studies.truth import stepwise as ref
-from studies.truth.urdf import SERVICER3
+from studies.truth.bodies import SERVICER3
 from tests.simulated import simulated as predicted
 
 POINT, RATE0 = (0.2, -0.1, 0.3), (0.02, -0.03, 0.015)

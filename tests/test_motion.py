@@ -14,7 +14,7 @@ from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre
-from studies.truth.urdf import BRANCHED
+from studies.truth.bodies import BRANCHED
 from tests.conftest import PLANAR
 
 EXCITATION = Excitation([0.3, -0.5], [0.6, 0.2], 0.25, periods=2, ramp=10.0, start=[0.1, 0.0])

@@ -11,7 +11,7 @@ from test_design import plan as flywheel_plan
 from bayesid.design import DOptimal, Limits, PaperExcitation, Problem
 from bayesid.design.reacting_swing import _chosen, _largest, base_rates, reacting_swing
 from bayesid.robot.robot import Robot
-from studies.truth.urdf import BRANCHED, SERVICER4
+from studies.truth.bodies import BRANCHED, SERVICER4
 
 
 @pytest.mark.parametrize("file", [SERVICER4, BRANCHED], ids=["revolute", "slides and branches"])

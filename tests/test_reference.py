@@ -16,8 +16,8 @@ import pytest
 from scipy.interpolate import make_lsq_spline
 
 from studies.truth import mujoco as mj
+from studies.truth.bodies import moving_joints
 from studies.truth.stepwise import Response, circular_zenith, simulate
-from studies.truth.urdf import moving_joints
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT.parent / "shared" / "examples"

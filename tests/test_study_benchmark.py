@@ -11,9 +11,7 @@ import pytest
 from bayesid.inference.predicted_readings import integration_error_at
 from studies.benchmark.cases import chain, posterior_of
 from studies.benchmark.report import figures_of_merit, goals_of, write_report
-from studies.benchmark.run import Benchmark
-from studies.benchmark.sampling import Sampling
-from studies.benchmark.timing import Rival, seconds_per_evaluation
+from studies.benchmark.run import Benchmark, Rival, Sampling, seconds_per_evaluation
 from studies.common.study import Verdict
 from tests.pdf_text import PdfText
 from tests.report_rules import broken_rules

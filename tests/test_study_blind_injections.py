@@ -20,11 +20,18 @@ from studies.blind_injections.goals import (
     _scatter,
     _stated,
     goals_of,
+    record_of,
     share_text,
 )
-from studies.blind_injections.record import record_of
-from studies.blind_injections.rows import confusion, confusion_matrix, rates, reliability, scores, statements
-from studies.blind_injections.snap_limit import snap_limit
+from studies.blind_injections.rows import (
+    confusion,
+    confusion_matrix,
+    rates,
+    reliability,
+    scores,
+    snap_limit,
+    statements,
+)
 from studies.blind_injections.trials import Plan, read
 from studies.common.monte_carlo import read_store
 from studies.common.study import Verdict

@@ -10,13 +10,11 @@ from arviz.stats.ecdf_utils import ecdf_confidence_band
 from scipy import stats
 
 from studies.calibration import make, plan, read, write_report
-from studies.calibration.cases import REPLICATES, Case
-from studies.calibration.coverage_of_cases import ALL, interval_coverage
+from studies.calibration.data import REPLICATES, Case
 from studies.calibration.encoders import _ratios, smooth_share
-from studies.calibration.outcomes import Replicates
+from studies.calibration.outcomes import ALL, POINTS, Replicates, coverage, holm, interval_coverage, uniform_p_value
 from studies.calibration.replicate import Method
 from studies.calibration.report import goals_of
-from studies.calibration.uniformity import POINTS, coverage, holm, uniform_p_value
 from studies.common.monte_carlo import run_trials
 from studies.common.study import Verdict
 from tests.pdf_text import PdfText

@@ -8,11 +8,8 @@ from pathlib import Path
 import pytest
 
 from studies.common.study import Verdict
-from studies.cost.commands import Run, run_command
-from studies.cost.growth import Floor
-from studies.cost.nested import Nested
 from studies.cost.report import goals_of, write_report
-from studies.cost.run import Cost, run
+from studies.cost.run import Cost, Floor, Nested, Run, run, run_command
 from studies.cost.search_times import SearchTimes, search_clock
 from tests.pdf_text import PdfText
 from tests.report_rules import broken_rules

@@ -12,13 +12,11 @@ import pytest
 from bayesid.inference.proposal import StudentT
 from studies.common.monte_carlo import run_trials
 from studies.common.study import Verdict
-from studies.peers.contest import REFERENCE, attempt, tasks
+from studies.peers.contest import REFERENCE, Recipe, attempt, lines, tasks
 from studies.peers.recipes import with_scipy, with_sysid
-from studies.peers.reference import bridge
 from studies.peers.report import goals_of, read, write_report
-from studies.peers.samplers import Sampler, effective_samples
-from studies.peers.task import Recipe, lines
-from studies.truth.urdf import SERVICER3
+from studies.peers.samplers import Sampler, bridge, effective_samples
+from studies.truth.bodies import SERVICER3
 from tests.pdf_text import PdfText
 from tests.report_rules import broken_rules
 

@@ -8,10 +8,9 @@ import pytest
 from bayesid import InputError
 from studies.common.study import Verdict
 from studies.throws import run
-from studies.throws.body_result import BodyResult
+from studies.throws.analysis import BodyResult
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws
-from studies.throws.goals import _quick_fit, goals_of, held_in_all
-from studies.throws.report import write_report
+from studies.throws.report import _quick_fit, goals_of, held_in_all, write_report
 from tests.report_rules import broken_rules
 
 PRESENT = (DEFAULT_FOLDER / "truth.json").is_file()

@@ -30,7 +30,7 @@ from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
-from studies.truth.urdf import moving_joints
+from studies.truth.bodies import moving_joints
 from tests.conftest import ROOT
 
 ROBOTS = {

@@ -13,7 +13,7 @@ from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from studies.truth import stepwise as ref
-from studies.truth.urdf import SERVICER3
+from studies.truth.bodies import SERVICER3
 from tests.simulated import simulated
 
 END, TIMES = 46.0, np.arange(0.0, 60.01, 0.5)

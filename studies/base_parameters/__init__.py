@@ -15,10 +15,8 @@ from threadpoolctl import threadpool_limits
 from bayesid import Robot
 from bayesid.identifiability import Base
 from studies.base_parameters.peers import compare
-from studies.base_parameters.recovery import identify_by_torques
 from studies.base_parameters.report import Result, write_report
-from studies.base_parameters.scale import scale_cases
-from studies.base_parameters.structure import equations_at, structure
+from studies.base_parameters.structure import equations_at, identify_by_torques, scale_cases, structure
 from studies.common.ets7 import ets7
 from studies.common.provenance import MODELS, study_origin
 from studies.common.study import Command

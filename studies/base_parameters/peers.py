@@ -17,10 +17,7 @@ from bayesid._math.arrays import Floats
 from bayesid.identifiability import Base, base_parameters, standard_names
 from bayesid.identifiability.stacked_regressor import GRAVITY
 
-__all__ = ["Comparison", "compare"]
-
-STATES = 80
-"""Number of random states, many more than the parameters need."""
+STATES = 80  # number of random states, many more than the parameters need
 
 ABSENT = "is not evaluated, since it is not installed (the extra peers brings it)"
 """Statement in place of FIGAROH's version."""

@@ -12,9 +12,7 @@ from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_number, format_percent, format_range, format_vector
 from studies.base_parameters.peers import Comparison
-from studies.base_parameters.recovery import STATES, WRONG, Recovery
-from studies.base_parameters.scale import ScaleCase
-from studies.base_parameters.structure import Equations, Structure
+from studies.base_parameters.structure import STATES, WRONG, Equations, Recovery, ScaleCase, Structure
 from studies.base_parameters.texts import regrouping_rows, symbol, unchanged
 from studies.common.report_parts import add_number_table
 from studies.common.study import Goal, Verdict
@@ -30,10 +28,7 @@ from studies.common.template import (
     write_table,
 )
 
-__all__ = ["Result", "goals_of", "singular_figure", "write_report"]
-
-COUNTS = (24, 52)
-"""Numbers of base parameters by the paper's rules: 30 − 6 for two joints, 70 − 18 for six."""
+COUNTS = (24, 52)  # numbers of base parameters by the paper's rules: 30 − 6 for two joints, 70 − 18 for six
 
 EXACT = 1e-9
 """Largest relative error of a parameter, and largest angle between two spaces [rad], that count as rounding."""

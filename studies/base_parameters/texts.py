@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from bayesid.identifiability import BaseParameters
 from bayesid.report.numbers import format_number
 
-__all__ = ["regrouping_rows", "symbol", "unchanged"]
-
 _LOWERED = str.maketrans("0123456789-", "₀₁₂₃₄₅₆₇₈₉₋")
 
 _LETTERS = {"mass": "m", "first": "h", "inertia": "I"}

@@ -22,13 +22,8 @@ from bayesid.inference.simulated_recordings import simulate_manoeuvre
 from bayesid.simulation.effects import GravityGradient
 from studies.common.ets7 import INTERVAL, RADIUS
 
-__all__ = ["DURATION", "SIGMA", "chain", "excitation", "posterior_of"]
-
-SIGMA = 1.0e-5
-"""Noise per sample of rate [rad/s] and accelerometer [m/s2]."""
-
-DURATION = 120.0
-"""Length of every manoeuvre [s]."""
+SIGMA = 1.0e-5  # noise per sample of rate [rad/s] and accelerometer [m/s2]
+DURATION = 120.0  # length of every manoeuvre [s]
 
 LINK = """
   <link name="link{n}"><inertial><origin xyz="{half} 0 0.01"/><mass value="{mass}"/>

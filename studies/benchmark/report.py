@@ -15,32 +15,23 @@ from bayesid.app.compilation_cache import keep_compiled
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_number, format_text
-from studies.benchmark.run import RUNS, Benchmark, run
-from studies.benchmark.timing import EVALUATED
+from studies.benchmark.run import EVALUATED, RUNS, Benchmark, run
 from studies.common.provenance import processor, study_origin
 from studies.common.report_parts import columns
 from studies.common.study import Command, Goal, Verdict
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 
-__all__ = ["goals_of", "main", "write_report"]
-
 RIVALS = {"Pinocchio, step by step in Python": 2000.0, "MuJoCo rollouts in C": 100.0}
 """Smallest wanted ratio of the time of each other simulator to that of an evaluation."""
 
-ERROR = 0.01
-"""Largest wanted error of the integration [standard deviations of a sample]."""
-
-LINKS, WHITENING = 1.3, 1.5
-"""Largest wanted ratios of the times with 60 and 6 links, and with noisy and exact joints."""
+ERROR = 0.01  # largest wanted error of the integration [standard deviations of a sample]
+LINKS, WHITENING = 1.3, 1.5  # largest wanted ratios of the times with 60 and 6 links, and with noisy and exact joints
 
 SAMPLES, SECONDS = 4000.0, 8.0
 """Number of effective samples that are wanted, and the time of an identification with them, all compiled [s]."""
 
-CHEAPER = 20.0
-"""Smallest wanted ratio of the evaluations per effective sample, emcee's default move over the package's."""
-
-ENOUGH = 50.0
-"""Number of autocorrelation times from which on the estimate of the autocorrelation is reliable."""
+CHEAPER = 20.0  # smallest wanted ratio of the evaluations per effective sample, emcee's default move over the package's
+ENOUGH = 50.0  # number of autocorrelation times from which on the estimate of the autocorrelation is reliable
 
 Figures = Sequence[tuple[str, Floats, float, bool]]
 """Figures of merit: name, value in each run, goal, and whether more is better."""

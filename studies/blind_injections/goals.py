@@ -1,27 +1,22 @@
-"""Goals of the campaign: what was reached, with its interval, and whether that decides."""
+"""Goals of the campaign with their intervals, and the counts of right verdicts that the package ships."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 
 import numpy as np
 from scipy import stats
 
+from bayesid.diagnosis import Status
 from bayesid.report.verdict_record import Share
 from studies.blind_injections.trials import CASES, Trial
 from studies.common.study import Goal, Verdict
 from studies.truth.basilisk.cases import BasiliskCase
 
-__all__ = ["CLEAR", "LEFT", "TORQUES", "barely_left", "goals_of", "in_basilisk", "share_text", "wrongly_explained"]
-
-CLEAR = 7.0
-"""Signal-to-noise ratio from which the hidden causes should be named."""
-
-LEFT = 10.0
-"""Signal-to-noise ratio left by the best known causes from which an outside effect should be called unknown."""
-
-SURE = 0.9
-"""Stated probability from which a named cause should be right as often as 93 % say."""
+CLEAR = 7.0  # signal-to-noise ratio from which the hidden causes should be named
+LEFT = 10.0  # signal-to-noise ratio left by the best known causes from which an outside effect should be called unknown
+SURE = 0.9  # stated probability from which a named cause should be right as often as 93 % say
 
 TORQUES = {
     "swinging and growing torques": (0.9, ("swinging-torque", "growing-torque")),
@@ -32,8 +27,7 @@ TORQUES = {
 COVERED, COVERAGE = 1.96, (0.93, 0.97)
 """Half-width of a 95 % interval in standard deviations, and the goal on how often such intervals hold the truth."""
 
-LEAST_NULLS = 1000
-"""Trials without anything hidden below which a rate of 1 % is not decided."""
+LEAST_NULLS = 1000  # trials without anything hidden below which a rate of 1 % is not decided
 
 
 def share_text(count: int, total: int) -> str:
@@ -195,3 +189,26 @@ def _coverage(trials: Sequence[Sequence[float]]) -> Goal:
     verdict = Verdict.PASS if within else Verdict.FAIL if beside else Verdict.OPEN
     reached = f"{100.0 * share:.1f} ± {100.0 * error:.1f} % ({counts.sum()} numbers of {len(counts)} trials)"
     return Goal(goal_text, reached, verdict)
+
+
+RIGHT: dict[Status, Callable[[Trial], bool]] = {
+    Status.EXPLAINED: lambda trial: trial.holds,
+    Status.AMBIGUOUS: lambda trial: trial.in_set,
+    Status.UNKNOWN: lambda trial: trial.kind == "unknown",
+    Status.UNRESOLVED: lambda trial: trial.kind != "adequate",
+    Status.ADEQUATE: lambda trial: trial.kind == "adequate",
+}
+"""When a verdict of each status counts as right."""
+
+
+def record_of(trials: Sequence[Trial]) -> dict[str, dict[str, int]]:
+    """Return the counts by status, of nulls without alarm ("quiet"), and of clear effects with one ("loud")."""
+    shares = {}
+    for status, right in RIGHT.items():
+        said = [trial for trial in trials if trial.status == status.value]
+        shares[status.value] = Share(sum(map(right, said)), len(said))
+    nulls = [trial for trial in trials if trial.kind == "adequate"]
+    clear = [t for t in trials if t.kind != "adequate" and (t.signal_to_noise or 0.0) >= CLEAR]
+    shares["quiet"] = Share(sum(not trial.alarmed for trial in nulls), len(nulls))
+    shares["loud"] = Share(sum(trial.alarmed for trial in clear), len(clear))
+    return {name: asdict(share) for name, share in shares.items()}

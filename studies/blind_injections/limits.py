@@ -19,10 +19,7 @@ from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.inference.posterior import Posterior
 
-__all__ = ["Limits", "limits_of", "simulated_naming", "what_is_left"]
-
-DRAWS = 8
-"""Number of simulated data sets from each of which the decision is taken."""
+DRAWS = 8  # number of simulated data sets from each of which the decision is taken
 
 
 @dataclass(frozen=True)

@@ -23,31 +23,31 @@ from studies.blind_injections.goals import (
     barely_left,
     goals_of,
     in_basilisk,
+    record_of,
     share_text,
     wrongly_explained,
 )
 from studies.blind_injections.limits import DRAWS
-from studies.blind_injections.record import record_of
-from studies.blind_injections.reliability import reliability_figure
-from studies.blind_injections.rows import confusion, confusion_matrix, errors, rates, reliability, scores
-from studies.blind_injections.snap_limit import snap_limit
+from studies.blind_injections.rows import (
+    confusion,
+    confusion_matrix,
+    errors,
+    rates,
+    reliability,
+    reliability_figure,
+    scores,
+    snap_limit,
+)
 from studies.blind_injections.trials import Trial, plan, read, run
 from studies.common.provenance import study_origin
 from studies.common.report_parts import add_number_table
 from studies.common.study import WORKERS, Command, Verdict
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 
-__all__ = ["main", "write_report"]
-
 SCORES = ["stated of", "statements", "Brier score", "log score", "mean stated", "share true"]
-SHOWN = 2
-"""Trials of a case that were not answered rightly, from which the report lists its answers."""
-
-SNAPS = 20
-"""Draws of what could be reached of each snap."""
-
-TICKS = (3, 5, 7, 10, 20, 50, 100)
-"""Ticks of the signal-to-noise ratio in the figure."""
+SHOWN = 2  # trials of a case that were not answered rightly, from which the report lists its answers
+SNAPS = 20  # draws of what could be reached of each snap
+TICKS = (3, 5, 7, 10, 20, 50, 100)  # ticks of the signal-to-noise ratio in the figure
 
 COMMAND = Command(
     "blind_injections",

@@ -1,29 +1,25 @@
-"""Rows of the tables: outcomes by signal-to-noise ratio, stated probabilities, scores, errors and answers."""
+"""Rows of the tables and the reliability diagram, and how well the torque of a snap can be reconstructed at all."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
+from matplotlib.figure import Figure
 from scipy import stats
+from threadpoolctl import threadpool_limits
 
 from bayesid._math.arrays import Floats
+from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_signed
 from studies.blind_injections.trials import Trial
 
-__all__ = ["LEAST", "confusion", "confusion_matrix", "errors", "rates", "reliability", "reliable_pairs", "scores"]
-__all__ += ["statements"]
-
-BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, np.inf)
-"""Limits of the ranges of signal-to-noise ratio in the table."""
-
-STATED = (0.0, 0.5, 0.7, 0.9, 0.95, 0.99, 0.999, 1.0)
-"""Limits of the ranges of stated probability in the table."""
-
-LEAST = 1e-6
-"""Probability below which a statement that comes true is not counted as worse."""
+BINS = (0.0, 3.0, 5.0, 7.0, 10.0, 20.0, np.inf)  # limits of the ranges of signal-to-noise ratio in the table
+STATED = (0.0, 0.5, 0.7, 0.9, 0.95, 0.99, 0.999, 1.0)  # limits of the ranges of stated probability in the table
+LEAST = 1e-6  # probability below which a statement that comes true is not counted as worse
 
 
 def rates(trials: Sequence[Trial]) -> list[list[str]]:
@@ -168,3 +164,75 @@ def _scattered(label: str, values: Sequence[float]) -> list[str]:
         return [label, "0", "–", "–", "–", "–"]
     inside = [f"{100.0 * (np.abs(found) < limit).mean():.0f} %" for limit in (1.0, 2.0)]
     return [label, str(len(found)), format_signed(found.mean(), 2), f"{np.sqrt((found**2).mean()):.2f}", *inside]
+
+
+@styled
+def reliability_figure(trials: Iterable[Trial]) -> Figure:
+    """Draw the share of verdicts that held, with its interval, over the mean stated probability of each range."""
+    figure = wide_figure(1.9)
+    axes = figure.subplots()
+    axes.plot([0.0, 1.0], [0.0, 1.0], color=TRUTH, linewidth=0.8)
+    for pairs in reliable_pairs(trials).values():
+        stated, right = float(np.mean([pair[0] for pair in pairs])), sum(held for _, held in pairs)
+        interval = stats.binomtest(right, len(pairs)).proportion_ci(method="wilson")
+        axes.plot([stated, stated], [interval.low, interval.high], color=AFTER, linewidth=1.0)
+        axes.plot(stated, right / len(pairs), "o", color=AFTER, markersize=4)
+    axes.set(xlim=(0.0, 1.02), ylim=(-0.03, 1.03), xlabel="stated probability", ylabel="share right")
+    return figure
+
+
+TIME = np.arange(0.0, 150.5, 0.5)  # time stamps of each recording [s]
+DECAY, RECORDINGS = 4.0, 3  # time in which the torque falls to 1/e [s], and number of recordings
+ONSETS = (50.0, 80.0)  # instants between which the torque sets in [s]
+
+SCALES = 10.0 ** np.linspace(-2.0, 1.0, 10)
+"""Standard deviations of the torque in the reader's prior, relative to the true one; all are equally probable."""
+
+
+@threadpool_limits.wrap(limits=1)  # threads only get in each other's way where another process keeps a core busy
+def snap_limit(signal_to_noise: float, rng: np.random.Generator) -> float:
+    """Draw the correlation of the posterior mean of a torque that dies away with the true one.
+
+    Each recording holds one such torque along the same axis, at one instant, on a body that is free to turn. The reader
+    measures the rates with white noise and knows all that but the instant, the decay, the axis and the size; the
+    initial rate is free.
+
+    Parameters
+    ----------
+    signal_to_noise : float
+        Root of the noncentrality of all recordings together, beside the initial rates.
+    rng : numpy.random.Generator
+    """
+    rates, torques = _responses()
+    information = (rates**2).sum(axis=1)
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    begin = rng.uniform(*ONSETS)
+    seen = _centred(-np.expm1(-np.maximum(TIME - begin, 0.0) / DECAY))
+    size = signal_to_noise / np.sqrt(RECORDINGS) / np.linalg.norm(seen)
+    true = np.outer(size / DECAY * axis, begin <= TIME) * np.exp(-(TIME - begin) / DECAY)
+    variance = ((size / DECAY) * SCALES[:, None]) ** 2
+    found = []
+    for _ in range(RECORDINGS):
+        measured = np.outer(size * axis, seen) + _centred(rng.normal(size=(3, len(TIME))))
+        score = measured @ rates.T
+        visible = variance * information
+        log_evidence = 0.5 * variance * (score**2).sum(axis=0) / (1.0 + visible) - 1.5 * np.log1p(visible)
+        weight = np.exp(log_evidence - log_evidence.max())
+        shrunk = (weight / weight.sum() * variance / (1.0 + visible)).sum(axis=0)
+        found.append((score * shrunk) @ torques)
+    return float(np.corrcoef(np.ravel(found), np.ravel([true] * RECORDINGS))[0, 1])
+
+
+@cache
+def _responses() -> tuple[Floats, Floats]:
+    """Return rates and torques, (k, T), of all instants and decays between which the reader does not decide."""
+    each = [(start, DECAY * 2.0**octaves) for start in TIME[:-1] for octaves in np.arange(-4.0, 4.5, 0.5)]
+    start, decay = np.array(each).T[:, :, None]
+    after = np.maximum(TIME - start, 0.0)
+    return _centred(-decay * np.expm1(-after / decay)), np.where(start <= TIME, np.exp(-after / decay), 0.0)
+
+
+def _centred(series: Floats) -> Floats:
+    """Return series without what a free initial rate takes of them."""
+    return series - series.mean(axis=-1, keepdims=True)

@@ -28,16 +28,11 @@ from studies.truth import hidden_causes
 from studies.truth.basilisk.cases import BASILISK_CASES, BasiliskCase
 from studies.truth.mujoco import Study as Written
 
-__all__ = ["Plan", "Trial", "make", "plan", "read", "run"]
-
 WEAKER = 0.1
 """Fraction of the strength in the data with which a trial is compared to measure the size of a hidden effect."""
 
-MATTERS = 0.01
-"""Probability above which a cause is kept with its trial."""
-
-WEAK_TO_STRONG, OUTSIDE = (0.1, 1.5), (0.3, 2.0)
-"""Least and largest strength of causes of the catalogue and of others."""
+MATTERS = 0.01  # probability above which a cause is kept with its trial
+WEAK_TO_STRONG, OUTSIDE = (0.1, 1.5), (0.3, 2.0)  # least and largest strength of causes of the catalogue and of others
 
 FIRST_SEED = {False: 200, True: 90_000}
 """Seed of the first trial of the small and of the full plan; those of tests and of development are others."""
@@ -51,14 +46,9 @@ IN_BASILISK, EVERY_EIGHTH = 937, 8
 
 _ALL: tuple[hidden_causes.Case | BasiliskCase, ...] = (*hidden_causes.CASES, *BASILISK_CASES)
 
-CASES = {case.name: case for case in _ALL}
-"""All cases by name."""
-
-_NOT_SEEN = Limits(None, None, None)
-"""Limits where what is hidden does not change the mean of the data."""
-
-SPOILT = ("outliers", "quantisation")
-"""Beginnings of the names of causes that do not change the mean of the data."""
+CASES = {case.name: case for case in _ALL}  # all cases by name
+_NOT_SEEN = Limits(None, None, None)  # limits where what is hidden does not change the mean of the data
+SPOILT = ("outliers", "quantisation")  # beginnings of the names of causes that do not change the mean of the data
 
 
 @dataclass(frozen=True)

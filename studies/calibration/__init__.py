@@ -21,8 +21,7 @@ from studies.common.study import TRIALS, Command
 
 __all__ = ["Replicates", "main", "make", "plan", "read", "write_report"]
 
-SEED = 1
-"""Seed of all replicates."""
+SEED = 1  # seed of all replicates
 
 COMMAND = Command(
     "calibration",

@@ -1,14 +1,16 @@
-"""Truths drawn from the prior, and the recordings that the sensors take of them."""
+"""The cases, truths drawn from the prior, and the recordings that the sensors take of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cache
 from typing import NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 
-from bayesid import InertialParameters, Manoeuvre, Posterior, Robot
+from bayesid import BodyPrior, InertialParameters, Manoeuvre, Model, Posterior, Robot, SensorKind
 from bayesid._math.arrays import Floats
 from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
 from bayesid.recording.recording import Recording
@@ -16,25 +18,85 @@ from bayesid.robot.composite_tables import composite_rows
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.log_cholesky import log_cholesky_vector
+from bayesid.robot.robot import Load
 from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects import AccelBias
-from bayesid.simulation.model import Model
-from studies.calibration.cases import INDEPENDENT, Case, model_of
-from studies.common.ets7 import BIAS, ENCODER, INTERVAL
+from studies.common.ets7 import ACCEL, BASE, BIAS, ENCODER, INTERVAL, RATE, ets7
 from studies.common.flight import prescribed, readings, smoothed, true_robot
-from studies.common.models import NOISE
+from studies.common.models import ARM_SPREAD, NOISE, base_model
 from studies.truth.mujoco import smooth_motion
 
-__all__ = ["Recorded", "Truth", "draw_truth", "point", "record"]
+BASE_SPREAD, LOAD_SPREAD, DRAWINGS_SPREAD = 0.3, 0.3, 0.05
+"""Relative widths of the priors of base and load (their masses are uncertain by a factor of 1.8) and, where the whole
+system is unknown, of the links. The default width of 1 would draw bases of a tenth of the mass and of ten times it."""
 
-DURATION = 120.0
-"""Length of a recording [s]."""
+START_RATE = 1e-3  # standard deviation of each axis of the initial rate [rad/s]
 
-STEP = 0.1
-"""Longest integration step of both simulators [s]."""
+LOAD = Load("load", "link6", InertialParameters(120.0, [0.05, -0.1, 0.45], np.diag([14.0, 11.0, 9.0])))
+"""Load in the hand where the whole system is unknown."""
 
-AMPLITUDE = 0.5
-"""Typical excursion of a joint [rad]."""
+
+class Case(StrEnum):
+    """One kind of replicate."""
+
+    BASE = "base body"
+    EXACT = "base body, joints known exactly"
+    ARM = "base body, arm known to 5 %"
+    WHOLE = "whole system"
+    AROUND = "base body, around one data set"
+    MUJOCO = "MuJoCo, ETS-VII"
+    MUJOCO_REST = "MuJoCo, ETS-VII from rest"
+    PLANAR = "MuJoCo, planar robot"
+    PLANAR_REST = "MuJoCo, planar robot from rest"
+
+
+REPLICATES = {
+    Case.BASE: 1000,
+    Case.EXACT: 200,
+    Case.ARM: 300,
+    Case.WHOLE: 200,
+    Case.AROUND: 100,
+    Case.MUJOCO: 100,
+    Case.MUJOCO_REST: 100,
+    Case.PLANAR: 100,
+    Case.PLANAR_REST: 100,
+}
+"""Number of replicates of each case in the full study."""
+
+INDEPENDENT = (Case.MUJOCO, Case.MUJOCO_REST, Case.PLANAR, Case.PLANAR_REST)
+"""Cases whose data MuJoCo makes; the package itself makes those of the others."""
+
+AT_REST = (Case.MUJOCO_REST, Case.PLANAR_REST)
+
+
+@cache
+def model_of(case: Case) -> Model:
+    """Return the model of a case: ETS-VII or the planar robot, its sensors and its priors."""
+    robot = Robot.shipped("planar") if case in (Case.PLANAR, Case.PLANAR_REST) else ets7()
+    robot = robot.with_load(LOAD) if case is Case.WHOLE else robot
+    model = base_model(
+        {SensorKind.RATE: RATE, SensorKind.ACCEL: ACCEL},
+        robot=robot,
+        base_spread=BASE_SPREAD,
+        arm_spread=ARM_SPREAD if case is Case.ARM else 0.0,
+        rate_sigma=0.0 if case in AT_REST else START_RATE,
+    )
+    return replace(model, priors=_whole(robot)) if case is Case.WHOLE else model
+
+
+def _whole(robot: Robot) -> tuple[BodyPrior, ...]:
+    """Return priors of all bodies with mass."""
+    widths = {BASE: BASE_SPREAD, LOAD.name: LOAD_SPREAD}
+    return tuple(
+        BodyPrior(name, link.inertial, widths.get(name, DRAWINGS_SPREAD))
+        for name, link in robot.links.items()
+        if link.inertial.mass > 0.0
+    )
+
+
+DURATION = 120.0  # length of a recording [s]
+STEP = 0.1  # longest integration step of both simulators [s]
+AMPLITUDE = 0.5  # typical excursion of a joint [rad]
 
 POSTURE = np.array([0.2, -0.8, 1.2, -0.5, 0.6, 0.3])
 """Joint positions before and after the motion [rad]; the planar robot has the first two."""

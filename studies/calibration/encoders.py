@@ -19,16 +19,9 @@ from bayesid.recording.smoothing import ORDERS, JointSamples
 from studies.calibration.data import AMPLITUDE, DURATION
 from studies.truth.mujoco import smooth_motion
 
-__all__ = ["NEAR", "Smoothed", "smooth_share", "smoothed_errors"]
-
-RAMP = 20.0
-"""Length of the quintic ramps, at whose inner ends the jerk jumps [s]."""
-
-NEAR = 1.0
-"""Distance from such an end within which a sample counts as near it [s]."""
-
-MOTIONS = 10
-"""Number of random motions of each row."""
+RAMP = 20.0  # length of the quintic ramps, at whose inner ends the jerk jumps [s]
+NEAR = 1.0  # distance from such an end within which a sample counts as near it [s]
+MOTIONS = 10  # number of random motions of each row
 
 SETTINGS = ((0.5, 1e-6), (0.5, 1e-5), (0.5, 1e-4), (2.0, 1e-6))
 """Time between samples [s] and noise of the encoder [rad]."""

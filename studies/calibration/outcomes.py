@@ -1,22 +1,69 @@
-"""Outcomes of the replicates, by case and by method."""
+"""Outcomes of the replicates: whether ranks are uniform, and the coverage of the intervals, by case and by method."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from scipy import stats
 
 from bayesid._math.arrays import Floats
-from studies.calibration.cases import Case
+from studies.calibration.data import Case
 from studies.calibration.replicate import Method
-from studies.calibration.uniformity import uniform_p_value
 from studies.common.monte_carlo import read_store
 
-__all__ = ["Replicates", "read"]
+K = TypeVar("K", bound=Hashable)
+
+POINTS = np.arange(1, 20) / 20.0
+"""Points at which the distribution function of the ranks is compared with that of the uniform one."""
+
+
+def uniform_p_value(ranks: Floats) -> float:
+    """Return the p-value of ranks (N,) in (0, 1) being uniform, exact and simultaneous over `POINTS`.
+
+    The statistic is the smallest binomial tail of any count of ranks below a point (Säilynoja, Bürkner & Vehtari 2022);
+    its distribution follows by recursion from point to point, since the counts are a Markov chain.
+    """
+    total = len(ranks)
+    observed = np.searchsorted(np.sort(ranks), POINTS, side="right")
+    least = min(np.minimum(stats.binom.cdf(observed, total, POINTS), stats.binom.sf(observed - 1, total, POINTS)))
+    every = np.arange(total + 1)
+    before, probability, last = np.zeros(1, dtype=int), np.ones(1), 0.0
+    for here in POINTS:
+        tails = np.minimum(stats.binom.cdf(every, total, here), stats.binom.sf(every - 1, total, here))
+        inside = every[tails > least * (1.0 + 1e-9)]
+        step = stats.binom.pmf(inside - before[:, None], total - before[:, None], (here - last) / (1.0 - last))
+        before, probability, last = inside, probability @ step, here
+    return float(np.clip(1.0 - probability.sum(), 0.0, 1.0))
+
+
+def holm(p_values: Mapping[K, float]) -> dict[K, float]:
+    """Return p-values corrected by Holm's method, which needs no independence."""
+    ordered = sorted(p_values, key=lambda name: p_values[name])
+    corrected: dict[K, float] = {}
+    largest = 0.0
+    for position, name in enumerate(ordered):
+        largest = max(largest, min(1.0, (len(ordered) - position) * p_values[name]))
+        corrected[name] = largest
+    return corrected
+
+
+def coverage(ranks: Floats, level: float) -> tuple[float, float]:
+    """Return the share of truths within central intervals of a level, and its standard error.
+
+    Parameters
+    ----------
+    ranks : (N, n) array
+        Ranks of n unknowns in N replicates; those of one replicate may depend on one another.
+    level : float
+        Level of the intervals.
+    """
+    shares = (np.abs(2.0 * ranks - 1.0) < level).mean(axis=1)
+    return float(shares.mean()), float(shares.std(ddof=1) / np.sqrt(len(shares)))
 
 
 @dataclass(frozen=True)
@@ -80,3 +127,45 @@ def read(store: Path) -> list[Replicates]:
         if mine:
             found.append(Replicates(case, results, [line["error"] for line in mine if "error" in line]))
     return found
+
+
+ALL = "all cases"  # name of all cases together
+LEVELS = (0.5, 0.9, 0.95)  # levels of the intervals whose coverage is counted
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Share of truths within intervals of a level, with its standard error over replicates."""
+
+    level: float
+    share: float
+    error: float
+
+    @property
+    def p_value(self) -> float:
+        """Probability that the share lies as far from the level, on either side, where intervals are right."""
+        distance = abs(self.share - self.level)
+        if self.error == 0.0:
+            return float(distance == 0.0)
+        return float(2.0 * stats.norm.sf(distance / self.error))
+
+    def __str__(self) -> str:
+        return f"{100.0 * self.share:.1f} ± {100.0 * self.error:.1f} %"
+
+
+def interval_coverage(cases: Sequence[Replicates]) -> dict[tuple[str, float], Coverage]:
+    """Return the coverage by importance sampling, by the name of a case or `ALL` and by level."""
+    ranks = {str(item.case): item.bodies() for item in cases if len(item.results) > 1}
+    found = {
+        (name, level): Coverage(level, *coverage(values, level)) for name, values in ranks.items() for level in LEVELS
+    }
+    if ranks:
+        together = list(ranks.values())
+        found |= {(ALL, level): Coverage(level, *pooled_coverage(together, level)) for level in LEVELS}
+    return found
+
+
+def pooled_coverage(ranks: Sequence[Floats], level: float) -> tuple[float, float]:
+    """Return the coverage of replicates of several cases, each replicate with the same weight, and its error."""
+    shares = np.concatenate([(np.abs(2.0 * item - 1.0) < level).mean(axis=1) for item in ranks])
+    return float(shares.mean()), float(shares.std() / np.sqrt(len(shares)))

@@ -21,33 +21,22 @@ from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of
 from bayesid.inference.ensemble import sample
 from bayesid.inference.importance import choose_parameterisation, weighted_draws
 from bayesid.inference.mode import Optimum, maximise
-from studies.calibration.cases import REPLICATES, Case, model_of
-from studies.calibration.data import Truth, draw_truth, point, record
+from studies.calibration.data import REPLICATES, Case, Truth, draw_truth, model_of, point, record
 
-__all__ = ["ARMS", "LOG_LIKELIHOOD", "Method", "Plan", "make", "plan"]
-
-DRAWS = 499
-"""Number of posterior draws among which the truth is ranked."""
+DRAWS = 499  # number of posterior draws among which the truth is ranked
 
 WEIGHTED = 1500
 """Number of draws of importance sampling; the package's default of 4,000 gives the same ranks at a higher price."""
 
-EFFECTIVE = 1000.0
-"""Effective samples of emcee."""
+EFFECTIVE = 1000.0  # effective samples of emcee
 
 EVERY = 20
 """Of so many replicates of a case, emcee samples the posterior of one; none of the whole system, where each would take
 four minutes and more."""
 
-ARMS = (Case.ARM, Case.WHOLE)
-"""Cases with an unknown arm."""
-
-SMALL = (Case.EXACT, Case.MUJOCO)
-"""Cases of the small plan."""
-
-FIRST_SEED = 20_000
-"""Seed of the data set around which replicates are drawn."""
-
+ARMS = (Case.ARM, Case.WHOLE)  # cases with an unknown arm
+SMALL = (Case.EXACT, Case.MUJOCO)  # cases of the small plan
+FIRST_SEED = 20_000  # seed of the data set around which replicates are drawn
 LOG_LIKELIHOOD = "log likelihood"
 
 

@@ -14,25 +14,28 @@ from bayesid.inference.importance import TRUSTED
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number, format_p_value, format_percent
-from studies.calibration.cases import ARM_SPREAD, BASE_SPREAD, DRAWINGS_SPREAD, INDEPENDENT, REPLICATES, Case
-from studies.calibration.coverage_of_cases import ALL, LEVELS, interval_coverage, pooled_coverage
+from studies.calibration.data import ARM_SPREAD, BASE_SPREAD, DRAWINGS_SPREAD, INDEPENDENT, REPLICATES, Case
 from studies.calibration.encoders import NEAR, Smoothed, smooth_share, smoothed_errors
-from studies.calibration.outcomes import Replicates
+from studies.calibration.outcomes import (
+    ALL,
+    LEVELS,
+    POINTS,
+    Replicates,
+    coverage,
+    holm,
+    interval_coverage,
+    pooled_coverage,
+    uniform_p_value,
+)
 from studies.calibration.replicate import ARMS, LOG_LIKELIHOOD, Method
-from studies.calibration.uniformity import POINTS, coverage, holm, uniform_p_value
 from studies.common.ets7 import START, ets7
 from studies.common.figures import robot_outline
 from studies.common.report_parts import add_number_table
 from studies.common.study import Goal, Verdict
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
 
-__all__ = ["FAMILYWISE", "goals_of", "write_report"]
-
-FAMILYWISE = 0.01
-"""Probability that any rank of any case is called not uniform where all are."""
-
-SHORT = 2.0
-"""Standard errors below the stated share from which a coverage is named among what went wrong."""
+FAMILYWISE = 0.01  # probability that any rank of any case is called not uniform where all are
+SHORT = 2.0  # standard errors below the stated share from which a coverage is named among what went wrong
 
 
 def goals_of(cases: Sequence[Replicates]) -> list[Goal]:

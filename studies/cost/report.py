@@ -14,32 +14,19 @@ from bayesid.app.compilation_cache import keep_compiled
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, BEFORE, styled, wide_figure
 from bayesid.report.numbers import format_number
-from studies.benchmark.timing import EVALUATED
+from studies.benchmark.run import EVALUATED
 from studies.common.provenance import MODELS, processor, study_origin
 from studies.common.report_parts import columns
 from studies.common.study import Command, Goal, Verdict
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
-from studies.cost.cases import COMMANDS, DIAGNOSES
-from studies.cost.commands import AFTER_VERDICT
-from studies.cost.run import Cost, middle, run
+from studies.cost.run import AFTER_VERDICT, COMMANDS, DIAGNOSES, Cost, middle, run
 from studies.cost.search_times import SearchTimes
 
-__all__ = ["goals_of", "main", "write_report"]
-
-MEMORY = 1.5
-"""Largest wanted memory of a diagnosis [GB]."""
-
-SAMPLES = 30.0
-"""Longest wanted time for 4,000 effective samples of an extended model [s]."""
-
-STEP, BEGIN = 0.03, 20.0
-"""Longest wanted times of one criterion with its gradient, and of a cold start of a search [s]."""
-
-CHANGED = 0.1
-"""Relative change of a time beside an earlier run from which it is told."""
-
-CHEAPER = 100.0
-"""Smallest wanted ratio of one nested run for each candidate to a verdict on all of them."""
+MEMORY = 1.5  # largest wanted memory of a diagnosis [GB]
+SAMPLES = 30.0  # longest wanted time for 4,000 effective samples of an extended model [s]
+STEP, BEGIN = 0.03, 20.0  # longest wanted times of one criterion with its gradient, and of a cold start of a search [s]
+CHANGED = 0.1  # relative change of a time beside an earlier run from which it is told
+CHEAPER = 100.0  # smallest wanted ratio of one nested run for each candidate to a verdict on all of them
 
 
 def goals_of(cost: Cost) -> list[Goal]:

@@ -1,39 +1,307 @@
-"""The measurements of the study of cost."""
+"""The measurements: commands in processes of their own, growth of one evaluation, its floor, and a nested sampler."""
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 import tempfile
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
+from bayesid import BodyPrior, Manoeuvre, Model, Posterior
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
-from bayesid.diagnosis import diagnose
-from studies.cost.cases import COMMANDS, DIAGNOSES, write_case
-from studies.cost.commands import Run, run_command
-from studies.cost.growth import Floor, floor_of, growth, verdict_by_candidates
-from studies.cost.nested import Nested, nested
+from bayesid.diagnosis import Diagnosis, candidates, diagnose
+from bayesid.inference import choose_parameterisation, compiled, maximise
+from studies.benchmark.cases import chain, posterior_of
+from studies.benchmark.run import best_of, seconds_per_evaluation
+from studies.common.ets7 import ets7
 from studies.cost.search_times import SearchTimes, search_times
+from studies.peers.density import Target
+from studies.peers.samplers import Budget, dynesty
+from studies.truth import hidden_causes
 
-__all__ = ["Cost", "middle", "run"]
+FIRST_SEED = 7100  # seed of the first case; those of tests and of the campaign are others
 
-REPEATS = 3
-"""Number of runs with compiled code kept, after the one without."""
 
-SAMPLED = ("leak", "payload", "link")
-"""Diagnoses after which the extended model is sampled, by their titles."""
+class Diagnosed(NamedTuple):
+    """A diagnosis that is timed.
 
-TITLES = tuple(item.title for item in DIAGNOSES)
-"""Titles of all diagnoses that are timed."""
+    Attributes
+    ----------
+    title : str
+        What is hidden.
+    case : str
+        Name of the case of `studies.truth.hidden_causes`.
+    warm, cold : float
+        Longest wanted times from files to verdict, with compiled code kept and without [s].
+    """
 
-COUNTS = (10, 20, 40, 1000)
-"""Numbers of candidates of the catalogue; the last one takes all."""
+    title: str
+    case: str
+    warm: float
+    cold: float
 
-LIMIT = 600.0
-"""Time at which a nested sampler is stopped [s]."""
+
+DIAGNOSES = (
+    Diagnosed("nothing", "null, three joints", 5.0, 20.0),
+    Diagnosed("leak", "thruster-leak", 5.0, 20.0),
+    Diagnosed("payload", "payload:link3", 5.0, 20.0),
+    Diagnosed("link", "link-inertia:link2", 5.0, 20.0),
+    Diagnosed("wheel and bias", "wheel-momentum, accel-bias", 10.0, 40.0),
+    Diagnosed("growing torque", "growing-torque", 10.0, 40.0),
+    Diagnosed("swinging torque", "swinging-torque", 10.0, 40.0),
+)
+"""Single causes within 5 s, cold 20 s; pairs and what nobody listed within twice that."""
+
+COMMANDS = {
+    "check": (("check",), None),
+    "identify": (("identify",), 20.0),
+    "identifiability": (("identifiability",), 30.0),
+    "design": (("design",), 120.0),
+}
+"""Other commands: words, and the longest wanted time with compiled code kept, from files to report [s]."""
+
+
+def write_case(name: str, folder: Path) -> Path:
+    """Write the files of a case, three recordings of 140 to 160 s, and return the study's."""
+    number = next(k for k, case in enumerate(hidden_causes.CASES) if case.name == name)
+    return hidden_causes.CASES[number].make(folder, FIRST_SEED + number)
+
+
+PROGRAM = "from bayesid.app.command_line import main; main()"
+
+AFTER_VERDICT = ("consequences", "sample", "design", "report")  # phases of a diagnosis that follow the verdict
+STATING = ("diagnosis.json", "identification.json")  # files that state the time by phase
+
+
+class Run(NamedTuple):
+    """One command.
+
+    Attributes
+    ----------
+    wall, processor : float
+        Time from its start to its end, and processor time of all its threads [s].
+    memory : float
+        Largest resident memory [GB].
+    phases : dict of str to float
+        Time by phase, where the command states it [s]; "start" is what comes before the first, import and files.
+    """
+
+    wall: float
+    processor: float
+    memory: float
+    phases: dict[str, float]
+
+    @property
+    def to_verdict(self) -> float:
+        """Time of a diagnosis from its start to the verdict [s]."""
+        return self.wall - sum(self.phases.get(name, 0.0) for name in AFTER_VERDICT)
+
+
+def run_command(words: Sequence[str], study: Path, output: Path, cache: Path) -> Run:
+    """Run a command on a study and measure it.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Name of the command and its options.
+    study : Path
+        Study file.
+    output : Path
+        Folder of the results, which must not exist.
+    cache : Path
+        Folder of compiled code; an empty one makes the run a cold one.
+
+    Raises
+    ------
+    RuntimeError
+        If the command fails.
+    """
+    command = [sys.executable, "-c", PROGRAM, words[0], str(study), "--output", str(output), *words[1:]]
+    environment = os.environ | {"BAYESID_CACHE": str(cache)}
+    began = time.perf_counter()
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
+        said = process.stderr.read() if process.stderr else ""
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+    wall = time.perf_counter() - began
+    if process.returncode:
+        raise RuntimeError(f"{' '.join(words)} of {study} failed: {said.strip()[-500:]}")
+    phases: dict[str, float] = {}
+    for name in STATING:
+        if (output / name).is_file():
+            phases = json.loads((output / name).read_text(encoding="utf-8"))["seconds"]
+            phases = {"start": max(wall - sum(phases.values()), 0.0), **phases}
+    return Run(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 2.0**20, phases)
+
+
+MATRIX, VECTOR = 1500, 30_000_000  # sizes of the matrix product and of the sum that measure what the machine can do
+
+
+class Floor(NamedTuple):
+    """What one evaluation of the log likelihood needs, and what one core of this machine gives.
+
+    Attributes
+    ----------
+    operations, traffic : float
+        Floating-point operations, and bytes read and written by all compiled operations, of one evaluation in a batch.
+    speed, bandwidth : float
+        Operations per second of a large matrix product, and bytes per second of a sum of large vectors.
+    seconds : float
+        Time of one evaluation, both cores [s].
+    """
+
+    operations: float
+    traffic: float
+    speed: float
+    bandwidth: float
+    seconds: float
+
+    @property
+    def least(self) -> float:
+        """Time that operations alone would take at the speed of a matrix product [s]."""
+        return self.operations / self.speed
+
+
+def floor_of(repeats: int) -> Floor:
+    """Count what an evaluation needs and measure what the machine gives."""
+    posterior = posterior_of(ets7())
+    batch = 64
+    z = jnp.zeros((batch, posterior.size)) + posterior.starting_point()
+
+    def chi2(points: jax.Array) -> jax.Array:
+        function = jax.vmap(lambda one: compiled.residuals(structure, numbers, one, arrays))
+        return jnp.sum(function(points) ** 2, axis=(1, 2, 3))
+
+    structure, numbers, arrays = posterior.structure, posterior.numbers, posterior.data.arrays
+    cost = jax.jit(chi2).lower(z).compile().cost_analysis()
+    counted = cost if isinstance(cost, dict) else {}
+    a = np.random.default_rng(0).normal(size=(MATRIX, MATRIX))
+    v, w = np.ones(VECTOR), np.ones(VECTOR)
+    product, total = best_of(lambda: a @ a, repeats), best_of(lambda: np.add(v, w, out=w), repeats)
+    return Floor(
+        float(counted.get("flops", np.nan)) / batch,
+        float(counted.get("bytes accessed", np.nan)) / batch,
+        2.0 * MATRIX**3 / product,
+        24.0 * VECTOR / total,
+        seconds_per_evaluation(posterior, repeats),
+    )
+
+
+def growth(repeats: int, sizes: int | None = None) -> dict[str, dict[int, float]]:
+    """Return the time of one evaluation by samples, recordings, links, unknowns and walkers in a batch [s].
+
+    Parameters
+    ----------
+    repeats : int
+        Repetitions, of which the fastest counts.
+    sizes : int, optional
+        How many sizes of each are measured, the smallest ones; by default all.
+    """
+    robot = ets7()
+    three = posterior_of(robot, recordings=3)
+
+    def seconds(posterior: Posterior) -> float:
+        return seconds_per_evaluation(posterior, repeats)
+
+    return {
+        "samples of a recording": {
+            round(120.0 / interval) + 1: seconds(posterior_of(robot, interval=interval))
+            for interval in (1.0, 0.5, 0.25, 0.125)[:sizes]
+        },
+        "recordings": {n: seconds(posterior_of(robot, recordings=n)) for n in (1, 2, 4, 8)[:sizes]},
+        "links": {n: seconds(posterior_of(chain(n))) for n in (3, 6, 12, 24, 48)[:sizes]},
+        "unknowns": {item.size: seconds(item) for item in (_with_bodies(three, n) for n in (1, 2, 4, 7)[:sizes])},
+        "walkers in a batch": {n: _seconds_of_batch(three, n, repeats) / n for n in (1, 4, 16, 64, 256)[:sizes]},
+    }
+
+
+def _with_bodies(posterior: Posterior, bodies: int) -> Posterior:
+    """Return the posterior with more unknown bodies, the base first."""
+    model = posterior.model
+    massive = [name for name, link in model.robot.links.items() if link.inertial.mass > 0.0]
+    names = sorted(massive, key=lambda name: name != model.robot.base)[:bodies]
+    priors = tuple(BodyPrior(name, model.robot.link(name).inertial, 0.3) for name in names)
+    changed = Model(model.robot, model.sensors, priors, model.orbit, model.effects)
+    return Posterior.of(changed, posterior.manoeuvres, step=posterior.step)
+
+
+def _seconds_of_batch(posterior: Posterior, count: int, repeats: int) -> float:
+    z = posterior.starting_point() + 0.01 * np.random.default_rng(0).normal(size=(count, posterior.size))
+    return best_of(lambda: posterior.log_density(z), repeats)
+
+
+def verdict_by_candidates(model: Model, manoeuvres: list[Manoeuvre], counts: tuple[int, ...]) -> dict[int, float]:
+    """Return the time of the verdict by the number of candidates of the catalogue [s].
+
+    The code must be compiled: the same recordings have been diagnosed in this process.
+    """
+    every = candidates(model, longest=float(manoeuvres[0].recording.time[-1]))
+    found = {}
+    for count in counts:
+        chosen = every[:count] if count < len(every) else every
+        found[len(chosen)] = diagnose(model, manoeuvres, effects=chosen).seconds["verdict"]
+    return found
+
+
+class Nested(NamedTuple):
+    """What one run of dynesty took.
+
+    Attributes
+    ----------
+    seconds : float
+        Processor time [s].
+    unknowns : int
+        Number of unknowns of the extended model.
+    done : bool
+        Whether it ended by itself, before its limit of time.
+    """
+
+    seconds: float
+    unknowns: int
+    done: bool
+
+
+def nested(diagnosis: Diagnosis, limit: float, seed: int) -> Nested | None:
+    """Run dynesty on the likelihood of a diagnosis' extended model; None where dynesty is not installed.
+
+    It gets coordinates in which the Laplace approximation at the mode is a standard normal, its best case.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        With a named cause.
+    limit : float
+        Time at which it is stopped [s].
+    seed : int
+    """
+    if find_spec("dynesty") is None:
+        return None
+    rng = np.random.default_rng(seed)
+    posterior, optimum = maximise(diagnosis.posterior, rng, start=diagnosis.start)
+    target = Target(choose_parameterisation(posterior, optimum, rng), optimum)
+    reached = dynesty(target, Budget(effective_samples=4000.0, seconds=limit), rng)
+    return Nested(reached.seconds, target.size, reached.finished)
+
+
+REPEATS = 3  # number of runs with compiled code kept, after the one without
+SAMPLED = ("leak", "payload", "link")  # diagnoses after which the extended model is sampled, by their titles
+TITLES = tuple(item.title for item in DIAGNOSES)  # titles of all diagnoses that are timed
+COUNTS = (10, 20, 40, 1000)  # numbers of candidates of the catalogue; the last one takes all
+LIMIT = 600.0  # time at which a nested sampler is stopped [s]
 
 
 @dataclass(frozen=True)

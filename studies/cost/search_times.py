@@ -14,10 +14,7 @@ import time
 from pathlib import Path
 from typing import NamedTuple
 
-__all__ = ["SearchTimes", "search_clock", "search_times"]
-
-EVALUATIONS = 30
-"""Number of manoeuvres at which the criterion is evaluated."""
+EVALUATIONS = 30  # number of manoeuvres at which the criterion is evaluated
 
 
 class SearchTimes(NamedTuple):

@@ -13,7 +13,7 @@ from studies.common import mission
 from studies.common.ets7 import INTERVAL, LIMITS
 from studies.excitation.contest import sparse
 from studies.excitation.saturation import crowd_of, searches_of
-from studies.truth.urdf import SERVICER4
+from studies.truth.bodies import SERVICER4
 
 __all__ = ["Rivals", "other_problem", "other_robots"]
 

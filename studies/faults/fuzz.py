@@ -1,15 +1,18 @@
-"""Study files, robots and recordings spoilt at random, as a command reads them."""
+"""Study files, robots and recordings spoilt at random, as a command reads them, and units that users mistake."""
 
 from __future__ import annotations
 
+import csv
+import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 from unittest.mock import patch
 
+import numpy as np
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
@@ -19,8 +22,6 @@ from bayesid.app.command_line import app
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 
-__all__ = ["KINDS", "Answer", "Spoilt", "answer_to", "spoilt"]
-
 JUNK = (
     *("nan", "inf", "-inf", "-1.0", "0", "0.0", "1e-300", "1e300", "1e400", "9" * 400, "-0.0", "1_000", "0x10", "1,5"),
     *("true", "''", '""', '"x"', "'..'", "'/'", '"\\u0000"', "[]", "[1.0]", "[nan, nan, nan]", "[[]]", "{}", "{x = 1}"),
@@ -28,8 +29,7 @@ JUNK = (
 )
 """Texts that take the place of a value."""
 
-ACCEPTED = "the files are accepted"
-"""Message of what ends a command after it has read its files."""
+ACCEPTED = "the files are accepted"  # message of what ends a command after it has read its files
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,7 @@ class Spoilt:
         file.write_bytes(changed[self.kind])
 
 
-KINDS = ("replace a value", "insert", "cut off", "drop a line", "repeat a line", "another byte")
-"""Changes of a file."""
+KINDS = ("replace a value", "insert", "cut off", "drop a line", "repeat a line", "another byte")  # changes of a file
 
 
 def _word(content: bytes, at: int) -> tuple[int, int]:
@@ -147,3 +146,60 @@ def _reading_alone() -> Iterator[None]:
 
     with patch.object(study_to_model, "load_posterior", read):
         yield
+
+
+def _columns(prefix: str, factor: float) -> Callable[[Path], None]:
+    """Return a change that multiplies all columns of the recordings whose names begin alike."""
+
+    def change(folder: Path) -> None:
+        for file in folder.glob("*.csv"):
+            with file.open(newline="") as stream:
+                header, *rows = csv.reader(stream)
+            scaled = [at for at, name in enumerate(header) if name.startswith(prefix)]
+            for row in rows:
+                for at in scaled:
+                    row[at] = repr(float(row[at]) * factor) if row[at] else ""
+            with file.open("w", newline="") as stream:
+                csv.writer(stream).writerows([header, *rows])
+
+    return change
+
+
+def _key(pattern: str, factor: float) -> Callable[[Path], None]:
+    """Return a change that multiplies the numbers of the study after a pattern, to the end of the line."""
+
+    def change(folder: Path) -> None:
+        file = folder / "study.toml"
+        number = re.compile(r"-?\d+\.?\d*(e-?\d+)?")
+
+        def scaled(found: re.Match[str]) -> str:
+            return found[1] + number.sub(lambda text: repr(float(text[0]) * factor), found[2])
+
+        file.write_text(re.sub(rf"({pattern} = )(.*)", scaled, file.read_text()))
+
+    return change
+
+
+SLIPS: Mapping[str, Callable[[Path], None]] = {
+    "joint positions in degrees": _columns("position.", 180.0 / np.pi),
+    "rate in degrees per second": _columns("rate.", 180.0 / np.pi),
+    "rate in arcseconds per second": _columns("rate.", 648000.0 / np.pi),
+    "acceleration in mm/s²": _columns("accel.", 1000.0),
+    "acceleration in g": _columns("accel.", 1.0 / 9.80665),
+    "acceleration in mg": _columns("accel.", 1000.0 / 9.80665),
+    "time in milliseconds": _columns("time", 1000.0),
+    "time in minutes": _columns("time", 1.0 / 60.0),
+    "radius of the orbit in km": _key("radius", 1e-3),
+    "place of the accelerometer in mm": _key("position", 1000.0),
+}
+"""Changes of the folder of a study, by what they stand for."""
+
+
+def refused(study: Path, slip: str, folder: Path) -> tuple[bool, str]:
+    """Return whether ``bayesid check`` refuses a study with one wrong unit with exit status 2, and what it says."""
+    copied = folder / "study"
+    shutil.copytree(study.parent, copied)
+    SLIPS[slip](copied)
+    done = CliRunner().invoke(app, ["check", str(copied / study.name), "--output", str(folder / "out")])
+    clear = done.exit_code == 2 and done.output.startswith("Error: ") and not (folder / "out").exists()
+    return clear, " ".join(done.output.split())

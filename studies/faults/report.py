@@ -9,27 +9,44 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib.figure import Figure
+
 from bayesid._io.words import counted
 from bayesid.report import Document
+from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
 from studies.common.monte_carlo import read_store, run_trials
 from studies.common.provenance import study_origin
 from studies.common.report_parts import add_number_table
 from studies.common.study import TRIALS, Command, Goal, Verdict
 from studies.common.template import Summary, add_first_page, write_study
-from studies.faults.figure import OUTCOMES, answer_figure
-from studies.faults.fuzz import KINDS
+from studies.faults.fuzz import KINDS, SLIPS
 from studies.faults.kills import COMMANDS
 from studies.faults.surroundings import SURROUNDINGS
 from studies.faults.trials import attempt, tasks
-from studies.faults.units import SLIPS
 
-__all__ = ["main", "write_report"]
+OUTCOMES = {"refused": "refused with a clear message", "accepted": "accepted", "faulty": "unclear answer"}
+"""Titles of the outcomes by their keys."""
 
-Made = Mapping[str, Any]
-"""A task with its result."""
 
-NAMED = re.compile(r"\.(csv|toml|urdf): ")
-"""File in a message, with what follows on the place in it."""
+@styled
+def answer_figure(answers: Mapping[str, Mapping[str, int]]) -> Figure:
+    """Draw the numbers of files by outcome, one bar for each kind of change."""
+    figure = wide_figure(0.75 + 0.2 * len(answers))
+    axes = figure.subplots()
+    place, left = np.arange(len(answers)), np.zeros(len(answers))
+    for (key, title), colour in zip(OUTCOMES.items(), COLOURS[2:5], strict=True):
+        counts = np.array([found.get(key, 0) for found in answers.values()])
+        axes.barh(place, counts, 0.65, left=left, color=colour, label=title)
+        left = left + counts
+    axes.set(xlabel="number of files", ylim=(len(answers) - 0.5, -0.5))
+    axes.set_yticks(place, list(answers))
+    shared_legend(figure, axes, len(OUTCOMES))
+    return figure
+
+
+Made = Mapping[str, Any]  # A task with its result
+NAMED = re.compile(r"\.(csv|toml|urdf): ")  # file in a message, with what follows on the place in it
 
 COMMAND = Command(
     "faults",

@@ -17,8 +17,6 @@ from typer.testing import CliRunner
 
 from bayesid.app.command_line import app
 
-__all__ = ["FULL", "HOOKS", "PLUGIN", "SURROUNDINGS", "answer_amid", "can_fill_a_disk", "with_plugin"]
-
 PLUGIN = '''
 import jax.numpy as jnp
 from bayesid import Effect, Parameter, Wrench, register
@@ -72,11 +70,8 @@ def _plugin(hook: str) -> Callable[[Path, Path], list[str]]:
     return arguments
 
 
-TWICE = "two runs into one folder"
-"""Title of the case whose folder is claimed meanwhile."""
-
-FULL = "a full disk"
-"""Title of the case whose folder for results lies on a file system of a few kilobytes."""
+TWICE = "two runs into one folder"  # title of the case whose folder is claimed meanwhile
+FULL = "a full disk"  # title of the case whose folder for results lies on a file system of a few kilobytes
 
 FILL = 'mount -t tmpfs -o size=16k tmpfs "$0" && exec "$@"'
 """Shell command that runs another one where a folder is such a file system, in a name space of its own."""

@@ -15,18 +15,13 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import seed as seeded
 
 from bayesid.app.compilation_cache import keep_compiled
-from studies.faults.foreign_cache import answers_beside_another_version
-from studies.faults.fuzz import KINDS, Spoilt, answer_to, spoilt
-from studies.faults.kills import COMMANDS, kill_and_resume
+from studies.faults.fuzz import KINDS, SLIPS, Spoilt, answer_to, refused, spoilt
+from studies.faults.kills import COMMANDS, answers_beside_another_version, kill_and_resume
 from studies.faults.surroundings import FULL, SURROUNDINGS, answer_amid, can_fill_a_disk
-from studies.faults.units import SLIPS, refused
+from studies.truth.bodies import SERVICER3
 from studies.truth.mujoco import Manoeuvres, write_study
-from studies.truth.urdf import SERVICER3
 
-__all__ = ["attempt", "tasks"]
-
-Task = Mapping[str, Any]
-"""What is tried, and how often."""
+Task = Mapping[str, Any]  # what is tried, and how often
 
 
 def tasks(full: bool) -> list[Task]:

@@ -20,8 +20,7 @@ from studies.manual.content import content
 
 __all__ = ["main", "run"]
 
-PROSE = Path(__file__).with_name("manual.typ")
-"""Text of the manual, which sets ``content.json`` beside it."""
+PROSE = Path(__file__).with_name("manual.typ")  # text of the manual, which sets ``content.json`` beside it
 
 
 def run(output: Path) -> None:

@@ -26,14 +26,12 @@ from bayesid.simulation.effects.register import known_effects
 
 __all__ = ["Pieces", "content"]
 
-Pieces = list[str]
-"""A text in pieces: plain, code, plain, and so on."""
+Pieces = list[str]  # A text in pieces: plain, code, plain, and so on
 
 PROJECT = Path(__file__).resolve().parents[2] / "pyproject.toml"
 """Description of the package, which states its version and the order of its rooms."""
 
-VALUES = {int: "N", float: "X", str: "TEXT", Path: "PATH"}
-"""Words for the value of an option that names none."""
+VALUES = {int: "N", float: "X", str: "TEXT", Path: "PATH"}  # words for the value of an option that names none
 
 
 def content() -> dict[str, Any]:

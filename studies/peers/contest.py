@@ -1,43 +1,106 @@
-"""Trials of the contest: one sampler on one density or one recipe on the task, alone in a process with one core."""
+"""Trials of the contest: one sampler on one density or one recipe on the task, alone in a process with one core.
+
+The task is the base of a robot in deep space from recordings made by MuJoCo. Nothing but the arm moves the robot, so
+that every peer's model is complete; a momentum of wheels that none of them knows of makes it incomplete. The recipes
+are what users write, see `studies.peers.recipes`.
+"""
 
 from __future__ import annotations
 
+import ast
+import importlib
+import inspect
 import os
+import tempfile
+import time
 from collections.abc import Mapping
+from contextlib import redirect_stdout
 from dataclasses import asdict
+from enum import StrEnum
+from io import StringIO
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bayesid._math.arrays import Floats
 from bayesid.app.compilation_cache import keep_compiled
+from studies.common.flight import light_wheel
 from studies.peers.density import CASES, target_of
-from studies.peers.reference import reference
-from studies.peers.samplers import SAMPLERS, Budget, Sampler
-from studies.peers.task import Recipe, attempt_recipe
+from studies.peers.samplers import SAMPLERS, Budget, Sampler, reference
+from studies.truth.bodies import SERVICER3
+from studies.truth.mujoco import Hidden, Manoeuvres, write_study
 
-__all__ = ["EFFECTIVE", "LIMITS", "NESTED", "REFERENCE", "attempt", "tasks"]
+WHEEL = np.array([0.3, -0.2, 0.25])
+"""Hidden momentum of the wheels [N m s], a hundredth of what a small reaction wheel stores."""
 
-EFFECTIVE = 4000.0
-"""Number of effective samples that are wanted."""
+
+class Recipe(StrEnum):
+    """Ways to identify the base, named by their files."""
+
+    BAYESID = "with_bayesid"
+    SCIPY = "with_scipy"
+    SYSID = "with_sysid"
+
+
+def lines(recipe: Recipe) -> int:
+    """Return how many lines a user writes, without blank ones, comments and docstrings."""
+    module = importlib.import_module(f"studies.peers.recipes.{recipe}")
+    source = ast.unparse(_without_docstrings(ast.parse(inspect.getsource(module))))
+    return sum(bool(line.strip()) for line in source.splitlines())
+
+
+def _without_docstrings(tree: ast.Module) -> ast.Module:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.FunctionDef) and ast.get_docstring(node) is not None:
+            node.body = node.body[1:] or [ast.Pass()]
+    return tree
+
+
+def attempt_recipe(recipe: Recipe, hidden: bool, seed: int, *, count: int, duration: float) -> dict[str, Any]:
+    """Identify the base of a study that is written for it.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    hidden : bool
+        Whether wheels are spinning.
+    seed : int
+        Seed of the study, the same for all recipes that are to be compared.
+    count, duration
+        Number and length of the recordings [s].
+
+    Returns
+    -------
+    dict
+        Processor time ``seconds``, ``truth``, ``mean`` and ``sd`` of the ten quantities.
+    """
+    module = importlib.import_module(f"studies.peers.recipes.{recipe}")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        rng = np.random.default_rng([seed, int(hidden)])
+        parts = Hidden(rotor=light_wheel(WHEEL)) if hidden else Hidden()
+        manoeuvres = Manoeuvres(count=count, duration=duration)
+        study = write_study(folder, SERVICER3, rng, orbit=None, hidden=parts, manoeuvres=manoeuvres, step=0.25)
+        began = time.process_time()
+        with redirect_stdout(StringIO()):
+            mean, sd = module.identify(folder)
+        seconds = time.process_time() - began
+    truth: Floats = study.base.quantities
+    return {"seconds": seconds, "truth": truth.tolist(), "mean": mean.tolist(), "sd": sd.tolist()}
+
+
+EFFECTIVE = 4000.0  # number of effective samples that are wanted
 
 LIMITS = {10: 80.0, 19: 80.0, 39: 150.0, 79: 500.0}
 """Limits of a peer's processor time by the number of unknowns [s]; more than five times what the package takes."""
 
-LONG = 15_000.0
-"""Number of effective samples of a reference."""
-
-REFERENCE = "reference"
-"""Name of the reference among the samplers."""
-
-NESTED = 19
-"""Largest number of unknowns on which nested samplers are tried; with more they are far from ending in time."""
-
-REPLICATES = 3
-"""Number of studies on which every recipe is tried, with a hidden wheel and without."""
-
-Task = Mapping[str, Any]
-"""What is tried: a sampler on a number of unknowns, or a recipe."""
+LONG = 15_000.0  # number of effective samples of a reference
+REFERENCE = "reference"  # name of the reference among the samplers
+NESTED = 19  # largest number of unknowns on which nested samplers are tried; with more they are far from ending in time
+REPLICATES = 3  # number of studies on which every recipe is tried, with a hidden wheel and without
+Task = Mapping[str, Any]  # what is tried: a sampler on a number of unknowns, or a recipe
 
 
 def tasks(full: bool) -> list[Task]:
@@ -62,7 +125,7 @@ def tasks(full: bool) -> list[Task]:
 
 
 def attempt(task: Task, rng: np.random.Generator) -> dict[str, Any]:
-    """Make one trial in a new process; see `studies.peers.samplers.Reached` and `studies.peers.task`."""
+    """Make one trial in a new process; see `studies.peers.samplers.Reached` and `studies.peers.contest`."""
     cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
     if cores:  # the new process inherits what this thread may use
         os.sched_setaffinity(0, {sorted(cores)[os.getpid() % len(cores)]})

@@ -32,10 +32,7 @@ from studies.benchmark.cases import DURATION, excitation
 from studies.common.ets7 import ACCEL, BASE, ENCODER, INTERVAL, RATE, ets7
 from studies.common.models import ARM_SPREAD, base_model
 
-__all__ = ["CASES", "Case", "Target", "target_of"]
-
-RECORDINGS = 3
-"""Number of recordings of every case."""
+RECORDINGS = 3  # number of recordings of every case
 
 
 @dataclass(frozen=True)

@@ -23,24 +23,17 @@ from studies.common.provenance import study_origin
 from studies.common.report_parts import add_number_table
 from studies.common.study import TRIALS, Command, Goal, Verdict
 from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
-from studies.peers.contest import EFFECTIVE, LIMITS, LONG, NESTED, REFERENCE, attempt, tasks
+from studies.peers.contest import EFFECTIVE, LIMITS, LONG, NESTED, REFERENCE, Recipe, attempt, lines, tasks
 from studies.peers.density import CASES
 from studies.peers.samplers import ADAPTATION, BROAD, CHAINS, LIVE, Sampler
-from studies.peers.task import Recipe, lines
 
-__all__ = ["Made", "goals_of", "main", "read", "write_report"]
-
-FASTER = 5.0
-"""Smallest wanted ratio of the best peer's time to the package's."""
-
-EVIDENCE = 0.1
-"""Largest wanted error of the log evidence."""
+FASTER = 5.0  # smallest wanted ratio of the best peer's time to the package's
+EVIDENCE = 0.1  # largest wanted error of the log evidence
 
 LEAST = 0.25
 """Share of the wanted samples from which on the time to all of them is extrapolated; adaptation outweighs fewer."""
 
-SIGMAS = 1.96
-"""Half width of a 95 % interval in standard deviations."""
+SIGMAS = 1.96  # half width of a 95 % interval in standard deviations
 
 PACKAGES = ("emcee", "numpyro", "dynesty", "nautilus-sampler", "jax", "scipy", "pin", "mujoco")
 """Packages whose versions are stated."""
@@ -55,11 +48,8 @@ TITLES = {
 SHORT = {Recipe.BAYESID: "bayesid", Recipe.SCIPY: "SciPy, Pinocchio", Recipe.SYSID: "mujoco.sysid"}
 """Short titles of the recipes."""
 
-TICKS = (5, 10, 20, 50, 100, 200, 500, 1000, 2000)
-"""Ticks of times in the figure [s]."""
-
-Made = Sequence[Mapping[str, Any]]
-"""Trials that were made: ``task`` and ``result``."""
+TICKS = (5, 10, 20, 50, 100, 200, 500, 1000, 2000)  # ticks of times in the figure [s]
+Made = Sequence[Mapping[str, Any]]  # trials that were made: ``task`` and ``result``
 
 COMMAND = Command(
     "peers",

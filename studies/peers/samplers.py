@@ -4,6 +4,11 @@ Everything that only has to be compiled once is compiled before the clock runs. 
 package stops by its own rule; its peers stop as soon as they have the effective samples, or at a limit of time, and
 looking whether they may stop is not counted against them. Effective samples of all chains are counted by one estimator,
 ArviZ's for the bulk, with each walker of an ensemble as a chain; those of weighted draws by Kish's formula.
+
+The reference is long chains, and the log evidence by bridge sampling between them and a Student-t (Meng and Wong,
+"Simulating ratios of normalizing constants", 1996, with the optimal bridge), which needs no proposal that covers the
+posterior, unlike importance sampling. The Student-t is fitted to one half of the ensembles and bridged to the other
+half, and the other way round.
 """
 
 from __future__ import annotations
@@ -20,36 +25,23 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from emcee.moves import DEMove, DESnookerMove, StretchMove
+from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats
 from bayesid.inference import importance_sample, sample
+from bayesid.inference.proposal import StudentT
 from studies.peers.density import Target
-
-__all__ = ["SAMPLERS", "Budget", "Reached", "Sampler"]
 
 BROAD = 3.0
 """Width of the normal prior that nested sampling starts from, in standard deviations of the Laplace approximation."""
 
-CHAINS = 8
-"""Number of chains of NUTS, evaluated together: a point then costs less than half of what it costs alone."""
-
-ADAPTATION = 100
-"""Number of steps in which NUTS finds its step size."""
-
-NUTS_BLOCK = 10
-"""Number of steps of NUTS between two looks at the clock."""
-
-BLOCK = 100
-"""Number of steps of an ensemble between two looks at the clock."""
-
-LOWEST = -1e300
-"""Log likelihood outside the support, for nested samplers that refuse infinite ones."""
-
-PACE = 200
-"""Number of evaluations that are timed to turn the limit of time into one of evaluations."""
-
-LIVE = 500
-"""Number of live points of dynesty, its own default."""
+CHAINS = 8  # number of chains of NUTS, evaluated together: a point then costs less than half of what it costs alone
+ADAPTATION = 100  # number of steps in which NUTS finds its step size
+NUTS_BLOCK = 10  # number of steps of NUTS between two looks at the clock
+BLOCK = 100  # number of steps of an ensemble between two looks at the clock
+LOWEST = -1e300  # log likelihood outside the support, for nested samplers that refuse infinite ones
+PACE = 200  # number of evaluations that are timed to turn the limit of time into one of evaluations
+LIVE = 500  # number of live points of dynesty, its own default
 
 
 class Sampler(StrEnum):
@@ -326,3 +318,66 @@ SAMPLERS: Mapping[Sampler, Callable[[Target, Budget, np.random.Generator], Reach
     Sampler.NAUTILUS: nautilus,
 }
 """Samplers by name, the package's own first."""
+
+
+ITERATIONS = 100  # number of iterations of the bridge, many more than it needs
+
+
+def reference(target: Target, budget: Budget, rng: np.random.Generator) -> Reached:
+    """Return the reference, with as many effective samples as the budget wants; its time is no part of a comparison."""
+    began = time.process_time()
+    trusted = importance_sample(target.parameterisation, target.optimum, rng).trusted
+    chains = sample(
+        target.parameterisation,
+        target.optimum,
+        int(rng.integers(2**31)),
+        effective_samples=budget.effective_samples,
+        trusted=trusted,
+    )
+    y = chains.y.reshape(len(chains.y), -1, chains.walkers, target.size)
+    halves = np.array_split(np.arange(len(y)), 2)
+    values, evaluations = [], chains.evaluations
+    for fitted, bridged in (halves, halves[::-1]):
+        known = y[fitted].reshape(-1, target.size)
+        proposal = StudentT.about(known.mean(axis=0), np.cov(known.T))
+        draws = proposal.draw(int(budget.effective_samples), rng)
+        evaluations += len(draws)
+        proposed = target.parameterisation.log_density(draws) - proposal.log_density(draws)
+        own = y[bridged].reshape(-1, target.size)
+        sampled = chains.log_density[bridged].ravel() - proposal.log_density(own)
+        values.append(bridge(sampled, proposed, effective_samples(np.concatenate(y[bridged], axis=1))))
+    (first, error), (second, other) = values
+    x = target.whitened(y.reshape(-1, target.size))
+    return Reached(
+        seconds=time.process_time() - began,
+        evaluations=evaluations,
+        gradients=0,
+        effective_samples=effective_samples(np.concatenate(y, axis=1)),
+        finished=chains.converged,
+        log_evidence=0.5 * (first + second),
+        log_evidence_error=float(max(0.5 * np.hypot(error, other), 0.5 * abs(first - second))),
+        mean=x.mean(axis=0).tolist(),
+    )
+
+
+def bridge(sampled: Floats, proposed: Floats, effective: float) -> tuple[float, float]:
+    """Return the log evidence by bridge sampling, and its standard error.
+
+    Parameters
+    ----------
+    sampled : (n,) array
+        Log density over that of the proposal at draws of the posterior.
+    proposed : (m,) array
+        The same at draws of the proposal.
+    effective : float
+        Number of effective samples among the draws of the posterior.
+    """
+    shift = float(np.median(sampled))
+    sampled, proposed = sampled - shift, proposed - shift
+    n, m, value = effective, len(proposed), 0.0
+    for _ in range(ITERATIONS):
+        above = proposed - np.logaddexp(np.log(n) + proposed, np.log(m) + value)
+        below = -np.logaddexp(np.log(n) + sampled, np.log(m) + value)
+        value = float(logsumexp(above) - np.log(m) - logsumexp(below) + np.log(len(sampled)))
+    spread = [np.exp(part - logsumexp(part) + np.log(len(part))).var() for part in (above, below)]
+    return value + shift, float(np.sqrt(spread[0] / m + spread[1] / n))

@@ -17,8 +17,7 @@ from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis import Diagnosis
 from studies.common.provenance import study_origin
 from studies.common.study import Command
-from studies.throws.analysis import Analysis, analyse, prepare
-from studies.throws.body_result import BodyResult
+from studies.throws.analysis import Analysis, BodyResult, analyse, prepare
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws, read_truth
 from studies.throws.diagnosis import Lacking, geometry_errors, lacking, without_wheel
 from studies.throws.left_over import pole_pairs
@@ -27,11 +26,8 @@ from studies.throws.report import write_report
 
 __all__ = ["Analysis", "BodyResult", "Result", "main", "run"]
 
-QUICK = 4
-"""Throws of each body that a quick run identifies."""
-
-TRAINING = 1
-"""Throws of each body that are diagnosed."""
+QUICK = 4  # throws of each body that a quick run identifies
+TRAINING = 1  # throws of each body that are diagnosed
 
 
 @dataclass(frozen=True)

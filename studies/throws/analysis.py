@@ -1,4 +1,4 @@
-"""The analysis of all throws under one model: calibration, bodies, and how the throws scatter about them."""
+"""The analysis of all throws under one model: calibration, bodies without the device, how throws scatter about them."""
 
 from __future__ import annotations
 
@@ -8,21 +8,148 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from bayesid import Posterior
-from studies.throws.bodies import Tensor, object_moments, tensors, truth_sd, wheel_inertia
-from studies.throws.body_result import BodyResult
-from studies.throws.data import Timing, Truth, read_throws
-from studies.throws.effects import STEP
-from studies.throws.joint import Joint, Throw, maximise_jointly
+from bayesid.inference.body_quantities import bodies_of
+from studies.throws.data import WHEEL_INERTIA, Timing, Truth, read_throws, regress
+from studies.throws.joint import SMOOTH, Joint, SmoothWidth, Throw, fit_widths, maximise_jointly, width_of
 from studies.throws.left_over import LeftOver, left_over
-from studies.throws.model import extended, is_calibration, is_own, manoeuvres
-from studies.throws.regression import regress
-from studies.throws.smooth_widths import SMOOTH, SmoothWidth, fit_widths, width_of
-
-__all__ = ["Analysis", "analyse", "prepare"]
+from studies.throws.model import STEP, extended, is_calibration, is_own, manoeuvres
 
 Floats = NDArray[np.floating]
+
+PLATE_SD = 0.03  # relative uncertainty of the plate's moments, which are from the authors' CAD: "a few percent"
+
+BLOCK_SD = 0.005
+"""Relative uncertainty of what the blocks add: 0.1 to 0.2 mm in their place on levers of 63 mm, and their mass."""
+
+
+@dataclass(frozen=True)
+class Tensor:
+    """Inertia about the centre of mass (..., 3, 3) [kg m2] and the centre of mass from the sensor (..., 3) [m]."""
+
+    inertia: Floats
+    com: Floats
+
+
+def tensors(posterior: Posterior, coordinates: Floats) -> Tensor:
+    """Turn log-Cholesky coordinates of many points, shape (n, 10), into inertias."""
+    z = np.zeros((len(coordinates), posterior.size))
+    z[:, :10] = coordinates
+    values = bodies_of(posterior, z)["base_link"].values
+    xx, yy, zz, xy, xz, yz = values[:, 4:].T
+    return Tensor(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1), values[:, 1:4])
+
+
+def steiner(mass: float, offset: Floats) -> Floats:
+    """Inertia of a point mass at offsets (..., 3): shape (..., 3, 3)."""
+    square = (offset**2).sum(axis=-1)[..., None, None]
+    return mass * (square * np.eye(3) - offset[..., :, None] * offset[..., None, :])
+
+
+def shift(device: Tensor, test: Tensor, device_mass: float, mass: float) -> Floats:
+    """Return what the displacement of both parts from the common centre of mass adds to the inertia."""
+    offset = test.com - device.com
+    return steiner(device_mass, offset) + steiner(mass, device_mass / mass * offset)
+
+
+def wheel_inertia(device: Tensor, proof: Tensor, truth: Truth) -> Floats:
+    """Inertia of the wheel, shape (n,) [kg m2], that gives the known box its known moments, by least squares.
+
+    The fits use a nominal wheel; all their inertias scale with it, the shift of the masses does not.
+    """
+    added = shift(device, proof, truth.device_mass, truth.mass["cal_proof"])
+    # the box's edges lie along the sensor's axes: its smallest moment about x, its largest about z
+    known = np.linalg.eigvalsh(np.diag(truth.moments["cal_proof"]) + added)
+    seen = np.linalg.eigvalsh(proof.inertia - device.inertia)
+    return WHEEL_INERTIA * (known * seen).sum(axis=-1) / (seen**2).sum(axis=-1)
+
+
+def object_moments(device: Tensor, test: Tensor, wheel: Floats | float, device_mass: float, mass: float) -> Floats:
+    """Principal moments of the body without the device, shape (n, 3) [kg m2], ascending."""
+    scale = np.asarray(wheel)[..., None, None] / WHEEL_INERTIA
+    alone = scale * (test.inertia - device.inertia) - shift(device, test, device_mass, mass)
+    return np.linalg.eigvalsh(alone)
+
+
+def truth_sd(truth: Truth, body: str) -> Floats:
+    """Return the standard deviation of a body's stated moments, shape (3,) [kg m2], under the assumptions above."""
+    plate = truth.moments.get("Empty", truth.moments[body])
+    return np.hypot(PLATE_SD * plate, BLOCK_SD * (truth.moments[body] - plate))
+
+
+@dataclass(frozen=True)
+class BodyResult:
+    """Principal moments of one body without the device, ascending [kg m2].
+
+    Attributes
+    ----------
+    throws : tuple of str
+    moments, formal : (throws, 3) array
+        Of single throws, with the posterior's standard deviation of each; device, wheel and drag as found jointly.
+    joint, joint_formal, joint_jackknife : (3,) array
+        Of all throws together; the jackknife takes whole throws out, calibration throws included.
+    truth, truth_sd : (3,) array
+    """
+
+    name: str
+    throws: tuple[str, ...]
+    moments: Floats
+    formal: Floats
+    joint: Floats
+    joint_formal: Floats
+    joint_jackknife: Floats
+    truth: Floats
+    truth_sd: Floats
+
+    @property
+    def errors(self) -> Floats:
+        """Of single throws against the truth [%], shape (throws, 3)."""
+        return 100.0 * (self.moments / self.truth - 1.0)
+
+    @property
+    def joint_errors(self) -> Floats:
+        """Of the joint fit against the truth [%], shape (3,)."""
+        return 100.0 * (self.joint / self.truth - 1.0)
+
+    @property
+    def mean_error(self) -> float:
+        """Mean size of the errors of single throws over throws and moments [%]."""
+        return float(np.abs(self.errors).mean())
+
+    @property
+    def mean_error_sd(self) -> float:
+        """Standard error of `mean_error`, from how throws differ [%]."""
+        sizes = np.abs(self.errors).mean(axis=1)
+        return float(sizes.std(ddof=1) / np.sqrt(len(sizes)))
+
+    @property
+    def largest_error(self) -> float:
+        """Largest error of any moment in any throw [%]."""
+        return float(np.abs(self.errors).max())
+
+    @property
+    def inflation(self) -> float:
+        """Factor by which formal standard deviations of single throws are too small, from the throws' scatter alone."""
+        freedom = len(self.throws) / (len(self.throws) - 1.0)
+        return float(np.sqrt(freedom * (((self.moments - self.moments.mean(axis=0)) / self.formal) ** 2).mean()))
+
+    def held(self, level: float, *, with_truth: bool = False) -> tuple[int, int]:
+        """Return how many intervals of single throws hold the truth at a level, and of how many.
+
+        With ``with_truth`` the interval counts what all throws share as well: the truth's own uncertainty, and that of
+        the wheel and the device, for which the jackknife of the joint answer stands.
+        """
+        sd = np.sqrt(self.formal**2 + (self.truth_sd**2 + self.joint_jackknife**2 if with_truth else 0.0))
+        inside = np.abs(self.moments - self.truth) < norm.ppf(0.5 + 0.5 * level) * sd
+        return int(inside.sum()), inside.size
+
+    @property
+    def joint_distance(self) -> Floats:
+        """Joint value less truth in units of jackknife and truth's uncertainty together, shape (3,)."""
+        return (self.joint - self.truth) / np.hypot(self.joint_jackknife, self.truth_sd)
+
 
 DRAWS = 1000
 

@@ -5,12 +5,18 @@ Throw", arXiv:2503.13137. They are not part of the project; `DEFAULT_FOLDER` say
 
 A sample is the value of a local parabola with Gaussian weights (Fan and Gijbels, Local polynomial modelling, 1996):
 it passes polynomials of degree three unchanged. Samples that are 2.149 weight widths apart are uncorrelated where the
-raw noise is white, and those twice as far have a correlation of -0.006.
+raw noise is white, and those twice as far have a correlation of -0.006. Their noise is measured where the wheel hardly
+accelerates: there the motion follows a polynomial of degree five over a few hundredths of a second, and what samples
+leave about it is noise of the sensors and vibration of the wheel's bearings.
+
+A fit starts from a linear regression. Euler's equation with the wheel is linear in the inertia, and the accelerometer's
+reading in free fall is linear in its place relative to the centre of mass. Only the mass has to be known.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,29 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from bayesid import InputError, Recording
-
-__all__ = [
-    "CALIBRATION",
-    "DEFAULT_FOLDER",
-    "EXCLUDED",
-    "INTERVAL",
-    "POLE_PAIRS",
-    "SMOOTH",
-    "WHEEL_COUNT",
-    "WHEEL_INERTIA",
-    "WHEEL_STEPS",
-    "Timing",
-    "Truth",
-    "read_raw",
-    "read_throws",
-    "read_truth",
-]
+from bayesid import InertialParameters, InputError, Recording
 
 Floats = NDArray[np.floating]
 
-DEFAULT_FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "throws"
-"""Beside the checkout."""
+DEFAULT_FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "throws"  # beside the checkout
 
 CALIBRATION = ("cal_device", "cal_proof")
 """The device alone and the device on a box of known inertia, which every comparison needs."""
@@ -51,23 +39,18 @@ EXCLUDED = {"Empty_LOG00188": "its gyro is saturated; the folder of the measurem
 SIGNS = np.array([-1.0, -1.0, 1.0])
 RATE_SCALE = np.pi / 180.0 / 16.384
 ACCEL_SCALE = 9.81 / 2048.0
-POLE_PAIRS = 6
-"""Of the wheel's motor, as the source of the data states; its inertia takes up an error of this number."""
-
-WHEEL_COUNT = 100.0 / POLE_PAIRS * 2.0 * np.pi / 60.0
-"""Wheel speed of one count of its reading [rad/s]."""
+POLE_PAIRS = 6  # of the wheel's motor, as the source of the data states; its inertia takes up an error of this number
+WHEEL_COUNT = 100.0 / POLE_PAIRS * 2.0 * np.pi / 60.0  # wheel speed of one count of its reading [rad/s]
 
 WHEEL_INERTIA = 1.45e-6
 """Nominal inertia of the wheel [kg m2]; every inertia scales with it, and the known box gives its true value."""
 
-INTERVAL = 0.005
-"""Between samples [s]."""
+INTERVAL = 0.005  # between samples [s]
 
 SMOOTH = INTERVAL / np.sqrt(14.0 - np.sqrt(88.0))
 """Width of the weights [s], at which the correlation of neighbouring samples is zero."""
 
-WHEEL_STEPS = 4
-"""Values of the wheel's momentum per sample."""
+WHEEL_STEPS = 4  # values of the wheel's momentum per sample
 
 
 @dataclass(frozen=True)
@@ -206,3 +189,99 @@ def _wheel_speed(clock: Floats, erpm: Floats, grid: Floats, timing: Timing) -> F
     fine = np.arange(grid[0] - 5.0 * SMOOTH, grid[-1] + 5.0 * SMOOTH, 0.25e-3)
     held = np.interp(fine, instant - timing.delay - timing.delay_periods * period, -value * WHEEL_COUNT)
     return _weights(grid, fine) @ held
+
+
+SPAN, DEGREE = 13, 5  # samples of one polynomial and its degree
+QUIET = 2000.0  # wheel acceleration up to which the polynomial follows the motion [rad/s2], a tenth of the largest
+
+
+def quiet_noise(recordings: Sequence[Recording], sensor: str) -> Floats:
+    """Return the standard deviation of one sample of a sensor, shape (3,), from all quiet stretches of some recordings.
+
+    Every stretch of thirteen samples gives one residual, that of its middle; its variance is that of a sample times one
+    less the weight that the middle has in its own polynomial.
+    """
+    place = np.vander(np.linspace(-1.0, 1.0, SPAN), DEGREE + 1)
+    leave = (np.eye(SPAN) - place @ np.linalg.pinv(place))[SPAN // 2]
+    square: list[Floats] = []
+    for recording in recordings:
+        time, values = recording.vector(sensor)
+        if sensor == "wheel_momentum":
+            time, values = time[::WHEEL_STEPS], values[::WHEEL_STEPS]
+        wheel_time, wheel = recording.vector("wheel_momentum")
+        slope = np.abs(np.gradient(wheel[:, 2], wheel_time)) / WHEEL_INERTIA
+        for first in range(len(time) - SPAN + 1):
+            own = slice(first, first + SPAN)
+            inside = (wheel_time >= time[own][0]) & (wheel_time <= time[own][-1])
+            if time[own][-1] - time[own][0] < (SPAN - 0.5) * INTERVAL and slope[inside].max() < QUIET:
+                square.append((leave @ values[own]) ** 2 / leave[SPAN // 2])
+    return np.sqrt(np.mean(square, axis=0))
+
+
+SHARE = 0.05
+"""Least principal moment of the second moments of mass relative to their trace, where noise gives what no body has."""
+
+
+def regress(recordings: Sequence[Recording], mass: float) -> InertialParameters:
+    """Return the body of a mass that explains differenced rates and accelerations best.
+
+    Raises
+    ------
+    InputError
+        If the recordings do not hold the wheel's momentum.
+    """
+    if any("wheel_momentum.z" not in recording.channels for recording in recordings):
+        raise InputError("the wheel is not recorded", remedy="Its inertia sets the scale of the regression: record it")
+    left, right = (np.concatenate(parts) for parts in zip(*map(_euler, recordings), strict=True))
+    xx, xy, xz, yy, yz, zz = np.linalg.lstsq(left, right, rcond=None)[0]
+    place, reading = (np.concatenate(parts) for parts in zip(*map(_accelerometer, recordings), strict=True))
+    com = -np.linalg.lstsq(place, reading, rcond=None)[0]
+    return InertialParameters(mass, com, _possible(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])))
+
+
+def _possible(inertia: Floats) -> Floats:
+    """Return the nearest inertia whose second moments of mass are those of a body with volume."""
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    size, axes = np.linalg.eigh(second)
+    second = axes @ np.diag(np.maximum(size, SHARE * np.abs(size).sum())) @ axes.T
+    return np.asarray(np.trace(second) * np.eye(3) - second)
+
+
+def _euler(recording: Recording) -> tuple[Floats, Floats]:
+    """Return I dw/dt + w x I w = -(dh/dt + w x h) as rows over xx, xy, xz, yy, yz, zz."""
+    time, rate, slope, good = _differenced(recording)
+    wheel_time, wheel = recording.vector("wheel_momentum")
+    at = np.searchsorted(wheel_time, time)
+    torque = np.gradient(wheel, wheel_time, axis=0)[at]
+    turned = np.cross(rate[:, None, :], _times_inertia(rate).transpose(0, 2, 1)).transpose(0, 2, 1)
+    left, right = _times_inertia(slope) + turned, -(torque + np.cross(rate, wheel[at]))
+    return left[good].reshape(-1, 6), right[good].ravel()
+
+
+def _accelerometer(recording: Recording) -> tuple[Floats, Floats]:
+    """Return a = dw/dt x r + w x (w x r) with the throw's mean taken off, as rows over r."""
+    _, rate, slope, good = _differenced(recording)
+    _, reading = recording.vector("accel")
+    turn = _cross(slope) + _cross(rate) @ _cross(rate)
+    left, right = turn[good], reading[good]
+    return (left - left.mean(axis=0)).reshape(-1, 3), (right - right.mean(axis=0)).ravel()
+
+
+def _differenced(recording: Recording) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
+    """Return times, rates and their derivatives, and where both neighbours are there."""
+    time, rate = recording.vector("rate")
+    gap = np.diff(time) > 1.5 * recording.interval("rate.x")
+    good = ~(np.concatenate([[True], gap]) | np.concatenate([gap, [True]]))
+    return time, rate, np.gradient(rate, time, axis=0), good
+
+
+def _cross(vector: Floats) -> Floats:
+    """Matrices (T, 3, 3) of the cross product with vectors (T, 3) on the left."""
+    return np.cross(vector[:, None, :], np.eye(3)).transpose(0, 2, 1)
+
+
+def _times_inertia(vector: Floats) -> Floats:
+    """Matrices (T, 3, 6) that give inertia times vector (T, 3)."""
+    x, y, z = vector.T
+    o = np.zeros_like(x)
+    return np.array([[x, y, z, o, o, o], [o, x, o, y, z, o], [o, o, x, o, y, z]]).transpose(2, 0, 1)

@@ -15,22 +15,25 @@ from bayesid.diagnosis.outcome.extended_model import extended_posterior, extende
 from bayesid.inference.mode import fit
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.simulation.effects import Effect
-from studies.throws.bodies import Tensor, object_moments, tensors, wheel_inertia
-from studies.throws.data import POLE_PAIRS, Timing, Truth
-from studies.throws.effects import GSensitivity, GyroCross, SmoothTorque, WheelDelay, WheelImbalance, WheelTilt
-from studies.throws.model import KNOTS, TORQUE, manoeuvres, rigid
-from studies.throws.regression import regress
-
-__all__ = ["SPREAD", "HeldOut", "Lacking", "device_candidates", "geometry_errors", "lacking", "without_wheel"]
+from studies.throws.analysis import Tensor, object_moments, tensors, wheel_inertia
+from studies.throws.data import POLE_PAIRS, Timing, Truth, regress
+from studies.throws.model import (
+    KNOTS,
+    TORQUE,
+    GSensitivity,
+    GyroCross,
+    SmoothTorque,
+    WheelDelay,
+    WheelImbalance,
+    WheelTilt,
+    manoeuvres,
+    rigid,
+)
 
 Floats = NDArray[np.floating]
 
-SPREAD = 0.1
-"""Relative width of the body's prior about a linear regression on the throws."""
-
-TESTING = 2
-"""Throws at most that are predicted."""
-
+SPREAD = 0.1  # relative width of the body's prior about a linear regression on the throws
+TESTING = 2  # throws at most that are predicted
 ITERATIONS = 20
 
 CATALOGUE = (

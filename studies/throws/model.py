@@ -1,10 +1,17 @@
-"""The models of a thrown body: rigid body with wheel, and the same with what is known to be missing."""
+"""The models of a thrown body: rigid with its wheel, and with what acts on the device beyond, written as a user would.
+
+All sizes are those of a small flight controller with one reaction wheel along z, thrown by hand in air.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import ClassVar
 
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from bayesid import (
@@ -19,34 +26,215 @@ from bayesid import (
     SensorKind,
     White,
 )
-from studies.throws.data import WHEEL_COUNT, WHEEL_INERTIA
-from studies.throws.effects import AirDrag, GyroCross, SmoothForce, SmoothTorque, ThrowBias, WheelDelay, WheelTilt
-from studies.throws.noise import quiet_noise
+from bayesid.simulation.effects import AccelBias, Effect, Instant, Parameter, Readings, Wrench
+from bayesid.simulation.effects.physical_bound import PhysicalBound
+from studies.throws.data import SMOOTH, WHEEL_COUNT, WHEEL_INERTIA, quiet_noise
 
-__all__ = ["KNOTS", "TORQUE", "extended", "is_calibration", "is_fitted", "is_own", "is_rigid", "manoeuvres", "rigid"]
+STEP = 0.0025  # longest integration step [s], half of the interval between samples
+
+
+class GyroCross(Effect):
+    """Cross-axis sensitivity of the gyro, a symmetric matrix without diagonal: the scale factors stay one."""
+
+    name = "gyro-cross"
+    summary = "Each gyro axis reads a little of the two others."
+
+    def __init__(self, sigma: float = 0.01) -> None:
+        self.parameters = tuple(Parameter(axes, "1", sigma) for axes in ("xy", "xz", "yz"))
+
+    def read(self, values: Array, readings: Readings) -> Readings:
+        """Mix the axes."""
+        xy, xz, yz = values
+        one = jnp.ones(())
+        matrix = jnp.stack([jnp.stack([one, xy, xz]), jnp.stack([xy, one, yz]), jnp.stack([xz, yz, one])])
+        return readings.replace(rate=readings.rate @ matrix)
+
+
+class GSensitivity(Effect):
+    """Gyro that reads a little of the specific force: a full matrix, whose rows are the gyro's axes."""
+
+    name = "g-sensitivity"
+    summary = "The gyro reads a little of the specific force."
+
+    def __init__(self, sigma: float = 2e-4) -> None:
+        self.parameters = tuple(Parameter(a + b, "rad s/m", sigma) for a in "xyz" for b in "xyz")
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the sensitivity of a poor micromechanical gyro."""
+        return (PhysicalBound("rad s/m", 6e-4, "Micromechanical gyros read up to 0.3 degree per second and g."),)
+
+    def read(self, values: Array, readings: Readings) -> Readings:
+        """Add a share of the specific force."""
+        return readings.replace(rate=readings.rate + readings.accel @ values.reshape(3, 3).T)
+
+
+class WheelTilt(Effect):
+    """The wheel's axis is not quite the gyro's z axis: its recorded momentum has components along x and y."""
+
+    name = "wheel-tilt"
+    summary = "The wheel is mounted at a small angle."
+
+    def __init__(self, sigma: float = 0.05) -> None:
+        self.parameters = tuple(Parameter(axis, "rad", sigma) for axis in "xy")
+
+    def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
+        """Return what the recorded momentum lacks, and its derivative."""
+        tilt = jnp.concatenate([values, jnp.zeros(1)])
+        return tilt * instant.environment.wheel_momentum[2], tilt * instant.environment.wheel_torque[2]
+
+
+class WheelDelay(Effect):
+    """The recorded momentum of the wheel is late: the true one is ahead by its slope times the delay.
+
+    The second derivative, which only an accelerometer would see where the wheel's torque jumps, is left out.
+    """
+
+    name = "wheel-delay"
+    summary = "The recorded speed of the wheel is late."
+
+    def __init__(self, sigma: float = 0.002) -> None:
+        self.parameters = (Parameter("delay", "s", sigma),)
+
+    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+        """Return the time of one reading of the wheel at its lowest speed."""
+        return (PhysicalBound("s", 0.006, "A reading is an average over an electrical period, up to 6 ms here."),)
+
+    def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
+        """Return the missing momentum."""
+        return values[0] * instant.environment.wheel_torque, jnp.zeros(3)
+
+
+class WheelImbalance(Effect):
+    """Imbalance of the wheel, static and dynamic, which shakes the body once in a turn; its phase differs by throw.
+
+    The angle of the wheel is the integral of its recorded speed, or of a share of it where the motor has more poles
+    than the record takes it to have. The samples are filtered, and so is what turns faster.
+
+    Parameters
+    ----------
+    share : float
+        Speed of the wheel relative to the recorded one.
+    static, dynamic : float
+        Standard deviations of the imbalance [kg m, kg m2].
+    """
+
+    name = "wheel-imbalance"
+    summary = "The wheel is out of balance and shakes the body once in a turn."
+    per_recording = True
+    states = 1
+    constant_names = ("share",)
+
+    def __init__(self, share: float = 1.0, static: float = 1e-7, dynamic: float = 3e-9) -> None:
+        self.share = share
+        parts = ("static", "kg m", static), ("dynamic", "kg m2", dynamic)
+        self.parameters = tuple(Parameter(f"{name}.{way}", unit, sd) for name, unit, sd in parts for way in ("c", "s"))
+
+    def derivative(self, values: Array, instant: Instant, inner: Array) -> Array:
+        """Return the speed of the wheel."""
+        return self._speed(instant)[None]
+
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
+        """Return the force of the eccentric mass, which acts near the sensors."""
+        return Wrench(self._speed(instant) ** 2 * self._turned(values[:2], instant, inner), jnp.zeros(3))
+
+    def momentum(self, values: Array, instant: Instant, inner: Array) -> tuple[Array, Array]:
+        """Return the momentum of the wheel across its axis, and its derivative at the present speed."""
+        speed = self._speed(instant)
+        momentum = speed * self._turned(values[2:], instant, inner)
+        return momentum, speed * jnp.cross(jnp.array([0.0, 0.0, 1.0]), momentum)
+
+    def _speed(self, instant: Instant) -> Array:
+        return jnp.asarray(self.share * instant.environment.wheel_momentum[2] / WHEEL_INERTIA)
+
+    def _turned(self, pair: Array, instant: Instant, inner: Array) -> Array:
+        """Return a vector across the axis that turns with the wheel, as the filter of the samples leaves it."""
+        u = self._speed(instant) * SMOOTH
+        gain = (1.0 + 0.5 * u**2) * jnp.exp(-0.5 * u**2)
+        c, s = jnp.cos(inner[0]), jnp.sin(inner[0])
+        return gain * jnp.stack([pair[0] * c - pair[1] * s, pair[0] * s + pair[1] * c, jnp.zeros(())])
+
+
+class AirDrag(Effect):
+    """Rotational drag of the air, linear in the rate: torque = -diag(values) rate."""
+
+    name = "air-drag"
+    summary = "Air slows the rotation."
+
+    def __init__(self, sigma: float) -> None:
+        self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
+
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
+        """Return the drag torque."""
+        return Wrench(jnp.zeros(3), -values * instant.rate)
+
+
+class Smooth(Effect):
+    """Vector that nothing else explains: piecewise linear in time, with independent normal values at its knots."""
+
+    per_recording = True
+    unit: ClassVar[str]
+
+    def __init__(self, duration: float, knots: int, sigma: float) -> None:
+        self.knots, self.spacing, self.sigma = knots, duration / (knots - 1), sigma
+        names = [f"{axis}{knot}" for knot in range(knots) for axis in "xyz"]
+        self.parameters = tuple(Parameter(name, self.unit, sigma) for name in names)
+
+    def course(self, values: ArrayLike, time: ArrayLike) -> Array:
+        """Return the vector at times of any shape, given the values at the knots (knots * 3,): shape (..., 3)."""
+        distance = jnp.abs(jnp.asarray(time)[..., None] / self.spacing - jnp.arange(self.knots))
+        return jnp.maximum(0.0, 1.0 - distance) @ jnp.asarray(values).reshape(self.knots, 3)
+
+
+class SmoothTorque(Smooth):
+    """Unexplained torque on the body."""
+
+    name = "smooth-torque"
+    summary = "A smooth torque of unknown cause acts on the body, another one in every throw."
+    unit = "N m"
+
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
+        """Return the torque of the instant."""
+        return Wrench(jnp.zeros(3), self.course(values, instant.environment.time))
+
+
+class SmoothForce(Smooth):
+    """Unexplained specific force that the accelerometer reads, such as the drag of the air on a moving plate."""
+
+    name = "smooth-force"
+    summary = "A smooth force of unknown cause acts on the body, another one in every throw."
+    unit = "m/s2"
+
+    def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
+        """Return the force of the instant per mass."""
+        return self.course(values, instant.environment.time)
+
+
+class ThrowBias(AccelBias):
+    """Constant error of the accelerometer, another one in every throw; it stands in for the drag force as well."""
+
+    name = "throw-bias"
+    per_recording = True
+
+    @property
+    def longest_step(self) -> float:
+        """Integration step that suits half a second [s]."""
+        return STEP
+
 
 Floats = NDArray[np.floating]
 
 URDF = """<robot name="thrown"><link name="base_link"><inertial><origin xyz="{com}"/><mass value="{mass}"/>
 <inertia ixx="{0}" ixy="{1}" ixz="{2}" iyy="{3}" iyz="{4}" izz="{5}"/></inertial></link></robot>"""
 
-KNOTS = 16
-"""Of the unexplained torque, over the flight: 32 ms apart."""
-
-TORQUE = 100.0 * WHEEL_INERTIA
-"""Width of the unexplained torque that estimates of a body's own start from [N m]."""
-
-DRAG = 20.0 * WHEEL_INERTIA
-"""Prior standard deviation of the drag coefficients [N m s]."""
-
-BIAS = 0.1
-"""Prior standard deviation of the accelerometer's constant error in a throw [m/s2]."""
+KNOTS = 16  # of the unexplained torque, over the flight: 32 ms apart
+TORQUE = 100.0 * WHEEL_INERTIA  # width of the unexplained torque that estimates of a body's own start from [N m]
+DRAG = 20.0 * WHEEL_INERTIA  # prior standard deviation of the drag coefficients [N m s]
+BIAS = 0.1  # prior standard deviation of the accelerometer's constant error in a throw [m/s2]
 
 RESOLUTION = WHEEL_COUNT / np.sqrt(12.0)
 """Least noise of the wheel's recorded speed, that of its counts [rad/s]: the gyro sees it through the inertia."""
 
-RATE = 150.0
-"""Prior standard deviation of the initial rate [rad/s], wide enough for any throw."""
+RATE = 150.0  # prior standard deviation of the initial rate [rad/s], wide enough for any throw
 
 
 def rigid(centre: InertialParameters, spread: float, recordings: Sequence[Recording]) -> Model:

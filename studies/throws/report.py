@@ -2,29 +2,265 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from bayesid.diagnosis import Diagnosis
+from bayesid.diagnosis.evidence.verdict import NAMED
 from bayesid.report import Document, format_quantity
+from bayesid.report.figures.figure_style import styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_probability, format_signed
+from bayesid.report.verdict_record import Share
 from studies.common.report_parts import columns
-from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study
-from studies.throws.bodies import BLOCK_SD, PLATE_SD
-from studies.throws.body_result import BodyResult
+from studies.common.study import Goal, Verdict
+from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
+from studies.throws.analysis import BLOCK_SD, PLATE_SD, Analysis, BodyResult
 from studies.throws.data import EXCLUDED, INTERVAL
 from studies.throws.diagnosis import SPREAD
-from studies.throws.figures import left_over_figure, throws_figure
-from studies.throws.goals import goals_of, held_in_all, wheel_probability
-from studies.throws.shaking import shaking_words
-from studies.throws.tables import write_tables
+from studies.throws.joint import LARGEST
+from studies.throws.left_over import CHANNELS, ORDERS, PHASES, LeftOver, following, shaken_axis, shaking_words
 
 if TYPE_CHECKING:
     from studies.throws import Result
 
-__all__ = ["write_report"]
+
+@styled
+def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
+    """Draw the errors of single throws, a row per body, a column per model."""
+    figure = wide_figure(1.6 * len(extended.bodies))
+    panels = figure.subplots(len(extended.bodies), 2, sharey="row", squeeze=False)
+    for row, body in zip(panels, extended.bodies, strict=True):
+        for axes, analysis in zip(row, (plain, extended), strict=True):
+            result = analysis.bodies[body]
+            band = float(100.0 * (result.truth_sd / result.truth).max())
+            axes.axhspan(-band, band, color="#eeeeee")
+            axes.axhline(0.0, color="#888888", linewidth=0.8)
+            places = np.arange(len(result.throws))
+            for index, name in enumerate(("smallest", "middle", "largest")):
+                sd = 100.0 * result.formal[:, index] / result.truth[index]
+                place = places + 0.2 * (index - 1)
+                axes.errorbar(
+                    place, result.errors[:, index], sd, fmt="os^"[index], markersize=3, linewidth=1, label=name
+                )
+            axes.set_xticks(places, [name[-3:] for name in result.throws])
+            axes.set_title(f"{body}, {analysis.label} model")
+        row[0].set_ylabel("error [%]")
+    for axes in panels[-1]:
+        axes.set_xlabel("number of the throw")
+    handles, labels = panels[0][1].get_legend_handles_labels()
+    figure.legend(handles, [f"{label} moment" for label in labels], loc="outside upper center", ncols=3)
+    return figure
+
+
+@styled
+def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
+    """Draw the spectrum of what is left on the accelerometer, and the raw accelerometer against the wheel's orders."""
+    figure = wide_figure(0.6 + 0.72 * len(left))
+    panels = figure.subplots(len(left), 2, sharex="col", squeeze=False)
+    for row, (body, own) in zip(panels, left.items(), strict=True):
+        spectrum = np.array([own.spectrum[:, c] for c in range(3, 6)])
+        for edge in (own.wheel[0], own.wheel[2]):
+            row[0].axvspan(edge - 2.0, edge + 2.0, color="#eeeeee")
+        for c in range(3, 6):
+            row[0].plot(own.frequencies[1:], 1e3 * spectrum[c - 3, 1:], linewidth=1, label=CHANNELS[c][-1])
+            row[1].semilogy(
+                ORDERS, np.sqrt((own.orders[:, :, c] ** 2).mean(axis=0)), linewidth=1, label=CHANNELS[c][-1]
+            )
+        row[1].axvline(own.turn[0], color="#888888", linewidth=0.8)
+        row[0].set_title(body, loc="left")
+        row[0].set_ylabel("[mm/s²]")
+        row[1].set_ylabel("[m/s²]")
+    panels[0][0].set_title("residual of samples")
+    panels[0][1].set_title("raw readings, wheel at speed")
+    panels[-1][0].set_xlabel("frequency [Hz]")
+    panels[-1][1].set_xlabel("frequency / that of the recorded wheel")
+    handles, labels = panels[0][1].get_legend_handles_labels()
+    figure.legend(handles, [f"accelerometer {label}" for label in labels], loc="outside upper center", ncols=3)
+    return figure
+
+
+QUICK_FIT = {"Empty": 1.9, "A": 1.0}  # mean errors of a quick least-squares fit by those who prepared the data [%]
+LOW, HIGH = 0.90, 0.98  # share of 95 % intervals that should hold the truth
+SECONDS = 600.0  # longest time of a full run [s]
+
+
+def held_in_all(result: Result, *, with_truth: bool = False) -> tuple[int, int]:
+    """Return how many 95 % intervals of single throws hold the truth over all bodies, and of how many."""
+    counts = [body.held(0.95, with_truth=with_truth) for body in result.extended.bodies.values()]
+    return sum(held for held, _ in counts), sum(total for _, total in counts)
+
+
+def goals_of(result: Result) -> list[Goal]:
+    """Return each goal, what was reached, and whether that passes; what only a full run tests is not tested before."""
+    bodies, studies = result.extended.bodies.values(), result.studies
+    ratios = [ratio for body in bodies for ratio in body.joint_formal / body.joint_jackknife]
+    torques = [widths["smooth-torque"].ratio for widths in result.extended.widths.values()]
+    named = [study.body for study in studies if study.diagnosis.verdict.causes]
+    better = [study.body for study in studies if study.held_out.gain.sum() > 0.0]
+    return [
+        *(_quick_fit(body) for body in bodies if body.name in QUICK_FIT),
+        _coverage(result),
+        Goal(
+            "joint answer: formal over jackknife sd between 0.67 and 1.5 for every moment",
+            f"{min(ratios):.2f} to {max(ratios):.2f}",
+            Verdict.of(min(ratios) >= 0.67 and max(ratios) <= 1.5),
+        ),
+        Goal(
+            f"unexplained torque at most {LARGEST:g} prior sd on every body",
+            f"{max(torques):.2f}",
+            Verdict.of(max(torques) <= LARGEST),
+        ),
+        Goal("a cause named on every body", *_full(result, f"{len(named)} of {len(studies)}", len(named))),
+        Goal(
+            "extension predicts throws left out better",
+            *_full(result, f"{len(better)} of {len(studies)} bodies", len(better)),
+        ),
+        *_reverse(result),
+        Goal(
+            "whole run within 10 minutes, the search for the dropped wheel aside",
+            f"{result.seconds / 60.0:.1f} minutes",
+            Verdict.of(result.seconds <= SECONDS if studies else None),
+        ),
+    ]
+
+
+def _quick_fit(body: BodyResult) -> Goal:
+    """Return the goal on the mean size of the differences, which is uncertain by what throws differ."""
+    goal, mean, error = QUICK_FIT[body.name], body.mean_error, body.mean_error_sd
+    text = f"{body.name}: single throws differ from the stated moments by at most {goal:g} % in the mean, as a quick "
+    low, high = mean - 2.0 * error, mean + 2.0 * error
+    verdict = Verdict.PASS if high <= goal else Verdict.FAIL if low > goal else Verdict.OPEN
+    return Goal(f"{text}least-squares fit does", f"{mean:.2f} ± {error:.2f} %", verdict)
+
+
+def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
+    """Return what was reached on all diagnosed bodies, which only a full run has."""
+    if not result.studies:
+        return "not run", Verdict.NOT_TESTED
+    return reached, Verdict.of(count == len(result.studies))
+
+
+def _coverage(result: Result) -> Goal:
+    count, total = held_in_all(result)
+    low, high = Share(count, total).interval
+    inside = low >= LOW and high <= HIGH
+    outside = high < LOW or low > HIGH
+    text = f"95 % intervals of single throws hold the truth in {100 * LOW:.0f} to {100 * HIGH:.0f} % of cases"
+    reached = f"{100.0 * count / total:.0f} %: {count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
+    return Goal(text, reached, Verdict.of(inside) if inside or outside else Verdict.OPEN)
+
+
+def _reverse(result: Result) -> list[Goal]:
+    """Goals on the recorded wheel dropped: whether its probability says that it is there, and whether it is named."""
+    titles = (
+        f"recorded wheel dropped: a wheel about z has a probability of {NAMED:g} or more on every body",
+        "recorded wheel dropped: the verdict names a wheel on every body",
+    )
+    if not result.wheels:
+        return [Goal(title, "not run", Verdict.NOT_TESTED) for title in titles]
+    found = list(result.wheels.values())
+    held = [wheel_probability(item) for item in found]
+    named = [any(cause.startswith("wheel-history") for cause in item.verdict.causes) for item in found]
+    return [
+        Goal(titles[0], f"at least {min(held):.3f}", Verdict.of(min(held) >= NAMED)),
+        Goal(titles[1], f"{sum(named)} of {len(named)}", Verdict.of(all(named))),
+    ]
+
+
+def wheel_probability(found: Diagnosis) -> float:
+    """Return the probability that a wheel of unknown course about the recorded wheel's axis is at work."""
+    return found.probabilities.of_any(["wheel-history:z"])
+
+
+SETS = 10  # number of sets of causes that are listed of each body
+AXES = tuple(f"{sensor} {axis}" for sensor in ("gyro", "accelerometer") for axis in "xyz")
+
+Row = tuple[object, ...]
+
+
+def write_tables(output: Path, result: Result) -> list[str]:
+    """Write the tables beside a report and return the names of their files."""
+    files = [
+        write_table(
+            output,
+            "moments",
+            ["model", "throw", "moment", "stated [kg m2]", "found [kg m2]", "formal sd [kg m2]"],
+            _moment_rows(result),
+        ),
+        write_table(
+            output,
+            "bodies",
+            [
+                *("body", "throws", "torque sd [N m]", "rms / sd of the torque", "force sd [m/s2]"),
+                *(f"noise in flight / at rest, {axis}" for axis in AXES),
+                *("wheel [Hz]", "loudest order", "throws with it", "axis", "amplitude [m/s2]", "beside it [m/s2]"),
+                "force [N]",
+            ],
+            _body_rows(result),
+        ),
+        write_table(
+            output,
+            "residuals",
+            ["body", "channel", "rms", "rms at rest", "loudest [Hz]", *PHASES, *(f"imbalance, {p}" for p in PHASES)],
+            _residual_rows(result),
+        ),
+        write_table(output, "device", ["error", "mean", "formal sd"], _device_rows(result)),
+    ]
+    if result.studies:
+        header = ["diagnosis", "body", "probability", "log evidence", "causes"]
+        files.append(write_table(output, "causes", header, _cause_rows(result)))
+    return files
+
+
+def _moment_rows(result: Result) -> Iterator[Row]:
+    for analysis in (result.plain, result.extended):
+        for body in analysis.bodies.values():
+            for throw, found, sd in zip(body.throws, body.moments, body.formal, strict=True):
+                for k, name in enumerate(("smallest", "middle", "largest")):
+                    yield analysis.label, throw, name, *map(_digits, (body.truth[k], found[k], sd[k]))
+
+
+def _body_rows(result: Result) -> Iterator[Row]:
+    for name, own in result.extended.left.items():
+        widths = result.extended.widths[name]
+        torque, force = widths["smooth-torque"], widths["smooth-force"]
+        order, there, beside = own.turn
+        axis = shaken_axis(own)
+        numbers = (torque.sd, torque.ratio, force.sd, *result.extended.noise[name], own.wheel[1], order)
+        felt = (there[axis], beside[axis], result.masses[name] * there[axis])
+        yield (
+            *(name, len(own.names), *map(_digits, numbers), following(own, result.pairs)),
+            *(CHANNELS[axis][-1], *map(_digits, felt)),
+        )
+
+
+def _residual_rows(result: Result) -> Iterator[Row]:
+    for name, own in result.extended.left.items():
+        for c, channel in enumerate(AXES):
+            numbers = (own.rms[c], own.quiet[c], own.loudest(c), *own.phase[:, c], *own.shaken[:, c])
+            yield name, channel, *map(_digits, numbers)
+
+
+def _device_rows(result: Result) -> Iterator[Row]:
+    for name, (mean, sd) in result.extended.calibration.items():
+        yield name, _digits(mean), _digits(sd)
+
+
+def _cause_rows(result: Result) -> Iterator[Row]:
+    found = [("as recorded", study.body, study.diagnosis) for study in result.studies]
+    found += [("wheel dropped", body, diagnosis) for body, diagnosis in result.wheels.items()]
+    for title, body, diagnosis in found:
+        for item in diagnosis.probabilities.sets[:SETS]:
+            numbers = (_digits(item.probability), _digits(item.log_evidence))
+            yield title, body, *numbers, " + ".join(item.names) or "nothing"
+
+
+def _digits(value: float | np.floating) -> str:
+    return f"{float(value):.6g}"
 
 
 def write_report(result: Result, output: Path, origin: str | None = None) -> None:

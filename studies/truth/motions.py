@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike
 
 from studies.truth.numerics import Array, quintic_step
 
-__all__ = ["Manoeuvres", "Motion", "ProfiledManoeuvres", "cycloid", "septic", "smooth_motion", "trapezoid"]
-
 Motion = Callable[[float], tuple[Array, Array, Array]]
 """Time [s] -> positions, speeds, accelerations of the joints, each (joints,)."""
 

@@ -7,8 +7,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Array", "cross", "quintic_step", "runge_kutta_step", "substeps"]
-
 Array = NDArray[np.floating]
 
 

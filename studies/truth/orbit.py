@@ -9,16 +9,9 @@ from numpy.typing import ArrayLike
 
 from studies.truth.numerics import Array
 
-__all__ = ["EARTH_FIELD", "EARTH_RADIUS", "MU", "Orbit"]
-
-MU = 3.986004418e14
-"""Gravitational parameter of the Earth [m3/s2]."""
-
-EARTH_RADIUS = 6371.2e3
-"""Radius of the magnetic field's reference sphere [m]."""
-
-EARTH_FIELD = 3.12e-5
-"""Magnetic field on the equator of that sphere [T]."""
+MU = 3.986004418e14  # gravitational parameter of the Earth [m3/s2]
+EARTH_RADIUS = 6371.2e3  # radius of the magnetic field's reference sphere [m]
+EARTH_FIELD = 3.12e-5  # magnetic field on the equator of that sphere [T]
 
 
 @dataclass(frozen=True)

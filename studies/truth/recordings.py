@@ -1,4 +1,4 @@
-"""Recordings as a study has them: when each sensor samples, its noise, gaps, recorded thrust, and the CSV file."""
+"""What simulators read, and studies as they write them: noise, gaps, recorded thrust, the CSV and the TOML file."""
 
 from __future__ import annotations
 
@@ -6,30 +6,50 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from studies.truth.numerics import Array
-from studies.truth.readings import Truth
+from studies.truth.orbit import Orbit
 
-__all__ = [
-    "Distortion",
-    "Sensors",
-    "Spoiling",
-    "Table",
-    "add_noise",
-    "add_thrusts",
-    "by_axis",
-    "columns",
-    "cut_gaps",
-    "delayed",
-]
-__all__ += ["sample_times", "write_csv"]
 
-Table = dict[str, Array]
-"""Columns of a recording by channel; NaN where a sensor takes no sample."""
+class Truth(NamedTuple):
+    """Noise-free motion at n times; base axes unless said otherwise.
 
+    Fields
+    ------
+    times : (n,) array [s]
+    position, speed, acceleration, torque : (n, joints) array
+        Motion and torque of the driven joints, in the order of the URDF.
+    rate : (n, 3) array [rad/s]
+    attitude : (n, 4) array
+        Quaternion x, y, z, w, base axes to orbit axes.
+    accel : (n, 3) array [m/s2]
+    force, external_torque : (n, 3) array
+        Thrust at the base origin [N, N m].
+    """
+
+    times: Array
+    position: Array
+    speed: Array
+    acceleration: Array
+    torque: Array
+    rate: Array
+    attitude: Array
+    accel: Array
+    force: Array
+    external_torque: Array
+
+    def at(self, times: Array) -> Truth:
+        """Rows at some of the times."""
+        rows = np.searchsorted(self.times, times)
+        return Truth(*(values[rows] for values in self))
+
+
+Table = dict[str, Array]  # columns of a recording by channel; NaN where a sensor takes no sample
 
 Distortion = Callable[[Table, Truth], None]
 """Changes the noise-free columns in place, given with the truth at their times."""
@@ -64,14 +84,15 @@ def by_axis(family: str, names: Iterable[str], values: Array) -> Table:
     return {f"{family}.{name}": column.copy() for name, column in zip(names, values.T, strict=True)}
 
 
+def stacked(table: Table, family: str, names: Iterable[str] = "xyz") -> Array:
+    """Array with one column for each channel of a family."""
+    return np.stack([table[f"{family}.{name}"] for name in names], axis=1)
+
+
 def sample_times(duration: float, sensors: Sensors) -> dict[str, Array]:
     """Instants at which each sensor samples [s], by sensor."""
-    periods = {
-        "position": sensors.encoder_period,
-        "rate": sensors.rate_period,
-        "accel": sensors.accel_period,
-        "attitude": sensors.attitude_period,
-    }
+    periods = {"position": sensors.encoder_period, "rate": sensors.rate_period, "accel": sensors.accel_period}
+    periods["attitude"] = sensors.attitude_period
     return {
         name: np.round(np.arange(int(duration / period + 1e-9) + 1) * period, 9)
         for name, period in periods.items()
@@ -103,7 +124,7 @@ def add_noise(table: Table, sensors: Sensors, generator: np.random.Generator) ->
         if sigma is not None:
             column += sigma * generator.standard_normal(column.shape)
     if "attitude.x" in table:
-        true = np.stack([table[f"attitude.{axis}"] for axis in "xyzw"], axis=1)
+        true = stacked(table, "attitude", "xyzw")
         turn, taken = sensors.attitude_sigma * generator.standard_normal((len(true), 3)), ~np.isnan(true[:, 0])
         noisy = Rotation.from_quat(true[taken]) * Rotation.from_rotvec(turn[taken])
         true[taken] = noisy.as_quat()
@@ -136,3 +157,75 @@ def write_csv(file: Path, times: Array, table: Mapping[str, Array]) -> None:
         cells = ["" if np.isnan(column[index]) else f"{column[index]:.12g}" for column in table.values()]
         rows.append(",".join([f"{time:.12g}", *cells]))
     file.write_text("\n".join(rows) + "\n")
+
+
+def study_toml(
+    title: str,
+    base: str,
+    sensors: Sensors,
+    attitudes: Sequence[Array],
+    *,
+    orbits: Sequence[Orbit | None] | None = None,
+    effects: Sequence[str] | None = None,
+    link_spread: float = 0.0,
+    initial_rate: str | None = None,
+) -> str:
+    """Text of study.toml beside robot.urdf and manoeuvre-1.csv, manoeuvre-2.csv and so on, with the base unknown.
+
+    Parameters
+    ----------
+    title, base : str
+        Title of the study, and name of the base link.
+    sensors : Sensors
+        Noise and mounting as the study states them.
+    attitudes : sequence of (4,) array
+        Initial quaternion of each recording, x, y, z, w.
+    orbits : sequence of Orbit or None, optional
+        Orbit of each recording; they differ in the argument of latitude only.
+    effects : sequence of str, optional
+        Effects of the study's model; the study says nothing of its model where left out.
+    link_spread, initial_rate
+        Settings of the study of the same names.
+    """
+    places = [None] * len(attitudes) if orbits is None else list(orbits)
+    lines = [f'title = "{title}"', "[robot]", 'urdf = "robot.urdf"']
+    if link_spread:
+        lines += [f"link_spread = {link_spread!r}"]
+    lines += _orbit_lines(places[0])
+    if sensors.rate_period is not None:
+        lines += ["[sensors.rate]", f"sigma = {sensors.rate_sigma!r}"]
+    if sensors.accel_period is not None:
+        lines += ["[sensors.accel]", f"sigma = {sensors.accel_sigma!r}"]
+        lines += [f"position = {_list(sensors.accel_position)}"]
+    if sensors.attitude_period is not None:
+        lines += ["[sensors.attitude]", f"sigma = {sensors.attitude_sigma!r}"]
+    lines += ["[sensors.encoder]", f"sigma = {sensors.encoder_sigma!r}"]
+    for index, (attitude, place) in enumerate(zip(attitudes, places, strict=True), start=1):
+        lines += ["[[recordings]]", f'file = "manoeuvre-{index}.csv"', f"attitude = {_list(attitude)}"]
+        if place is not None:
+            lines += [f"argument_of_latitude = {place.argument_of_latitude!r}"]
+    lines += ["[unknowns]", f'bodies = ["{base}"]']
+    if effects is not None:
+        names = ", ".join(f'"{effect}"' for effect in effects)
+        lines += ["[model]", f"effects = [{names}]"]
+        if initial_rate is not None:
+            lines += [f'initial_rate = "{initial_rate}"']
+    return "\n".join(lines) + "\n"
+
+
+def _orbit_lines(orbit: Orbit | None) -> list[str]:
+    """Lines of the orbit's section."""
+    if orbit is None:
+        return []
+    lines = ["[orbit]", f"radius = {orbit.radius!r}"]
+    if orbit.eccentricity:
+        lines += [f"eccentricity = {orbit.eccentricity!r}", f"argument_of_perigee = {orbit.argument_of_perigee!r}"]
+    if orbit.inclination is not None:
+        lines += [f"inclination = {orbit.inclination!r}"]
+    if orbit.sun is not None:
+        lines += [f"sun = {_list(orbit.sun)}"]
+    return lines
+
+
+def _list(values: ArrayLike) -> str:
+    return "[" + ", ".join(repr(float(value)) for value in np.asarray(values)) + "]"

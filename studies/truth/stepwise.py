@@ -19,18 +19,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from studies.truth.bodies import moving_joints
 from studies.truth.motions import Motion
 from studies.truth.numerics import Array, runge_kutta_step, substeps
 from studies.truth.orbit import MU
-from studies.truth.urdf import moving_joints
 
-__all__ = ["Reference", "Response", "Wheel", "Wrench", "Zenith", "circular_zenith", "simulate"]
-
-Zenith = Callable[[float], tuple[Array, float]]
-"""Time [s] -> unit vector in orbit axes and mu / R^3 [1/s2]."""
-
-Wrench = Callable[[float], ArrayLike]
-"""Time [s] -> force or torque at the base origin, base axes [N or N m]."""
+Zenith = Callable[[float], tuple[Array, float]]  # time [s] -> unit vector in orbit axes and mu / R^3 [1/s2]
+Wrench = Callable[[float], ArrayLike]  # time [s] -> force or torque at the base origin, base axes [N or N m]
 
 Wheel = Callable[[float], tuple[ArrayLike, ArrayLike]]
 """Time [s] -> momentum of the wheels relative to the base [N m s] and its derivative, base axes."""

@@ -1,4 +1,4 @@
-"""True motion of a free-floating robot from Basilisk.
+"""True motion of a free-floating robot from Basilisk, with a panel, fuel slosh, a wheel or a leak hidden in it.
 
 A serial arm of revolute joints hangs on a Basilisk hub (`SpinningBodyNDOFStateEffector`). Each joint is held by a
 spring and a damper of Basilisk's, and a motor torque moves their rest position along a smooth reference: a servo that
@@ -15,32 +15,244 @@ whole of it, computed from the composite inertia, so that links and acceleromete
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from Basilisk.architecture import messaging, sysModel
-from Basilisk.simulation import extForceTorque, spacecraft
-from Basilisk.utilities import SimulationBaseClass, macros
+from Basilisk.simulation import (
+    extForceTorque,
+    hingedRigidBodyStateEffector,
+    linearSpringMassDamper,
+    reactionWheelStateEffector,
+    spacecraft,
+    spinningBodyNDOFStateEffector,
+)
+from Basilisk.utilities import SimulationBaseClass, macros, simIncludeRW
 from scipy.spatial.transform import Rotation
 
-from studies.truth.basilisk.arm import joint_inertias, read_robot
-from studies.truth.basilisk.effectors import arm_effector, column, panel_effector, slosh_effectors, wheel_effector
-from studies.truth.basilisk.parts import BasiliskHidden, Leak
+from studies.truth.bodies import SERVICER4, Body, Joint, join, read_urdf, rotation_from_rpy
 from studies.truth.motions import Motion
 from studies.truth.numerics import Array
-from studies.truth.readings import Truth
-from studies.truth.urdf import SERVICER4
+from studies.truth.recordings import Truth
 
-__all__ = ["LEAD", "STEP", "Run", "simulate"]
+
+@dataclass(frozen=True)
+class Panel:
+    """A rigid panel hinged on the base and held by a spring; at rest at time 0.
+
+    Parameters
+    ----------
+    mass : float
+        Mass [kg].
+    hinge : (3,) tuple
+        A point of the hinge line, base frame [m].
+    rpy : (3,) tuple
+        Roll, pitch, yaw of the panel's axes at rest relative to the base; y is the hinge line.
+    reach : float
+        Distance of the centre of mass from the hinge, along the panel's -x [m].
+    inertia : (3,) tuple
+        Moments about the centre of mass in the panel's axes [kg m2].
+    frequency : float
+        With the base held [Hz].
+    damping : float
+        Relative to critical.
+    """
+
+    mass: float = 3.0
+    hinge: tuple[float, float, float] = (-0.5, 0.1, 0.2)
+    rpy: tuple[float, float, float] = (0.5, 0.3, -0.4)
+    reach: float = 0.7
+    inertia: tuple[float, float, float] = (0.31, 0.51, 0.8)
+    frequency: float = 0.25
+    damping: float = 0.01
+
+    @property
+    def body(self) -> Body:
+        """The panel at rest, base axes."""
+        axes = rotation_from_rpy(self.rpy)
+        return Body(self.mass, np.array(self.hinge) - self.reach * axes[:, 0], axes @ np.diag(self.inertia) @ axes.T)
+
+
+@dataclass(frozen=True)
+class Slosh:
+    """Three particles on springs at one point of the base, each free along one base axis; at rest at time 0.
+
+    `mass` is that of each particle, which is the mass that sloshes along any direction: the `mass` of the contract's
+    fuel-slosh. The two other particles move with the base along that direction, so that 3 `mass` is on board at rest.
+    Against one particle free in all directions this differs by products of displacement and rate, both small.
+    """
+
+    mass: float = 2.0
+    position: tuple[float, float, float] = (-0.2, 0.3, -0.4)
+    frequency: float = 0.2
+    damping: float = 0.01
+
+    @property
+    def body(self) -> Body:
+        """The three particles at rest, base axes."""
+        return Body(3.0 * self.mass, np.array(self.position), np.zeros((3, 3)))
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A balanced wheel that spins freely, without motor torque.
+
+    Its spin momentum relative to inertial space is constant; that relative to the base changes by `spin_inertia` times
+    the change of the base's rate, hence the small default.
+    """
+
+    momentum: tuple[float, float, float] = (0.02, -0.03, 0.015)
+    spin_inertia: float = 1e-4
+
+
+@dataclass(frozen=True)
+class Leak:
+    """A constant force and torque at the base origin, base axes."""
+
+    force: tuple[float, float, float] = (4e-4, -3e-4, 5e-4)
+    torque: tuple[float, float, float] = (4e-5, 6e-5, -5e-5)
+
+
+@dataclass(frozen=True)
+class BasiliskHidden:
+    """What the study's model does not know."""
+
+    panel: Panel | None = None
+    slosh: Slosh | None = None
+    wheel: Wheel | None = None
+    leak: Leak | None = None
+
+
+_NOTHING = BasiliskHidden()
+
+
+class Link(NamedTuple):
+    """A link of the arm and the joint that carries it."""
+
+    joint: Joint
+    body: Body
+
+
+class Robot(NamedTuple):
+    """Name of the base link, the base body, the arm from the base outwards."""
+
+    name: str
+    base: Body
+    arm: list[Link]
+
+
+def read_robot(urdf: str | Path) -> Robot:
+    """Read a serial arm of revolute joints on a base; a fixed massless tip is left out."""
+    robot = read_urdf(urdf)
+    joints = {joint.parent: joint for joint in robot.joints}
+    parent, arm = robot.base, []
+    while parent in joints and joints[parent].child in robot.bodies:
+        joint = joints[parent]
+        if joint.kind not in ("revolute", "continuous"):
+            raise ValueError(f"joint {joint.name} is {joint.kind}; only revolute joints are simulated")
+        parent = joint.child
+        axis = joint.axis / np.linalg.norm(joint.axis)
+        arm.append(Link(joint._replace(axis=axis), robot.bodies[parent]))
+    return Robot(robot.base, robot.bodies[robot.base], arm)
+
+
+def true_base(hidden: BasiliskHidden = _NOTHING, urdf: str | Path = SERVICER4) -> Body:
+    """Inertial parameters of the base with all that is fixed on it when nothing moves, the goal of identification."""
+    extra = [hidden_part.body for hidden_part in (hidden.panel, hidden.slosh) if hidden_part is not None]
+    return join(read_robot(urdf).base, *extra)
+
+
+def joint_inertias(arm: Sequence[Link], position: Array) -> Array:
+    """Inertia of all that a joint carries about its axis [kg m2], (joints,)."""
+    rotation, origin = np.eye(3), np.zeros(3)
+    axes, origins, bodies = [], [], []
+    for link, angle in zip(arm, position, strict=True):
+        origin = origin + rotation @ link.joint.offset
+        # the arm is mirrored, every joint turned the other way; it sets the stiffness of the servos and nothing else
+        rotation = rotation @ link.joint.rotation @ Rotation.from_rotvec(-angle * link.joint.axis).as_matrix()
+        axes.append(rotation @ link.joint.axis)
+        origins.append(origin)
+        tensor = rotation @ link.body.inertia @ rotation.T
+        bodies.append(Body(link.body.mass, origin + rotation @ link.body.com, tensor))
+    carried = [join(*bodies[index:]) for index in range(len(bodies))]
+    return np.array(
+        [axis @ body.inertia_about(point) @ axis for axis, point, body in zip(axes, origins, carried, strict=True)]
+    )
+
+
+def column(vector: Sequence[float] | Array) -> list[list[float]]:
+    """Vector as a column, which is how Basilisk takes it."""
+    return [[float(value)] for value in vector]
+
+
+def arm_effector(
+    arm: Sequence[Link], position: Array, stiffness: Array, damping: Array
+) -> spinningBodyNDOFStateEffector.SpinningBodyNDOFStateEffector:
+    """Arm whose joints are held by springs and dampers."""
+    effector = spinningBodyNDOFStateEffector.SpinningBodyNDOFStateEffector()
+    effector.ModelTag = "arm"
+    for index, link in enumerate(arm):
+        part = spinningBodyNDOFStateEffector.SpinningBody()
+        part.setMass(link.body.mass)
+        part.setISPntSc_S(link.body.inertia.tolist())
+        part.setR_ScS_S(column(link.body.com))
+        part.setR_SP_P(column(link.joint.offset))
+        part.setDCM_S0P(link.joint.rotation.T.tolist())
+        part.setSHat_S(column(link.joint.axis))
+        part.setThetaInit(float(position[index]))
+        part.setK(float(stiffness[index]))
+        part.setC(float(damping[index]))
+        effector.addSpinningBody(part)
+    return effector
+
+
+def panel_effector(panel: Panel) -> hingedRigidBodyStateEffector.HingedRigidBodyStateEffector:
+    """Panel on its spring."""
+    effector = hingedRigidBodyStateEffector.HingedRigidBodyStateEffector()
+    effector.ModelTag = "panel"
+    omega, about_hinge = 2.0 * np.pi * panel.frequency, panel.inertia[1] + panel.mass * panel.reach**2
+    effector.mass, effector.d = panel.mass, panel.reach
+    effector.IPntS_S = np.diag(panel.inertia).tolist()
+    effector.r_HB_B = column(panel.hinge)
+    effector.dcm_HB = rotation_from_rpy(panel.rpy).T.tolist()
+    effector.k, effector.c = about_hinge * omega**2, 2.0 * panel.damping * about_hinge * omega
+    return effector
+
+
+def slosh_effectors(slosh: Slosh) -> list[linearSpringMassDamper.LinearSpringMassDamper]:
+    """Particles of fuel, one free along each base axis."""
+    effectors, omega = [], 2.0 * np.pi * slosh.frequency
+    for axis in np.eye(3):
+        effector = linearSpringMassDamper.LinearSpringMassDamper()
+        effector.massInit = slosh.mass
+        effector.k, effector.c = slosh.mass * omega**2, 2.0 * slosh.damping * slosh.mass * omega
+        effector.r_PB_B, effector.pHat_B = column(slosh.position), column(axis)
+        effectors.append(effector)
+    return effectors
+
+
+def wheel_effector(wheel: Wheel, craft: spacecraft.Spacecraft) -> reactionWheelStateEffector.ReactionWheelStateEffector:
+    """Wheel that spins freely on the craft."""
+    effector, factory = reactionWheelStateEffector.ReactionWheelStateEffector(), simIncludeRW.rwFactory()
+    size = float(np.linalg.norm(wheel.momentum))
+    factory.create(
+        "custom",
+        [value / size for value in wheel.momentum],
+        Js=wheel.spin_inertia,
+        Omega=size / wheel.spin_inertia / macros.RPM,
+        RWModel=messaging.BalancedWheels,
+        useMaxTorque=False,
+    )
+    factory.addToSpacecraft("wheel", effector, craft)
+    return effector
+
 
 STEP = 0.01
 """Integration step [s] of the classical Runge-Kutta method; angular momentum then drifts by less than 1e-6 N m s."""
 
-LEAD = 5
-"""Steps before time 0 and after the end, for central differences there."""
-
-_NOTHING = BasiliskHidden()
+LEAD = 5  # steps before time 0 and after the end, for central differences there
 
 
 class _Motors(sysModel.SysModel):

@@ -1,22 +1,120 @@
-"""The catalogue of cases: at least one for each name of the contract, then pairs, outside effects, nulls."""
+"""Cases: studies that hide something, and the answer; at least one for each name of the contract.
+
+With strength 1 most causes change the sensors by 20 to 60 standard deviations that neither the base body nor the
+initial rates can imitate; that number grows in proportion to the strength.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from studies.truth.bodies import BRANCHED, SERVICER3, SERVICER4
 from studies.truth.hidden_causes import causes as hide
-from studies.truth.hidden_causes.case import Build, Case
-from studies.truth.urdf import BRANCHED, SERVICER3, SERVICER4
+from studies.truth.hidden_causes.causes import Generator, Options, direction, merge, triple
+from studies.truth.motions import Manoeuvres
+from studies.truth.mujoco.study import Study, write_study
+from studies.truth.numerics import Array
+from studies.truth.orbit import Orbit
+from studies.truth.recordings import Sensors, Truth
 
-__all__ = ["CASES"]
+Build = Callable[[Generator, float], Options]  # source of random numbers and strength -> keywords that hide one thing
 
 
-def _case(
+@dataclass(frozen=True)
+class Case:
+    """A study that can be written, and the answer.
+
+    Parameters
+    ----------
+    name : str
+    causes : tuple of str
+        The contract's names for what is hidden; empty for nulls and for outside effects.
+    status : str
+        "effect", "adequate" or "unknown" (outside the catalogue).
+    builds : tuple of callable
+        (draw, strength) -> keywords of `write_study`, one for each thing hidden.
+    urdf : path
+    fixed : dict
+        Further keywords.
+    accept : tuple of str
+        Names that are as right as one of the causes, since they change the model alike; outside the catalogue, causes
+        that come as close as unknown.
+    frame : str, optional
+        Axes in which an outside wrench is fixed; "orbit" are those of each recording's start.
+    """
+
+    name: str
+    causes: tuple[str, ...]
+    status: str
+    builds: tuple[Build, ...]
+    urdf: Path
+    fixed: Options
+    accept: tuple[str, ...] = ()
+    frame: str | None = None
+
+    def write(self, folder: str | Path, seed: int, strength: float = 1.0) -> Study:
+        """Write the study; circumstances, motions and noise follow from the seed and do not depend on the strength."""
+        options = circumstances(np.random.default_rng([seed, 1]))
+        causes: Options = {}
+        for cause in self._causes(seed, strength):
+            causes = merge(causes, cause)
+        causes.pop("true", None)
+        for changes in (self.fixed, causes):
+            for key, value in changes.items():
+                # a mapping changes some fields of what the circumstances are
+                options[key] = replace(options[key], **value) if isinstance(value, dict) and key in options else value
+        # the study may declare its sensors otherwise than they are
+        if "declared" in options:
+            options["declared"] = replace(options["sensors"], **options["declared"])
+        if "declared_offset" in options:
+            true = options["sensors"].accel_position
+            options["declared_accel_position"] = np.add(true, options.pop("declared_offset"))
+        return write_study(folder, self.urdf, np.random.default_rng(seed), title="Free-flyer", **options)
+
+    def make(self, folder: str | Path, seed: int, strength: float = 1.0) -> Path:
+        """Write the study and return its file."""
+        return self.write(folder, seed, strength).file
+
+    def amplitudes(self, seed: int, strength: float = 1.0) -> dict[str, Array]:
+        """Magnitudes of what is hidden, by cause, for causes that are a vector or a number."""
+        true: dict[str, Array] = {}
+        for options in self._causes(seed, strength):
+            true |= options.get("true", {})
+        return true
+
+    def torque(self, seed: int, strength: float, truth: Truth) -> Array:
+        """Torque of hidden fields along a motion, base axes, (n, 3) [N m]."""
+        fields = [field for options in self._causes(seed, strength) for field in options["hidden"].fields]
+        turns = Rotation.from_quat(truth.attitude).as_matrix()
+        rows = zip(truth.times, turns, truth.rate, strict=True)
+        return np.array([sum((field(*row)[1] for field in fields), np.zeros(3)) for row in rows])
+
+    def _causes(self, seed: int, strength: float) -> list[Options]:
+        return [build(np.random.default_rng([seed, 2 + i]), strength) for i, build in enumerate(self.builds)]
+
+
+def circumstances(draw: Generator, count: int = 3) -> Options:
+    """Orbit, places on it, manoeuvres and sensors of a study, drawn at random; they do not depend on what is hidden."""
+    sun = triple(direction(draw))
+    orbit = Orbit(radius=float(draw.uniform(6.75e6, 7.1e6)), inclination=float(draw.uniform(0.6, 1.6)), sun=sun)
+    return {
+        "orbit": orbit,
+        "latitudes": draw.uniform(0.0, 2.0 * np.pi, count).tolist(),
+        "manoeuvres": Manoeuvres(count=count, duration=float(draw.choice([140.0, 150.0, 160.0]))),
+        "sensors": Sensors(accel_position=triple(np.round(direction(draw, 0.4), 3))),
+        "step": 0.25,
+    }
+
+
+def _hidden(
     name: str,
-    causes: Sequence[str],
     *builds: Build,
     urdf: Path = SERVICER3,
     accept: Sequence[str] = (),
@@ -24,127 +122,77 @@ def _case(
     frame: str | None = None,
     **fixed: Any,
 ) -> Case:
-    """Case in which the builds act together."""
-    others = tuple(other for other in accept if other not in causes)
-    return Case(name, tuple(causes), status, builds, urdf, fixed, others, frame)
+    """Case in which the builds act together; that of an effect is named after its causes."""
+    causes = tuple(name.split(", ")) if status == "effect" else ()
+    return Case(name, causes, status, builds, urdf, fixed, tuple(a for a in accept if a not in causes), frame)
 
 
-def _effect(name: str, build: Build, **options: Any) -> Case:
-    """Case that hides one cause of the catalogue."""
-    return _case(name, [name], build, **options)
+_outside, _null = partial(_hidden, status="unknown"), partial(_hidden, status="adequate")
 
 
-def _outside(name: str, build: Build, **options: Any) -> Case:
-    """Case that hides something outside the catalogue."""
-    return _case(name, [], build, status="unknown", **options)
-
-
-def _null(name: str, **options: Any) -> Case:
-    """Case that hides nothing."""
-    return _case(name, [], status="adequate", **options)
+def _vector(sensor: str, kind: str, size: float) -> Build:
+    return partial(hide.vector_fault, sensor, kind, size)
 
 
 LATENCIES = ("rate-latency", "accel-latency", "joint-latency")
 HAND4 = ("payload:link4", "link-inertia:link4", "payload:tip", "link-inertia:tip")
 HAND3 = ("payload:link3", "link-inertia:link3")
+STAR_SENSOR = {"rate_period": None, "attitude_period": 0.5}
 
 _payload3 = partial(hide.payload, "link3", SERVICER3, 0.08, [0.7, 0.05, 0.03])
 _payload4 = partial(hide.payload, "link4", SERVICER4, 0.06, [0.1, 0.05, 0.2])
 
 CASES: tuple[Case, ...] = (
-    _effect("gravity-gradient", hide.no_gradient),
-    _effect("initial-rate", hide.initial_rate, urdf=SERVICER4),
-    _effect("wheel-momentum", hide.wheel),
-    _effect("aerodynamic-drag", hide.air, urdf=SERVICER4),
-    _effect("solar-pressure", hide.light),
-    _effect("magnetic-dipole", hide.magnet, urdf=SERVICER4),
-    _effect("thruster-leak", hide.leak),
-    _effect("rotational-drag", hide.braking, urdf=SERVICER4),
-    _effect("flexible-appendage", hide.panel),
-    _effect("fuel-slosh", hide.fuel, urdf=SERVICER4),
-    _effect("payload:link3", _payload3, accept=HAND3),
-    _effect("payload:link4", _payload4, urdf=SERVICER4, accept=HAND4),
-    _effect("link-inertia:link3", partial(hide.wrong_cad, "link3", SERVICER4, 0.015), urdf=SERVICER4, accept=HAND3),
-    _effect(
-        "link-inertia:link2",
-        partial(hide.wrong_cad, "link2", SERVICER3, 0.012),
-        accept=("payload:link2", "link-inertia:link2"),
-    ),
-    _effect("joint-flexibility:joint2", partial(hide.soft_joint, "joint2", 0.9)),
-    _effect("joint-flexibility:joint3", partial(hide.soft_joint, "joint3", 1.0), urdf=SERVICER4),
-    _effect("rate-bias", partial(hide.vector_fault, "rate", "bias", 3e-4)),
-    _effect("rate-drift", partial(hide.vector_fault, "rate", "drift", 2e-7), urdf=SERVICER4),
-    _effect("rate-scale", partial(hide.vector_fault, "rate", "scale", 2.2e-2)),
-    _effect("rate-misalignment", partial(hide.vector_fault, "rate", "misalignment", 1.2e-3), urdf=SERVICER4),
-    _effect("accel-bias", partial(hide.vector_fault, "accel", "bias", 8e-6)),
-    _effect("accel-drift", partial(hide.vector_fault, "accel", "drift", 1e-7), urdf=SERVICER4),
-    _effect("accel-scale", partial(hide.vector_fault, "accel", "scale", 2e-2)),
-    _effect("accel-misalignment", partial(hide.vector_fault, "accel", "misalignment", 7e-3), urdf=SERVICER4),
-    _effect("accel-position", hide.misplaced),
-    _effect("rate-latency", partial(hide.delay, "rate", 0.006), accept=LATENCIES),
-    _effect("accel-latency", partial(hide.delay, "accel", 0.012), urdf=SERVICER4, accept=LATENCIES),
-    _effect("joint-latency", partial(hide.delay, "encoder", 0.006), accept=LATENCIES),
-    _effect("encoder-offset:joint2", partial(hide.encoder_offset, "joint2", 2e-3)),
-    _effect("encoder-offset:joint3", partial(hide.encoder_offset, "joint3", 4e-3), urdf=SERVICER4),
-    _effect("rate-noise", partial(hide.understated, "rate", 0.35)),
-    _effect("accel-noise", partial(hide.understated, "accel", 0.35), urdf=SERVICER4),
-    _effect("coloured-noise:rate", partial(hide.coloured, "rate")),
-    _effect("coloured-noise:accel", partial(hide.coloured, "accel"), urdf=SERVICER4),
-    _effect("outliers:rate", partial(hide.outliers, "rate"), urdf=SERVICER4),
-    _effect("outliers:accel", partial(hide.outliers, "accel")),
-    _effect("quantisation:rate", partial(hide.rounded, "rate")),
-    _effect("quantisation:accel", partial(hide.rounded, "accel"), urdf=SERVICER4),
-    _effect("encoder-noise", partial(hide.understated, "encoder", 1.5), urdf=SERVICER4),
-    _effect("rate-clock", partial(hide.clock, "rate", 5e-5)),
-    _effect("accel-clock", partial(hide.clock, "accel", 1e-4), urdf=SERVICER4),
-    _effect(
-        "attitude-misalignment",
-        hide.turned_star_sensor,
-        urdf=SERVICER4,
-        sensors={"rate_period": None, "attitude_period": 0.5},
-    ),
-    _effect("wheel-history:z", hide.changing_wheel),
-    _effect("mass-shift", hide.jumping_mass),
-    _case(
-        "wheel-momentum, accel-bias",
-        ["wheel-momentum", "accel-bias"],
-        hide.wheel,
-        partial(hide.vector_fault, "accel", "bias", 8e-6),
-    ),
-    _case(
-        "payload:link4, rate-drift",
-        ["payload:link4", "rate-drift"],
-        _payload4,
-        partial(hide.vector_fault, "rate", "drift", 2e-7),
-        urdf=SERVICER4,
-        accept=HAND4,
-    ),
-    _case(
-        "payload:link3, rate-bias",
-        ["payload:link3", "rate-bias"],
-        _payload3,
-        partial(hide.vector_fault, "rate", "bias", 3e-4),
-        accept=HAND3,
-    ),
-    _case(
-        "thruster-leak, accel-scale",
-        ["thruster-leak", "accel-scale"],
-        hide.leak,
-        partial(hide.vector_fault, "accel", "scale", 2e-2),
-    ),
-    _case(
-        "rate-noise, accel-noise",
-        ["rate-noise", "accel-noise"],
-        partial(hide.understated, "rate", 0.35),
-        partial(hide.understated, "accel", 0.35),
-    ),
-    _case(
-        "coloured-noise:accel, wheel-momentum",
-        ["coloured-noise:accel", "wheel-momentum"],
-        partial(hide.coloured, "accel"),
-        hide.wheel,
-        urdf=SERVICER4,
-    ),
+    _hidden("gravity-gradient", hide.no_gradient),
+    _hidden("initial-rate", hide.initial_rate, urdf=SERVICER4),
+    _hidden("wheel-momentum", hide.wheel),
+    _hidden("aerodynamic-drag", hide.air, urdf=SERVICER4),
+    _hidden("solar-pressure", hide.light),
+    _hidden("magnetic-dipole", hide.magnet, urdf=SERVICER4),
+    _hidden("thruster-leak", hide.leak),
+    _hidden("rotational-drag", hide.braking, urdf=SERVICER4),
+    _hidden("flexible-appendage", hide.panel),
+    _hidden("fuel-slosh", hide.fuel, urdf=SERVICER4),
+    _hidden("payload:link3", _payload3, accept=HAND3),
+    _hidden("payload:link4", _payload4, urdf=SERVICER4, accept=HAND4),
+    _hidden("link-inertia:link3", partial(hide.wrong_cad, "link3", SERVICER4, 0.015), urdf=SERVICER4, accept=HAND3),
+    _hidden("link-inertia:link2", partial(hide.wrong_cad, "link2", SERVICER3, 0.012), accept=["payload:link2"]),
+    _hidden("joint-flexibility:joint2", partial(hide.soft_joint, "joint2", 0.9)),
+    _hidden("joint-flexibility:joint3", partial(hide.soft_joint, "joint3", 1.0), urdf=SERVICER4),
+    _hidden("rate-bias", _vector("rate", "bias", 3e-4)),
+    _hidden("rate-drift", _vector("rate", "drift", 2e-7), urdf=SERVICER4),
+    _hidden("rate-scale", _vector("rate", "scale", 2.2e-2)),
+    _hidden("rate-misalignment", _vector("rate", "misalignment", 1.2e-3), urdf=SERVICER4),
+    _hidden("accel-bias", _vector("accel", "bias", 8e-6)),
+    _hidden("accel-drift", _vector("accel", "drift", 1e-7), urdf=SERVICER4),
+    _hidden("accel-scale", _vector("accel", "scale", 2e-2)),
+    _hidden("accel-misalignment", _vector("accel", "misalignment", 7e-3), urdf=SERVICER4),
+    _hidden("accel-position", hide.misplaced),
+    _hidden("rate-latency", partial(hide.delay, "rate", 0.006), accept=LATENCIES),
+    _hidden("accel-latency", partial(hide.delay, "accel", 0.012), urdf=SERVICER4, accept=LATENCIES),
+    _hidden("joint-latency", partial(hide.delay, "encoder", 0.006), accept=LATENCIES),
+    _hidden("encoder-offset:joint2", partial(hide.encoder_offset, "joint2", 2e-3)),
+    _hidden("encoder-offset:joint3", partial(hide.encoder_offset, "joint3", 4e-3), urdf=SERVICER4),
+    _hidden("rate-noise", partial(hide.understated, "rate", 0.35)),
+    _hidden("accel-noise", partial(hide.understated, "accel", 0.35), urdf=SERVICER4),
+    _hidden("coloured-noise:rate", partial(hide.coloured, "rate")),
+    _hidden("coloured-noise:accel", partial(hide.coloured, "accel"), urdf=SERVICER4),
+    _hidden("outliers:rate", partial(hide.outliers, "rate"), urdf=SERVICER4),
+    _hidden("outliers:accel", partial(hide.outliers, "accel")),
+    _hidden("quantisation:rate", partial(hide.rounded, "rate")),
+    _hidden("quantisation:accel", partial(hide.rounded, "accel"), urdf=SERVICER4),
+    _hidden("encoder-noise", partial(hide.understated, "encoder", 1.5), urdf=SERVICER4),
+    _hidden("rate-clock", partial(hide.clock, "rate", 5e-5)),
+    _hidden("accel-clock", partial(hide.clock, "accel", 1e-4), urdf=SERVICER4),
+    _hidden("attitude-misalignment", hide.turned_star_sensor, urdf=SERVICER4, sensors=STAR_SENSOR),
+    _hidden("wheel-history:z", hide.changing_wheel),
+    _hidden("mass-shift", hide.jumping_mass),
+    _hidden("wheel-momentum, accel-bias", hide.wheel, _vector("accel", "bias", 8e-6)),
+    _hidden("payload:link4, rate-drift", _payload4, _vector("rate", "drift", 2e-7), urdf=SERVICER4, accept=HAND4),
+    _hidden("payload:link3, rate-bias", _payload3, _vector("rate", "bias", 3e-4), accept=HAND3),
+    _hidden("thruster-leak, accel-scale", hide.leak, _vector("accel", "scale", 2e-2)),
+    _hidden("rate-noise, accel-noise", *(partial(hide.understated, sensor, 0.35) for sensor in ("rate", "accel"))),
+    _hidden("coloured-noise:accel, wheel-momentum", partial(hide.coloured, "accel"), hide.wheel, urdf=SERVICER4),
     _outside("pulse-train", hide.pulse_train, frame="base"),
     _outside("thermal-snap", hide.thermal_snap, urdf=SERVICER4, frame="base"),
     _outside("growing-torque", hide.growing_torque, frame="orbit"),
@@ -162,7 +210,7 @@ CASES: tuple[Case, ...] = (
     ),
     _null("null, coarse encoder", urdf=SERVICER4, sensors={"encoder_sigma": 2e-5}),
     _null("null, uncertain arm", link_spread=0.02),
-    _null("null, star sensor", urdf=SERVICER4, sensors={"rate_period": None, "attitude_period": 0.5}),
+    _null("null, star sensor", urdf=SERVICER4, sensors=STAR_SENSOR),
     _null("null, laboratory", orbit=None, latitudes=None),
     _null("null, slides and branches", urdf=BRANCHED, manoeuvres={"frequencies": (0.015, 0.03), "duration": 170.0}),
     _null("null, eccentric orbit", orbit={"eccentricity": 0.05, "argument_of_perigee": 1.0, "radius": 7.3e6}),

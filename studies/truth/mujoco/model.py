@@ -10,29 +10,88 @@ pulses) is a field: a force and torque on the base given by time, attitude and r
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
+from mujoco import rollout as mujoco_rollout
 from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
 
-from studies.truth.bodies import Body, join
+from studies.truth.bodies import Body, Description, join, read_urdf
 from studies.truth.motions import Motion
-from studies.truth.mujoco.build import add_appendage, add_links, add_mover, add_rotor, set_inertial
-from studies.truth.mujoco.fields import Field
-from studies.truth.mujoco.parts import Appendage, Flexibility, Mover, Rotor, Thrust
+from studies.truth.mujoco.parts import Appendage, Field, Flexibility, Mover, Rotor, Thrust
 from studies.truth.numerics import Array, cross, runge_kutta_step, substeps
 from studies.truth.orbit import Orbit
-from studies.truth.readings import Truth
-from studies.truth.urdf import attribute, link_bodies, moving, root_link
+from studies.truth.recordings import Truth
 
-__all__ = ["TruthModel"]
+ARMATURE = 1.0
+"""Inertia of a flexible joint's motor about its axis [kg m2]; the motor is driven, so that nothing else feels it."""
 
-STEPS = 40
-"""Least number of steps within which a body moves within the base."""
+JOINT_TYPES = {
+    "revolute": mujoco.mjtJoint.mjJNT_HINGE,
+    "continuous": mujoco.mjtJoint.mjJNT_HINGE,
+    "prismatic": mujoco.mjtJoint.mjJNT_SLIDE,
+}
+"""MuJoCo's joint for each moving joint of a URDF."""
+
+
+def _quaternion(rotation: Array) -> Array:
+    """MuJoCo's quaternion (w, x, y, z) of a rotation matrix."""
+    return np.asarray(Rotation.from_matrix(rotation).as_quat(scalar_first=True))
+
+
+def _set_inertial(spec_body: mujoco.MjsBody, body: Body) -> None:
+    """Give a body of the model its inertial parameters."""
+    moments, axes = np.linalg.eigh(body.inertia)
+    axes[:, 2] *= np.linalg.det(axes)
+    spec_body.explicitinertial = True
+    spec_body.mass, spec_body.ipos = body.mass, body.com
+    spec_body.inertia, spec_body.iquat = moments, _quaternion(axes)
+
+
+def _add_links(
+    spec_body: mujoco.MjsBody,
+    name: str,
+    robot: Description,
+    changed: Mapping[str, Body],
+    flexible: Mapping[str, Flexibility],
+) -> None:
+    """Add everything that hangs on link `name`."""
+    bodies = robot.bodies | dict(changed)
+    for joint in (joint for joint in robot.joints if joint.parent == name):
+        added = spec_body.add_body(name=joint.child, pos=joint.offset, quat=_quaternion(joint.rotation))
+        if joint.child in bodies:
+            _set_inertial(added, bodies[joint.child])
+        if joint.kind != "fixed":
+            motor = added.add_joint(name=joint.name, type=JOINT_TYPES[joint.kind], axis=joint.axis)
+            if joint.name in flexible:
+                # two coaxial joints on one body: the motor needs some inertia to keep the matrix regular
+                motor.armature = ARMATURE
+                added.add_joint(name=f"{joint.name} spring", type=JOINT_TYPES[joint.kind], axis=joint.axis)
+        _add_links(added, joint.child, robot, changed, flexible)
+
+
+def _add_appendage(base: mujoco.MjsBody, name: str, appendage: Appendage) -> None:
+    """Add the body with springs of the wanted frequency: stiffness = inertia about the axis x omega^2."""
+    body, omega = appendage.body, 2.0 * np.pi * appendage.frequency
+    added = base.add_body(name=name)
+    _set_inertial(added, body)
+    about_anchor = body.inertia_about(np.array(appendage.anchor))
+    kinds = [(mujoco.mjtJoint.mjJNT_HINGE, a) for a in appendage.hinges]
+    kinds += [(mujoco.mjtJoint.mjJNT_SLIDE, a) for a in appendage.slides]
+    for index, (kind, direction) in enumerate(kinds):
+        axis = np.asarray(direction, dtype=float) / np.linalg.norm(direction)
+        inertia = axis @ about_anchor @ axis if kind == mujoco.mjtJoint.mjJNT_HINGE else body.mass
+        spring = added.add_joint(name=f"{name}_{index}", type=kind, axis=axis, pos=appendage.anchor)
+        # MuJoCo 4 takes polynomials; the first coefficient is the linear one
+        spring.stiffness = [inertia * omega**2, 0.0, 0.0]
+        spring.damping = [2.0 * appendage.damping * inertia * omega, 0.0, 0.0]
+
+
+STEPS = 40  # least number of steps within which a body moves within the base
 
 
 class TruthModel:
@@ -73,14 +132,16 @@ class TruthModel:
         flexible: Sequence[Flexibility] = (),
         configuration: ArrayLike | None = None,
     ) -> None:
-        tree = ElementTree.parse(urdf).getroot()
-        root = root_link(tree)
-        self.joints = tuple(attribute(joint, "name") for joint in moving(tree))
+        robot = read_urdf(urdf)
+        self.joints = tuple(joint.name for joint in robot.moving)
         self.orbit, self.thrusts, self.rotor = orbit, tuple(thrusts), rotor
         self.fields, self.movers = tuple(fields), tuple(movers)
         changed, springs = dict(changed or {}), {f.joint: f for f in flexible}
-        self._check_names(tree, root, changed, springs)
-        base = link_bodies(tree)[root]
+        links = set(robot.links) - {robot.base}
+        for kind, names, known in (("link", set(changed), links), ("joint", set(springs), set(self.joints))):
+            if not names <= known:
+                raise ValueError(f"no {kind} {sorted(names - known)} to change; there are {sorted(known)}")
+        base = robot.bodies[robot.base]
         hidden: list[Appendage | Mover] = [*appendages, *movers]
         at_rest = ([] if rotor is None else [rotor.body]) + [part.body for part in hidden]
         self.base = join(base, *at_rest)
@@ -88,32 +149,28 @@ class TruthModel:
 
         spec = mujoco.MjSpec()
         spec.option.gravity = np.zeros(3)
-        spec_base = spec.worldbody.add_body(name=root)
+        spec_base = spec.worldbody.add_body(name=robot.base)
         spec_base.add_freejoint()
-        set_inertial(spec_base, base)
+        _set_inertial(spec_base, base)
         spec_base.add_site(name="sensor", pos=np.asarray(accel_position, dtype=float))
         for kind in ("ACCELEROMETER", "GYRO"):
             sensor = spec.add_sensor(name=kind, type=getattr(mujoco.mjtSensor, f"mjSENS_{kind}"))
             sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_SITE, "sensor"
         if rotor is not None:
-            add_rotor(spec_base, rotor)
+            added = spec_base.add_body(name="rotor")
+            _set_inertial(added, rotor.body)
+            added.add_joint(name="rotor", type=mujoco.mjtJoint.mjJNT_HINGE, axis=rotor.axis, pos=rotor.position)
         for index, appendage in enumerate(appendages):
-            add_appendage(spec_base, f"appendage{index}", appendage)
+            _add_appendage(spec_base, f"appendage{index}", appendage)
         for index, mover in enumerate(movers):
-            add_mover(spec_base, f"mover{index}", mover)
-        add_links(spec_base, root, tree, changed, springs)
+            added = spec_base.add_body(name=f"mover{index}")
+            _set_inertial(added, mover.body)
+            added.add_joint(name=f"mover{index}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=mover.direction)
+        _add_links(spec_base, robot.base, robot, changed, springs)
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self._index_degrees_of_freedom()
         self._stiffen(springs, np.zeros(len(self.joints)) if configuration is None else configuration)
-
-    def _check_names(
-        self, tree: ElementTree.Element, root: str, changed: Mapping[str, Body], springs: Mapping[str, Flexibility]
-    ) -> None:
-        links = {attribute(link, "name") for link in tree.iterfind("link")} - {root}
-        for kind, names, known in (("link", set(changed), links), ("joint", set(springs), set(self.joints))):
-            if not names <= known:
-                raise ValueError(f"no {kind} {sorted(names - known)} to change; there are {sorted(known)}")
 
     def _stiffen(self, springs: Mapping[str, Flexibility], configuration: ArrayLike) -> None:
         """Give flexible joints their stiffness and damping."""
@@ -299,3 +356,43 @@ class TruthModel:
             time = target
             rows.append(self._read(motion, time, state))
         return rows
+
+
+def rollout(exact: TruthModel, motion: Motion, count: int, step: float) -> Callable[[], Array]:
+    """Prepare the rollout of a motion from time 0, its joints driven by the exact torques at mid-step.
+
+    Parameters
+    ----------
+    exact : TruthModel
+        The robot, without gravity gradient; its integrator is changed.
+    motion : callable
+        Time -> positions, speeds, accelerations of the joints.
+    count : int
+        Number of steps.
+    step : float
+        Length of a step [s].
+
+    Returns
+    -------
+    callable
+        Rolls out and returns the rates of the base before each step, (count, 3) [rad/s].
+    """
+    model = exact.model
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    model.opt.timestep = step
+    torque = np.zeros((1, count, model.nv))
+    torque[0][:, exact.driven_v] = exact.run(motion, step * (np.arange(count) + 0.5), step=min(step, 0.1)).torque
+    # a fresh state, since the exact flight leaves its last one behind
+    data = mujoco.MjData(model)
+    position, speed, _ = motion(0.0)
+    data.qpos[exact.driven_q], data.qvel[exact.driven_v] = position, speed
+    mujoco.mj_forward(model, data)
+    initial = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+    mujoco.mj_getState(model, data, initial, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    control = int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+
+    def roll() -> Array:
+        sensed = mujoco_rollout.rollout(model, data, initial[None], torque, control_spec=control)[1][0]
+        return np.asarray(sensed[:, 3:6])
+
+    return roll

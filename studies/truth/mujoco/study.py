@@ -6,35 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from studies.truth.bodies import Body, nearby, wrong_guess
+from studies.truth import recordings as rec
+from studies.truth.bodies import Body, Description, nearby, read_urdf, write_urdf, wrong_guess
 from studies.truth.motions import Manoeuvres
-from studies.truth.mujoco.fields import Field
 from studies.truth.mujoco.model import TruthModel
-from studies.truth.mujoco.parts import Appendage, Flexibility, Mover, Rotor, Thrust
+from studies.truth.mujoco.parts import Appendage, Field, Flexibility, Mover, Rotor, Thrust
 from studies.truth.numerics import Array
 from studies.truth.orbit import Orbit
-from studies.truth.readings import Truth
-from studies.truth.recordings import (
-    Distortion,
-    Sensors,
-    Spoiling,
-    add_noise,
-    add_thrusts,
-    columns,
-    cut_gaps,
-    delayed,
-    sample_times,
-    write_csv,
-)
-from studies.truth.study_file import study_toml
-from studies.truth.urdf import attribute, link_bodies, moved_links, moving, root_link, write_urdf
-
-__all__ = ["Hidden", "Study", "write_study"]
+from studies.truth.recordings import Distortion, Sensors, Spoiling, Truth
 
 
 @dataclass(frozen=True)
@@ -137,25 +120,19 @@ def write_study(
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    tree = ElementTree.parse(urdf).getroot()
-    options: dict[str, Any] = {
-        "rotor": hidden.rotor,
-        "appendages": hidden.appendages,
-        "thrusts": hidden.thrusts,
-        "movers": hidden.movers,
-        "flexible": hidden.flexible,
-        "accel_position": sensors.accel_position,
-    }
+    robot = read_urdf(urdf)
+    parts = ("rotor", "appendages", "thrusts", "movers", "flexible")
+    options: dict[str, Any] = {part: getattr(hidden, part) for part in parts}
+    options["accel_position"] = sensors.accel_position
     model = TruthModel(urdf, **options)
     write_urdf(urdf, folder / "robot.urdf", wrong_guess(model.base, generator, guess_spread))
-    changed = _drawn_links(tree, generator, link_spread) | dict(hidden.changed)
-    samples = sample_times(manoeuvres.duration, sensors)
+    changed = _drawn_links(robot, generator, link_spread) | dict(hidden.changed)
+    samples = rec.sample_times(manoeuvres.duration, sensors)
     times = np.unique(np.concatenate(list(samples.values())))
-    taken = delayed(times, sensors)
+    taken = rec.delayed(times, sensors)
     truths: list[Truth] = []
-    attitudes: list[Array] = []
-    orbits: list[Orbit | None] = []
-    kinds = [attribute(joint, "type") for joint in moving(tree)]
+    attitudes, orbits = [], []
+    kinds = [joint.kind for joint in robot.moving]
     configuration: Array | None = None
     for index in range(1, manoeuvres.count + 1):
         attitude = generator.standard_normal(4)
@@ -170,20 +147,19 @@ def write_study(
         fields = [*hidden.fields, *([] if place is None else [make(place) for make in hidden.environment])]
         options["movers"] = [mover.in_recording(index - 1) for mover in hidden.movers]
         model = TruthModel(urdf, orbit=place, fields=fields, changed=changed, configuration=configuration, **options)
-        whole = model.run(
-            motion, np.unique(np.concatenate(list(taken.values()))), rate0=rate, attitude0=attitudes[-1], step=step
-        )
+        instants = np.unique(np.concatenate(list(taken.values())))
+        whole = model.run(motion, instants, rate0=rate, attitude0=attitudes[-1], step=step)
         truth = whole.at(times)
-        table = columns(model.joints, {name: whole.at(when) for name, when in taken.items()}, samples, times)
+        table = rec.columns(model.joints, {name: whole.at(when) for name, when in taken.items()}, samples, times)
         if distort is not None:
             distort(table, truth)
-        add_noise(table, sensors, generator)
+        rec.add_noise(table, sensors, generator)
         if spoil is not None:
             spoil(table, times, generator)
-        cut_gaps(table, times, gaps or {})
+        rec.cut_gaps(table, times, gaps or {})
         if hidden.thrusts and record_thrusts:
-            add_thrusts(table, truth, {edge for thrust in hidden.thrusts for edge in (thrust.start, thrust.stop)})
-        write_csv(folder / f"manoeuvre-{index}.csv", times, table)
+            rec.add_thrusts(table, truth, {edge for thrust in hidden.thrusts for edge in (thrust.start, thrust.stop)})
+        rec.write_csv(folder / f"manoeuvre-{index}.csv", times, table)
         truths.append(truth)
     if effects is None:
         effects = () if orbit is None else ("gravity-gradient",)
@@ -192,23 +168,12 @@ def write_study(
         x, y, z = np.asarray(declared_accel_position, dtype=float)
         told = replace(told, accel_position=(x, y, z))
     file = folder / "study.toml"
-    text = study_toml(
-        title,
-        root_link(tree),
-        told,
-        attitudes,
-        orbits=orbits,
-        effects=effects,
-        link_spread=link_spread,
-        initial_rate=initial_rate,
-    )
-    file.write_text(text)
+    model_told: dict[str, Any] = {"effects": effects, "link_spread": link_spread, "initial_rate": initial_rate}
+    file.write_text(rec.study_toml(title, robot.base, told, attitudes, orbits=orbits, **model_told))
     return Study(file, model.base, tuple(truths))
 
 
-def _drawn_links(tree: ElementTree.Element, generator: np.random.Generator, spread: float) -> dict[str, Body]:
+def _drawn_links(robot: Description, generator: np.random.Generator, spread: float) -> dict[str, Body]:
     """Draw the links that joints move; what is fixed on them stays."""
-    if not spread:
-        return {}
-    bodies = link_bodies(tree)
-    return {name: nearby(bodies[name], generator, spread) for name in moved_links(tree) if name in bodies}
+    links = [joint.child for joint in robot.moving if joint.child in robot.bodies] if spread else []
+    return {name: nearby(robot.bodies[name], generator, spread) for name in links}
