@@ -19,12 +19,23 @@ from bayesid._math.arrays import Floats, namespace
 if TYPE_CHECKING:
     from jax import Array
 
-__all__ = ["BASIS", "PARAMETERS", "InertialParameters", "mass_com_inertia", "parameters_from_pseudo_inertia"]
+__all__ = [
+    "BASIS",
+    "PARAMETERS",
+    "InertialParameters",
+    "mass_com_inertia",
+    "nearest_physical",
+    "parameters_from_pseudo_inertia",
+]
 
 A = TypeVar("A", Floats, "Array")
 
 PARAMETERS = 10
 """Number of inertial parameters of a rigid body."""
+
+
+POINT = 1e-12
+"""Square of the radius of gyration below which the mass of a body is in a point [m2]."""
 
 
 def _basis() -> Floats:
@@ -93,7 +104,7 @@ class InertialParameters:
         if not np.allclose(self.inertia, self.inertia.T, rtol=1e-9, atol=1e-12 * max(1.0, np.abs(self.inertia).max())):
             raise InputError("the inertia tensor is not symmetric", remedy=remedy)
         low, middle, high = np.linalg.eigvalsh(self.inertia)
-        slack = 1e-9 * max(high, 1e-300)
+        slack = max(1e-9 * high, POINT * self.mass)
         if low < -slack:
             raise InputError(f"principal moments >= 0 fails: the smallest is {low:g} kg m2", remedy=remedy)
         if low + middle < high - slack:
@@ -131,6 +142,26 @@ class InertialParameters:
     def is_extended(self) -> bool:
         """Whether the mass fills a volume, as log-Cholesky coordinates require; that of a rod or a point does not."""
         return self.mass > 0.0 and bool(np.linalg.eigvalsh(self.pseudo_inertia / self.mass)[0] > 1e-12)
+
+
+def nearest_physical(inertia: Floats, margin: float = 0.0) -> Floats:
+    """Return the inertia of the physical body whose second moments of mass are nearest, in the Frobenius norm.
+
+    Parameters
+    ----------
+    inertia : (3, 3) array
+        Symmetric, about the centre of mass [kg m2].
+    margin : float
+        Smallest principal second moment of the result relative to the largest: 0 admits plates and rods, which have no
+        log-Cholesky coordinates.
+
+    Returns
+    -------
+    (3, 3) array
+    """
+    moments, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+    second = (axes * np.maximum(moments, margin * max(moments[-1], 0.0))) @ axes.T
+    return np.asarray(np.trace(second) * np.eye(3) - second)
 
 
 def parameters_from_pseudo_inertia(pseudo_inertia: A) -> A:

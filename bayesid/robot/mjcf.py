@@ -1,174 +1,196 @@
-"""Robots in MuJoCo's format MJCF, read by Pinocchio and rewritten as URDF.
+"""Robots in MuJoCo's format MJCF, compiled by MuJoCo itself and rewritten as URDF.
 
-What Pinocchio is known to read otherwise than MuJoCo, or to leave out without a word, is refused. Masses, places and
-axes are those of the file. Actuators, contacts and damping have no part in a measured motion; armature, the inertia of
-spinning rotors, is left out too.
+MuJoCo's own compiler decides what a file means: angles, sequences of angles, defaults, frames, replicas, included
+files, inertias from geometry, total mass. Masses, places, axes and limits are those of its compiled model. Actuators,
+contacts and damping have no part in a measured motion; armature, the inertia of spinning rotors, is left out too.
 """
 
 from __future__ import annotations
 
-import tempfile
+import warnings
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from bayesid._io.errors import InputError
-from bayesid.robot.mjcf_limits import refuse_unread
+from bayesid._math.arrays import Floats
+from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.urdf_tree import BOUNDLESS, write_inertial
 
 __all__ = ["urdf_of_mjcf"]
 
-BOUNDLESS = 1e9
-"""Limit of what has none, since URDF demands a number for a prismatic joint."""
 
-LIGHTEST = 1e-9
-"""Mass below which a body has none: it is the rounding of a difference [kg]."""
+def urdf_of_mjcf(file: Path) -> str:
+    """Return the URDF of a robot in MJCF.
 
-SAME_PLACE = 1e-12
-"""Difference of two poses that is rounding [m, 1]."""
-
-AXES = {"RX": (1, 0, 0), "RY": (0, 1, 0), "RZ": (0, 0, 1), "PX": (1, 0, 0), "PY": (0, 1, 0), "PZ": (0, 0, 1)}
-"""Axes of Pinocchio's joints along an axis of their frame, by the end of their names."""
-
-UNALIGNED = {"RevoluteUnaligned": "R", "PrismaticUnaligned": "P"}
-"""Letters of Pinocchio's joints along any axis."""
-
-
-def urdf_of_mjcf(root: ET.Element, file: Path) -> str:
-    """Return the URDF of a robot whose MJCF has been parsed.
-
-    The first body of the world is the base, whether it has a free joint or not.
-
-    Parameters
-    ----------
-    root : Element
-        Element ``<mujoco>`` of the file.
-    file : Path
-        The file, which Pinocchio reads again.
+    The only tree of bodies in the world is the robot, and its first body the base, whether it has a free joint or not.
 
     Raises
     ------
     InputError
-        If the file holds what Pinocchio does not read, or a joint that is neither a hinge nor a slide.
+        If MuJoCo cannot read the file, or it holds several robots, a closed loop or a joint that is neither a hinge
+        nor a slide.
     """
-    refuse_unread(root, file)
+    import mujoco
+
     try:
-        model = pin.buildModelFromMJCF(str(file))
-    except Exception as error:
-        message = str(error).rpartition("message:")[2].strip()  # after the place in Pinocchio's own source
-        raise InputError(
-            f"Pinocchio cannot read the robot: {message}", file=file, remedy="Correct the MJCF or convert it to URDF"
-        ) from error
-    robot = ET.Element("robot", name=root.get("model", "robot"))
-    scale = _slide_scale(root)
-    free = model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
-    base = 1 if free else 0
-    links = {base: _add_bodies(robot, model, base, file)}
-    for joint in range(base + 1, model.njoints):
-        links[joint] = _add_bodies(robot, model, joint, file)
-        _add_joint(robot, model, joint, links, scale, file)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of attributes that MuJoCo will drop, which it still honours
+            spec = mujoco.MjSpec.from_file(str(file))
+            _drop_visuals(spec, mujoco)
+            model = spec.compile()
+    except (ValueError, RuntimeError) as error:
+        problem = f"MuJoCo cannot read the robot: {' '.join(str(error).split()).removeprefix('Error: ')}"
+        raise InputError(problem, file=file, remedy="Correct the MJCF or convert it to URDF") from error
+    _refuse_loops(model, mujoco, file)
+    links = _names(model.body, model.nbody, "body")
+    joints = _names(model.joint, model.njnt, "joint")
+    base = _base(model, mujoco, links, file)
+    robot = ET.Element("robot", name=model.names[: model.names.index(b"\0")].decode() or "robot")
+    for body in range(1, model.nbody):
+        if model.body_rootid[body] != base:
+            continue
+        if body != base:
+            _add_joints(robot, model, mujoco, body, links, joints, file)
+        rotation = _rotation(model.body_iquat[body])
+        inertia = rotation @ np.diag(model.body_inertia[body]) @ rotation.T
+        link = ET.SubElement(robot, "link", name=links[body])
+        mass = float(model.body_mass[body])
+        try:
+            write_inertial(link, InertialParameters(mass, model.body_ipos[body], 0.5 * (inertia + inertia.T)))
+        except InputError as error:
+            raise error.within(file=file, place=f"body {links[body]}") from None
     ET.indent(robot)
     return ET.tostring(robot, encoding="unicode") + "\n"
 
 
-def _slide_scale(root: ET.Element) -> float:
-    """Return the factor that makes the limits of slides right.
-
-    Pinocchio 4.1 takes the range of a slide for an angle where the file's angles are in degrees. A slide of which the
-    range is known tells whether it does.
-    """
-    compiler = root.find("compiler")
-    angle = "degree" if compiler is None else compiler.get("angle", "degree")
-    body = '<body name="a"><joint type="slide" range="0 1"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body>'
-    with tempfile.TemporaryDirectory() as folder:
-        probe = Path(folder) / "slide.xml"
-        probe.write_text(f'<mujoco><compiler angle="{angle}"/><worldbody>{body}</worldbody></mujoco>', encoding="utf-8")
-        return 1.0 / float(pin.buildModelFromMJCF(str(probe)).upperPositionLimit[0])
-
-
-def _add_bodies(robot: ET.Element, model: pin.Model, joint: int, file: Path) -> str:
-    """Add the bodies that a joint carries, and return the link whose axes are those of the joint."""
-    own, fixed = None, []
-    rest = model.inertias[joint].toDynamicParameters()
-    for frame in model.frames:
-        if frame.type != pin.FrameType.BODY or frame.parentJoint != joint:
-            continue
-        holder = model.frames[frame.parentFrame]
-        if holder.type == pin.FrameType.FIXED_JOINT and holder.name != "universe":
-            fixed.append((frame, holder.inertia))
-            rest = rest - frame.placement.act(holder.inertia).toDynamicParameters()
-        else:
-            own = frame
-    if own is None:
-        raise InputError("the joint carries no body", file=file, place=model.names[joint], remedy="Give it a body")
-    inertia = pin.Inertia.Zero()
-    if rest[0] > LIGHTEST:
-        inertia = own.placement.actInv(pin.Inertia.FromDynamicParameters(rest))
-    carrier = own.name
-    if own.placement.isIdentity(SAME_PLACE):
-        _add_link(robot, own.name, inertia)
-    else:
-        # the axes of a link of a URDF are those of its joint, so that the body is fixed on a link without mass
-        carrier = f"{model.names[joint]}_axes"
-        _add_link(robot, carrier, pin.Inertia.Zero())
-        _add_fixed(robot, own, carrier, inertia)
-    for frame, body in fixed:
-        _add_fixed(robot, frame, carrier, body)
-    return carrier
+def _drop_visuals(spec: Any, mujoco: Any) -> None:
+    """Remove what has no mass, so that its files need not be there: meshes of bodies with an inertia of their own."""
+    spec.compiler.fusestatic = False
+    for kind in ("keys", "textures", "materials", "skins", "sensors", "actuators", "excludes", "pairs"):
+        for element in list(getattr(spec, kind)):
+            spec.delete(element)
+    always = spec.compiler.inertiafromgeom == 1
+    for element in (*spec.geoms, *spec.sites, *spec.tendons):
+        element.material = ""
+    for geom in list(spec.geoms):
+        shapeless = geom.type in (mujoco.mjtGeom.mjGEOM_HFIELD, mujoco.mjtGeom.mjGEOM_PLANE)
+        if (geom.parent.explicitinertial and not always) or geom.parent is spec.worldbody or shapeless:
+            spec.delete(geom)
+    used = {geom.meshname for geom in spec.geoms}
+    for mesh in list(spec.meshes):
+        if mesh.name not in used:
+            spec.delete(mesh)
 
 
-def _add_link(robot: ET.Element, name: str, inertia: pin.Inertia) -> None:
-    link = ET.SubElement(robot, "link", name=name)
-    if inertia.mass <= 0.0:
-        return
-    element = ET.SubElement(link, "inertial")
-    ET.SubElement(element, "origin", xyz=_text(inertia.lever), rpy="0 0 0")
-    ET.SubElement(element, "mass", value=f"{inertia.mass:.17g}")
-    entries = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    ET.SubElement(element, "inertia", {key: f"{inertia.inertia[index]:.17g}" for key, index in entries.items()})
+def _names(access: Any, count: int, kind: str) -> list[str]:
+    """Return a name for each body or joint, those that the file leaves without one by their number."""
+    return [access(index).name or f"{kind}{index}" for index in range(count)]
 
 
-def _add_fixed(robot: ET.Element, frame: pin.Frame, carrier: str, inertia: pin.Inertia) -> None:
-    _add_link(robot, frame.name, inertia)
-    joint = ET.SubElement(robot, "joint", name=f"{frame.name}_mount", type="fixed")
-    _place(joint, frame.placement, carrier, frame.name)
+def _refuse_loops(model: Any, mujoco: Any, file: Path) -> None:
+    """Refuse constraints that close a loop of bodies. Coupled joints are no matter, since each is recorded."""
+    for index in range(model.neq):
+        kind = mujoco.mjtEq(model.eq_type[index])
+        if kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
+            raise InputError(
+                f"the constraint <{_word(kind)}> is not supported",
+                file=file,
+                place="equality",
+                remedy="Leave a tree of bodies",
+            )
+    if model.nflex:
+        raise InputError("a flexible body is not supported", file=file, remedy="Leave a tree of rigid bodies")
 
 
-def _add_joint(
-    robot: ET.Element, model: pin.Model, index: int, links: dict[int, str], scale: float, file: Path
-) -> None:
-    name, kind = model.names[index], model.joints[index].shortname().removeprefix("JointModel")
-    if kind in UNALIGNED:
-        axis, letter = np.array(model.joints[index].extract().axis), UNALIGNED[kind]
-    elif kind in AXES:
-        axis, letter = np.array(AXES[kind], dtype=float), kind[0]
-    else:
+def _word(kind: Any) -> str:
+    """Return the word of the format for a member of one of MuJoCo's enumerations."""
+    return str(kind.name.rpartition("_")[2].lower())
+
+
+def _base(model: Any, mujoco: Any, links: list[str], file: Path) -> int:
+    """Return the root of the only tree that has joints or mass."""
+    trees = [
+        int(body)
+        for body in np.unique(model.body_rootid[1:])
+        if model.body_subtreemass[body] > 0.0 and not model.body_mocapid[body] >= 0
+    ]
+    if len(trees) != 1:
+        shown = f": {', '.join(links[body] for body in trees)}" if trees else ""
         raise InputError(
-            f"joint type {kind!r} is not supported",
+            f"the world holds {len(trees)} bodies{shown}",
             file=file,
-            place=f"joint {name}",
-            remedy="Give every body at most one joint, a hinge or a slide, and only the base a free joint",
+            place="worldbody",
+            remedy="Leave one, the base of the robot",
         )
-    position = model.joints[index].idx_q
-    bounds = np.array([model.lowerPositionLimit[position], model.upperPositionLimit[position]])
-    bounded = bool(np.isfinite(bounds).all())
-    if letter == "P":
-        bounds = scale * bounds if bounded else np.array([-BOUNDLESS, BOUNDLESS])
-    kinds = {"P": "prismatic", "R": "revolute" if bounded else "continuous"}
-    joint = ET.SubElement(robot, "joint", name=name, type=kinds[letter])
-    _place(joint, model.jointPlacements[index], links[model.parents[index]], links[index])
-    ET.SubElement(joint, "axis", xyz=_text(axis))
-    if kinds[letter] != "continuous":
-        lower, upper = (f"{value:.17g}" for value in bounds)
-        ET.SubElement(joint, "limit", lower=lower, upper=upper, effort=f"{BOUNDLESS}", velocity=f"{BOUNDLESS}")
+    (base,) = trees
+    first = model.body_jntadr[base]
+    kinds = [mujoco.mjtJoint(kind) for kind in model.jnt_type[first : first + model.body_jntnum[base]]]
+    if kinds and kinds != [mujoco.mjtJoint.mjJNT_FREE]:
+        raise InputError(
+            f"a {_word(kinds[0])} joins it to the world, where only a free joint can",
+            file=file,
+            place=f"body {links[base]}",
+            remedy="The base flies freely: give it a free joint or none",
+        )
+    return base
 
 
-def _place(joint: ET.Element, placement: pin.SE3, parent: str, child: str) -> None:
-    ET.SubElement(joint, "origin", xyz=_text(placement.translation), rpy=_text(pin.rpy.matrixToRpy(placement.rotation)))
+def _add_joints(
+    robot: ET.Element, model: Any, mujoco: Any, body: int, links: list[str], joints: list[str], file: Path
+) -> None:
+    """Join a body to its parent by its joints, one after the other, or rigidly.
+
+    MuJoCo turns or shifts the body about each joint's anchor by its position less ``ref``. A link of a URDF has its
+    axes at its joint, so that a body whose anchor is elsewhere is fixed on a link without mass there.
+    """
+    pose = pin.SE3(_rotation(model.body_quat[body]), model.body_pos[body])
+    above, first = links[model.body_parentid[body]], model.body_jntadr[body]
+    for index in range(first, first + model.body_jntnum[body]):
+        kind = mujoco.mjtJoint(model.jnt_type[index])
+        turns = kind == mujoco.mjtJoint.mjJNT_HINGE
+        if not turns and kind != mujoco.mjtJoint.mjJNT_SLIDE:
+            raise InputError(
+                f"joint type {_word(kind)!r} is not supported",
+                file=file,
+                place=f"joint {joints[index]}",
+                remedy="Give bodies hinges or slides, and only the base a free joint",
+            )
+        axis, anchor = model.jnt_axis[index], pin.SE3(np.eye(3), model.jnt_pos[index])
+        back = -float(model.qpos0[model.jnt_qposadr[index]])
+        start = pin.SE3(pin.exp3(back * axis), np.zeros(3)) if turns else pin.SE3(np.eye(3), back * axis)
+        last = index == first + model.body_jntnum[body] - 1
+        moved = links[body] if last and not np.any(anchor.translation) else f"{joints[index]}_axes"
+        limited = bool(model.jnt_limited[index])
+        kinds = ("revolute" if limited else "continuous") if turns else "prismatic"
+        element = _place(robot, joints[index], kinds, pose * anchor * start, above, moved)
+        ET.SubElement(element, "axis", xyz=_text(axis))
+        lower, upper = model.jnt_range[index] if limited else (-BOUNDLESS, BOUNDLESS)
+        limits = {"lower": f"{lower:.17g}", "upper": f"{upper:.17g}"} if kinds != "continuous" else {}
+        ET.SubElement(element, "limit", limits, effort=f"{BOUNDLESS:g}", velocity=f"{BOUNDLESS:g}")
+        pose, above = anchor.inverse(), moved
+        if moved != links[body]:
+            ET.SubElement(robot, "link", name=moved)
+    if above != links[body]:
+        _place(robot, f"{links[body]}_mount", "fixed", pose, above, links[body])
+
+
+def _place(robot: ET.Element, name: str, kind: str, pose: pin.SE3, parent: str, child: str) -> ET.Element:
+    joint = ET.SubElement(robot, "joint", name=name, type=kind)
+    ET.SubElement(joint, "origin", xyz=_text(pose.translation), rpy=_text(pin.rpy.matrixToRpy(pose.rotation)))
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=child)
+    return joint
 
 
-def _text(values: np.ndarray) -> str:
+def _rotation(quaternion: Floats) -> Floats:
+    """Return the rotation matrix, (3, 3), of a quaternion in MuJoCo's order w, x, y, z."""
+    w, x, y, z = quaternion
+    return np.asarray(pin.Quaternion(w, x, y, z).matrix())
+
+
+def _text(values: Floats) -> str:
     return " ".join(f"{value:.17g}" for value in values)

@@ -22,11 +22,9 @@ from bayesid._math.arrays import Floats
 from bayesid.robot.body_prior import draw_inertial
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.mjcf import urdf_of_mjcf
+from bayesid.robot.urdf_tree import BOUNDLESS, prepared_urdf, write_inertial, xml_root
 
 __all__ = ["Joint", "Link", "Load", "Robot"]
-
-MOVING = ("revolute", "continuous", "prismatic")
-"""Joint types of a URDF that move."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +86,8 @@ class Robot:
     model : pinocchio.Model
         Kinematic tree with a free-flyer base and no gravity. Its inertias are those of the URDF; the present parameters
         are those in `links`.
+    remarks : tuple of str
+        What the file left open or got wrong, and how it was read.
     """
 
     name: str
@@ -97,6 +97,7 @@ class Robot:
     joints: tuple[Joint, ...]
     loads: tuple[str, ...]
     model: pin.Model
+    remarks: tuple[str, ...] = ()
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the content for another process, to which a read-only mapping cannot be sent."""
@@ -107,8 +108,14 @@ class Robot:
         self.__dict__.update(state, links=MappingProxyType(state["links"]))
 
     @classmethod
-    def from_urdf(cls, file: str | Path) -> Robot:
-        """Read a robot from a URDF, or from an MJCF, which is rewritten as URDF; the root link is the base body.
+    def from_urdf(cls, file: str | Path, *, nearest_physical: bool = False) -> Robot:
+        """Read a robot from a URDF, or from an MJCF, which MuJoCo compiles; the root link is the base body.
+
+        Parameters
+        ----------
+        file : path
+        nearest_physical : bool
+            Whether a link that is no physical body takes the nearest physical inertia, with a remark.
 
         Raises
         ------
@@ -119,11 +126,8 @@ class Robot:
         path = Path(file)
         if not path.is_file():
             raise InputError("no such file", file=path, remedy="Correct the path of the URDF")
-        try:
-            text = path.read_text(encoding="utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise InputError(f"not a text file: {error}", file=path, remedy="Save it as UTF-8 text") from error
-        root = _parsed(text, path)
+        text: str | bytes = path.read_bytes()
+        root = xml_root(text, path)
         if root.tag == "sdf":
             raise InputError(
                 "this is SDF, which the installed Pinocchio does not read",
@@ -131,14 +135,16 @@ class Robot:
                 remedy="Convert it to URDF or MJCF",
             )
         if root.tag == "mujoco":
-            text = urdf_of_mjcf(root, path)
+            text = urdf_of_mjcf(path)
+        elif root.tag == "mujocoinclude":
+            raise InputError("this is a part of an MJCF", file=path, remedy="Give the file that includes it")
         elif root.tag != "robot":
             raise InputError(
                 f"the root element is <{root.tag}>",
                 file=path,
                 remedy="Give a URDF, whose root is <robot>, or an MJCF, whose root is <mujoco>",
             )
-        return cls.from_string(text, file=path)
+        return cls.from_string(text, file=path, nearest_physical=nearest_physical)
 
     @classmethod
     def shipped(cls, name: str) -> Robot:
@@ -150,33 +156,35 @@ class Robot:
         return cls.from_urdf(Path(str(folder / f"{name}.urdf")))
 
     @classmethod
-    def from_string(cls, urdf: str, file: Path | None = None) -> Robot:
-        """Read a robot from the text of a URDF (`from_urdf`)."""
-        root = _parsed(urdf, file)
-        inertials = _inertials(root, file)
-        _check_joints(root, file)
-        model = _built(urdf, file)
+    def from_string(cls, urdf: str | bytes, file: Path | None = None, *, nearest_physical: bool = False) -> Robot:
+        """Read a robot from the text of a URDF.
+
+        Parameters
+        ----------
+        urdf : str or bytes
+        file : Path, optional
+            Named in errors.
+        nearest_physical : bool
+            As in `from_urdf`.
+        """
+        root = xml_root(urdf, file)
+        inertials, remarks = prepared_urdf(root, file, take_nearest=nearest_physical)
+        text = ET.tostring(root, encoding="unicode")
+        model = _built(text, root, file)
         model.gravity.setZero()
         links = {}
         for frame in model.frames:
             if frame.type == pin.FrameType.BODY:
                 links[frame.name] = Link(inertials[frame.name], frame.parentJoint - 2, frame.placement.homogeneous)
-        base = next(iter(links))
-        if links[base].inertial.mass <= 0.0:
-            raise InputError(
-                "mass > 0 fails: the root link has no mass",
-                file=file,
-                place=f"link {base}",
-                remedy="The root link is the base body: give it its <inertial>",
-            )
         return cls(
             name=root.get("name", "robot"),
             file=file,
-            urdf=urdf,
+            urdf=text,
             links=MappingProxyType(links),
             joints=tuple(_joint(model, index, root) for index in range(2, model.njoints)),
             loads=(),
             model=model,
+            remarks=tuple(remarks),
         )
 
     @property
@@ -246,7 +254,7 @@ class Robot:
                 ET.SubElement(joint, "child", link=name)
             else:
                 element = next(item for item in root.findall("link") if item.get("name") == name)
-            _write_inertial(element, link.inertial)
+            write_inertial(element, link.inertial)
         ET.indent(root)
         return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
@@ -263,21 +271,20 @@ class Robot:
         )
 
 
-def _parsed(text: str, file: Path | None) -> ET.Element:
-    try:
-        return ET.fromstring(text)
-    except ET.ParseError as error:
-        raise InputError(f"not well-formed XML: {error}", file=file, remedy="Correct the URDF") from error
+def _built(urdf: str, root: ET.Element, file: Path | None) -> pin.Model:
+    """Return Pinocchio's model; its parser says on the error stream alone what is wrong, which the error repeats.
 
-
-def _built(urdf: str, file: Path | None) -> pin.Model:
-    """Return Pinocchio's model; its parser says on the error stream alone what is wrong, which the error repeats."""
+    The free-flyer gets a name that no joint has: Pinocchio would hang a joint of the same name on the base.
+    """
+    taken, flyer = {joint.get("name") for joint in root.findall("joint")}, "free_flyer"
+    while flyer in taken:
+        flyer += "_"
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as said:
         sys.stderr.flush()
         stream = os.dup(2)
         os.dup2(said.fileno(), 2)
         try:
-            return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+            return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer(), flyer)
         except Exception as error:
             said.seek(0)
             lines = [line.removeprefix("Error:").strip() for line in said if line.startswith("Error:")]
@@ -288,98 +295,22 @@ def _built(urdf: str, file: Path | None) -> pin.Model:
             os.close(stream)
 
 
-def _numbers(text: str) -> list[float]:
-    return [float(word) for word in text.split()]
-
-
-def _inertials(root: ET.Element, file: Path | None) -> dict[str, InertialParameters]:
-    inertials = {}
-    for link in root.findall("link"):
-        name = link.get("name", "")
-        try:
-            inertials[name] = _read_inertial(link.find("inertial"))
-        except InputError as error:
-            raise error.within(file=file, place=f"link {name}") from None
-        except (TypeError, ValueError, AttributeError) as error:
-            raise InputError(
-                f"unreadable <inertial>: {error}",
-                file=file,
-                place=f"link {name}",
-                remedy="Give mass and inertia as numbers",
-            ) from None
-    return inertials
-
-
-def _read_inertial(element: ET.Element | None) -> InertialParameters:
-    if element is None:
-        return InertialParameters(0.0, np.zeros(3), np.zeros((3, 3)))
-    origin = element.find("origin")
-    position = _numbers(origin.get("xyz", "0 0 0")) if origin is not None else [0.0] * 3
-    angles = _numbers(origin.get("rpy", "0 0 0")) if origin is not None else [0.0] * 3
-    rotation = pin.rpy.rpyToMatrix(np.array(angles))
-    mass = element.find("mass")
-    tensor = element.find("inertia")
-    if mass is None or tensor is None:
-        raise InputError("<inertial> lacks its <mass> or <inertia>", remedy="Give both, or leave <inertial> out")
-    entry = {key: float(tensor.get(key, "0")) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
-    about_com = np.array(
-        [
-            [entry["ixx"], entry["ixy"], entry["ixz"]],
-            [entry["ixy"], entry["iyy"], entry["iyz"]],
-            [entry["ixz"], entry["iyz"], entry["izz"]],
-        ]
-    )
-    return InertialParameters(float(mass.get("value", "nan")), position, rotation @ about_com @ rotation.T)
-
-
-def _write_inertial(link: ET.Element, inertial: InertialParameters) -> None:
-    old = link.find("inertial")
-    if old is not None:
-        link.remove(old)
-    if inertial.mass == 0.0:
-        return
-    element = ET.SubElement(link, "inertial")
-    ET.SubElement(element, "origin", xyz=" ".join(f"{value:.17g}" for value in inertial.com), rpy="0 0 0")
-    ET.SubElement(element, "mass", value=f"{inertial.mass:.17g}")
-    tensor = inertial.inertia
-    entries = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-    ET.SubElement(element, "inertia", {key: f"{tensor[index]:.17g}" for key, index in entries.items()})
-
-
-def _check_joints(root: ET.Element, file: Path | None) -> None:
-    for joint in root.findall("joint"):
-        name, kind = joint.get("name", ""), joint.get("type", "")
-        if kind not in (*MOVING, "fixed"):
-            raise InputError(
-                f"joint type {kind!r} is not supported",
-                file=file,
-                place=f"joint {name}",
-                remedy=f"Use one of {', '.join(MOVING)} or fixed",
-            )
-        if joint.find("mimic") is not None:
-            raise InputError(
-                "mimic joints are not supported",
-                file=file,
-                place=f"joint {name}",
-                remedy="Make it an independent joint and record it",
-            )
-
-
 def _joint(model: pin.Model, index: int, root: ET.Element) -> Joint:
     name = model.names[index]
     element = next(item for item in root.findall("joint") if item.get("name") == name)
     limit = element.find("limit")
     kind = element.get("type", "")
 
-    def bound(key: str, default: float) -> float:
+    def bound(key: str, sign: float) -> float:
         text = None if limit is None else limit.get(key)
-        return default if text is None else float(text)
+        value = sign * BOUNDLESS if text is None else float(text)
+        return value if abs(value) < BOUNDLESS else sign * np.inf
 
     bounded = kind != "continuous"
     return Joint(
         name=name,
         kind=kind,
-        lower=bound("lower", -np.inf) if bounded else -np.inf,
-        upper=bound("upper", np.inf) if bounded else np.inf,
-        velocity=bound("velocity", np.inf),
+        lower=bound("lower", -1.0) if bounded else -np.inf,
+        upper=bound("upper", 1.0) if bounded else np.inf,
+        velocity=bound("velocity", 1.0),
     )
