@@ -214,3 +214,20 @@ def test_the_draft_is_a_toml_file(flown, tmp_path):
     status, output = run("init", *copied(flown, tmp_path), "--output", tmp_path / "study")
     assert status == 2
     assert "study.toml" in output
+
+
+def test_an_impossible_inertia_is_refused_or_replaced_on_request_and_the_study_says_so(flown, tmp_path):
+    urdf, *recordings = copied(flown, tmp_path)
+    text = urdf.read_text(encoding="utf-8")
+    urdf.write_text(text.replace('izz="0.74"', 'izz="0.94"'), encoding="utf-8")
+    study = tmp_path / "study.toml"
+    status, output = run("init", urdf, *recordings, "--output", study)
+    assert (status, study.exists()) == (2, False)
+    assert "link link3" in output
+    assert "--nearest-physical" in output
+    status, output = run("init", urdf, *recordings, "--output", study, "--nearest-physical")
+    assert status == 0, output
+    assert "Link link3" in output
+    model = load_model(Study.load(study))
+    assert model.robot.link("link3").inertial.is_extended
+    assert "Link link3" in model.robot.remarks[0]

@@ -33,10 +33,16 @@ def run(file: StudyFile, output: Output) -> Iterator[str]:
     count = len(posterior.manoeuvres)
     yield f"{study.title}: {count} recordings, {posterior.samples} samples, {posterior.size} unknowns."
     yield from open_places(study)
+    yield from posterior.model.robot.remarks
     checks = [check_recording(posterior, index) for index in range(count)]
     with complete_folder(output) as folder:
         write_json(
-            folder / "check.json", {"title": study.title, "recordings": [_check_dict(check) for check in checks]}
+            folder / "check.json",
+            {
+                "title": study.title,
+                "robot": {"remarks": posterior.model.robot.remarks},
+                "recordings": [_check_dict(check) for check in checks],
+            },
         )
         origin = report_origin(study, "check", None, output=output)
         check_report(posterior, checks, study.title, folder / "report.pdf", origin=origin)

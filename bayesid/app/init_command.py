@@ -17,6 +17,9 @@ def run(
     robot: Annotated[Path, typer.Argument(metavar="ROBOT.urdf", help="Robot, as URDF or MJCF.")],
     recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING...", help="CSV or Parquet files.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="STUDY.toml", help="Study file to write.")],
+    nearest_physical: Annotated[
+        bool, typer.Option("--nearest-physical", help="Give links with impossible inertias the nearest possible one.")
+    ] = False,
 ) -> Iterator[str]:
     """Draft a study file for a robot and its recordings, with marks where something could not be known."""
     if output.exists():
@@ -32,9 +35,9 @@ def run(
     from bayesid.recording.recording import Recording
     from bayesid.robot.robot import Robot
 
-    known = Robot.from_urdf(robot)
+    known = Robot.from_urdf(robot, nearest_physical=nearest_physical)
     read = [Recording.read(file) for file in recordings]
-    text = draft_study(known, robot, read, output.parent, output.stem)
+    text = draft_study(known, robot, read, output.parent, output.stem, nearest_physical=nearest_physical)
     try:
         Study.from_mapping(tomllib.loads(text))
     except InputError as error:
@@ -42,6 +45,7 @@ def run(
         raise InputError(problem, place=error.place, remedy=error.remedy) from None
     create_folder(output.parent)
     write_text(output, text)
+    yield from known.remarks
     yield f"Matched {len(known.joints)} joints of {known.name} in {len(read)} recordings."
     yield f"Wrote {output}, with {text.count(CHECK)} places marked `{CHECK}`."
     yield f"Next: bayesid check {output} --output {output.with_name(output.stem + '-check')}"

@@ -35,7 +35,15 @@ UNITS = {"rate": "rad/s", "accel": "m/s2", "attitude": "rad, small rotation in b
 """Sensors of the base, with the units of their noise."""
 
 
-def draft_study(robot: Robot, urdf: Path, recordings: Sequence[Recording], folder: Path, title: str) -> str:
+def draft_study(
+    robot: Robot,
+    urdf: Path,
+    recordings: Sequence[Recording],
+    folder: Path,
+    title: str,
+    *,
+    nearest_physical: bool = False,
+) -> str:
     """Return the text of a study file.
 
     Parameters
@@ -50,6 +58,8 @@ def draft_study(robot: Robot, urdf: Path, recordings: Sequence[Recording], folde
         Folder of the study file, to which its paths are relative.
     title : str
         Title of the study.
+    nearest_physical : bool
+        Whether the robot was read with the nearest physical inertias.
 
     Raises
     ------
@@ -63,7 +73,7 @@ def draft_study(robot: Robot, urdf: Path, recordings: Sequence[Recording], folde
     _require_base_sensor(recordings)
     sections = [
         _head(title),
-        _robot(robot, urdf, folder),
+        _robot(robot, urdf, folder, nearest_physical),
         ORBIT,
         *(_vector_sensor(recordings, family) for family in UNITS),
         _encoder(robot, recordings),
@@ -108,10 +118,11 @@ def _head(title: str) -> str:
     )
 
 
-def _robot(robot: Robot, urdf: Path, folder: Path) -> str:
+def _robot(robot: Robot, urdf: Path, folder: Path, nearest_physical: bool) -> str:
     return _section(
         _line("[robot]", f"base {robot.base}, {len(robot.joints)} moving joints, {robot.mass:.6g} kg"),
         f"urdf = {_path(urdf, folder)}",
+        *(["nearest_physical = true"] if nearest_physical else []),
         _unsure("link_spread = 0.0", "relative uncertainty of all links that are not unknown; 0 = known exactly"),
         "# joints, all of them recorded:" if robot.joints else "# no moving joints",
         *(f"#   {joint.name}: {joint.kind}, {_limits(joint)}" for joint in robot.joints),

@@ -65,7 +65,7 @@ def load_robot(study: Study) -> Robot:
 
 def _load_robot(study: Study) -> tuple[Robot, JointPrior | None]:
     """Return the robot, and the joint prior from an earlier posterior if the study names one."""
-    robot = Robot.from_urdf(study.robot.urdf)
+    robot = Robot.from_urdf(study.robot.urdf, nearest_physical=study.robot.nearest_physical)
     try:
         for load in study.robot.loads:
             robot = robot.with_load(Load(load.name, load.link, load.parameters))

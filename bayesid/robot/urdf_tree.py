@@ -274,7 +274,10 @@ def _physical_inertials(
         inertials[name] = InertialParameters(mass, com, nearest)
         refused.append((f"{place}: {problem.problem}", entries))
     if refused and take_nearest:
-        remarks += [f"{text}. The nearest physical inertia is taken: {entries}." for text, entries in refused]
+        remarks += [
+            f"{text[0].upper()}{text[1:]}. The nearest physical inertia is taken: {entries}."
+            for text, entries in refused
+        ]
     elif refused:
         raise InputError(
             "; ".join(f"{text} (nearest physical inertia in the link's axes: {entries})" for text, entries in refused),

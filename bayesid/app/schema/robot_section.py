@@ -87,11 +87,14 @@ class RobotSection(Section):
         URDF of the robot, whose root link is the base body, or its MJCF, which is rewritten as URDF.
     link_spread : float, optional
         Relative uncertainty of all links that are not unknowns, by default 0, which means known exactly.
+    nearest_physical : bool, optional
+        Whether links whose inertia no rigid body can have take the nearest that one can; by default they are refused.
     loads : sequence of LoadSection, optional
         Bodies that are fixed to links.
     """
 
     urdf: File
+    nearest_physical: bool = False
     link_spread: Annotated[NonNegative, no_more_than(1.0, "A fraction, not a percentage: 0.05 is 5 %")] = 0.0
     loads: Annotated[tuple[LoadSection, ...], BeforeValidator(array_of_tables)] = ()
 
