@@ -18,9 +18,9 @@ from bayesid.diagnosis.candidates.generic_signatures import CORNERS, WAVES
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.noise.noise_faults import noise_fault
 from bayesid.diagnosis.noise.noise_tests import chi2_log_sf
-from bayesid.diagnosis.outcome.extended_model import extended_start
 from bayesid.diagnosis.outcome.gain import measure_gain
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
+from bayesid.diagnosis.search.extended_model import extended_start
 from bayesid.diagnosis.search.left_beside import LeftBeside
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior

@@ -14,7 +14,7 @@ from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
-from bayesid.diagnosis.outcome.cause_power import cause_power
+from bayesid.diagnosis.outcome.candidate_table import cause_power
 from tests.gram_problem import LinearProblem
 
 SIZES = {"a": 1, "b": 3, "c": 2, "d": 1, "e": 6}

@@ -17,18 +17,19 @@ from bayesid.app.schema import Study
 from bayesid.diagnosis import (
     Candidate,
     CauseSet,
+    DisturbingWrench,
     Frame,
     Hypothesis,
     ProbableVerdict,
     SetProbabilities,
     Status,
-    Unexplained,
     candidates,
     diagnose,
 )
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
-from bayesid.diagnosis.outcome.cause_amplitudes import CauseAmplitude, amplitudes_of
-from bayesid.diagnosis.outcome.wrench_correlations import torque_correlations
+from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
+from bayesid.diagnosis.outcome.disturbance import torque_correlations
+from bayesid.diagnosis.response.effect_functions import CauseAmplitude
 from bayesid.inference.residual_view import ResidualView
 from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.recording import Recording
@@ -117,7 +118,7 @@ def weighed(result, *sets: tuple[tuple[str, ...], str | None, float]):
 
 
 @pytest.fixture(scope="module")
-def disturbance(biased) -> Unexplained:
+def disturbance(biased) -> DisturbingWrench:
     """A torque about x that follows the first joint's position."""
     base = biased.before.fit
     time = np.asarray(base.operating.node.environment.time)[0]
@@ -125,7 +126,7 @@ def disturbance(biased) -> Unexplained:
     torque = np.stack([1e-3 * position, 0.0 * time, 0.0 * time], axis=1)
     same = {frame: [torque] for frame in Frame}
     sd = [np.full_like(torque, 1e-4)]
-    return Unexplained(12.0, ("planar",), [time], same, same, sd, sd, Frame.BASE, 50.0)
+    return DisturbingWrench(12.0, ("planar",), [time], same, same, sd, sd, Frame.BASE, 50.0)
 
 
 def candidate(**changes) -> Candidate:
@@ -405,7 +406,7 @@ def test_the_spectrum_of_a_wave_is_its_amplitude():
     wave = 0.3 * np.cos(2.0 * np.pi * 0.05 * time)
     torque = [np.stack([wave, 0.0 * time, 0.0 * time], axis=1)]
     same = dict.fromkeys(Frame, torque)
-    disturbance = Unexplained(1.0, ("a",), [time], same, same, torque, torque, None, 0.0)
+    disturbance = DisturbingWrench(1.0, ("a",), [time], same, same, torque, torque, None, 0.0)
     frequency, amplitude = torque_amplitudes(disturbance, 0)
     assert frequency[np.argmax(amplitude[:, 0])] == pytest.approx(0.05, rel=0.01)
     assert amplitude[:, 0].max() == pytest.approx(0.3, rel=0.02)

@@ -10,7 +10,7 @@ import pytest
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis.candidates.generic_signatures import generic_signatures
-from bayesid.diagnosis.outcome.disturbing_wrench import Frame, unexplained_wrench
+from bayesid.diagnosis.outcome.disturbance import Frame, disturbing_wrench
 from bayesid.diagnosis.outcome.torque_events import EventCandidates, Held
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.search.hypothesis import Hypothesis
@@ -91,7 +91,7 @@ def test_a_snap_in_mujoco_is_drawn_better_with_events(seed, tmp_path):
     perturbed = perturbed.with_posterior(relinearised(posterior, first.z))
     hypothesis = Hypothesis(perturbed, perturbed.fit(z=first.z))
     bank = generic_signatures(perturbed, hypothesis.fit)
-    smooth, sudden = (unexplained_wrench(hypothesis, bank, wanted) for wanted in (False, True))
+    smooth, sudden = (disturbing_wrench(hypothesis, bank, wanted) for wanted in (False, True))
     assert sudden.log_bayes_factor > smooth.log_bayes_factor + 10.0
 
     def correlation(found: SimpleNamespace) -> float:

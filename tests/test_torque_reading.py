@@ -12,7 +12,7 @@ from bayesid import InputError, MeasuredMotion, Robot
 from bayesid.diagnosis import Status, diagnose
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.diagnosis.evidence.verdict import ProbableVerdict
-from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread, read_torques, torques_beside
+from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead, read_torques, torques_beside
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.response.present_fit import fit_present_model
 from bayesid.diagnosis.search.hypothesis import Hypothesis
@@ -128,7 +128,7 @@ def test_torques_are_read_where_the_study_knows_every_candidate(flown, friction)
 def test_torques_are_not_read_beside_a_motion_that_may_hold_something_without_a_name(flown, verdict):
     case = flown(11)
     found = torques_beside(verdict, fitted(case), case[0], CausePrior(), np.random.default_rng(0))
-    assert isinstance(found, Unread)
+    assert isinstance(found, TorquesNotRead)
     assert "no name" in found.reason
 
 

@@ -9,7 +9,7 @@ from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 if TYPE_CHECKING:
-    from bayesid.diagnosis.outcome.loop_review import DiagnosisReview
+    from bayesid.diagnosis.loop_review import DiagnosisReview
 
 __all__ = ["cause_prior", "loop_review", "stated_bounds"]
 
@@ -29,7 +29,7 @@ def cause_prior(study: Study) -> CausePrior:
 
 def loop_review(study: Study) -> DiagnosisReview:
     """Return the diagnosis of what a loop has flown, with what the study says of causes."""
-    from bayesid.diagnosis.outcome.loop_review import DiagnosisReview
+    from bayesid.diagnosis.loop_review import DiagnosisReview
 
     stated = study.design is not None and "argument_of_latitude" in study.design.model_fields_set
     first = study.recordings[0].argument_of_latitude if study.recordings else None

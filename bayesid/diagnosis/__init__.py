@@ -4,11 +4,11 @@ from bayesid.diagnosis.candidates.candidate_effects import candidates
 from bayesid.diagnosis.diagnose import diagnose, identify_extended
 from bayesid.diagnosis.evidence.cause_sets import CausePrior, CauseSet, SetProbabilities
 from bayesid.diagnosis.evidence.verdict import ProbableVerdict, Status
+from bayesid.diagnosis.loop_review import DiagnosisReview
 from bayesid.diagnosis.outcome.candidate_table import Candidate
-from bayesid.diagnosis.outcome.disturbing_wrench import Frame, Unexplained
+from bayesid.diagnosis.outcome.disturbance import DisturbingWrench, Frame
 from bayesid.diagnosis.outcome.gain import Gain
-from bayesid.diagnosis.outcome.loop_review import DiagnosisReview
-from bayesid.diagnosis.outcome.torque_reading import TorqueCause, TorqueReading, Unread
+from bayesid.diagnosis.outcome.torque_reading import TorqueCause, TorqueReading, TorquesNotRead
 from bayesid.diagnosis.result import Diagnosis
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 
@@ -18,6 +18,7 @@ __all__ = [
     "CauseSet",
     "Diagnosis",
     "DiagnosisReview",
+    "DisturbingWrench",
     "Frame",
     "Gain",
     "Hypothesis",
@@ -26,8 +27,7 @@ __all__ = [
     "Status",
     "TorqueCause",
     "TorqueReading",
-    "Unexplained",
-    "Unread",
+    "TorquesNotRead",
     "candidates",
     "diagnose",
     "identify_extended",

@@ -15,9 +15,9 @@ from bayesid.diagnosis.candidates.candidate_effects import candidates
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.diagnosis.evidence.verdict import Status, verdict_sensitivity
 from bayesid.diagnosis.outcome.candidate_table import candidate_table
-from bayesid.diagnosis.outcome.disturbing_wrench import unexplained_wrench
+from bayesid.diagnosis.outcome.disturbance import disturbing_wrench
 from bayesid.diagnosis.outcome.gain import measure_gain
-from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread, torque_candidates, torques_beside
+from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead, torque_candidates, torques_beside
 from bayesid.diagnosis.response.followed_motion import step_along_data, without_torque
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.response.present_fit import fit_present_model
@@ -136,10 +136,10 @@ def _diagnose(
     progress(0.85, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
     lacking = Hypothesis(perturbed, without_torque(weighed.base.fit)) if present.held else before
-    disturbance = unexplained_wrench(lacking, weighed.base.bank, open_question)
-    unexplained = unexplained_wrench(after, weighed.state(named).point.bank, False) if named else disturbance
+    disturbance = disturbing_wrench(lacking, weighed.base.bank, open_question)
+    unexplained = disturbing_wrench(after, weighed.state(named).point.bank, False) if named else disturbance
     table = candidate_table(weighed, catalogue, rng)
-    torques: TorqueReading | Unread | None = None
+    torques: TorqueReading | TorquesNotRead | None = None
     if whole.torque is not None:
         progress(0.95, "reading the joint torques")
         torques = torques_beside(verdict, after, whole, prior, rng, limits)

@@ -13,13 +13,12 @@ from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import ProbableVerdict, VerdictSensitivity
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
-from bayesid.diagnosis.outcome.candidate_table import Candidate
-from bayesid.diagnosis.outcome.cause_amplitudes import amplitudes_of, amplitudes_of_others
-from bayesid.diagnosis.outcome.disturbing_wrench import Unexplained
-from bayesid.diagnosis.outcome.extended_model import extended_posterior, extended_start
+from bayesid.diagnosis.outcome.candidate_table import Candidate, amplitudes_of, amplitudes_of_others
+from bayesid.diagnosis.outcome.disturbance import DisturbingWrench
 from bayesid.diagnosis.outcome.gain import Gain
-from bayesid.diagnosis.outcome.torque_reading import TorqueReading, Unread
+from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead
 from bayesid.diagnosis.search.cause_weighing import WeighedCauses
+from bayesid.diagnosis.search.extended_model import extended_posterior, extended_start
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
 from bayesid.inference import Identification
@@ -54,11 +53,11 @@ class Diagnosis:
     candidates : list of Candidate
     gain : Gain
         Present model against the extended one.
-    disturbance : Unexplained
+    disturbance : DisturbingWrench
         What it would take in the present model.
-    unexplained : Unexplained
+    unexplained : DisturbingWrench
         Left by the named causes, or by the present model where none is named.
-    torques : TorqueReading, Unread or None
+    torques : TorqueReading, TorquesNotRead or None
         What the joint torques say beyond the motion, or why they were not read; None where the study has none.
     effects : tuple of Effect
         Candidates of the catalogue.
@@ -76,9 +75,9 @@ class Diagnosis:
     sensitivity: VerdictSensitivity
     candidates: list[Candidate]
     gain: Gain
-    disturbance: Unexplained
-    unexplained: Unexplained
-    torques: TorqueReading | Unread | None
+    disturbance: DisturbingWrench
+    unexplained: DisturbingWrench
+    torques: TorqueReading | TorquesNotRead | None
     effects: tuple[Effect, ...]
     bounds: Mapping[str, tuple[PhysicalBound, ...]]
     seed: int
@@ -210,10 +209,10 @@ def _gain(result: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _torques(found: TorqueReading | Unread | None) -> dict[str, Any] | None:
+def _torques(found: TorqueReading | TorquesNotRead | None) -> dict[str, Any] | None:
     if found is None:
         return None
-    if isinstance(found, Unread):
+    if isinstance(found, TorquesNotRead):
         return {"status": "not evaluated", "reason": found.reason}
     before, after = found.chi2_per_sample
     return {

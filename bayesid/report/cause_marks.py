@@ -8,7 +8,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Hypothesis
-from bayesid.diagnosis.outcome.cause_amplitudes import amplitudes_of
+from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
 from bayesid.report.vector_size import vector_size
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect

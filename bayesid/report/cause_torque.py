@@ -27,7 +27,7 @@ def cause_torque(hypothesis: Hypothesis) -> list[Floats] | None:
     Returns
     -------
     list of (S, 3) arrays or None
-        In base axes, at the instants of `Unexplained`; None where no cause acts in one of these ways.
+        In base axes, at the instants of `DisturbingWrench`; None where no cause acts in one of these ways.
     """
     fit = hypothesis.fit
     acting = [index for index, effect in enumerate(fit.effects) if _acts(effect)]

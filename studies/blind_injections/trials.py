@@ -19,7 +19,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Frame, Status, diagnose
 from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict
-from bayesid.diagnosis.outcome.cause_amplitudes import effect_amplitude
+from bayesid.diagnosis.outcome.candidate_table import effect_amplitude
 from bayesid.inference.perturbed_posterior import residual_of
 from bayesid.inference.posterior import Posterior
 from studies.blind_injections.limits import Limits, limits_of, what_is_left

@@ -12,7 +12,7 @@ from bayesid import Model, Posterior, Sensor, SensorKind, White
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import CauseSet, Diagnosis, Hypothesis, diagnose
-from bayesid.diagnosis.outcome.cause_amplitudes import amplitudes_of
+from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.simulation.effects import create

@@ -26,7 +26,7 @@ from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Status, probable_verdict
-from bayesid.diagnosis.outcome.extended_model import extended_posterior, extended_start
+from bayesid.diagnosis.search.extended_model import extended_posterior, extended_start
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
@@ -37,7 +37,7 @@ from bayesid.simulation.effects.physical_bound import PhysicalBound, bounds_by_l
 from bayesid.simulation.effects.register import known_effects
 from bayesid.simulation.model import Model
 
-__all__ = ["TorqueCause", "TorqueReading", "Unread", "read_torques", "torque_candidates", "torques_beside"]
+__all__ = ["TorqueCause", "TorqueReading", "TorquesNotRead", "read_torques", "torque_candidates", "torques_beside"]
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class TorqueReading:
 
 
 @dataclass(frozen=True)
-class Unread:
+class TorquesNotRead:
     """Joint torques that were recorded and not read.
 
     Attributes
@@ -106,7 +106,7 @@ def torques_beside(
     prior: CausePrior,
     rng: np.random.Generator,
     bounds: Mapping[str, Sequence[PhysicalBound]] | None = None,
-) -> TorqueReading | Unread:
+) -> TorqueReading | TorquesNotRead:
     """Return what the joint torques say beside a verdict on the motion, see `read_torques`.
 
     Torques depend on the motion of the base. Where something without a name moves it, a torque that the model does not
@@ -114,11 +114,11 @@ def torques_beside(
     """
     nameless = any(UNKNOWN in names for names in verdict.ambiguous_with)
     if nameless or verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
-        return Unread("The motion shows something that has no name, and torques depend on the motion.")
+        return TorquesNotRead("The motion shows something that has no name, and torques depend on the motion.")
     try:
         return read_torques(hypothesis, model, prior, rng, bounds)
     except InputError as error:
-        return Unread(f"{error.problem[0].upper()}{error.problem[1:]}.")
+        return TorquesNotRead(f"{error.problem[0].upper()}{error.problem[1:]}.")
 
 
 @dataclass(frozen=True)

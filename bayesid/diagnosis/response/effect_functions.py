@@ -11,10 +11,32 @@ from jax import Array
 
 from bayesid._math.arrays import Floats, Traceable, namespace
 from bayesid._math.kept_jit import kept_jit
-from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect import Effect, Quantity
 from bayesid.simulation.effects.effect_key import EffectKey
 
-__all__ = ["PriorConstants", "load_slopes", "loads_of", "physical", "report_of", "report_slopes", "traced_physical"]
+__all__ = [
+    "CauseAmplitude",
+    "PriorConstants",
+    "load_slopes",
+    "loads_of",
+    "physical",
+    "report_of",
+    "report_slopes",
+    "traced_physical",
+]
+
+
+class CauseAmplitude(NamedTuple):
+    """One quantity of a cause, with its mean and standard deviation in the quantity's unit."""
+
+    quantity: Quantity
+    mean: float
+    sd: float
+
+    @property
+    def distance(self) -> float:
+        """Distance from zero in standard deviations, infinite for an exact value."""
+        return abs(self.mean) / self.sd if self.sd > 0.0 else float("inf")
 
 
 class PriorConstants(NamedTuple):

@@ -11,8 +11,8 @@ from bayesid._io.errors import InputError
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.noise.noise_tests import noise_tests
 from bayesid.diagnosis.noise.structure_tests import structure_tests
-from bayesid.diagnosis.outcome.extended_model import exactly_fitted
 from bayesid.diagnosis.search.cause_weighing import WeighedCauses
+from bayesid.diagnosis.search.extended_model import exactly_fitted
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
 from bayesid.simulation.effects.effect import Effect

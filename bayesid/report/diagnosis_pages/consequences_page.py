@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayesid.diagnosis import Diagnosis, Frame, Status, Unexplained
-from bayesid.diagnosis.outcome.wrench_correlations import torque_correlations
+from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Status
+from bayesid.diagnosis.outcome.disturbance import torque_correlations
 from bayesid.report import figures
 from bayesid.report.cause_torque import cause_torque
 from bayesid.report.document import Document
@@ -76,7 +76,7 @@ def _may_be_disturbance(result: Diagnosis) -> bool:
     return bool(result.after.faults) or any(effect.uses(hook) for effect in result.after.fit.effects for hook in hooks)
 
 
-def _add_wrench(document: Document, result: Diagnosis, wrench: Unexplained, whole: bool) -> None:
+def _add_wrench(document: Document, result: Diagnosis, wrench: DisturbingWrench, whole: bool) -> None:
     """Add the figures of a wrench and the table of its correlations; the whole of it in further axes too."""
     in_orbit = result.before.fit.posterior.model.orbit is not None
     for frame, name in AXES.items():

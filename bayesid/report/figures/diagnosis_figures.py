@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis import Candidate, Frame, Unexplained
-from bayesid.diagnosis.outcome.disturbing_wrench import WAVES
+from bayesid.diagnosis import Candidate, DisturbingWrench, Frame
+from bayesid.diagnosis.outcome.disturbance import WAVES
 from bayesid.report.figures.figure_style import (
     COLOURS,
     curve_style,
@@ -63,12 +63,12 @@ def candidate_strengths(rows: Sequence[Candidate], named: Sequence[str], alarm: 
 
 
 @styled
-def wrench_histories(wrench: Unexplained, frame: Frame, cause: Sequence[Floats] | None = None) -> Figure:
+def wrench_histories(wrench: DisturbingWrench, frame: Frame, cause: Sequence[Floats] | None = None) -> Figure:
     """Draw a reconstructed torque, and force where it is seen, over time in the axes of one frame, ± 1 sd in base axes.
 
     Parameters
     ----------
-    wrench : Unexplained
+    wrench : DisturbingWrench
     frame : Frame
     cause : sequence of (S, 3) arrays, optional
         Torque of the named causes in each recording, in the same axes, drawn over the reconstructed one.
@@ -103,7 +103,7 @@ def wrench_histories(wrench: Unexplained, frame: Frame, cause: Sequence[Floats] 
 
 
 @styled
-def wrench_spectrum(wrench: Unexplained) -> Figure:
+def wrench_spectrum(wrench: DisturbingWrench) -> Figure:
     """Draw the amplitude of the reconstructed torque by frequency, in base axes, one curve per recording."""
     figure = wide_figure(1.9)
     panels = figure.subplots(1, 3, squeeze=False)
@@ -123,7 +123,7 @@ def wrench_spectrum(wrench: Unexplained) -> Figure:
     return figure
 
 
-def torque_amplitudes(wrench: Unexplained, index: int) -> tuple[Floats, Floats]:
+def torque_amplitudes(wrench: DisturbingWrench, index: int) -> tuple[Floats, Floats]:
     """Return frequencies [Hz], as far as resolved, and amplitudes [N m] of one recording's torque about its mean."""
     time, torque = wrench.time[index], wrench.torque[Frame.BASE][index]
     uniform = np.linspace(time[0], time[-1], len(time))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bayesid.diagnosis import Candidate
-from bayesid.diagnosis.outcome.cause_amplitudes import CauseAmplitude
+from bayesid.diagnosis.response.effect_functions import CauseAmplitude
 from bayesid.report.numbers import format_number, format_quantity, format_unit
 
 __all__ = ["amplitude_text", "limit_text"]

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bayesid._io.words import joined
-from bayesid.diagnosis import Diagnosis, Frame, Hypothesis, Status, Unexplained
+from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Hypothesis, Status
 from bayesid.diagnosis.candidates.jump_instants import jump_instants
 from bayesid.diagnosis.evidence.verdict import COVERED, NAMED, UNKNOWN
 from bayesid.diagnosis.noise.noise_faults import SUMMARIES
-from bayesid.diagnosis.outcome.cause_amplitudes import amplitudes_of
+from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
 from bayesid.report.class_probabilities import alternative_probability, alternatives, cause_probability
 from bayesid.report.numbers import (
     format_fixed,
@@ -206,7 +206,7 @@ def gain_sentence(result: Diagnosis) -> str:
     return f"What it gains: {text}."
 
 
-def wrench_sentence(wrench: Unexplained) -> str:
+def wrench_sentence(wrench: DisturbingWrench) -> str:
     """Return how strong a reconstructed disturbance is, and in which axes it keeps its direction."""
     if wrench.signal_to_noise == 0.0:
         return "A free torque and force on the base would explain no more than noise does."

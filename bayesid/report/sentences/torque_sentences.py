@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from bayesid._io.words import joined
-from bayesid.diagnosis import Status, TorqueReading, Unread
+from bayesid.diagnosis import Status, TorqueReading, TorquesNotRead
 from bayesid.report.numbers import format_fixed, format_p_value, format_quantity, format_unit, relation
 from bayesid.report.sentences.set_words import probability_text, set_text
 
 __all__ = ["torque_sentence", "torque_size"]
 
 
-def torque_sentence(found: TorqueReading | Unread) -> str:
+def torque_sentence(found: TorqueReading | TorquesNotRead) -> str:
     """Return what the joint torques say beside the verdict on the motion, or why they were not read."""
-    if isinstance(found, Unread):
+    if isinstance(found, TorquesNotRead):
         return f"The joint torques were not evaluated. {found.reason}"
     before, after = (format_fixed(value, 2) for value in found.chi2_per_sample)
     match found.verdict.status:

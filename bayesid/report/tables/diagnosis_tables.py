@@ -9,8 +9,9 @@ import numpy as np
 
 from bayesid.diagnosis import Candidate, Diagnosis
 from bayesid.diagnosis.candidates.jump_instants import jump_instants
-from bayesid.diagnosis.outcome.cause_amplitudes import CauseAmplitude, amplitudes_of
-from bayesid.diagnosis.outcome.wrench_correlations import TorqueCorrelation
+from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
+from bayesid.diagnosis.outcome.disturbance import TorqueCorrelation
+from bayesid.diagnosis.response.effect_functions import CauseAmplitude
 from bayesid.report.document import Rows
 from bayesid.report.numbers import (
     format_fixed,

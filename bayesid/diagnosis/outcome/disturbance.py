@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -21,7 +22,7 @@ from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidate
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.residual_view import by_recording
 
-__all__ = ["Frame", "Unexplained", "unexplained_wrench"]
+__all__ = ["DisturbingWrench", "Frame", "TorqueCorrelation", "disturbing_wrench", "torque_correlations"]
 
 DECIDED = 6.0
 """Advantage in twice the log likelihood that names a frame."""
@@ -41,7 +42,7 @@ class Frame(Enum):
 
 
 @dataclass(frozen=True)
-class Unexplained:
+class DisturbingWrench:
     """A disturbing wrench.
 
     Attributes
@@ -82,7 +83,7 @@ class Unexplained:
         write_text(file, "\n".join(lines) + "\n")
 
 
-def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: bool = True) -> Unexplained:
+def disturbing_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: bool = True) -> DisturbingWrench:
     """Reconstruct the disturbance that a fit leaves.
 
     Torque and force have the priors of the generic candidates: cosines in time whose variances fall beyond a corner,
@@ -149,7 +150,7 @@ def unexplained_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: 
             out.append(np.einsum("tba,tb->ta", rotations[frame][0][r][own], value))
         return out
 
-    return Unexplained(
+    return DisturbingWrench(
         snr,
         tuple(manoeuvre.recording.name for manoeuvre in fit.posterior.manoeuvres),
         time,
@@ -356,3 +357,53 @@ def _one_direction(gram: Floats, gradient: Floats, scale: float, direction: Floa
         direction = np.linalg.solve(quadratic + 1e-9 * np.trace(quadratic) * np.eye(3), trajectory @ gradient)
         direction = direction / np.linalg.norm(direction)
     return taken
+
+
+MOST_CORRELATIONS = 12
+
+
+class TorqueCorrelation(NamedTuple):
+    """Correlation of one component of the torque, in base axes, with a known series, all recordings pooled."""
+
+    component: str
+    series: str
+    correlation: float
+
+
+def torque_correlations(wrench: DisturbingWrench, hypothesis: Hypothesis) -> list[TorqueCorrelation]:
+    """Return the largest correlations of the reconstructed torque with motion, orbit and clock, the largest first.
+
+    Parameters
+    ----------
+    wrench : DisturbingWrench
+    hypothesis : Hypothesis
+        Hypothesis whose fit gives the motion of the joints and of the base.
+    """
+    torque = np.concatenate(wrench.torque[Frame.BASE])
+    correlations = [
+        TorqueCorrelation(f"torque {'xyz'[axis]}", name, float(np.corrcoef(torque[:, axis], series)[0, 1]))
+        for name, series in _known_series(wrench, hypothesis)
+        for axis in range(3)
+        if np.std(series) > 0.0 and np.std(torque[:, axis]) > 0.0
+    ]
+    return sorted(correlations, key=lambda item: -abs(item.correlation))[:MOST_CORRELATIONS]
+
+
+def _known_series(wrench: DisturbingWrench, hypothesis: Hypothesis) -> Iterator[tuple[str, Floats]]:
+    posterior, node = hypothesis.fit.posterior, hypothesis.fit.operating.node
+    states = [
+        manoeuvre.motion.evaluate(time) for manoeuvre, time in zip(posterior.manoeuvres, wrench.time, strict=True)
+    ]
+    for order, kind in enumerate(("position", "speed", "acceleration")):
+        for column, joint in enumerate(posterior.model.robot.joints):
+            yield f"{kind} of {joint.name}", np.concatenate([state[order][:, column] for state in states])
+    counts = [len(time) for time in wrench.time]
+    for axis in range(3):
+        rates = [np.asarray(node.rate)[r, :n, axis] for r, n in enumerate(counts)]
+        yield f"rate of the base about {'xyz'[axis]}", np.concatenate(rates)
+    if posterior.model.orbit is not None:
+        phase = np.concatenate([np.asarray(node.environment.argument_of_latitude)[r, :n] for r, n in enumerate(counts)])
+        yield "cosine of the argument of latitude", np.cos(phase)
+        yield "sine of the argument of latitude", np.sin(phase)
+    yield "time", np.concatenate(wrench.time)
+    yield "time squared", np.concatenate(wrench.time) ** 2
