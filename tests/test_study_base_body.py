@@ -13,8 +13,8 @@ from bayesid.recording.recording import Recording
 from bayesid.simulation.model import Manoeuvre
 from bayesid.simulation.sensors import SensorKind
 from studies import base_body
-from studies.base_body import noise_free, paper, setting
-from studies.base_body.report import goals_of, write_report
+from studies.base_body import analysis, paper
+from studies.base_body.report import STUDY, goals_of
 from studies.common.ets7 import ACCELEROMETER, BASE, RADIUS, ets7, excitation, tip_speed
 from studies.common.study import Verdict
 from studies.truth import stepwise as reference
@@ -64,8 +64,8 @@ def test_data_of_an_independent_simulator_give_the_same(tmp_path: Path):
         for index, axis in enumerate("xyz")
     }
     recording = Recording("reference", None, time, channels)
-    posterior = Posterior.of(noise_free.guess_model(), [Manoeuvre(recording, motion)], step=0.5, flat_prior=True)
-    assert noise_free.identify_exact(posterior).worst < GOAL
+    posterior = Posterior.of(analysis.guess_model(), [Manoeuvre(recording, motion)], step=0.5, flat_prior=True)
+    assert analysis.identify_exact(posterior).worst < GOAL
 
 
 def test_the_poor_manoeuvre_hardly_excites_the_third_axis_and_costs_when_there_is_noise(result):
@@ -77,7 +77,7 @@ def test_the_poor_manoeuvre_hardly_excites_the_third_axis_and_costs_when_there_i
 
 def test_the_base_turns_slower_than_a_hundredth_of_a_radian_per_second(result):
     assert result.fast.peak[SensorKind.RATE] < 0.01
-    assert [joint for joint, _, _ in setting.limits_broken()] == [1, 2]
+    assert [joint for joint, _, _ in analysis.limits_broken()] == [1, 2]
 
 
 def test_leaving_the_gravity_gradient_out_costs(result):
@@ -116,13 +116,13 @@ def test_a_slower_manoeuvre_keeps_the_limits_of_the_flight(result):
 
 
 def test_the_arm_is_scaled_to_a_seventh():
-    robot = setting.heavy_arm(ets7())
+    robot = analysis.heavy_arm(ets7())
     moving = sum(robot.link(f"link{index}").inertial.mass for index in range(2, 7))
     assert moving / robot.link(BASE).inertial.mass == pytest.approx(1.0 / 7.0)
 
 
 def test_the_report_is_written(result, tmp_path: Path):
-    write_report(result, tmp_path / "base_body.pdf")
+    STUDY.write(result, tmp_path / "base_body.pdf")
     assert broken_rules(tmp_path / "base_body.pdf", full=False) == []
     verdicts = [goal.verdict for goal in goals_of(result)]
     assert verdicts == [Verdict.PASS, Verdict.PASS, Verdict.FAIL, Verdict.NOT_TESTED, Verdict.NOT_TESTED]

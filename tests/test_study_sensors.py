@@ -10,18 +10,42 @@ from studies.base_body import paper
 from studies.common.ets7 import INTERVAL
 from studies.common.quantities import JUDGED
 from studies.common.study import Verdict
-from studies.sensors import Effort, run
-from studies.sensors.draws import Draws
-from studies.sensors.integration import scalars
-from studies.sensors.linear import Estimator, Linear
-from studies.sensors.montecarlo import EQUAL, EXACT, LIKELIHOOD, PAPER, PIECES, TREATMENTS, WEIGHTED, WHOLE, Spread
-from studies.sensors.regressor import Balance, attenuation, regress, solve_balance
-from studies.sensors.report import _failing, _judged, write_report
+from studies.sensors import STUDY, Effort, run
+from studies.sensors.checks import Balance, attenuation, regress, scalars, solve_balance
+from studies.sensors.estimators import (
+    EQUAL,
+    EXACT,
+    LIKELIHOOD,
+    PAPER,
+    PIECES,
+    TREATMENTS,
+    WEIGHTED,
+    WHOLE,
+    Estimator,
+    Linear,
+    Spread,
+    as_read,
+    constant,
+    integral,
+    integrated,
+    integrated_whole,
+)
+from studies.sensors.report import _failing, _judged
 from studies.sensors.result import REALISTIC
-from studies.sensors.rows import equal_rms, percent
-from studies.sensors.setting import Noise, fly, levels, motion
-from studies.sensors.treatments import Differences, LowPass, Polynomial, SavitzkyGolay, SmoothingSpline, Wiener
-from studies.sensors.weights import as_read, constant, integral, integrated, integrated_whole
+from studies.sensors.signals import (
+    Differences,
+    Draws,
+    LowPass,
+    Noise,
+    Polynomial,
+    SavitzkyGolay,
+    SmoothingSpline,
+    Wiener,
+    fly,
+    levels,
+    motion,
+)
+from studies.sensors.tables import equal_rms, percent
 from tests.report_rules import broken_rules
 
 
@@ -208,5 +232,5 @@ def test_the_study(tmp_path):
     honest = result.joints[REALISTIC][LIKELIHOOD]
     assert 0.7 < honest.honesty.mean() < 1.3
     assert PIECES.title in result.rates[REALISTIC]
-    write_report(result, tmp_path / "sensors.pdf")
+    STUDY.write(result, tmp_path / "sensors.pdf")
     assert broken_rules(tmp_path / "sensors.pdf", full=False) == []

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from scipy import stats
 
@@ -11,73 +9,81 @@ from bayesid.report import Document
 from bayesid.report.figures import robot_pose
 from bayesid.report.numbers import format_fixed, format_number, format_percent
 from bayesid.simulation.sensors import SensorKind
-from studies.base_body import figures, paper, rows
-from studies.base_body.readings import CLAIM
-from studies.base_body.result import GRADES, BaseBody
-from studies.base_body.setting import limits_broken
+from studies.base_body import paper, tables
+from studies.base_body.analysis import CLAIM, GRADES, BaseBody, limits_broken, run
 from studies.common.ets7 import PERIOD, RAMP, TIP_SPEED, ets7, excitation, extended_wrist, tip_speed
 from studies.common.quantities import MASS, MOMENTS
 from studies.common.report_parts import columns
-from studies.common.study import Goal, Verdict
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
-)
+from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
 
-__all__ = ["goals_of", "write_report"]
+__all__ = ["STUDY", "BaseBody", "goals_of", "run"]
 
-EXACT = 1e-6
-"""Largest relative error that is allowed without noise; the integration allows no smaller one."""
+EXACT = 1e-6  # largest relative error that is allowed without noise; the integration allows no smaller one
+WANTED = 0.01  # relative standard deviation of the mass that is wanted from one manoeuvre
+LEVEL = 0.95  # level of the region of the sampled posterior that should hold the truth
 
-WANTED = 0.01
-"""Relative standard deviation of the mass that is wanted from one manoeuvre."""
-
-LEVEL = 0.95
-"""Level of the region of the sampled posterior that should hold the truth."""
-
+# what gives masses their scale where motion cannot
 WAY_OUT = "measured joint torques or a known thrust would (reports on the whole system and on base parameters)"
-"""What gives masses their scale where motion cannot."""
 
 
-def write_report(result: BaseBody, output: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, and beside it its summary and its further tables."""
-    document = Document("Base body of ETS-VII", "Problem 1 and section 4.1 of Lampariello and Hirzinger (IDETC 2005)")
+def _report(result: BaseBody) -> Report[BaseBody]:
+    motion, slow = excitation(paper.EXCITATION), excitation(paper.EXCITATION, result.slowness)
+    fastest, _ = tip_speed(slow, slow.duration)
     permitted, known = (result.precision[f"permitted, arm {arm}"] for arm in ("exact", "5 %"))
     faster = result.precision["faster, arm exact"]
-    summary = Summary(
-        "How well does one manoeuvre of the arm identify mass, centre of mass and inertia of the base, with realistic "
-        "sensors, at the speed that the flight's rule permits?",
-        f"At the permitted speed the mass of the base gets, to first order at the truth, a standard deviation of "
+    return Report(
+        title="Base body of ETS-VII",
+        subtitle="Problem 1 and section 4.1 of Lampariello and Hirzinger (IDETC 2005)",
+        question="How well does one manoeuvre of the arm identify mass, centre of mass and inertia of the base, with "
+        "realistic sensors, at the speed that the flight's rule permits?",
+        answer="At the permitted speed the mass of the base gets, to first order at the truth, a standard deviation of "
         f"{format_percent(permitted[MASS], 2)} if the arm is known exactly ({format_percent(faster[MASS], 2)} if flown "
-        f"{format_fixed(result.slowness, 1)} times faster), and of {format_percent(known[MASS], 2)} if the "
-        f"arm is known to 5 %, which no rate sensor, attitude sensor or accelerometer mends; {WAY_OUT}.",
-        tuple(goals_of(result)),
-        "the posture, period and joint zeros that the paper does not print are as assumed here, noise is white and the "
-        "arm's error is independent from link to link. Sampled posteriors are of the faster manoeuvre alone.",
-        bool(result.sampled),
+        f"{format_fixed(result.slowness, 1)} times faster), and of {format_percent(known[MASS], 2)} if the arm is "
+        f"known to 5 %, which no rate sensor, attitude sensor or accelerometer mends; {WAY_OUT}.",
+        valid="the posture, period and joint zeros that the paper does not print are as assumed here, noise is white "
+        "and the arm's error is independent from link to link. Sampled posteriors are of the faster manoeuvre alone.",
+        goals=goals_of(result),
+        full=bool(result.sampled),
+        figure=Picture(
+            tables.precision_figure(result),
+            "Relative standard deviation of the ten parameters after one manoeuvre, to first order at the truth, with "
+            f"a star sensor of 2″ and an accelerometer of {format_number(GRADES[0])} m/s².",
+        ),
+        setup=Setup(
+            robot="ETS-VII: the paper's base, and an arm of six joints and 140 kg from public models.",
+            manoeuvre=f"The paper's optimum of (26). At the permitted speed it takes {slow.duration:.0f} s and the tip "
+            f"moves with {1e3 * fastest:.0f} mm/s (rule: {1e3 * TIP_SPEED:.0f} mm/s); the base then turns with "
+            f"{format_number(1e3 * result.slow.peak[SensorKind.RATE], 2)} mrad/s at most. The faster one, "
+            f"{format_fixed(result.slowness, 1)} times, breaks the rule; with it the base turns with "
+            f"{format_number(1e3 * result.fast.peak[SensorKind.RATE], 2)} mrad/s, below the paper's bound of 10. Cases "
+            "without noise and sampled posteriors are of the faster one.",
+            sensors=f"At 2 Hz: attitude of a star sensor with 2″, an accelerometer of {format_number(GRADES[0])} m/s² "
+            "with an unknown constant bias (prior 10⁻⁴ m/s²), and joint encoders of 10⁻⁶ rad where the posterior is "
+            "sampled.",
+            known="Orbit, and the arm: exactly, or every link to 5 % of its mass (relative width 0.025).",
+            unknown="Ten parameters of the base, initial rate, bias, and the arm within its prior. Where it is "
+            "sampled, the prior is centred on the paper's initial guess with a relative width of one.",
+            replicates="One recording of each manoeuvre; coverage over many recordings is in the report on "
+            "calibration.",
+        ),
+        picture=Picture(
+            robot_pose(ets7(), motion, np.linspace(0.0, motion.duration, 5)[:-1]),
+            "The robot at four instants of the paper's manoeuvre.",
+        ),
+        sections=[_negatives, _evidence, _assumptions],
+        statements=_statements(result),
+        tables=[
+            CsvTable("estimates", ["case", "quantity", "truth", "estimate", "error"], tables.estimates(result)),
+            CsvTable("grades", ["known", "noise [m/s2]", "quantity", "relative sd"], tables.grades(result)),
+            CsvTable(
+                "sigma",
+                ["sigma", "unit", "share of peak", "sd of mass", "sd of worst moment", "manoeuvres for 2 %"],
+                tables.readings(result),
+            ),
+        ],
+        beside="Beside this report: all estimates without noise ({0}), standard deviations by grade of accelerometer "
+        "({1}), and what each unit of the paper's sigma would mean ({2}).",
     )
-    add_first_page(
-        document,
-        summary,
-        figures.precision(result),
-        "Relative standard deviation of the ten parameters after one manoeuvre, to first order at the truth, with a "
-        f"star sensor of 2″ and an accelerometer of {format_number(GRADES[0])} m/s².",
-    )
-    motion = excitation(paper.EXCITATION)
-    picture = robot_pose(ets7(), motion, np.linspace(0.0, motion.duration, 5)[:-1])
-    add_setup(document, _setup(result), picture, "The robot at four instants of the paper's manoeuvre.")
-    _negatives(document, result)
-    _evidence(document, result, output)
-    add_statements(document, _statements(result))
-    _assumptions(document)
-    write_study(document, summary, output, origin)
 
 
 def goals_of(result: BaseBody) -> list[Goal]:
@@ -111,39 +117,19 @@ def _held(result: BaseBody, arm: str) -> Goal:
     """Return the goal on the truth in the sampled posterior, and on the agreement of the three methods."""
     limit = float(stats.chi2.ppf(LEVEL, 10))
     text = (
-        f"faster manoeuvre, arm {'exact' if arm == 'exact' else 'known to 5 %'}: emcee, importance sampling and "
-        f"mode agree, and the {format_percent(LEVEL)} region holds the truth (squared distance at most "
+        f"faster manoeuvre, arm {'exact' if arm == 'exact' else 'known to 5 %'}: emcee, importance sampling and mode "
+        f"agree, and the {format_percent(LEVEL)} region holds the truth (squared distance at most "
         f"{format_fixed(limit, 1)})"
     )
     if arm not in result.sampled:
         return Goal(text, "not run", Verdict.NOT_TESTED)
     identified = result.sampled[arm]
-    distance = rows.squared_distance(identified)
+    distance = tables.squared_distance(identified)
     agreed = "agree" if not identified.disagreements else "disagree"
     return Goal(
         text,
         f"they {agreed}; squared distance {format_fixed(distance, 1)}",
         Verdict.of(not identified.disagreements and distance <= limit),
-    )
-
-
-def _setup(result: BaseBody) -> Setup:
-    motion = excitation(paper.EXCITATION, result.slowness)
-    fastest, _ = tip_speed(motion, motion.duration)
-    return Setup(
-        robot="ETS-VII: the paper's base, and an arm of six joints and 140 kg from public models.",
-        manoeuvre=f"The paper's optimum of (26). At the permitted speed it takes {motion.duration:.0f} s and the tip "
-        f"moves with {1e3 * fastest:.0f} mm/s (rule: {1e3 * TIP_SPEED:.0f} mm/s); the base then turns with "
-        f"{format_number(1e3 * result.slow.peak[SensorKind.RATE], 2)} mrad/s at most. The faster one, "
-        f"{format_fixed(result.slowness, 1)} times, breaks the rule; with it the base turns with "
-        f"{format_number(1e3 * result.fast.peak[SensorKind.RATE], 2)} mrad/s, below the paper's bound of 10. Cases "
-        "without noise and sampled posteriors are of the faster one.",
-        sensors=f"At 2 Hz: attitude of a star sensor with 2″, an accelerometer of {format_number(GRADES[0])} m/s² with "
-        "an unknown constant bias (prior 10⁻⁴ m/s²), and joint encoders of 10⁻⁶ rad where the posterior is sampled.",
-        known="Orbit, and the arm: exactly, or every link to 5 % of its mass (relative width 0.025).",
-        unknown="Ten parameters of the base, initial rate, bias, and the arm within its prior. Where it is sampled, "
-        "the prior is centred on the paper's initial guess with a relative width of one.",
-        replicates="One recording of each manoeuvre; coverage over many recordings is in the report on calibration.",
     )
 
 
@@ -160,15 +146,14 @@ def _negatives(document: Document, result: BaseBody) -> None:
         f"is {format_number(blind.misfit, 2)} of the noise, which no plot shows; its chi² is "
         f"{format_number(blind.misfit**2 * samples, 2)}.",
         "The scale of all masses comes from the arm alone: the equations of motion are homogeneous in the masses, "
-        f"gravity gradient included. Arm links known to 5 % leave the base's mass at "
+        "gravity gradient included. Arm links known to 5 % leave the base's mass at "
         f"{format_percent(float(result.precision['permitted, arm 5 %'][MASS]), 2)}, and the best accelerometer of "
-        f"section 4.3 ({format_number(GRADES[-1])} m/s²) at "
-        f"{format_percent(float(result.grades['5 %'][-1, MASS]), 2)} (faster manoeuvre). Measured "
-        "joint torques, a known thrust or one known body would give the scale too (reports on the whole system and on "
-        "base parameters).",
-        "The poorly exciting manoeuvre, whose rate about z peaks at "
-        f"{format_fixed(1e3 * float(poor.peak[2]), 2)} mrad/s, costs nothing without noise; with noise izz is "
-        f"{format_fixed(float(loss[6]), 1)} and ixy {format_fixed(float(loss[7]), 1)} times more uncertain.",
+        f"section 4.3 ({format_number(GRADES[-1])} m/s²) at {format_percent(float(result.grades['5 %'][-1, MASS]), 2)} "
+        "(faster manoeuvre). Measured joint torques, a known thrust or one known body would give the scale too "
+        "(reports on the whole system and on base parameters).",
+        f"The poorly exciting manoeuvre, whose rate about z peaks at {format_fixed(1e3 * float(poor.peak[2]), 2)} "
+        f"mrad/s, costs nothing without noise; with noise izz is {format_fixed(float(loss[6]), 1)} and ixy "
+        f"{format_fixed(float(loss[7]), 1)} times more uncertain.",
         "The printed optimum leaves the joint limits of ±π/2 that the paper states: "
         + "; ".join(
             f"joint {joint} moves from {format_number(low)} to {format_number(high)} rad"
@@ -191,9 +176,9 @@ def _gradient(result: BaseBody) -> str:
     return text + "."
 
 
-def _evidence(document: Document, result: BaseBody, output: Path) -> None:
+def _evidence(document: Document, result: BaseBody) -> None:
     document.section("Evidence")
-    header, cases = rows.case_table(result)
+    header, cases = tables.case_table(result)
     document.table(
         header,
         cases,
@@ -203,10 +188,10 @@ def _evidence(document: Document, result: BaseBody, output: Path) -> None:
         columns("lrrrrr"),
     )
     document.figure(
-        figures.errors(result),
+        tables.error_figure(result),
         "Relative errors without noise, of the paper's printed results and of those found here; the line is the goal.",
     )
-    header, widths = rows.precision_table(result)
+    header, widths = tables.precision_table(result)
     document.table(
         header,
         widths,
@@ -217,25 +202,11 @@ def _evidence(document: Document, result: BaseBody, output: Path) -> None:
     )
     if result.sampled:
         document.figure(
-            figures.posterior(result),
+            tables.posterior_figure(result),
             "Sampled posterior (mean and standard deviation, faster manoeuvre) beside the results that the paper "
             "printed; triangles mark what lies beyond the panel.",
         )
-        document.items([rows.sampler_sentence(name, identified) for name, identified in result.sampled.items()])
-    files = [
-        write_table(output, "estimates", ["case", "quantity", "truth", "estimate", "error"], rows.estimates(result)),
-        write_table(output, "grades", ["known", "noise [m/s2]", "quantity", "relative sd"], rows.grades(result)),
-        write_table(
-            output,
-            "sigma",
-            ["sigma", "unit", "share of peak", "sd of mass", "sd of worst moment", "manoeuvres for 2 %"],
-            rows.readings(result),
-        ),
-    ]
-    document.paragraph(
-        f"Beside this report: all estimates without noise ({files[0]}), standard deviations by grade of accelerometer "
-        f"({files[1]}), and what each unit of the paper's sigma would mean ({files[2]})."
-    )
+        document.items([tables.sampler_sentence(name, identified) for name, identified in result.sampled.items()])
 
 
 def _statements(result: BaseBody) -> list[Statement]:
@@ -264,15 +235,15 @@ def _statements(result: BaseBody) -> list[Statement]:
             "Noise of sigma 0.04 leaves an error of about 2 % in three dimensions too (4.3).",
             Finding.CONFIRMED if max(reading.mass, reading.moment) <= CLAIM else Finding.REFUTED,
             "Read, as in the report on sensors, as degrees per second and the same share of an accelerometer's peak: "
-            f"one faster manoeuvre leaves, to first order at the truth, {format_percent(reading.mass, 2)} in the "
-            f"mass and {format_percent(reading.moment, 2)} in the worst moment; 2 % take "
+            f"one faster manoeuvre leaves, to first order at the truth, {format_percent(reading.mass, 2)} in the mass "
+            f"and {format_percent(reading.moment, 2)} in the worst moment; 2 % take "
             f"{format_number(np.ceil(reading.manoeuvres))} manoeuvres. The report on sensors has these beside the "
             "errors over drawn noise. The paper prints no unit.",
         ),
     ]
 
 
-def _assumptions(document: Document) -> None:
+def _assumptions(document: Document, _: BaseBody) -> None:
     document.section("Assumptions where the paper is silent")
     wrist = ", ".join(format_number(value) for value in extended_wrist())
     document.items(
@@ -288,3 +259,13 @@ def _assumptions(document: Document) -> None:
             "they are scaled.",
         ]
     )
+
+
+STUDY = Study(
+    "base_body",
+    "Identify the base body of ETS-VII, beside what the paper printed.",
+    run=run,
+    report=_report,
+    full="add what takes minutes",
+    seed=0,
+)

@@ -27,47 +27,33 @@ __all__ += ["FlightManoeuvre", "ets7", "excitation", "extended_wrist", "tip_of",
 
 Floats = NDArray[np.floating]
 
-BASE, TIP = "base_link", "tip"
-"""Links of the base body and of the end-effector."""
+BASE, TIP = "base_link", "tip"  # links of the base body and of the end-effector
+RADIUS = 6.916e6  # radius of the circular orbit, as the paper states it [m]
+ACCELEROMETER = (0.4, 0.3, 0.8)  # mounting point of the accelerometer in the base [m]; no source states it
 
-RADIUS = 6.916e6
-"""Radius of the circular orbit, as the paper states it [m]."""
-
-ACCELEROMETER = (0.4, 0.3, 0.8)
-"""Mounting point of the accelerometer in the base [m]; no source states it."""
-
+# noise per sample of rates, accelerations and joint positions: two seconds of arc per second, a good accelerometer,
+# good encoders [rad/s, m/s2, rad]
 RATE, ACCEL, ENCODER = 1e-5, 1e-5, 1e-6
-"""Noise per sample of rates, accelerations and joint positions: two seconds of arc per second, a good accelerometer,
-good encoders [rad/s, m/s2, rad]."""
 
-INTERVAL = 0.5
-"""Time between samples of all sensors [s]; assumed."""
+INTERVAL = 0.5  # time between samples of all sensors [s]; assumed
+BIAS = 1e-4  # standard deviation of the accelerometer's constant error [m/s2]
+TIP_SPEED, TIP_RATE = 0.05, float(np.radians(5.0))  # rule of the experiments on ETS-VII for the tip [m/s, rad/s]
+LIMITS = Limits(tip_speed=TIP_SPEED, tip_rate=TIP_RATE)  # the same rule as limits of a design
+START = np.array([0.0, -0.6, 1.0, -0.4, 0.3, 0.0])  # joint positions before and after a manoeuvre [rad]; assumed
 
-BIAS = 1e-4
-"""Standard deviation of the accelerometer's constant error [m/s2]."""
-
-TIP_SPEED, TIP_RATE = 0.05, float(np.radians(5.0))
-"""Rule of the experiments on ETS-VII for the tip [m/s, rad/s]."""
-
-LIMITS = Limits(tip_speed=TIP_SPEED, tip_rate=TIP_RATE)
-"""The same rule as limits of a design."""
-
-START = np.array([0.0, -0.6, 1.0, -0.4, 0.3, 0.0])
-"""Joint positions before and after a manoeuvre [rad]; assumed."""
-
+# excursion of the six joints between the flight's two ramps [rad]
 EXCURSION = np.array([0.0, 0.264, -0.321, 0.057, 0.0, 0.0])
-"""Excursion of the six joints between the flight's two ramps [rad]."""
 
+# start and end of the ramps out and back [s]: the flight's 682.5 to 705.1 s and 744.5 to 767.1 s, counted from a minute
+# before them
 RAMPS = ((60.0, 82.6), (122.0, 144.6))
-"""Start and end of the ramps out and back [s]: the flight's 682.5 to 705.1 s and 744.5 to 767.1 s, counted from a
-minute before them."""
 
+# time within which a joint reaches its speed [s]; assumed, since a sharp corner would take an infinite torque
 CORNER = 4.0
-"""Time within which a joint reaches its speed [s]; assumed, since a sharp corner would take an infinite torque."""
 
+# period and ramp of the paper's excitation at its fastest [s], and its number of periods; the base then turns with 8
+# mrad/s at most
 PERIOD, RAMP, PERIODS = 30.0, 30.0, 2
-"""Period and ramp of the paper's excitation at its fastest [s], and its number of periods; the base then turns with
-8 mrad/s at most."""
 
 
 @cache
@@ -78,24 +64,12 @@ def ets7() -> Robot:
 
 @dataclass(frozen=True)
 class FlightManoeuvre:
-    """Manoeuvre that ETS-VII flew: joints 2 to 4 out and back; a `bayesid.recording.joint_motion.Motion`.
+    """Manoeuvre that ETS-VII flew: joints 2 to 4 out and back; a `bayesid.recording.joint_motion.Motion`."""
 
-    Parameters
-    ----------
-    start : (6,) array
-        Joint positions before and after [rad].
-    excursion : (6,) array
-        Excursion between the ramps [rad].
-    corner : float or None
-        Length of the rounded corners of linear ramps [s]; None makes each ramp one quintic.
-    earlier : float
-        Time by which all of it happens earlier than `RAMPS` [s].
-    """
-
-    start: Floats
-    excursion: Floats = field(default_factory=lambda: EXCURSION)
-    corner: float | None = CORNER
-    earlier: float = 0.0
+    start: Floats  # (6,): joint positions before and after [rad]
+    excursion: Floats = field(default_factory=lambda: EXCURSION)  # (6,): excursion between the ramps [rad]
+    corner: float | None = CORNER  # length of the rounded corners of linear ramps [s]; None makes each ramp one quintic
+    earlier: float = 0.0  # time by which all of it happens earlier than `RAMPS` [s]
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,)."""

@@ -20,11 +20,10 @@ from studies.common.flight import flown_along
 
 __all__ = ["manoeuvre_figure", "robot_outline"]
 
-SIDE = 1.15
-"""Longer side of the drawing as printed [in]."""
+SIDE = 1.15  # longer side of the drawing as printed [in]
 
+# lengths that the scale may have [m]; the longest is drawn that is at most half as long as the drawing is wide
 BARS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-"""Lengths that the scale may have [m]; the longest is drawn that is at most half as long as the drawing is wide."""
 
 
 @styled

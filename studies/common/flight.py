@@ -39,8 +39,7 @@ __all__ = [
 
 ORBIT = Orbit(radius=RADIUS)
 
-WATCH_STEP = 0.2
-"""Interval at which the robot is looked at, which is also the largest step of the integration [s]."""
+WATCH_STEP = 0.2  # interval at which the robot is looked at, which is also the largest step of the integration [s]
 
 
 def light_wheel(momentum: Floats) -> Rotor:
@@ -208,23 +207,14 @@ class _Watched(TruthModel):
 
 @dataclass(frozen=True)
 class Flown:
-    """Course of the limited quantities.
+    """Course of the limited quantities."""
 
-    Attributes
-    ----------
-    time : (T,) array
-        Times [s].
-    tip_speed, tip_rate : (T,) array
-        Speed [m/s] and angular rate [rad/s] of the tip, the larger of those relative to the base and to inertial space,
-        as in `bayesid.design.Limits`.
-    base_rotation : (T,) array
-        Rotation of the base since the start [rad].
-    """
-
-    time: Floats
+    time: Floats  # (T,): times [s]
+    # (T,): speed [m/s] and angular rate [rad/s] of the tip, the larger of those relative to the base and to inertial
+    # space, as in `bayesid.design.Limits`
     tip_speed: Floats
     tip_rate: Floats
-    base_rotation: Floats
+    base_rotation: Floats  # (T,): rotation of the base since the start [rad]
 
     def largest(self, name: str) -> float:
         """Return the largest value of a quantity, by the name of its limit."""

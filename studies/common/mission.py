@@ -42,23 +42,18 @@ from studies.truth.mujoco import Truth
 __all__ = ["DURATION", "ENCODERS", "POINTS", "REACH", "ROWS", "TRUTH_STEP", "base_unknown", "flight_manoeuvre", "fly"]
 __all__ += ["problem", "recorded", "ship", "splines", "start", "true_arm"]
 
-DURATION = 120.0
-"""Length of every manoeuvre [s]."""
+DURATION = 120.0  # length of every manoeuvre [s]
+POINTS = 8  # number of free control points of every joint's spline
 
-POINTS = 8
-"""Number of free control points of every joint's spline."""
-
+# range of every joint, either way [rad]; the paper's printed optimum needs 2.5, more than the limit it states
 REACH = 2.6
-"""Range of every joint, either way [rad]; the paper's printed optimum needs 2.5, more than the limit it states."""
 
-ENCODERS = {0: ENCODER}
-"""Noise of the encoders as designs want it: of positions alone."""
+ENCODERS = {0: ENCODER}  # noise of the encoders as designs want it: of positions alone
 
+# relative widths of the links' priors by what is known of the arm, the headline first
 ROWS = {"arm known to 5 %": ARM_SPREAD, "arm known exactly": 0.0}
-"""Relative widths of the links' priors by what is known of the arm, the headline first."""
 
-TRUTH_STEP = 0.5
-"""Integration step of MuJoCo [s]; rates then differ by 5e-12 rad/s from those with a fifth of it."""
+TRUTH_STEP = 0.5  # integration step of MuJoCo [s]; rates then differ by 5e-12 rad/s from those with a fifth of it
 
 
 @cache

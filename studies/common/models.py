@@ -17,11 +17,10 @@ from studies.common.ets7 import ACCEL, ACCELEROMETER, BIAS, ENCODER, RADIUS, RAT
 
 __all__ = ["ARM_SPREAD", "NOISE", "base_model", "guess_about", "orbiting_model"]
 
-ARM_SPREAD = 0.025
-"""Relative width of a link's prior where the arm is not known exactly: its mass is then known to 5 %."""
+ARM_SPREAD = 0.025  # relative width of a link's prior where the arm is not known exactly: its mass is then known to 5 %
 
+# family of channels -> noise per sample of a recording [rad, rad/s, m/s2], in the order in which it is drawn
 NOISE = {"position": ENCODER, "rate": RATE, "accel": ACCEL}
-"""Family of channels -> noise per sample of a recording [rad, rad/s, m/s2], in the order in which it is drawn."""
 
 
 def _sensors(noise: Mapping[SensorKind, float]) -> tuple[Sensor, ...]:

@@ -22,26 +22,18 @@ import numpy as np
 
 __all__ = ["Outcomes", "Workers", "read_store", "run_trials"]
 
-Workers = int | Executor
-"""Number of processes of this machine, one for this process itself; or an executor of any kind."""
+Workers = int | Executor  # number of processes of this machine, one for this process itself; or an executor of any kind
 
+# task and source of random numbers -> result; task and result are made of what JSON has, or of arrays
 Trial = Callable[[Any, np.random.Generator], Any]
-"""Task and source of random numbers -> result; task and result are made of what JSON has, or of arrays."""
 
 
 @dataclass(frozen=True)
 class Outcomes:
-    """Results of trials in the order of their tasks, None where there is none, and the messages of those that failed.
+    """Results of trials in the order of their tasks, None where there is none, and messages of those that failed."""
 
-    Attributes
-    ----------
-    results : list
-        Results as JSON has them: lists in place of tuples and arrays.
-    failures : dict of int to str
-        Messages by the number of the trial; a failed trial is tried again on the next run.
-    """
-
-    results: list[Any]
+    results: list[Any]  # results as JSON has them: lists in place of tuples and arrays
+    # messages by the number of the trial; a failed trial is tried again on the next run
     failures: dict[int, str] = field(default_factory=dict)
 
     def complete(self) -> list[Any]:

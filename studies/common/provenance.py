@@ -15,17 +15,15 @@ from bayesid.app.report_origin import origin_text
 
 __all__ = ["MODELS", "processor", "study_origin"]
 
-ROOT = Path(__file__).resolve().parents[2]
-"""Folder of the checkout."""
+ROOT = Path(__file__).resolve().parents[2]  # folder of the checkout
 
+# options of single studies that say how much is repeated
 COUNTS = ("starts", "searches", "repeats", "flights", "ships")
-"""Options of single studies that say how much is repeated."""
 
+# what a report says that only sets trials anew that were made before
 KEPT = "Trials were kept from former runs, and what they took is the time of the machines that made them"
-"""What a report says that only sets trials anew that were made before."""
 
-MODELS = ROOT / "bayesid" / "robot" / "models"
-"""Folder of the robots that are shipped."""
+MODELS = ROOT / "bayesid" / "robot" / "models"  # folder of the robots that are shipped
 
 
 def study_origin(name: str, options: argparse.Namespace, inputs: Sequence[Path] = (MODELS / "ets7.urdf",)) -> str:

@@ -11,17 +11,14 @@ from bayesid.robot.inertial_parameters import InertialParameters
 
 __all__ = ["HEADINGS", "JUDGED", "LABELS", "MASS", "MOMENTS", "body_of", "inertia_matrix", "squared_distances"]
 
-MASS, MOMENTS = 0, [4, 5, 6]
-"""Indices of the mass and of the three moments of inertia."""
+MASS, MOMENTS = 0, [4, 5, 6]  # indices of the mass and of the three moments of inertia
+JUDGED = [MASS, *MOMENTS]  # indices of the quantities by which studies judge an identification; the others may be zero
 
-JUDGED = [MASS, *MOMENTS]
-"""Indices of the quantities by which studies judge an identification; the others may be zero."""
-
+# short names for the axes of figures, such as ``I xx``
 LABELS = [key.replace("inertia.", "I ").replace("com.", "c ") for key in BODY_QUANTITIES]
-"""Short names for the axes of figures, such as ``I xx``."""
 
+# names with units for the rows of tables, such as ``inertia.xx [kg m²]``
 HEADINGS = [f"{key} [{format_unit(unit)}]" for key, unit in BODY_QUANTITIES.items()]
-"""Names with units for the rows of tables, such as ``inertia.xx [kg m²]``."""
 
 
 def inertia_matrix(quantities: Floats) -> Floats:

@@ -33,24 +33,16 @@ from studies.common.monte_carlo import Workers, run_trials
 
 __all__ = ["Realised", "Reference", "repeat"]
 
-STEPS = 4
-"""Number of Gauss-Newton steps of every fit."""
+STEPS = 4  # number of Gauss-Newton steps of every fit
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Planned manoeuvre about which recordings are linearised.
+    """Planned manoeuvre about which recordings are linearised."""
 
-    Attributes
-    ----------
-    posterior : Posterior
-        Posterior of the manoeuvre as it would be recorded without noise, with its noise linearised at ``z``.
-    z : (n,) array
-        Linearisation point.
-    """
-
+    # posterior of the manoeuvre as it would be recorded without noise, with its noise linearised at ``z``
     posterior: Posterior
-    z: Floats
+    z: Floats  # (n,): linearisation point
 
     @classmethod
     def of(cls, model: Model, motion: Motion, z: Floats | None = None) -> Reference:
@@ -100,20 +92,11 @@ def _reference(parameters: tuple[float, ...], points: int, arm_spread: float) ->
 
 @dataclass(frozen=True)
 class Realised:
-    """Errors of fits beside what was predicted of them.
+    """Errors of fits beside what was predicted of them."""
 
-    Attributes
-    ----------
-    errors : (N, 10) array
-        Estimates of the base's quantities less the truth.
-    predicted : (10,) array
-        Predicted standard deviations.
-    last_step : (N,) array
-        Largest change of a coordinate in the last step of every fit, in predicted standard deviations.
-    """
-
-    errors: Floats
-    predicted: Floats
+    errors: Floats  # (N, 10): estimates of the base's quantities less the truth
+    predicted: Floats  # (10,): predicted standard deviations
+    # (N,): largest change of a coordinate in the last step of every fit, in predicted standard deviations
     last_step: Floats
 
     @property

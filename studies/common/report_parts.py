@@ -9,6 +9,7 @@ from bayesid.report import Document
 
 __all__ = ["TERMS", "add_number_table", "columns", "glossary", "not_evaluated"]
 
+# meanings by term, as reports write it
 TERMS = {
     "a-optimal": "smallest sum of the posterior variances",
     "chi-square": "sum of squared residuals in standard deviations, per sample 1 where the model is right",
@@ -27,7 +28,6 @@ TERMS = {
     "sd": "standard deviation",
     "rms": "root mean square",
 }
-"""Meanings by term, as reports write it."""
 
 
 def glossary(document: Document) -> str:

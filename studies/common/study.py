@@ -30,6 +30,7 @@ __all__ += ["Statement", "Study", "Verdict", "show"]
 
 R = TypeVar("R")
 
+# options of what runs the trials: ``workers`` of `studies.common.monte_carlo.run_trials`
 WORKERS: Mapping[str, Mapping[str, Any]] = {
     "--workers": {"type": int, "default": 1, "help": "number of processes that run the trials"},
     "--scheduler": {
@@ -39,18 +40,17 @@ WORKERS: Mapping[str, Mapping[str, Any]] = {
         "help": "scheduler of dask.distributed whose workers run the trials, in place of processes of this machine",
     },
 }
-"""Options of what runs the trials: ``workers`` of `studies.common.monte_carlo.run_trials`."""
 
+# options of a study with `studies.common.monte_carlo.run_trials`, for `Command.extra`
 TRIALS: Mapping[str, Mapping[str, Any]] = {
     "--trials": {"type": Path, "help": "file that keeps the Monte Carlo trials, for an interrupted run"},
     **WORKERS,
 }
-"""Options of a study with `studies.common.monte_carlo.run_trials`, for `Command.extra`."""
 
+# option of a study whose trials are made by many runs
 MADE: Mapping[str, Mapping[str, Any]] = {
     "--made": {"action": "store_true", "help": "report the trials made so far, make no more"}
 }
-"""Option of a study whose trials are made by many runs."""
 
 
 class Verdict(StrEnum):
@@ -69,21 +69,11 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Goal:
-    """A goal of a study.
+    """A goal of a study."""
 
-    Attributes
-    ----------
-    text : str
-        What is to be reached, with its number.
-    reached : str
-        What was reached, with its interval where there is one.
-    verdict : Verdict
-        NOT DECIDED where the interval holds values on both sides of the goal.
-    """
-
-    text: str
-    reached: str
-    verdict: Verdict
+    text: str  # what is to be reached, with its number
+    reached: str  # what was reached, with its interval where there is one
+    verdict: Verdict  # NOT DECIDED where the interval holds values on both sides of the goal
 
 
 @dataclass(frozen=True)
@@ -141,51 +131,27 @@ class CsvTable(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Report(Generic[R]):
-    """What a report holds, in the order in which it is printed.
-
-    Attributes
-    ----------
-    title, subtitle : str
-    question, answer, valid : str
-        What is asked, the answer, and the conditions under which it is right; one sentence each.
-    goals : sequence of Goal
-    full : bool
-        Whether the study was run in full.
-    figure : Picture, optional
-        Figure that decides, on the first page.
-    setup : Setup, optional
-    outline : Figure, optional
-        Drawing of the robot inside the box of the setup.
-    picture : Picture, optional
-        Figure below the setup, as of the motion.
-    sections : sequence of callables
-        Each adds to a document what it shows of a result: failures, evidence, calibration.
-    statements : sequence of Statement
-        What is found of the paper's statements.
-    tables : sequence of CsvTable
-        Tables beside the report.
-    beside : str
-        Sentence on these tables; ``{all}`` stands for all names of files, ``{0}`` for the first.
-    credit : str
-        Sentence added to where the report comes from.
-    """
+    """What a report holds, in the order in which it is printed."""
 
     title: str
     subtitle: str
+    # what is asked, the answer, and the conditions under which it is right; one sentence each
     question: str
     answer: str
     valid: str
     goals: Sequence[Goal]
-    full: bool
-    figure: Picture | None = None
+    full: bool  # whether the study was run in full
+    figure: Picture | None = None  # figure that decides, on the first page
     setup: Setup | None = None
-    outline: Figure | None = None
-    picture: Picture | None = None
+    outline: Figure | None = None  # drawing of the robot inside the box of the setup
+    picture: Picture | None = None  # figure below the setup, as of the motion
+    # each adds to a document what it shows of a result: failures, evidence, calibration
     sections: Sequence[Callable[[Document, R], None]] = ()
-    statements: Sequence[Statement] = ()
-    tables: Sequence[CsvTable] = ()
+    statements: Sequence[Statement] = ()  # what is found of the paper's statements
+    tables: Sequence[CsvTable] = ()  # tables beside the report
+    # sentence on these tables; ``{all}`` stands for all names of files, ``{0}`` for the first
     beside: str = "Tables beside this report: {all}."
-    credit: str = ""
+    credit: str = ""  # sentence added to where the report comes from
 
     def document(self, result: R, output: Path) -> Document:
         """Return the printed report without its foot; the tables are written beside the output."""
@@ -223,26 +189,14 @@ class Report(Generic[R]):
 
 @dataclass(frozen=True)
 class Command:
-    """What a study understands on the command line, ``python -m studies.NAME [--full] [--output FILE] [--seed N]``.
+    """What a study understands on the command line, ``python -m studies.NAME [--full] [--output FILE] [--seed N]``."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the study, and of its report.
-    description : str
-        One sentence that says what the study does.
-    full : str, optional
-        What ``--full`` adds; the study has no such option where left out.
-    seed : int, optional
-        Seed of all random numbers unless another is given; the study has no such option where left out.
-    extra : mapping
-        Further options -> keywords of ``argparse.ArgumentParser.add_argument``.
-    """
-
-    name: str
-    description: str
-    full: str | None = None
+    name: str  # name of the study, and of its report
+    description: str  # one sentence that says what the study does
+    full: str | None = None  # what ``--full`` adds; the study has no such option where left out
+    # seed of all random numbers unless another is given; the study has no such option where left out
     seed: int | None = None
+    # further options -> keywords of ``argparse.ArgumentParser.add_argument``
     extra: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def parse(self, arguments: Sequence[str] | None = None) -> argparse.Namespace:
@@ -269,20 +223,12 @@ class Command:
 
 @dataclass(frozen=True, kw_only=True)
 class Study(Command, Generic[R]):
-    """A study: its command, how it runs, and what its report says.
+    """A study: its command, how it runs, and what its report says."""
 
-    Attributes
-    ----------
-    run : callable
-        Takes every option of the command but ``output`` as keyword, and ``progress`` as `show`; returns the result.
-    report : callable
-        Result -> `Report`.
-    inputs : callable
-        Options -> files that the study reads, for the report's origin; by default the robot ETS-VII.
-    """
-
+    # takes every option of the command but ``output`` as keyword, and ``progress`` as `show`; returns the result
     run: Callable[..., R]
-    report: Callable[[R], Report[R]]
+    report: Callable[[R], Report[R]]  # result -> `Report`
+    # options -> files that the study reads, for the report's origin; by default the robot ETS-VII
     inputs: Callable[[argparse.Namespace], Sequence[Path]] = lambda options: [MODELS / "ets7.urdf"]
 
     def main(self, arguments: Sequence[str] | None = None) -> None:

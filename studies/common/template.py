@@ -24,24 +24,14 @@ __all__ += ["write_study", "write_table"]
 
 @dataclass(frozen=True)
 class Summary:
-    """What a reader of the first page alone should know.
+    """What a reader of the first page alone should know."""
 
-    Attributes
-    ----------
-    question, answer : str
-        One sentence each.
-    goals : tuple of Goal
-    valid : str
-        Conditions under which the answer holds.
-    full : bool
-        Whether the study was run in full.
-    """
-
+    # one sentence each
     question: str
     answer: str
     goals: tuple[Goal, ...]
-    valid: str
-    full: bool
+    valid: str  # conditions under which the answer holds
+    full: bool  # whether the study was run in full
 
 
 def add_first_page(document: Document, summary: Summary, figure: Figure | None = None, caption: str = "") -> None:

@@ -20,14 +20,11 @@ from studies.ets7_drift.world import ATTITUDE_SIGMA, World, model_of
 
 __all__ = ["CAUSES", "Amplitude", "Attitude", "Case", "Step", "analyse"]
 
+# causes that act in the truth and that the simulation lacks
 CAUSES = ("initial-rate", "gravity-gradient", "wheel-momentum")
-"""Causes that act in the truth and that the simulation lacks."""
 
-DRAWS = 200
-"""Number of draws for the band about the predicted attitude."""
-
-MOST = 3
-"""Largest number of causes of a set that is shown."""
+DRAWS = 200  # number of draws for the band about the predicted attitude
+MOST = 3  # largest number of causes of a set that is shown
 
 
 @dataclass(frozen=True)
@@ -40,18 +37,12 @@ class Step:
 
 @dataclass(frozen=True)
 class Amplitude:
-    """A true amplitude, or another quantity, beside its estimate.
+    """A true amplitude, or another quantity, beside its estimate."""
 
-    Attributes
-    ----------
-    name, unit : str
-        Name and unit of the quantity.
-    truth, mean, sd : float
-        True value, posterior mean and standard deviation, in the unit.
-    """
-
+    # name and unit of the quantity
     name: str
     unit: str
+    # true value, posterior mean and standard deviation, in the unit
     truth: float
     mean: float
     sd: float
@@ -64,62 +55,32 @@ class Amplitude:
 
 @dataclass(frozen=True)
 class Attitude:
-    """Attitude of the base in one recording, Euler angles x, y, z since its start.
+    """Attitude of the base in one recording, Euler angles x, y, z since its start."""
 
-    Attributes
-    ----------
-    time : (T,) array
-        Sample times [s].
-    measured : (T, 3) array
-        Measured angles [degrees].
-    plain : (T, 3) array
-        Angles simulated by the present model as it stands [degrees].
-    fitted : (T, 3) array
-        Angles simulated by the present model after its base was fitted to the rates [degrees].
-    extended : (T, 3) array
-        Angles simulated by the extended model [degrees]; the fitted present model where nothing is named.
-    missed : (T, 3) array
-        Rotation from the measured attitude to the extended model's, about base axes [degrees].
-    sd : (T, 3) array
-        Predicted standard deviation of ``missed``: from what is not known of the model and the attitude's noise.
-    errors : dict of str to float
-        Root mean square angle between measured and simulated attitude [degrees], by the name of the simulation.
-    """
-
-    time: Floats
-    measured: Floats
-    plain: Floats
-    fitted: Floats
+    time: Floats  # (T,): sample times [s]
+    measured: Floats  # (T, 3): measured angles [degrees]
+    plain: Floats  # (T, 3): angles simulated by the present model as it stands [degrees]
+    fitted: Floats  # (T, 3): angles simulated by the present model after its base was fitted to the rates [degrees]
+    # (T, 3): angles simulated by the extended model [degrees]; the fitted present model where nothing is named
     extended: Floats
-    missed: Floats
+    missed: Floats  # (T, 3): rotation from the measured attitude to the extended model's, about base axes [degrees]
+    # (T, 3): predicted standard deviation of ``missed``: from what is not known of the model and the attitude's noise
     sd: Floats
+    # root mean square angle between measured and simulated attitude [degrees], by the name of the simulation
     errors: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Case:
-    """The world and its diagnosis.
+    """The world and its diagnosis."""
 
-    Attributes
-    ----------
-    world : World
-        What truly happens.
-    diagnosis : Diagnosis
-        Diagnosis of the rates.
-    steps : tuple of Step
-        The present model, then the most probable sets of one, two and three causes, without anything unknown; where
-        causes are named, the most probable sets of these.
-    amplitudes : tuple of Amplitude
-        Amplitudes of the named causes that have any.
-    attitudes : tuple of Attitude
-        Attitude in every recording.
-    """
-
-    world: World
-    diagnosis: Diagnosis
+    world: World  # what truly happens
+    diagnosis: Diagnosis  # diagnosis of the rates
+    # the present model, then the most probable sets of one, two and three causes, without anything unknown; where
+    # causes are named, the most probable sets of these
     steps: tuple[Step, ...]
-    amplitudes: tuple[Amplitude, ...]
-    attitudes: tuple[Attitude, ...]
+    amplitudes: tuple[Amplitude, ...]  # amplitudes of the named causes that have any
+    attitudes: tuple[Attitude, ...]  # attitude in every recording
 
     @property
     def right(self) -> bool:

@@ -50,17 +50,12 @@ from studies.ets7_drift.world import (
 
 __all__ = ["attitude_figure", "goals_of", "write_report"]
 
+# factor by which the predicted attitude should be nearer to the measured one than the present simulation
 BETTER = 100.0
-"""Factor by which the predicted attitude should be nearer to the measured one than the present simulation."""
 
-FAR = 3.0
-"""Errors of one number that should not be exceeded [standard deviations]."""
-
-REACH = 1.96
-"""Half-width of a 95 % band [standard deviations]."""
-
-NOISE = float(np.degrees(np.sqrt(3.0) * ATTITUDE_SIGMA))
-"""Expected size of the attitude's noise [degrees]."""
+FAR = 3.0  # errors of one number that should not be exceeded [standard deviations]
+REACH = 1.96  # half-width of a 95 % band [standard deviations]
+NOISE = float(np.degrees(np.sqrt(3.0) * ATTITUDE_SIGMA))  # expected size of the attitude's noise [degrees]
 
 
 def write_report(cases: Mapping[str, Case], output: Path, *, full: bool, origin: str | None = None) -> None:
@@ -165,18 +160,18 @@ def _setup(case: Case) -> Setup:
     return Setup(
         robot=f"ETS-VII as shipped with this package, on a circular orbit of {RADIUS / 1e3:g} km, without attitude "
         "control. An independent simulator (MuJoCo) makes the recordings.",
-        manoeuvre="Joints 2 to 4 move by 0.264, −0.321 and 0.057 rad out and back, as in flight, over "
-        f"{ramps}; its linear ramps are replaced by quintic ones. The tip moves with up to {1e3 * fastest:.0f} mm/s, "
-        f"where the flight's rule is {1e3 * TIP_SPEED:.0f} mm/s.",
+        manoeuvre=f"Joints 2 to 4 move by 0.264, −0.321 and 0.057 rad out and back, as in flight, over {ramps}; its "
+        f"linear ramps are replaced by quintic ones. The tip moves with up to {1e3 * fastest:.0f} mm/s, where the "
+        f"flight's rule is {1e3 * TIP_SPEED:.0f} mm/s.",
         sensors=f"Every {INTERVAL:g} s, noise per sample: rates {format_number(RATE_SIGMA)} rad/s (the paper's star "
         f"sensor: 2 arcsec), joints {format_number(ENCODER_SIGMA)} rad. The attitude, {format_number(ATTITUDE_SIGMA)} "
         "rad, is kept for comparison alone, but for the exact one at the start.",
         known="Orbit, links and joint motion. The present simulation starts at rest and has no effect.",
-        unknown=f"Base body, with a mass known to {' or '.join(KNOWN)}, of which the true base is a draw; "
-        f"hidden: gravity gradient, momentum {format_vector(MOMENTUM)} N m s left in the wheels, and initial rates of "
+        unknown=f"Base body, with a mass known to {' or '.join(KNOWN)}, of which the true base is a draw; hidden: "
+        f"gravity gradient, momentum {format_vector(MOMENTUM)} N m s left in the wheels, and initial rates of "
         f"{format_number(RATE)} rad/s per axis (assumed, as no values are public).",
-        replicates=f"{len(case.world.manoeuvres)} recordings of {DURATION:g} s, attitudes and places on orbit drawn "
-        "at random, one base. A single world: rates of right verdicts are in the report on blind injections.",
+        replicates=f"{len(case.world.manoeuvres)} recordings of {DURATION:g} s, attitudes and places on orbit drawn at "
+        "random, one base. A single world: rates of right verdicts are in the report on blind injections.",
     )
 
 

@@ -15,52 +15,33 @@ from studies.truth.mujoco import Body, nearby
 
 __all__ = ["DURATION", "KNOWN", "MOTION", "World", "draw_world", "model_of"]
 
-DURATION = 300.0
-"""Duration of a recording [s]; the attitude control is off throughout."""
+DURATION = 300.0  # duration of a recording [s]; the attitude control is off throughout
+INTERVAL = 1.0  # time between samples of all sensors [s]
 
-INTERVAL = 1.0
-"""Time between samples of all sensors [s]."""
-
+# manoeuvre of the flight from joints at zero, each of its linear ramps replaced by a smooth quintic
 MOTION = FlightManoeuvre(np.zeros(6), corner=None)
-"""Manoeuvre of the flight from joints at zero, each of its linear ramps replaced by a smooth quintic."""
 
-STEP = 0.25
-"""Integration step of MuJoCo [s]."""
+STEP = 0.25  # integration step of MuJoCo [s]
 
+# noise per sample of rates (two seconds of arc per second), attitude (twenty seconds of arc) and joints [rad/s, rad,
+# rad]
 RATE_SIGMA, ATTITUDE_SIGMA, ENCODER_SIGMA = 1e-5, 1e-4, 1e-5
-"""Noise per sample of rates (two seconds of arc per second), attitude (twenty seconds of arc) and joints [rad/s, rad,
-rad]."""
 
-MOMENTUM = (0.6, -0.4, 0.8)
-"""Momentum left in the reaction wheels [N m s]."""
+MOMENTUM = (0.6, -0.4, 0.8)  # momentum left in the reaction wheels [N m s]
+RATE = 3e-4  # standard deviation of the initial rates about each axis [rad/s]: a degree in a minute
 
-RATE = 3e-4
-"""Standard deviation of the initial rates about each axis [rad/s]: a degree in a minute."""
-
+# to what the base's mass is known -> relative width of the base's prior, of which the true base is a draw
 KNOWN = {"5 %": 0.025, "1 %": 0.005}
-"""To what the base's mass is known -> relative width of the base's prior, of which the true base is a draw."""
 
 
 @dataclass(frozen=True)
 class World:
-    """What truly happens in a set of recordings.
+    """What truly happens in a set of recordings."""
 
-    Attributes
-    ----------
-    momentum : (3,) array
-        Momentum of the wheels [N m s].
-    rates : (R, 3) array
-        Initial rates [rad/s].
-    base : (10,) array
-        Reported quantities of the true base body.
-    manoeuvres : tuple of Manoeuvre
-        Manoeuvres as recorded, with noise.
-    """
-
-    momentum: Floats
-    rates: Floats
-    base: Floats
-    manoeuvres: tuple[Manoeuvre, ...]
+    momentum: Floats  # (3,): momentum of the wheels [N m s]
+    rates: Floats  # (R, 3): initial rates [rad/s]
+    base: Floats  # (10,): reported quantities of the true base body
+    manoeuvres: tuple[Manoeuvre, ...]  # manoeuvres as recorded, with noise
 
 
 def draw_world(recordings: int, seed: int, spread: float, duration: float = DURATION) -> World:

@@ -35,39 +35,25 @@ from studies.ets7_limits.analysis import (
 
 __all__ = ["Result", "main", "run"]
 
+# numbers of repetitions at which the accuracy is drawn
 REPETITIONS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1e3, 3e3, 1e4, 1e5)
-"""Numbers of repetitions at which the accuracy is drawn."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """Content of the report.
+    """Content of the report."""
 
-    Attributes
-    ----------
-    motion : Motion
-        The designed manoeuvre.
-    answers : mapping
-        Answers by labels of rate and accelerometer, then by whether the arm and the bias are known.
-    after : mapping of str to Widths
-        Standard deviations from the ``designed`` manoeuvre and from that of the ``flight``.
-    repetitions : sequence of float
-        Numbers of repetitions of the curves.
-    curves : mapping
-        Largest relative standard deviations by manoeuvre and whether the arm is known.
-    difference : float
-        Largest relative difference of the standard deviations from those that `studies.excitation` states.
-    realised : tuple of (int, float, float)
-        Number of flights of the same manoeuvre in `studies.excitation`, and smallest and largest ratio of realised to
-        predicted errors.
-    """
-
-    motion: Motion
+    motion: Motion  # the designed manoeuvre
+    # answers by labels of rate and accelerometer, then by whether the arm and the bias are known
     answers: Mapping[tuple[str, str], Mapping[tuple[bool, bool], Answer]]
-    after: Mapping[str, Widths]
-    repetitions: Sequence[float]
+    after: Mapping[str, Widths]  # standard deviations from the ``designed`` manoeuvre and from that of the ``flight``
+    repetitions: Sequence[float]  # numbers of repetitions of the curves
+    # largest relative standard deviations by manoeuvre and whether the arm is known
     curves: Mapping[tuple[str, bool], Sequence[float]]
+    # largest relative difference of the standard deviations from those that `studies.excitation` states
     difference: float
+    # number of flights of the same manoeuvre in `studies.excitation`, and smallest and largest ratio of realised to
+    # predicted errors
     realised: tuple[int, float, float]
 
 

@@ -23,61 +23,37 @@ from studies.ets7_limits.information import LONGEST, Grade, ManoeuvreInformation
 __all__ = ["ACCELS", "DESIGN", "RATES", "USUAL", "Answer", "Widths", "answers", "designed_motion", "information_of"]
 __all__ += ["read_rows", "widths"]
 
+# noise of the rate sensors by label
 RATES: dict[str, Noise] = {
     "star sensor 2″": StarTracker(2.0),
     "10⁻⁵ rad/s": White(1e-5),
     "10⁻⁶ rad/s": White(1e-6),
 }
-"""Noise of the rate sensors by label."""
 
+# noise per sample of the accelerometers by label [m/s2]
 ACCELS = {"none": None, "10⁻⁴": 1e-4, "10⁻⁵": 1e-5, "10⁻⁷": 1e-7, "10⁻⁹": 1e-9}
-"""Noise per sample of the accelerometers by label [m/s2]."""
 
-USUAL = Grade(White(RATE), ACCEL)
-"""Sensors of the mission, for which the manoeuvre was designed."""
-
-DESIGN = "d-optimal"
-"""Manoeuvre of `studies.excitation` that is taken."""
+USUAL = Grade(White(RATE), ACCEL)  # sensors of the mission, for which the manoeuvre was designed
+DESIGN = "d-optimal"  # manoeuvre of `studies.excitation` that is taken
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Time that an accuracy takes with some sensors.
+    """Time that an accuracy takes with some sensors."""
 
-    Attributes
-    ----------
-    once : float
-        Largest relative standard deviation of mass and moments of inertia after one manoeuvre.
-    repetitions : float
-        Number of repetitions until 1 %; infinite where the longest time is not enough.
-    floor : float
-        Largest relative standard deviation after the longest time.
-    floored : bool
-        Whether no time is enough.
-    """
-
-    once: float
-    repetitions: float
-    floor: float
-    floored: bool
+    once: float  # largest relative standard deviation of mass and moments of inertia after one manoeuvre
+    repetitions: float  # number of repetitions until 1 %; infinite where the longest time is not enough
+    floor: float  # largest relative standard deviation after the longest time
+    floored: bool  # whether no time is enough
 
 
 @dataclass(frozen=True)
 class Widths:
-    """Standard deviations of the base's ten quantities from one manoeuvre with the mission's sensors.
+    """Standard deviations of the base's ten quantities from one manoeuvre with the mission's sensors."""
 
-    Attributes
-    ----------
-    truth : (10,) array
-        True quantities.
-    prior : (10,) array
-        Standard deviations before the manoeuvre.
-    exact, uncertain : (10,) array
-        Standard deviations after it with the arm known exactly, and with the arm known to 5 %.
-    """
-
-    truth: Floats
-    prior: Floats
+    truth: Floats  # (10,): true quantities
+    prior: Floats  # (10,): standard deviations before the manoeuvre
+    # (10,): standard deviations after it with the arm known exactly, and with the arm known to 5 %
     exact: Floats
     uncertain: Floats
 

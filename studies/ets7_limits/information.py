@@ -24,49 +24,27 @@ from studies.common.quantities import JUDGED
 
 __all__ = ["LONGEST", "Grade", "ManoeuvreInformation", "Repeated", "wide_posterior"]
 
-ABSENT = 1e3
-"""Noise that stands for an accelerometer that is not there [m/s2]."""
-
-LONGEST = 1e6
-"""Largest number of repetitions, which take years of moving without a pause."""
-
-TARGET = 0.01
-"""Relative standard deviation to reach."""
+ABSENT = 1e3  # noise that stands for an accelerometer that is not there [m/s2]
+LONGEST = 1e6  # largest number of repetitions, which take years of moving without a pause
+TARGET = 0.01  # relative standard deviation to reach
 
 
 @dataclass(frozen=True)
 class Grade:
-    """Grade of the sensors.
+    """Grade of the sensors."""
 
-    Parameters
-    ----------
-    rate : Noise
-        Noise of the rate sensor.
-    accel : float or None
-        Noise per sample of the accelerometer [m/s2]; None where there is none.
-    bias_known : bool
-        Whether the accelerometer's bias is known exactly.
-    """
-
-    rate: Noise
-    accel: float | None
-    bias_known: bool = False
+    rate: Noise  # noise of the rate sensor
+    accel: float | None  # noise per sample of the accelerometer [m/s2]; None where there is none
+    bias_known: bool = False  # whether the accelerometer's bias is known exactly
 
 
 @dataclass(frozen=True)
 class Repeated:
-    """Information of n repetitions of a manoeuvre.
+    """Information of n repetitions of a manoeuvre."""
 
-    Attributes
-    ----------
-    prior : Knowledge
-        Knowledge of the base's quantities before any manoeuvre, by the c unknowns that all repetitions share.
-    rows : (c, c) array
-        Rows equivalent to the whitened Jacobian of one repetition, its initial rate marginalised.
-    """
-
+    # knowledge of the base's quantities before any manoeuvre, by the c unknowns that all repetitions share
     prior: Knowledge
-    rows: Floats
+    rows: Floats  # (c, c): rows equivalent to the whitened Jacobian of one repetition, its initial rate marginalised
 
     def sd(self, repetitions: float) -> Floats:
         """Return the posterior standard deviations of the base's ten quantities, in their units."""
@@ -97,15 +75,9 @@ class Repeated:
 
 @dataclass
 class ManoeuvreInformation:
-    """Information of a manoeuvre for any sensors.
+    """Information of a manoeuvre for any sensors."""
 
-    Attributes
-    ----------
-    posterior : Posterior
-        Posterior with everything unknown that a question may take as known; see `wide_posterior`.
-    """
-
-    posterior: Posterior
+    posterior: Posterior  # posterior with everything unknown that a question may take as known; see `wide_posterior`
     _kept: dict[tuple[Noise, float], Floats] = field(default_factory=dict)
 
     def repeated(self, grade: Grade, arm_known: bool) -> Repeated:

@@ -44,14 +44,12 @@ from studies.ets7_limits.information import LONGEST
 
 __all__ = ["goals", "time_needed", "write_report"]
 
-YEAR = 3.156e7
-"""Length of a year [s]."""
+YEAR = 3.156e7  # length of a year [s]
 
+# largest relative sd that is wanted, and largest differences from another report and from realised errors
 WANTED, ALIKE, WITHIN = 0.01, 0.01, 0.05
-"""Largest relative sd that is wanted, and largest differences from another report and from realised errors."""
 
-USUAL = ("10⁻⁵ rad/s", "10⁻⁵")
-"""Labels of the mission's sensors."""
+USUAL = ("10⁻⁵ rad/s", "10⁻⁵")  # labels of the mission's sensors
 
 
 def time_needed(answer: Answer, duration: float) -> str:
@@ -78,8 +76,8 @@ def goals(result: Result) -> tuple[Goal, ...]:
         rows.append(Goal(text, reached, Verdict.of(once <= WANTED)))
     rows.append(
         Goal(
-            f"Standard deviations agree within {format_percent(ALIKE)} with those of the report on "
-            f"excitation, same manoeuvre",
+            f"Standard deviations agree within {format_percent(ALIKE)} with those of the report on excitation, same "
+            "manoeuvre",
             f"{format_percent(result.difference, 2)} at most, both rows of the arm",
             Verdict.of(result.difference <= ALIKE),
         )
@@ -90,8 +88,8 @@ def goals(result: Result) -> tuple[Goal, ...]:
     verdict = Verdict.FAIL if away > WITHIN + 2.0 * error else Verdict.OPEN if away > WITHIN else Verdict.PASS
     rows.append(
         Goal(
-            f"Realised errors of this manoeuvre within {format_percent(WITHIN)} of predicted, mission's "
-            f"sensors, arm 5 %",
+            f"Realised errors of this manoeuvre within {format_percent(WITHIN)} of predicted, mission's sensors, arm 5 "
+            "%",
             f"{least:.3f} to {most:.3f} by parameter over {count} flights in MuJoCo, each ± {error:.3f} (report on "
             "excitation)",
             verdict,
@@ -105,22 +103,16 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
     """Write the report as PDF, and its tables beside it."""
     document = Document("What ETS-VII could have identified", "Within 50 mm/s and 5 degrees per second at the tip")
     summary = Summary(
-        question=(
-            "How long must the arm move within the flight's rule until mass and moments of inertia of the base are "
-            "known to 1 %, and with which sensors?"
-        ),
-        answer=(
-            "With the arm known to 5 % of each link's mass no time and no rate sensor or accelerometer is enough: at "
-            f"least {format_percent(_least(result), 2)} are left, since motion alone takes the scale from the arm's "
-            "mass, which measured joint torques or a known thrust would give. With the arm known exactly one manoeuvre "
-            f"of {mission.DURATION:g} s leaves {format_percent(result.after['designed'].worst(True), 2)}, with sensors "
-            "of 10⁻⁵ rad/s and 10⁻⁵ m/s²."
-        ),
+        question="How long must the arm move within the flight's rule until mass and moments of inertia of the base "
+        "are known to 1 %, and with which sensors?",
+        answer="With the arm known to 5 % of each link's mass no time and no rate sensor or accelerometer is enough: "
+        f"at least {format_percent(_least(result), 2)} are left, since motion alone takes the scale from the arm's "
+        "mass, which measured joint torques or a known thrust would give. With the arm known exactly one manoeuvre of "
+        f"{mission.DURATION:g} s leaves {format_percent(result.after['designed'].worst(True), 2)}, with sensors of "
+        "10⁻⁵ rad/s and 10⁻⁵ m/s².",
         goals=goals(result),
-        valid=(
-            "wheels, fuel, paddles and thrusters do not act, attitude control is off, the initial attitude is known "
-            "and noise white. Every repetition starts at a new unknown rate; bias and arm stay the same."
-        ),
+        valid="wheels, fuel, paddles and thrusters do not act, attitude control is off, the initial attitude is known "
+        "and noise white. Every repetition starts at a new unknown rate; bias and arm stay the same.",
         full=True,
     )
     add_first_page(
@@ -151,21 +143,15 @@ def _least(result: Result) -> float:
 def _setup() -> Setup:
     (begin, end), (again, _) = RAMPS
     return Setup(
-        robot=(
-            "ETS-VII with the published base and nominal links. The accelerometer is at "
-            f"{format_vector(ACCELEROMETER)} m, which is not published."
-        ),
-        manoeuvre=(
-            f"Two of {mission.DURATION:g} s from the posture with the wrist extended: the d-optimal one of the report "
-            "on excitation, at the speed that the rule allows, and the flight's own, which turns joints 2 to 4 by "
-            f"{', '.join(format_number(turn) for turn in EXCURSION[1:4])} rad out and back within {end - begin:g} "
-            f"s each, {again - end:g} s apart, with corners rounded over {CORNER:g} s."
-        ),
-        sensors=(
-            f"Every {INTERVAL:g} s rates and accelerations with the noise in the table, encoders with "
-            f"{format_number(ENCODER)} rad. The mission's are {format_number(RATE)} rad/s and {format_number(ACCEL)} "
-            "m/s². The star sensor's 2 seconds of arc are differenced and taken as white."
-        ),
+        robot="ETS-VII with the published base and nominal links. The accelerometer is at "
+        f"{format_vector(ACCELEROMETER)} m, which is not published.",
+        manoeuvre=f"Two of {mission.DURATION:g} s from the posture with the wrist extended: the d-optimal one of the "
+        "report on excitation, at the speed that the rule allows, and the flight's own, which turns joints 2 to 4 by "
+        f"{', '.join(format_number(turn) for turn in EXCURSION[1:4])} rad out and back within {end - begin:g} s each, "
+        f"{again - end:g} s apart, with corners rounded over {CORNER:g} s.",
+        sensors=f"Every {INTERVAL:g} s rates and accelerations with the noise in the table, encoders with "
+        f"{format_number(ENCODER)} rad. The mission's are {format_number(RATE)} rad/s and {format_number(ACCEL)} m/s². "
+        "The star sensor's 2 seconds of arc are differenced and taken as white.",
         known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link, or exactly.",
         unknown=f"The base, the rate at the start, and the accelerometer's bias within {format_number(BIAS)} m/s².",
         replicates="Standard deviations to first order; those above some 30 % are rough.",
@@ -242,8 +228,8 @@ def _statements(result: Result) -> list[Statement]:
         Statement(
             "The base's mass is identified to 0.01 % with a given arm, which CAD data know to 5 % (1 and 4.1).",
             Finding.REFUTED,
-            f"5 % of each link's mass leave {format_percent(_least(result), 2)} of the base's, whatever "
-            "the rate sensor and the accelerometer.",
+            f"5 % of each link's mass leave {format_percent(_least(result), 2)} of the base's, whatever the rate "
+            "sensor and the accelerometer.",
         ),
     ]
 

@@ -29,39 +29,20 @@ from studies.excitation.saturation import CROWDED, Crowd, Searches, crowd_of, se
 
 __all__ = ["Result", "main", "run"]
 
-FULL, QUICK = THOROUGH, Search(starts=3, iterations=60)
-"""Effort of each search of a full and of a quick run."""
+FULL, QUICK = THOROUGH, Search(starts=3, iterations=60)  # effort of each search of a full and of a quick run
 
 
 @dataclass(frozen=True)
 class Result:
-    """Outcome of the study.
-
-    Attributes
-    ----------
-    contest : Contest
-    realised : mapping of str to Realised
-        Designs that were flown, by name.
-    cloud : Cloud
-        Random manoeuvres, splines of all joints.
-    crowds : mapping of str to Crowd
-        Searches from many starts by criterion, if there were any.
-    searches : Searches or None
-        Repeated thorough searches by d-optimality, if there were any.
-    rivals : mapping of str to Rivals
-        A search and the best of many descents on other robots, if there were any.
-    search : Search
-        Effort of each other search.
-    full : bool
-    """
+    """Outcome of the study."""
 
     contest: Contest
-    realised: Mapping[str, Realised]
-    cloud: Cloud
-    crowds: Mapping[str, Crowd]
-    searches: Searches | None
-    rivals: Mapping[str, Rivals]
-    search: Search
+    realised: Mapping[str, Realised]  # designs that were flown, by name
+    cloud: Cloud  # random manoeuvres, splines of all joints
+    crowds: Mapping[str, Crowd]  # searches from many starts by criterion, if there were any
+    searches: Searches | None  # repeated thorough searches by d-optimality, if there were any
+    rivals: Mapping[str, Rivals]  # A search and the best of many descents on other robots, if there were any
+    search: Search  # effort of each other search
     full: bool
 
 

@@ -15,20 +15,13 @@ __all__ = ["Cloud", "random_cloud"]
 
 @dataclass(frozen=True)
 class Cloud:
-    """Random manoeuvres of one family within limits.
+    """Random manoeuvres of one family within limits."""
 
-    Attributes
-    ----------
-    printed, intended, motion : (n,) arrays
-        Criterion (26) as printed, as intended, and the sum of the largest squared excursions alone.
-    information : (n,) array
-        Minus half the log-determinant of the posterior covariance of the base's coordinates.
-    """
-
+    # (n,): criterion (26) as printed, as intended, and the sum of the largest squared excursions alone
     printed: Floats
     intended: Floats
     motion: Floats
-    information: Floats
+    information: Floats  # (n,): minus half the log-determinant of the posterior covariance of the base's coordinates
 
     def correlation(self, values: Floats) -> tuple[float, float]:
         """Return the rank correlation with the information, and its standard error."""

@@ -33,41 +33,29 @@ from bayesid.design import (
 from bayesid.design.designed import sample_times
 from bayesid.recording.joint_motion import Motion
 from studies.base_body import paper
-from studies.base_body.setting import POOR
+from studies.base_body.analysis import POOR
 from studies.common import mission
 from studies.common.ets7 import INTERVAL
 from studies.common.quantities import JUDGED
 
 __all__ = ["Contest", "compete", "contest_problem", "paper_problem", "shrunk", "sparse"]
 
+# criteria of a quick run: the paper's, the one usual for arms on the ground, and the posterior's volume
 FEW: tuple[Criterion, ...] = (Paper26(), Paper26Intended(), ConditionNumber(), DOptimal())
-"""Criteria of a quick run: the paper's, the one usual for arms on the ground, and the posterior's volume."""
 
-ALL: tuple[Criterion, ...] = (*FEW, AOptimal(), EOptimal(), InformationGain(draws=2))
-"""Criteria of a full run."""
+ALL: tuple[Criterion, ...] = (*FEW, AOptimal(), EOptimal(), InformationGain(draws=2))  # criteria of a full run
 
 
 @dataclass(frozen=True)
 class Contest:
-    """Manoeuvres within the rule of the flight.
+    """Manoeuvres within the rule of the flight."""
 
-    Attributes
-    ----------
-    designs : mapping of str to Design
-        Designed manoeuvres by criterion, splines of all joints, with the arm known to 5 %.
-    predicted : mapping of str to mapping of str to Predicted
-        Predicted posteriors of all manoeuvres by what is known of the arm; beside the designs these are ``printed``
-        and ``poor``, the paper's manoeuvre and its poor neighbour, made smaller until they keep the rule.
-    shrink : mapping of str to float
-        Factors by which these two were made smaller.
-    motions : mapping of str to Motion
-        Motions of all manoeuvres.
-    """
-
-    designs: Mapping[str, Design]
+    designs: Mapping[str, Design]  # designed manoeuvres by criterion, splines of all joints, with the arm known to 5 %
+    # predicted posteriors of all manoeuvres by what is known of the arm; beside the designs these are ``printed`` and
+    # ``poor``, the paper's manoeuvre and its poor neighbour, made smaller until they keep the rule
     predicted: Mapping[str, Mapping[str, Predicted]]
-    shrink: Mapping[str, float]
-    motions: Mapping[str, Motion]
+    shrink: Mapping[str, float]  # factors by which these two were made smaller
+    motions: Mapping[str, Motion]  # motions of all manoeuvres
 
     def factor(self, name: str, over: str, row: str) -> float:
         """Return how many times smaller one manoeuvre's geometric-mean sd is than that of another."""

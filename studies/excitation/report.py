@@ -35,6 +35,7 @@ from studies.excitation.saturation import Crowd
 
 __all__ = ["goals", "write_report"]
 
+# titles of the manoeuvres
 TITLES = {
     "printed": "the paper's optimum, as printed",
     "poor": "its poor neighbour",
@@ -46,23 +47,19 @@ TITLES = {
     "e-optimal": "e-optimal",
     "information-gain": "information gain",
 }
-"""Titles of the manoeuvres."""
 
-DRAWN = ("printed", "paper-26", "condition-number", "d-optimal")
-"""Manoeuvres that are drawn."""
+DRAWN = ("printed", "paper-26", "condition-number", "d-optimal")  # manoeuvres that are drawn
+HEADLINE, IDEAL = mission.ROWS  # what is known of the arm: in the headline, and in the idealised row
 
-HEADLINE, IDEAL = mission.ROWS
-"""What is known of the arm: in the headline, and in the idealised row."""
-
+# factor over the condition number that is wanted, and largest deviation of realised from predicted errors
 WANTED, WITHIN = 1.3, 0.05
-"""Factor over the condition number that is wanted, and largest deviation of realised from predicted errors."""
 
+# number of starts that is wanted, that of a design by default, the difference per parameter that may remain between
+# their best manoeuvres, and the number of the base's parameters
 STARTS, USUAL, ALIKE, PARAMETERS = 100, Search().starts, 0.02, 10
-"""Number of starts that is wanted, that of a design by default, the difference per parameter that may remain between
-their best manoeuvres, and the number of the base's parameters."""
 
+# number of followed searches that are to reach the best known, and of robots on which they are wanted
 SEVERAL, ROBOTS = 3, 3
-"""Number of followed searches that are to reach the best known, and of robots on which they are wanted."""
 
 
 def goals(result: Result) -> tuple[Goal, ...]:
@@ -177,16 +174,12 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
     factors = {row: contest.factor("d-optimal", "condition-number", row) for row in mission.ROWS}
     summary = Summary(
         question="Which manoeuvre of ETS-VII, within the rule of its flight, tells most about its base?",
-        answer=(
-            "The manoeuvre with the smallest posterior volume (d-optimal) leaves standard deviations that are "
-            f"{factors[HEADLINE]:.2f} times smaller in the geometric mean than the best condition number's with the "
-            f"{HEADLINE}, and {factors[IDEAL]:.2f} times with the {IDEAL}; {_starts(result)}."
-        ),
+        answer="The manoeuvre with the smallest posterior volume (d-optimal) leaves standard deviations that are "
+        f"{factors[HEADLINE]:.2f} times smaller in the geometric mean than the best condition number's with the "
+        f"{HEADLINE}, and {factors[IDEAL]:.2f} times with the {IDEAL}; {_starts(result)}.",
         goals=reached,
-        valid=(
-            f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and keep 50 "
-            "mm/s and 5 degrees per second at the tip; the base rests at first and only the gravity gradient acts."
-        ),
+        valid=f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and keep 50 "
+        "mm/s and 5 degrees per second at the tip; the base rests at first and only the gravity gradient acts.",
         full=result.full,
     )
     add_first_page(
@@ -209,28 +202,17 @@ def _setup(result: Result) -> Setup:
     shrink = result.contest.shrink
     return Setup(
         robot=f"ETS-VII with the published base, nominal links, joints within ±{mission.REACH:g} rad.",
-        manoeuvre=(
-            f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight's rule allows. "
-            f"The paper's optimum had to be made smaller, to {format_percent(shrink['printed'], 2)} of its "
-            f"amplitudes, and its poor "
-            f"neighbour to {format_percent(shrink['poor'], 2)}."
-        ),
-        sensors=(
-            f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with {format_number(ACCEL)} "
-            f"m/s² and encoders with {format_number(ENCODER)} rad of white noise; the encoders' noise is part of every "
-            "criterion."
-        ),
+        manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight's rule "
+        f"allows. The paper's optimum had to be made smaller, to {format_percent(shrink['printed'], 2)} of its "
+        f"amplitudes, and its poor neighbour to {format_percent(shrink['poor'], 2)}.",
+        sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
+        f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; the encoders' "
+        "noise is part of every criterion.",
         known="The gravity gradient, the attitude at the start, and the arm to 5 % of the mass of each link.",
-        unknown=(
-            "The base (mass known to a factor of e²), the rate at the start, the accelerometer's bias within "
-            f"{format_number(BIAS)} m/s², and the links, which are marginalised."
-        ),
-        replicates=(
-            f"{result.search.starts} random starts and {result.search.exchanges} exchanges per criterion"
-            f"{_crowds(result)}; "
-            f"{_flights(result)}, "
-            "each with an arm, a bias and noise of its own."
-        ),
+        unknown="The base (mass known to a factor of e²), the rate at the start, the accelerometer's bias within "
+        f"{format_number(BIAS)} m/s², and the links, which are marginalised.",
+        replicates=f"{result.search.starts} random starts and {result.search.exchanges} exchanges per "
+        f"criterion{_crowds(result)}; {_flights(result)}, each with an arm, a bias and noise of its own.",
     )
 
 
@@ -317,10 +299,10 @@ def _calibration(document: Document, result: Result) -> None:
         document,
         ["manoeuvre", "flights", "error", "beyond", "last step [sd]"],
         [[cell or "none" for cell in row] for row in rows],
-        "Flights in MuJoCo: parameters whose realised error is not within "
-        f"{format_percent(WITHIN)} of the predicted sd. With a standard error of each ratio as stated some of ten lie "
-        "outside by chance alone. The modes were found by Gauss-Newton steps with the Jacobian of the plan; last step: "
-        "largest change of a coordinate by the last of them.",
+        f"Flights in MuJoCo: parameters whose realised error is not within {format_percent(WITHIN)} of the predicted "
+        "sd. With a standard error of each ratio as stated some of ten lie outside by chance alone. The modes were "
+        "found by Gauss-Newton steps with the Jacobian of the plan; last step: largest change of a coordinate by the "
+        "last of them.",
     )
     document.figure(
         _realised_figure(result),
@@ -335,8 +317,8 @@ def _saturation(document: Document, result: Result) -> None:
         _crowd_figure(result),
         "What more starts are worth: cost of every first descent, the best first, and mean of the best of n of them "
         "with the middle 80 % (band). Left, (26) as printed over the best value; right, geometric-mean sd per "
-        "parameter over the best by d-optimality. "
-        f"The dotted line is {format_percent(ALIKE)}; the square is the best once it was followed to the end.",
+        f"parameter over the best by d-optimality. The dotted line is {format_percent(ALIKE)}; the square is the best "
+        "once it was followed to the end.",
     )
 
 

@@ -17,29 +17,20 @@ from studies.truth.bodies import SERVICER4
 
 __all__ = ["Rivals", "other_problem", "other_robots"]
 
+# robots by what they are called in the report
 ROBOTS: Mapping[str, Callable[[], Robot]] = {
     "the planar table": lambda: Robot.shipped("planar"),
     "a servicer of four joints": lambda: Robot.from_urdf(SERVICER4),
 }
-"""Robots by what they are called in the report."""
 
-POSTURE = (0.0, -0.6, 1.0, -0.4)
-"""Joint positions before and after every manoeuvre [rad], as many as there are joints."""
+POSTURE = (0.0, -0.6, 1.0, -0.4)  # joint positions before and after every manoeuvre [rad], as many as there are joints
 
 
 class Rivals(NamedTuple):
-    """Costs by d-optimality on one robot.
+    """Costs by d-optimality on one robot."""
 
-    Attributes
-    ----------
-    crowd : float
-        The best of many descents from random starts, the best few of them followed to the end.
-    search : float
-        Where a search from other starts ends.
-    """
-
-    crowd: float
-    search: float
+    crowd: float  # the best of many descents from random starts, the best few of them followed to the end
+    search: float  # where a search from other starts ends
 
 
 def other_problem(robot: Robot) -> Problem:

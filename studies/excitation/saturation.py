@@ -15,27 +15,17 @@ from bayesid.design import Criterion, DOptimal, Paper26, Problem, Search, Store,
 
 __all__ = ["CROWDED", "Crowd", "Searches", "crowd_of", "searches_of"]
 
+# criteria whose searches begin at many starts: the two whose ratio is a goal
 CROWDED: tuple[Criterion, ...] = (Paper26(), DOptimal())
-"""Criteria whose searches begin at many starts: the two whose ratio is a goal."""
 
 
 @dataclass(frozen=True)
 class Crowd:
-    """Descents by one criterion from N random starts.
+    """Descents by one criterion from N random starts."""
 
-    Attributes
-    ----------
-    best : (n,) array
-        Parameters of the best manoeuvre, once the best descents were followed to the end.
-    cost : float
-        Its cost.
-    costs : (N,) array
-        Costs at which the first descents ended, in the order of their starts.
-    """
-
-    best: Floats
-    cost: float
-    costs: Floats
+    best: Floats  # (n,): parameters of the best manoeuvre, once the best descents were followed to the end
+    cost: float  # its cost
+    costs: Floats  # (N,): costs at which the first descents ended, in the order of their starts
 
     def share_of_best(self, count: int) -> Floats:
         """Return for each descent, the best first, the probability that it is the best of ``count`` drawn of all."""
@@ -67,18 +57,10 @@ def crowd_of(
 
 
 class Searches(NamedTuple):
-    """Searches by one criterion that differ in their seeds alone.
+    """Searches by one criterion that differ in their seeds alone."""
 
-    Attributes
-    ----------
-    best : (n,) array
-        Parameters of the best manoeuvre.
-    costs : (N,) array
-        Cost of the manoeuvre that each search ends with.
-    """
-
-    best: Floats
-    costs: Floats
+    best: Floats  # (n,): parameters of the best manoeuvre
+    costs: Floats  # (N,): cost of the manoeuvre that each search ends with
 
 
 def searches_of(

@@ -46,23 +46,17 @@ from studies.load import paper
 __all__ = ["AT_MOST", "GOAL", "LIMITED", "LOAD", "SAFE", "SPREAD", "TRUTH_STEP", "Flight", "Iteration"]
 __all__ += ["excitation", "fly_again", "fly_loop", "iterate", "load_unknown", "ship"]
 
-LOAD, LINK = "load", "link6"
-"""Name of the load, and link that carries it."""
+LOAD, LINK = "load", "link6"  # name of the load, and link that carries it
 
+# rule of the flight, and a bound on the rotation of the base [rad], which depends on the load
 SAFE = replace(LIMITS, base_rotation=0.5)
-"""Rule of the flight, and a bound on the rotation of the base [rad], which depends on the load."""
 
-LIMITED = ("tip_speed", "tip_rate", "base_rotation")
-"""Names of the limits of `SAFE` that depend on the load."""
+LIMITED = ("tip_speed", "tip_rate", "base_rotation")  # names of the limits of `SAFE` that depend on the load
+SPREAD = 2.0  # relative width of the load's prior: a tenth to thirty times of the truth lies within one width
+GOAL, AT_MOST = 1e-3, 5  # relative precision to reach, and the largest number of manoeuvres
 
-SPREAD = 2.0
-"""Relative width of the load's prior: a tenth to thirty times of the truth lies within one width."""
-
-GOAL, AT_MOST = 1e-3, 5
-"""Relative precision to reach, and the largest number of manoeuvres."""
-
+# MuJoCo's step without noise [s]; with twice that its own error is up to 5e-6 of the load's quantities
 TRUTH_STEP = 0.25
-"""MuJoCo's step without noise [s]; with twice that its own error is up to 5e-6 of the load's quantities."""
 
 
 def ship(load: Floats = paper.GUESS, robot: Robot | None = None) -> Robot:
@@ -91,21 +85,11 @@ def excitation() -> PaperExcitation:
 
 @dataclass(frozen=True)
 class MuJoCoSpacecraft:
-    """ETS-VII with the true load in MuJoCo, at rest before every manoeuvre.
+    """ETS-VII with the true load in MuJoCo, at rest before every manoeuvre."""
 
-    Parameters
-    ----------
-    seed : int, optional
-        Seed of arm, bias and noise; the arm is nominal and there is no noise where left out.
-    arm_spread : float
-        Relative width of the distribution from which the true arm is drawn.
-    step : float
-        MuJoCo's integration step [s].
-    """
-
-    seed: int | None = None
-    arm_spread: float = 0.0
-    step: float = mission.TRUTH_STEP
+    seed: int | None = None  # seed of arm, bias and noise; the arm is nominal and there is no noise where left out
+    arm_spread: float = 0.0  # relative width of the distribution from which the true arm is drawn
+    step: float = mission.TRUTH_STEP  # MuJoCo's integration step [s]
 
     @cached_property
     def robot(self) -> Robot:
@@ -136,18 +120,10 @@ class MuJoCoSpacecraft:
 
 @dataclass(frozen=True)
 class Iteration:
-    """One plan, execution and identification without noise.
+    """One plan, execution and identification without noise."""
 
-    Attributes
-    ----------
-    parameters : (6,) array
-        Parameters q1 and q2 of the first three joints [rad].
-    estimate : (10,) array
-        Estimated quantities of the load, in the order of `paper.TRUTH`.
-    """
-
-    parameters: Floats
-    estimate: Floats
+    parameters: Floats  # (6,): parameters q1 and q2 of the first three joints [rad]
+    estimate: Floats  # (10,): estimated quantities of the load, in the order of `paper.TRUTH`
 
     @property
     def worst(self) -> float:
@@ -187,33 +163,16 @@ def iterate(*, seed: int, search: Search) -> list[Iteration]:
 
 @dataclass(frozen=True)
 class Flight:
-    """Manoeuvres that were flown one after the other, and what was known of the load after each.
+    """Manoeuvres that were flown one after the other, and what was known of the load after each."""
 
-    Attributes
-    ----------
-    status : str
-        Status with which the loop ended.
-    plans : list of dict
-        Entry of every step's plan in the loop's history.
-    bodies : list of BodyDraws
-        Posterior of the load after every manoeuvre.
-    chi2 : list of float
-        Chi-square per sample of every fit.
-    largest : list of dict
-        Largest values of the limited quantities in MuJoCo, by limit.
-    reviews : list of dict
-        Entry of every step's diagnosis in the loop's history; empty where the steps are not diagnosed.
-    samples : list of int
-        Number of samples of every fit.
-    """
-
-    status: str
-    plans: list[dict[str, Any]]
-    bodies: list[BodyDraws]
-    chi2: list[float]
-    largest: list[dict[str, float]]
+    status: str  # status with which the loop ended
+    plans: list[dict[str, Any]]  # entry of every step's plan in the loop's history
+    bodies: list[BodyDraws]  # posterior of the load after every manoeuvre
+    chi2: list[float]  # chi-square per sample of every fit
+    largest: list[dict[str, float]]  # largest values of the limited quantities in MuJoCo, by limit
+    # entry of every step's diagnosis in the loop's history; empty where the steps are not diagnosed
     reviews: list[dict[str, Any]] = field(default_factory=list)
-    samples: list[int] = field(default_factory=list)
+    samples: list[int] = field(default_factory=list)  # number of samples of every fit
 
     def error(self, step: int) -> Floats:
         """Return the posterior mean less the truth over `paper.SCALE`, shape (10,)."""

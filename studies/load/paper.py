@@ -11,21 +11,21 @@ from studies.common.quantities import inertia_matrix
 
 __all__ = ["GUESS", "RESULTS", "SCALE", "TRUTH", "Reading", "errors", "readings"]
 
+# true load: mass, centre of mass, inertia xx yy zz xy xz yz, in the order and units of
+# `bayesid.inference.body_quantities.BODY_QUANTITIES`
 TRUTH = np.array([370.0, 0.33, 0.50, 1.04, 700.0, 700.0, 700.0, 0.0, 0.0, 0.0])
-"""True load: mass, centre of mass, inertia xx yy zz xy xz yz, in the order and units of
-`bayesid.inference.body_quantities.BODY_QUANTITIES`."""
 
+# initial guess of the load, in the same order
 GUESS = np.array([10.0, 0.1, 0.1, 0.1, 10.0, 10.0, 10.0, 1e-4, 1e-4, 1e-4])
-"""Initial guess of the load, in the same order."""
 
+# results after the first and the second iteration, in the same order
 RESULTS = (
     np.array([377.90, 0.30, 0.51, 1.00, 721.6, 743.2, 710.9, 0.0, 0.0, 0.0]),
     np.array([370.12, 0.33, 0.50, 1.04, 700.3, 700.7, 700.2, 0.0, 0.0, 0.0]),
 )
-"""Results after the first and the second iteration, in the same order."""
 
+# scale of relative errors: the true values, and the true moments for the products of inertia, which are zero
 SCALE = np.where(TRUTH == 0.0, TRUTH[4], TRUTH)
-"""Scale of relative errors: the true values, and the true moments for the products of inertia, which are zero."""
 
 
 def errors(quantities: Floats) -> Floats:
@@ -35,18 +35,10 @@ def errors(quantities: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Reading:
-    """The printed inertia taken about one point.
+    """The printed inertia taken about one point."""
 
-    Attributes
-    ----------
-    about : str
-        Point that the inertia is taken about, in words.
-    moments : (3,) array
-        Principal moments about the centre of mass, ascending [kg m2].
-    """
-
-    about: str
-    moments: Floats
+    about: str  # point that the inertia is taken about, in words
+    moments: Floats  # (3,): principal moments about the centre of mass, ascending [kg m2]
 
     @property
     def physical(self) -> bool:

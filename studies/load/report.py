@@ -40,33 +40,23 @@ from studies.load.loops import (
 
 __all__ = ["STUDY", "Result", "run"]
 
-NOISE_FREE = 1e-6
-"""Relative error to reach without noise."""
+NOISE_FREE = 1e-6  # relative error to reach without noise
 
+# squared distance from the mean within which ten parameters lie with 99 %, in standard deviations
 REGION = float(chi2.ppf(0.99, 10))
-"""Squared distance from the mean within which ten parameters lie with 99 %, in standard deviations."""
 
-TITLES = {"loop": "arm known to 5 %", "exact": "arm known exactly"}
-"""What is known of the arm, the headline first."""
+TITLES = {"loop": "arm known to 5 %", "exact": "arm known exactly"}  # what is known of the arm, the headline first
 
+# titles of the limits
 LIMIT_TITLES = {"tip_speed": "tip speed", "tip_rate": "tip rate", "base_rotation": "base rotation"}
-"""Titles of the limits."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """Outcome of the study.
+    """Outcome of the study."""
 
-    Attributes
-    ----------
-    iterations : list of Iteration
-        The paper's two iterations without noise.
-    flights : dict of str to Flight
-        By the keys of `TITLES`: the safe loop, and its manoeuvres flown again with the arm known exactly.
-    full : bool
-    """
-
-    iterations: list[Iteration]
+    iterations: list[Iteration]  # the paper's two iterations without noise
+    # by the keys of `TITLES`: the safe loop, and its manoeuvres flown again with the arm known exactly
     flights: dict[str, Flight]
     full: bool
 

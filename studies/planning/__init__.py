@@ -26,28 +26,16 @@ from studies.planning.world import planners_model
 
 __all__ = ["Result", "main", "run"]
 
-SHIPS, FEW = 200, 20
-"""Number of drawn ships of each row in a full and in a quick run."""
+SHIPS, FEW = 200, 20  # number of drawn ships of each row in a full and in a quick run
 
 
 @dataclass(frozen=True)
 class Result:
-    """Outcome of the study.
+    """Outcome of the study."""
 
-    Attributes
-    ----------
-    rows : mapping of str to Row
-        Drawn ships by what is known of the arm, see `studies.common.mission.ROWS`.
-    example : tuple of Trip
-        Paths of one more ship by stage, arm as in the headline.
-    course : Flown
-        Course of the first path with the published ship in MuJoCo.
-    full : bool
-    """
-
-    rows: Mapping[str, Row]
-    example: tuple[Trip, ...]
-    course: Flown
+    rows: Mapping[str, Row]  # drawn ships by what is known of the arm, see `studies.common.mission.ROWS`
+    example: tuple[Trip, ...]  # paths of one more ship by stage, arm as in the headline
+    course: Flown  # course of the first path with the published ship in MuJoCo
     full: bool
 
 

@@ -19,21 +19,14 @@ from studies.planning.world import EXCURSION, FlownPose, Swing
 
 __all__ = ["Planner", "miss_of"]
 
-ARM = 2.0
-"""Length that makes a rotation error comparable with a position error [m/rad]."""
+ARM = 2.0  # length that makes a rotation error comparable with a position error [m/rad]
 
 
 @dataclass(frozen=True)
 class Planner:
-    """Planner with a model of the ship; what it knows is points of the bodies' coordinates in that model.
+    """Planner with a model of the ship; what it knows is points of the bodies' coordinates in that model."""
 
-    Parameters
-    ----------
-    model : Model
-        Model whose priors are what the planner knows at first.
-    """
-
-    model: Model
+    model: Model  # model whose priors are what the planner knows at first
 
     @cached_property
     def first(self) -> Swing:

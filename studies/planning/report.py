@@ -35,17 +35,13 @@ from studies.planning.world import EXCURSION, SPREAD
 
 __all__ = ["goals", "write_report"]
 
-HEADLINE = next(iter(mission.ROWS))
-"""What is known of the arm in the headline."""
+HEADLINE = next(iter(mission.ROWS))  # what is known of the arm in the headline
 
+# regions that are counted, by indices of body and kind; base and end-effector turn alike
 REGIONS = {(0, 0): "base's position", (1, 0): "end-effector's position", (1, 1): "rotation"}
-"""Regions that are counted, by indices of body and kind; base and end-effector turn alike."""
 
-RISK = 0.05
-"""Probability with which the counts of one stage are called wrong although all of its regions are right."""
-
-NARROW = 0.05
-"""Half width of an interval above which a count decides nothing."""
+RISK = 0.05  # probability with which the counts of one stage are called wrong although all of its regions are right
+NARROW = 0.05  # half width of an interval above which a count decides nothing
 
 
 def _verdict(shares: list[Share]) -> Verdict:
@@ -88,16 +84,13 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
     held = [own.share(stage, 1, 0) for stage in range(len(STAGES))]
     summary = Summary(
         question="How far from its target does a path planned in joint space end, before and after identification?",
-        answer=(
-            f"With the {HEADLINE} the end-effector misses its target by {_median(own, 0, 0)} mm and "
-            f"{_median(own, 0, 1)} degrees in the median before identification and by {_median(own, 1, 0)} mm and "
-            f"{_median(own, 1, 1)} degrees after one manoeuvre; the predicted 95 % region of its position holds it in "
-            f"{held[0]} and {held[1]} of the flights."
-        ),
+        answer=f"With the {HEADLINE} the end-effector misses its target by {_median(own, 0, 0)} mm and "
+        f"{_median(own, 0, 1)} degrees in the median before identification and by {_median(own, 1, 0)} mm and "
+        f"{_median(own, 1, 1)} degrees after one manoeuvre; the predicted 95 % region of its position holds it in "
+        f"{held[0]} and {held[1]} of the flights.",
         goals=goals(result),
-        valid=(
-            "the joints follow the plan exactly, nothing but the gravity gradient acts, and every path starts at rest."
-        ),
+        valid="the joints follow the plan exactly, nothing but the gravity gradient acts, and every path starts at "
+        "rest.",
         full=result.full,
     )
     add_first_page(
@@ -119,29 +112,20 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
 def _setup(result: Result) -> Setup:
     counts = ", ".join(f"{len(own.miss)} with the {row}" for row, own in result.rows.items())
     return Setup(
-        robot=(
-            f"ETS-VII, its base drawn within {format_percent(2.0 * SPREAD)} of its mass and its links within 5 %; "
-            f"joints within ±{mission.REACH:g} rad, wrist extended at the start."
-        ),
-        manoeuvre=(
-            f"Identifying: the d-optimal manoeuvre of the study of excitation, {mission.DURATION:g} s within 50 mm/s "
-            "and 5 degrees per second. Planned: quintics from rest to rest in the same time, with joint excursions of "
-            f"{format_vector(EXCURSION, 2)} rad at first, at {format_number(1e3 * result.course.largest('tip_speed'))} "
-            "mm/s at most."
-        ),
-        sensors=(
-            f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with {format_number(ACCEL)} "
-            f"m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant bias of the accelerometer."
-        ),
+        robot=f"ETS-VII, its base drawn within {format_percent(2.0 * SPREAD)} of its mass and its links within 5 %; "
+        f"joints within ±{mission.REACH:g} rad, wrist extended at the start.",
+        manoeuvre=f"Identifying: the d-optimal manoeuvre of the study of excitation, {mission.DURATION:g} s within 50 "
+        "mm/s and 5 degrees per second. Planned: quintics from rest to rest in the same time, with joint excursions of "
+        f"{format_vector(EXCURSION, 2)} rad at first, at {format_number(1e3 * result.course.largest('tip_speed'))} "
+        "mm/s at most.",
+        sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
+        f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant bias "
+        "of the accelerometer.",
         known="The orbit and its gravity gradient, the attitude at the start, and the ship as it was published.",
-        unknown=(
-            f"The base and the links within these widths, the rate at the start, the bias within {format_number(BIAS)} "
-            "m/s²."
-        ),
-        replicates=(
-            f"Drawn ships: {counts}, each with noise and bias of its own. Each prediction has {DRAWS} draws; "
-            "posteriors are normal in log-Cholesky coordinates about the mode."
-        ),
+        unknown="The base and the links within these widths, the rate at the start, the bias within "
+        f"{format_number(BIAS)} m/s².",
+        replicates=f"Drawn ships: {counts}, each with noise and bias of its own. Each prediction has {DRAWS} draws; "
+        "posteriors are normal in log-Cholesky coordinates about the mode.",
     )
 
 

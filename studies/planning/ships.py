@@ -26,17 +26,15 @@ from studies.planning.world import FlownPose, fly, planners_model, true_ship
 
 __all__ = ["BODIES", "KINDS", "STAGES", "Row", "Trip", "fitted", "row_of", "trip_of"]
 
-STAGES = ("published ship", "identified ship")
-"""What the planner takes the ship for, before and after identification."""
+STAGES = ("published ship", "identified ship")  # what the planner takes the ship for, before and after identification
 
+# what is predicted: poses of base and end-effector, each with a region of position and one of rotation
 BODIES, KINDS = ("base", "tip"), ("position", "rotation")
-"""What is predicted: poses of base and end-effector, each with a region of position and one of rotation."""
 
-DRAWS = 400
-"""Number of draws of each prediction."""
+DRAWS = 400  # number of draws of each prediction
 
+# largest number of Gauss-Newton steps, and change of every coordinate below which they end [prior deviations]
 STEPS, SMALL = 20, 1e-4
-"""Largest number of Gauss-Newton steps, and change of every coordinate below which they end [prior deviations]."""
 
 
 @dataclass(frozen=True)
@@ -49,19 +47,11 @@ class _Task:
 
 @dataclass(frozen=True)
 class Trip:
-    """A planned path: predicted final poses and flown ones, ``base`` and ``tip``, and the miss.
-
-    Attributes
-    ----------
-    predicted : mapping of str to Pose
-    flown : mapping of str to (position, attitude)
-    miss : (float, float)
-        Distance [mm] and angle [degrees] of the end-effector from its target.
-    """
+    """A planned path: predicted final poses and flown ones, ``base`` and ``tip``, and the miss."""
 
     predicted: Mapping[str, Pose]
     flown: Mapping[str, FlownPose]
-    miss: tuple[float, float]
+    miss: tuple[float, float]  # distance [mm] and angle [degrees] of the end-effector from its target
 
     def to_dict(self) -> dict[str, Any]:
         """Return what the store keeps: the miss, and by body whether the regions hold and how large they are."""
@@ -77,24 +67,13 @@ class Trip:
 
 @dataclass(frozen=True)
 class Row:
-    """Outcome over N drawn ships with one knowledge of the arm; stages are those of `STAGES`.
+    """Outcome over N drawn ships with one knowledge of the arm; stages are those of `STAGES`."""
 
-    Attributes
-    ----------
-    miss : (N, 2 stages, 2) array
-        Distance [mm] and angle [degrees] of the end-effector from its target.
-    held : (N, 2 stages, 2 bodies, 2 kinds) array of bool
-        Whether the 95 % regions held the flown poses.
-    size : (N, 2 stages, 2 bodies, 2 kinds) array
-        Longest semi-axes of these regions [mm, degrees].
-    distance : (N,) array
-        Squared distances of the true base from the identified one; chi-square with ten degrees of freedom if the
-        posterior is right.
-    """
-
-    miss: Floats
-    held: NDArray[np.bool_]
-    size: Floats
+    miss: Floats  # (N, 2 stages, 2): distance [mm] and angle [degrees] of the end-effector from its target
+    held: NDArray[np.bool_]  # (N, 2 stages, 2 bodies, 2 kinds): whether the 95 % regions held the flown poses
+    size: Floats  # (N, 2 stages, 2 bodies, 2 kinds): longest semi-axes of these regions [mm, degrees]
+    # (N,): squared distances of the true base from the identified one; chi-square with ten degrees of freedom if the
+    # posterior is right
     distance: Floats
 
     def share(self, stage: int, body: int, kind: int) -> Share:

@@ -18,31 +18,23 @@ from studies.truth.numerics import quintic_step
 
 __all__ = ["EXCURSION", "SPREAD", "FlownPose", "Swing", "fly", "planners_model", "true_ship"]
 
+# position (3,) [m] and quaternion x, y, z, w to orbit axes, counted in orbit axes from where the base started
 FlownPose = tuple[Floats, Floats]
-"""Position (3,) [m] and quaternion x, y, z, w to orbit axes, counted in orbit axes from where the base started."""
 
+# excursion of the joints in the first plan [rad], whose end is the target if the ship is as it was published
 EXCURSION = np.array([1.3, -1.5, 0.6, 0.5, -0.7, 0.6])
-"""Excursion of the joints in the first plan [rad], whose end is the target if the ship is as it was published."""
 
-SPREAD = 0.15
-"""Relative width of the planner's prior of the base: its mass is then known to 30 %."""
+SPREAD = 0.15  # relative width of the planner's prior of the base: its mass is then known to 30 %
 
 
 @dataclass(frozen=True)
 class Swing:
-    """A path in joint space on which each joint goes from rest to rest on a quintic.
+    """A path in joint space on which each joint goes from rest to rest on a quintic."""
 
-    Parameters
-    ----------
-    start, goal : (6,) arrays
-        Joint positions before and after [rad].
-    duration : float
-        Duration of the path [s].
-    """
-
+    # (6,): joint positions before and after [rad]
     start: Floats
     goal: Floats
-    duration: float = mission.DURATION
+    duration: float = mission.DURATION  # duration of the path [s]
 
     def evaluate(self, time: Floats) -> JointState:
         """Return the joint state at the times, shape (T,)."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 
@@ -15,68 +14,96 @@ from studies.base_body import paper
 from studies.common.ets7 import ACCELEROMETER, INTERVAL, TIP_SPEED, ets7, tip_speed
 from studies.common.quantities import JUDGED, MASS
 from studies.common.report_parts import columns
-from studies.common.study import Goal, Verdict
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
+from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.sensors.estimators import EQUAL, EXACT, LIKELIHOOD, PAPER, WEIGHTED, WHOLE, WITHOUT_JUNCTIONS, Spread
+from studies.sensors.result import REALISTIC, Effort, Result, run
+from studies.sensors.signals import motion
+from studies.sensors.tables import (
+    diverging,
+    equal_rms,
+    estimate_rows,
+    honesty_of,
+    level_figure,
+    linear_rows,
+    percent,
+    refit_rows,
+    rms_of,
+    rms_pair,
+    treatment_figure,
+    treatment_rows,
 )
-from studies.sensors import rows
-from studies.sensors.figures import level_figure, treatment_figure
-from studies.sensors.montecarlo import EQUAL, EXACT, LIKELIHOOD, PAPER, WEIGHTED, WHOLE, WITHOUT_JUNCTIONS, Spread
-from studies.sensors.result import REALISTIC, Result
-from studies.sensors.rows import diverging, equal_rms, honesty_of, percent, rms_of, rms_pair
-from studies.sensors.setting import motion
 
-__all__ = ["goals_of", "write_report"]
+__all__ = ["STUDY", "Effort", "Result", "run"]
 
-PLANE = 0.02
-"""Error that the paper quotes for the plane and expects in three dimensions."""
+PLANE = 0.02  # error that the paper quotes for the plane and expects in three dimensions
 
+# ratio of actual to stated errors that counts as honest; its Monte-Carlo error with 48 sets of noise is 0.1
 HONEST = (0.75, 1.33)
-"""Ratio of actual to stated errors that counts as honest; its Monte-Carlo error with 48 sets of noise is 0.1."""
 
-LOSS = 1.01
-"""Largest ratio of standard deviations at which nothing counts as lost."""
+LOSS = 1.01  # largest ratio of standard deviations at which nothing counts as lost
+SHOWN = ("0.04 deg/s", REALISTIC, "2″, 1e-7, 1e-6")  # titles of the columns of estimates beside the report
+SPREAD = ["bias", "bias error", "sd", "sd error", "rms", "rms error", "stated sd", "actual over stated"]
 
-SHOWN = ("0.04 deg/s", REALISTIC, "2″, 1e-7, 1e-6")
-"""Levels of noise at which all treatments are drawn."""
+# levels of noise at which all treatments are drawn
 
 
-def write_report(result: Result, output: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, and beside it its summary and all its numbers."""
-    document = Document("Noise and sensor precision", "Section 4.3 of Lampariello and Hirzinger (IDETC 2005)")
-    summary = Summary(
-        "Section 4.3 expects in three dimensions the error of 2 % that its reference had in the plane with noise of "
-        "sigma 0.04, leaves open what integrating the accelerometer does, and names sensors. What do noise and sensors "
-        "do to the identified base?",
-        _answer(result),
-        tuple(goals_of(result)),
-        f"the arm is known exactly, the tip moves {_haste()}, noise is white and independent, and the initial attitude "
-        "is known. Errors are to first order about the truth, checked by nonlinear fits.",
-        bool(result.refits),
-    )
-    add_first_page(
-        document,
-        summary,
-        level_figure(result),
-        f"Root mean square error of mass and worst moment after one manoeuvre, by level of noise, over "
-        f"{result.effort.draws} sets of noise (bars: Monte-Carlo error). The last names state star sensor, "
-        "accelerometer [m/s²] and encoder [rad]. Grey: the 2 % of the paper.",
-    )
+def _report(result: Result) -> Report[Result]:
     planned = motion()
-    picture = robot_pose(ets7(), planned, np.linspace(0.0, planned.duration, 5)[:-1])
-    add_setup(document, _setup(result), picture, "The robot at four instants of the paper's manoeuvre.")
-    _negatives(document, result)
-    _evidence(document, result, output)
-    add_statements(document, _statements(result))
-    write_study(document, summary, output, origin)
+    fastest, _ = tip_speed(planned, planned.duration)
+    haste = f"{format_fixed(fastest / TIP_SPEED, 1)} times as fast as the flight's rule permits"
+    return Report(
+        title="Noise and sensor precision",
+        subtitle="Section 4.3 of Lampariello and Hirzinger (IDETC 2005)",
+        question="Section 4.3 expects in three dimensions the error of 2 % that its reference had in the plane with "
+        "noise of sigma 0.04, leaves open what integrating the accelerometer does, and names sensors. What do noise "
+        "and sensors do to the identified base?",
+        answer=_answer(result),
+        valid=f"the arm is known exactly, the tip moves {haste}, noise is white and independent, and the initial "
+        "attitude is known. Errors are to first order about the truth, checked by nonlinear fits.",
+        goals=_goals(result),
+        full=bool(result.refits),
+        figure=Picture(
+            level_figure(result),
+            "Root mean square error of mass and worst moment after one manoeuvre, by level of noise, over "
+            f"{result.effort.draws} sets of noise (bars: Monte-Carlo error). The last names state star sensor, "
+            "accelerometer [m/s²] and encoder [rad]. Grey: the 2 % of the paper.",
+        ),
+        setup=Setup(
+            robot="ETS-VII with the paper's base and a public arm, flown by an independent simulator (MuJoCo).",
+            manoeuvre=f"The paper's optimum of (26) in {planned.duration:.0f} s, as in the report on the base body. "
+            f"The tip moves with {1e3 * fastest:.0f} mm/s, {haste}: errors at the permitted speed are larger (report "
+            "on the base body).",
+            sensors=f"Rates, accelerometer at {ACCELEROMETER} m and encoders, white noise every {INTERVAL:g} s. The "
+            f"paper's sigmas {paper.SIGMAS[0]:g} and {paper.SIGMAS[1]:g} have no unit; both reports read them as "
+            "degrees per second of the rates, degrees of the joints, and the same share of the accelerometer's peak. "
+            "'2″' is a star sensor whose attitude is differenced, taken for white.",
+            known="Orbit, arm and initial attitude. There is no prior.",
+            unknown="Ten parameters of the base and the initial rate.",
+            replicates=f"{result.effort.draws} sets of noise, which all levels share but for its size; "
+            f"{len(result.levels)} levels, {len(next(iter(result.joints.values())))} treatments of the joints.",
+        ),
+        picture=Picture(
+            robot_pose(ets7(), planned, np.linspace(0.0, planned.duration, 5)[:-1]),
+            "The robot at four instants of the paper's manoeuvre.",
+        ),
+        sections=[_negatives, _evidence],
+        statements=_statements(result),
+        tables=[
+            CsvTable("estimates", ["treated", "noise", "treatment", "quantity", *SPREAD], estimate_rows(result)),
+            CsvTable(
+                "linear",
+                ["noise", "treatment", "quantity", "bias", "bias error", "closed form"],
+                linear_rows(result),
+            ),
+            CsvTable(
+                "fits",
+                ["noise", "estimator", "fits", "diverged", "median error of mass", "linear", "largest difference [sd]"],
+                refit_rows(result),
+            ),
+        ],
+        beside="Beside this report, relative to the truth: every estimator at every level, for joints, rates and "
+        "accelerometer ({0}), the linear method ({1}), and the nonlinear fits ({2}).",
+    )
 
 
 def _first(result: Result) -> str:
@@ -93,24 +120,18 @@ def _both(spread: Spread) -> float:
     return float(max(spread.rms[MASS], spread.rms[spread.worst()]))
 
 
-def _haste() -> str:
-    planned = motion()
-    fastest, _ = tip_speed(planned, planned.duration)
-    return f"{format_fixed(fastest / TIP_SPEED, 1)} times as fast as the flight's rule permits"
-
-
 def _answer(result: Result) -> str:
     level = _first(result)
     best = result.joints[level][LIKELIHOOD]
     mass, moment = equal_rms(result, level, PAPER)
     return (
-        f"With noise of {level} one manoeuvre gives the mass to {rows.rms_of(best, MASS)} % and the worst moment to "
-        f"{rms_of(best, best.worst())} % by the package's likelihood, and to {mass} % and {moment} % by the "
-        "paper's procedure; the paper expects 2 %."
+        f"With noise of {level} one manoeuvre gives the mass to {rms_of(best, MASS)} % and the worst moment to "
+        f"{rms_of(best, best.worst())} % by the package's likelihood, and to {mass} % and {moment} % by the paper's "
+        "procedure; the paper expects 2 %."
     )
 
 
-def goals_of(result: Result) -> list[Goal]:
+def _goals(result: Result) -> list[Goal]:
     """Return the goals."""
     level = _first(result)
     likelihood = {name: spreads[LIKELIHOOD] for name, spreads in result.joints.items()}
@@ -168,25 +189,6 @@ def _ratios(spreads: Mapping[str, Spread]) -> np.ndarray:
     return spreads[LIKELIHOOD].honesty[JUDGED]
 
 
-def _setup(result: Result) -> Setup:
-    planned = motion()
-    fastest, _ = tip_speed(planned, planned.duration)
-    return Setup(
-        robot="ETS-VII with the paper's base and a public arm, flown by an independent simulator (MuJoCo).",
-        manoeuvre=f"The paper's optimum of (26) in {planned.duration:.0f} s, as in the report on the base body. The "
-        f"tip moves with {1e3 * fastest:.0f} mm/s, {_haste()}: errors at the permitted speed are larger (report on the "
-        "base body).",
-        sensors=f"Rates, accelerometer at {ACCELEROMETER} m and encoders, white noise every {INTERVAL:g} s. The "
-        f"paper's sigmas {paper.SIGMAS[0]:g} and {paper.SIGMAS[1]:g} have no unit; both reports read them as degrees "
-        "per second of the rates, degrees of the joints, and the same share of the accelerometer's peak. '2″' is a "
-        "star sensor whose attitude is differenced, taken for white.",
-        known="Orbit, arm and initial attitude. There is no prior.",
-        unknown="Ten parameters of the base and the initial rate.",
-        replicates=f"{result.effort.draws} sets of noise, which all levels share but for its size; "
-        f"{len(result.levels)} levels, {len(next(iter(result.joints.values())))} treatments of the joints.",
-    )
-
-
 def _negatives(document: Document, result: Result) -> None:
     document.section("What goes wrong, and how far the numbers hold")
     level, standard = _first(result), _standard(result)
@@ -196,8 +198,8 @@ def _negatives(document: Document, result: Result) -> None:
     ratio = float(equal.sd[k] / weighted.sd[k])
     error = ratio * float(np.hypot(*(spread.sd_error[k] / spread.sd[k] for spread in (equal, weighted))))
     texts = [
-        "The package's likelihood itself: near the junctions of (27), where the joints' third derivative jumps, a "
-        "jump that the samples do not show biases its smoother. Actual over stated errors are "
+        "The package's likelihood itself: near the junctions of (27), where the joints' third derivative jumps, a jump "
+        "that the samples do not show biases its smoother. Actual over stated errors are "
         f"{honesty_of(result.joints[standard][LIKELIHOOD])} at {format_text(standard)}, and "
         f"{honesty_of(result.joints[standard][WITHOUT_JUNCTIONS])} if those samples are left out.",
         *(_failing(result, name) for name, spreads in result.joints.items() if not _is_honest(_ratios(spreads))),
@@ -265,7 +267,7 @@ def _failing(result: Result, level: str) -> str:
     )
 
 
-def _evidence(document: Document, result: Result, output: Path) -> None:
+def _evidence(document: Document, result: Result) -> None:
     document.section("Evidence")
     names = (EXACT, LIKELIHOOD, WITHOUT_JUNCTIONS)
     document.table(
@@ -290,7 +292,7 @@ def _evidence(document: Document, result: Result, output: Path) -> None:
     standard = _standard(result)
     document.table(
         ["treatment of the joints", "mass: bias", "sd", "moment: bias", "sd", "actual / stated"],
-        rows.treatment_rows(result, standard),
+        treatment_rows(result, standard),
         f"Treatments of the joints at {format_text(standard)}, base sensors as read [%]. Actual over stated errors are "
         "the range over mass and moments; one is honest.",
         columns("lrrrrr"),
@@ -300,31 +302,6 @@ def _evidence(document: Document, result: Result, output: Path) -> None:
         treatment_figure({format_text(name): spreads for name, spreads in shown.items()}),
         "Bias (dot; the thick bar is its Monte-Carlo error) and standard deviation (thin bar) of the mass and of the "
         "worst moment, by treatment of the joints.",
-    )
-    spread = ["bias", "bias error", "sd", "sd error", "rms", "rms error", "stated sd", "actual over stated"]
-    files = [
-        write_table(
-            output,
-            "estimates",
-            ["treated", "noise", "treatment", "quantity", *spread],
-            rows.estimate_rows(result),
-        ),
-        write_table(
-            output,
-            "linear",
-            ["noise", "treatment", "quantity", "bias", "bias error", "closed form"],
-            rows.linear_rows(result),
-        ),
-        write_table(
-            output,
-            "fits",
-            ["noise", "estimator", "fits", "diverged", "median error of mass", "linear", "largest difference [sd]"],
-            rows.refit_rows(result),
-        ),
-    ]
-    document.paragraph(
-        "Beside this report, relative to the truth: every estimator at every level, for joints, rates and "
-        f"accelerometer ({files[0]}), the linear method ({files[1]}), and the nonlinear fits ({files[2]})."
     )
 
 
@@ -373,3 +350,14 @@ def _averaged(exact: Spread, likelihood: Spread) -> str:
         f"manoeuvres from the errors over {len(likelihood.errors)} sets of noise, and {fewest:.0f} from the standard "
         f"deviations to first order ({format_percent(stated, 2)} in the worst), as in the report on the base body."
     )
+
+
+STUDY = Study(
+    "sensors",
+    "Verify what the paper expects of noise and sensors.",
+    run=run,
+    report=_report,
+    full="take all levels of noise, enough draws, and nonlinear fits: minutes",
+    seed=1,
+    extra=TRIALS,
+)

@@ -11,90 +11,90 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.common.monte_carlo import Workers
-from studies.sensors import montecarlo
-from studies.sensors.draws import Draws
-from studies.sensors.integration import Falsified, Scalar, falsified, scalars
-from studies.sensors.linear import linearised
-from studies.sensors.montecarlo import LIKELIHOOD, PAPER, Spread
-from studies.sensors.refits import Refits, refit_all
-from studies.sensors.regressor import Regression, attenuation, regress
-from studies.sensors.setting import Flight, Noise, fly, levels
+from studies.sensors import estimators
+from studies.sensors.checks import (
+    Falsified,
+    Refits,
+    Regression,
+    Scalar,
+    attenuation,
+    falsified,
+    refit_all,
+    regress,
+    scalars,
+)
+from studies.sensors.estimators import LIKELIHOOD, PAPER, Spread, linearised
+from studies.sensors.signals import Draws, Flight, Noise, fly, levels
 
-__all__ = ["REALISTIC", "Effort", "Result", "compute"]
+__all__ = ["REALISTIC", "Effort", "Result", "run"]
 
+# level of noise that stands for good sensors of today: star sensor, accelerometer [m/s2], encoder [rad]
 REALISTIC = "2″, 1e-5, 1e-5"
-"""Level of noise that stands for good sensors of today: star sensor, accelerometer [m/s2], encoder [rad]."""
 
+# levels at which the linear method and the nonlinear fits are tried
 REGRESSED = ("0.04 deg/s", "0.009 deg/s", REALISTIC)
-"""Levels at which the linear method and the nonlinear fits are tried."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """Amount of what is computed.
+    """Amount of what is computed."""
 
-    Parameters
-    ----------
-    draws : int
-        Number of sets of noise.
-    likelihood_fits, paper_fits : int
-        Numbers of nonlinear fits by the package's likelihood and by the paper's procedure.
-    levels : sequence of str
-        Levels of noise; all where empty.
-    """
-
-    draws: int
+    draws: int  # number of sets of noise
+    # numbers of nonlinear fits by the package's likelihood and by the paper's procedure
     likelihood_fits: int = 0
     paper_fits: int = 0
-    levels: Sequence[str] = ()
+    levels: Sequence[str] = ()  # levels of noise; all where empty
 
 
 @dataclass(frozen=True)
 class Result:
-    """The study's numbers, by level of noise and by treatment; relative to the true quantities.
+    """The study's numbers, by level of noise and by treatment; relative to the true quantities."""
 
-    Attributes
-    ----------
-    flight : Flight
-        True motion.
-    levels : mapping of str to Noise
-        Levels of noise by name.
-    joints, rates, accelerometers : mapping of str to mapping of str to Spread
-        Estimates by treatment of the joints, of the rates, and of the accelerometer.
-    falsified : mapping of str to Falsified
-        Errors without noise by use of the accelerometer.
-    scalars : sequence of Scalar
-        Problems with one unknown.
-    regressions : mapping of str to mapping of str to Regression
-        Estimates of the linear method.
-    predicted : mapping of str to (10,) array
-        Errors of the linear method with central differences, in closed form.
-    refits : mapping of str to mapping of str to Refits
-        Nonlinear fits by procedure; empty where the effort has none.
-    effort : Effort
-        Amount of what was computed.
-    seconds : float
-        Time that the computation took [s].
-    """
-
-    flight: Flight
-    levels: Mapping[str, Noise]
+    flight: Flight  # true motion
+    levels: Mapping[str, Noise]  # levels of noise by name
+    # estimates by treatment of the joints, of the rates, and of the accelerometer
     joints: Mapping[str, Mapping[str, Spread]]
     rates: Mapping[str, Mapping[str, Spread]]
     accelerometers: Mapping[str, Mapping[str, Spread]]
-    falsified: Mapping[str, Falsified]
-    scalars: Sequence[Scalar]
-    regressions: Mapping[str, Mapping[str, Regression]]
+    falsified: Mapping[str, Falsified]  # errors without noise by use of the accelerometer
+    scalars: Sequence[Scalar]  # problems with one unknown
+    regressions: Mapping[str, Mapping[str, Regression]]  # estimates of the linear method
+    # errors of the linear method with central differences, in closed form
     predicted: Mapping[str, NDArray[np.floating]]
-    refits: Mapping[str, Mapping[str, Refits]]
-    effort: Effort
-    seconds: float
+    refits: Mapping[str, Mapping[str, Refits]]  # nonlinear fits by procedure; empty where the effort has none
+    effort: Effort  # amount of what was computed
+    seconds: float  # time that the computation took [s]
 
 
-def compute(
-    effort: Effort, seed: int, trials: Path | None, workers: Workers, progress: Callable[[str], None]
+SMALL = Effort(draws=8, levels=("0.04 deg/s", REALISTIC))  # takes a minute
+FULL = Effort(draws=48, likelihood_fits=5, paper_fits=32)  # takes minutes
+
+
+def run(
+    *,
+    full: bool = False,
+    seed: int = 1,
+    effort: Effort | None = None,
+    trials: Path | None = None,
+    workers: Workers = 1,
+    progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
-    """Fly, treat and estimate; see `studies.sensors.run`."""
+    """Run the study: fly, treat and estimate.
+
+    Parameters
+    ----------
+    full : bool
+        Whether to take all levels of noise, enough draws, and nonlinear fits.
+    seed : int
+        Seed of all random numbers.
+    effort : Effort, optional
+        Effort in place of what ``full`` says.
+    trials, workers
+        File and number of processes of the nonlinear fits; see `studies.common.monte_carlo.run_trials`.
+    progress : callable
+        Receives a line on what is being done.
+    """
+    effort = effort or (FULL if full else SMALL)
     began = time.perf_counter()
     progress("flights of the independent simulator, Jacobian")
     flight, free, linear = fly(), fly(gradient=False), linearised()
@@ -106,9 +106,9 @@ def compute(
     accelerometers: dict[str, dict[str, Spread]] = {}
     for name, noise in chosen.items():
         progress(f"noise {name}, {time.perf_counter() - began:.0f} s")
-        joints[name] = montecarlo.joints(linear, draws, noise)
-        rates[name] = montecarlo.rates(linear, draws, noise)
-        accelerometers[name] = montecarlo.accelerometers(linear, draws, noise)
+        joints[name] = estimators.joints(linear, draws, noise)
+        rates[name] = estimators.rates(linear, draws, noise)
+        accelerometers[name] = estimators.accelerometers(linear, draws, noise)
     regressed = [name for name in REGRESSED if name in chosen]
     progress(f"linear method, {time.perf_counter() - began:.0f} s")
     elsewhere = draws.over(free)

@@ -22,40 +22,21 @@ from studies.separating.manoeuvres import Designed, design_both, separating_prob
 
 __all__ = ["FLIGHTS", "Result", "main", "run"]
 
-FLIGHTS = 400
-"""Number of sets of flights for each cause in a full run."""
-
-FULL, QUICK = THOROUGH, Search(starts=3, iterations=60)
-"""Effort of each search of a full and of a quick run."""
+FLIGHTS = 400  # number of sets of flights for each cause in a full run
+FULL, QUICK = THOROUGH, Search(starts=3, iterations=60)  # effort of each search of a full and of a quick run
 
 
 @dataclass(frozen=True)
 class Result:
-    """Outcome of the study.
+    """Outcome of the study."""
 
-    Attributes
-    ----------
-    designs : mapping of str to Designed
-        Designed manoeuvres by their criterion.
-    motions : mapping of str to Motion
-        All manoeuvres, the ``first`` among them.
-    expected : mapping of (truth, stage) to Expected
-        Expectations of linear theory.
-    directions : mapping of (truth, stage) to sequence of Expected
-        Expectations for effects of the same size in random directions.
-    realised : sequence of Realised
-        Realised log Bayes factors, one for each truth.
-    search : Search
-        Effort of each search.
-    full : bool
-    """
-
-    designs: Mapping[str, Designed]
-    motions: Mapping[str, Motion]
-    expected: Mapping[tuple[str, str], Expected]
+    designs: Mapping[str, Designed]  # designed manoeuvres by their criterion
+    motions: Mapping[str, Motion]  # all manoeuvres, the ``first`` among them
+    expected: Mapping[tuple[str, str], Expected]  # expectations of linear theory
+    # expectations for effects of the same size in random directions
     directions: Mapping[tuple[str, str], Sequence[Expected]]
-    realised: Sequence[Realised]
-    search: Search
+    realised: Sequence[Realised]  # realised log Bayes factors, one for each truth
+    search: Search  # effort of each search
     full: bool
 
 

@@ -23,27 +23,16 @@ from studies.truth.mujoco import Truth, leak
 
 __all__ = ["Realised", "expectations", "flown", "realise", "references"]
 
-DIRECTIONS = 200
-"""Number of random directions of an effect for which the separation is computed."""
+DIRECTIONS = 200  # number of random directions of an effect for which the separation is computed
 
 
 @dataclass(frozen=True)
 class Realised:
-    """Log Bayes factors over flights where one rival is hidden.
+    """Log Bayes factors over flights where one rival is hidden."""
 
-    Attributes
-    ----------
-    truth : str
-        Label of the hidden rival.
-    detected : (S,) array
-        Log Bayes factors of the truth against no cause at all, from the first manoeuvre alone.
-    factors : mapping of str to (S,) array
-        Log Bayes factors of the truth against its rival, by stage.
-    """
-
-    truth: str
-    detected: Floats
-    factors: Mapping[str, Floats]
+    truth: str  # label of the hidden rival
+    detected: Floats  # (S,): log Bayes factors of the truth against no cause at all, from the first manoeuvre alone
+    factors: Mapping[str, Floats]  # log Bayes factors of the truth against its rival, by stage
 
 
 def references(motions: Mapping[str, Motion], arm_spread: float = ARM_SPREAD) -> dict[str, Reference]:

@@ -18,21 +18,11 @@ __all__ = ["Expected", "Linearised", "unexplained_information"]
 
 @dataclass(frozen=True)
 class Expected:
-    """Expectations for one truth and a set of manoeuvres.
+    """Expectations for one truth and a set of manoeuvres."""
 
-    Attributes
-    ----------
-    alone : float
-        Noncentrality lambda of the effect against a model without it, everything else marginalised.
-    apart : float
-        Noncentrality lambda (1 - rho^2) against a model with the rival in its place.
-    log_factor : float
-        Mean log Bayes factor of the truth against the rival, what each prior costs included.
-    """
-
-    alone: float
-    apart: float
-    log_factor: float
+    alone: float  # noncentrality lambda of the effect against a model without it, everything else marginalised
+    apart: float  # noncentrality lambda (1 - rho^2) against a model with the rival in its place
+    log_factor: float  # mean log Bayes factor of the truth against the rival, what each prior costs included
 
     @property
     def sd(self) -> float:
@@ -66,20 +56,12 @@ def unexplained_information(information: Floats, group: Sequence[int], rest: Seq
 
 @dataclass(frozen=True)
 class Linearised:
-    """Manoeuvres linearised about the drifting base, in the unknowns of a model with both rivals.
+    """Manoeuvres linearised about the drifting base, in the unknowns of a model with both rivals."""
 
-    Attributes
-    ----------
-    information : (n, n) array
-        Information in coordinates whose prior is standard normal, without that prior.
-    names : tuple of str
-        Names of the unknowns.
-    score : (n,) array
-        Jacobian transposed times the whitened data, in coordinates counted from zero; zero where nothing was recorded.
-    """
-
-    information: Floats
-    names: tuple[str, ...]
+    information: Floats  # (n, n): information in coordinates whose prior is standard normal, without that prior
+    names: tuple[str, ...]  # names of the unknowns
+    # (n,): Jacobian transposed times the whitened data, in coordinates counted from zero; zero where nothing was
+    # recorded
     score: Floats
 
     @classmethod

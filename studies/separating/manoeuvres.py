@@ -20,23 +20,12 @@ __all__ = ["Designed", "design_both", "separating_problem"]
 
 @dataclass(frozen=True)
 class Designed:
-    """A designed manoeuvre.
+    """A designed manoeuvre."""
 
-    Attributes
-    ----------
-    costs : mapping of str to float
-        Values of both criteria by name.
-    largest : dict of str to float
-        Largest values of the limited quantities by name.
-    motion : ParameterisedMotion
-        Motion of the joints.
-    left_out : dict of str to int
-        Number of directions in which no manoeuvre shows a rival and which the criterion leaves out, by its label.
-    """
-
-    costs: dict[str, float]
-    largest: dict[str, float]
-    motion: ParameterisedMotion
+    costs: dict[str, float]  # values of both criteria by name
+    largest: dict[str, float]  # largest values of the limited quantities by name
+    motion: ParameterisedMotion  # motion of the joints
+    # number of directions in which no manoeuvre shows a rival and which the criterion leaves out, by its label
     left_out: dict[str, int]
 
 

@@ -34,26 +34,18 @@ from studies.separating.setting import DRIFT, RIVALS, SPREAD, STAGES, TRUTHS
 
 __all__ = ["factor_figure", "goals", "write_report"]
 
-RIVALRY = 2.2
-"""Log Bayes factor above which a cause is preferred to its one rival with a probability of 0.9 or more."""
+RIVALRY = 2.2  # log Bayes factor above which a cause is preferred to its one rival with a probability of 0.9 or more
+SURE = 0.9  # share of flights, and of directions, in which the factor is to be exceeded
+TICKS = (-10, -3, -1, 0, 1, 3, 10, 30, 100, 300)  # ticks of log Bayes factors
+LAST = "first, separating"  # stage with the separating manoeuvre
 
-SURE = 0.9
-"""Share of flights, and of directions, in which the factor is to be exceeded."""
-
-TICKS = (-10, -3, -1, 0, 1, 3, 10, 30, 100, 300)
-"""Ticks of log Bayes factors."""
-
-LAST = "first, separating"
-"""Stage with the separating manoeuvre."""
-
+# words for what is hidden
 HIDDEN = {
     "wheel-momentum": f"wheels with {format_vector(TRUTHS['wheel-momentum'])} N m s",
     "thruster-leak": f"leak of {format_vector(1e3 * TRUTHS['thruster-leak'])} mN m",
 }
-"""Words for what is hidden."""
 
-NAMES = {"wheel-momentum": "wheel momentum", "thruster-leak": "leak"}
-"""Short names of the two causes."""
+NAMES = {"wheel-momentum": "wheel momentum", "thruster-leak": "leak"}  # short names of the two causes
 
 
 def _preferred(item: Realised, stage: str) -> Share:
@@ -131,17 +123,12 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         for item in result.realised
     ]
     summary = Summary(
-        question=(
-            "Wheels with momentum left and a leaking valve push a slowly drifting base alike. Does a second manoeuvre "
-            "that is designed to separate them decide which it is?"
-        ),
+        question="Wheels with momentum left and a leaking valve push a slowly drifting base alike. Does a second "
+        "manoeuvre that is designed to separate them decide which it is?",
         answer=f"With the separating manoeuvre {' and '.join(parts)}.",
         goals=goals(result),
-        valid=(
-            "one of the two acts and nothing else, with the same size in both manoeuvres; the base is known to "
-            f"{format_percent(2.0 * SPREAD)} of its mass and drifts by a degree in a minute. The design "
-            f"knows that rate."
-        ),
+        valid="one of the two acts and nothing else, with the same size in both manoeuvres; the base is known to "
+        f"{format_percent(2.0 * SPREAD)} of its mass and drifts by a degree in a minute. The design knows that rate.",
         full=result.full,
     )
     add_first_page(
@@ -184,27 +171,17 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
 def _setup(result: Result) -> Setup:
     return Setup(
         robot=f"ETS-VII with the published base; joints within ±{mission.REACH:g} rad, wrist extended at the start.",
-        manoeuvre=(
-            f"{mission.DURATION:g} s each: first the flight's own, then quintic splines of all joints, at the 50 mm/s "
-            "and 5 degrees per second of the flight's rule."
-            f"{_left_out(result)}"
-        ),
-        sensors=(
-            f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with {format_number(ACCEL)} "
-            f"m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant bias of the accelerometer."
-        ),
+        manoeuvre=f"{mission.DURATION:g} s each: first the flight's own, then quintic splines of all joints, at the 50 "
+        f"mm/s and 5 degrees per second of the flight's rule.{_left_out(result)}",
+        sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
+        f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant bias "
+        "of the accelerometer.",
         known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link.",
-        unknown=(
-            f"The base within {format_percent(2.0 * SPREAD)} of its mass, the rate {format_vector(DRIFT)} "
-            f"rad/s at the start, the "
-            f"bias within {format_number(BIAS)} m/s², the links; and the cause, within 1 N m s of wheels, or 0.5 mN "
-            "and 0.5 mN m of leak, per axis."
-        ),
-        replicates=(
-            f"{len(result.realised[0].detected)} sets of flights for each cause, each with an arm, a bias and noise of "
-            f"its own; {result.search.starts} starts for each design. Evidences are linearised about the "
-            "plan."
-        ),
+        unknown=f"The base within {format_percent(2.0 * SPREAD)} of its mass, the rate {format_vector(DRIFT)} rad/s at "
+        f"the start, the bias within {format_number(BIAS)} m/s², the links; and the cause, within 1 N m s of wheels, "
+        "or 0.5 mN and 0.5 mN m of leak, per axis.",
+        replicates=f"{len(result.realised[0].detected)} sets of flights for each cause, each with an arm, a bias and "
+        f"noise of its own; {result.search.starts} starts for each design. Evidences are linearised about the plan.",
     )
 
 
@@ -223,10 +200,10 @@ def _failures(document: Document, result: Result) -> None:
         low, middle = np.quantile([other.log_factor for other in result.directions[item.truth, LAST]], [0.1, 0.5])
         texts.append(
             f"Hidden {HIDDEN[item.truth]}: the first manoeuvre alone shows the cause with ln B "
-            f"{format_fixed(item.detected.mean(), 1)} against none. In random directions of the same size the "
-            f"expected ln B over the rival with the separating manoeuvre is {format_fixed(middle, 1)} in the median "
-            f"and {format_fixed(low, 1)} at the lowest tenth; in {shown} directions "
-            f"it is above {RIVALRY} in {format_percent(SURE)} of flights or more."
+            f"{format_fixed(item.detected.mean(), 1)} against none. In random directions of the same size the expected "
+            f"ln B over the rival with the separating manoeuvre is {format_fixed(middle, 1)} in the median and "
+            f"{format_fixed(low, 1)} at the lowest tenth; in {shown} directions it is above {RIVALRY} in "
+            f"{format_percent(SURE)} of flights or more."
         )
     texts.append(
         "The whole diagnosis, which has the catalogue to choose from, was not run here: the models have these two "

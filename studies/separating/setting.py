@@ -17,30 +17,28 @@ from studies.common.models import ARM_SPREAD
 __all__ = ["CANDIDATES", "DRIFT", "RIVALS", "SPREAD", "STAGES", "TRUTHS"]
 __all__ += ["amplitude", "drifting", "rival_model", "rival_of"]
 
+# the two causes with the widths of their priors; the leak is a small one, of half a millinewton
 CANDIDATES: tuple[Effect, ...] = (WheelMomentum(1.0), ThrusterLeak(5e-4, 5e-4))
-"""The two causes with the widths of their priors; the leak is a small one, of half a millinewton."""
 
+# momentum left in the wheels [N m s] and torque of the leak [N m], base axes, of which one is hidden
 TRUTHS: dict[str, Floats] = {
     "wheel-momentum": np.array([-0.6, 0.35, 0.7]),
     "thruster-leak": np.array([-3e-4, 1.8e-4, 3.6e-4]),
 }
-"""Momentum left in the wheels [N m s] and torque of the leak [N m], base axes, of which one is hidden."""
 
-RIVALS = tuple(TRUTHS)
-"""Labels of the two rivals."""
+RIVALS = tuple(TRUTHS)  # labels of the two rivals
 
+# stages of the study, with the manoeuvres that are fitted together in each
 STAGES = {
     "first alone": ("first",),
     "first, d-optimal": ("first", "d-optimal"),
     "first, separating": ("first", "separation"),
 }
-"""Stages of the study, with the manoeuvres that are fitted together in each."""
 
-SPREAD = 0.1
-"""Relative width of the prior of the base."""
+SPREAD = 0.1  # relative width of the prior of the base
 
+# rate of the base when a manoeuvre starts, about a degree in a minute [rad/s]; unknown to every fit
 DRIFT = np.array([3e-4, -2e-4, 2.5e-4])
-"""Rate of the base when a manoeuvre starts, about a degree in a minute [rad/s]; unknown to every fit."""
 
 
 def rival_of(label: str) -> str:

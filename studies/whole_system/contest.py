@@ -23,17 +23,10 @@ __all__ = ["Method", "contest"]
 
 @dataclass(frozen=True)
 class Method:
-    """One method over K recordings of one flight that differ by their noise.
+    """One method over K recordings of one flight that differ by their noise."""
 
-    Attributes
-    ----------
-    title : str
-        Title of the method.
-    errors, believed : (K, 4) arrays
-        Relative errors of the masses of `groups`, and the standard deviations that the method itself states.
-    """
-
-    title: str
+    title: str  # title of the method
+    # (K, 4): relative errors of the masses of `groups`, and the standard deviations that the method itself states
     errors: Floats
     believed: Floats
 

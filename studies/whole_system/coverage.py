@@ -23,30 +23,18 @@ from studies.whole_system.world import fly, record
 
 __all__ = ["SCORED", "TAIL", "Coverage", "covered"]
 
-TAIL = 0.95
-"""Quantile of the distances beyond which their number is tested, as it is below one minus this."""
-
-SCORED = ("base", "load", "whole system")
-"""Groups of bodies whose masses are scored."""
+TAIL = 0.95  # quantile of the distances beyond which their number is tested, as it is below one minus this
+SCORED = ("base", "load", "whole system")  # groups of bodies whose masses are scored
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """Errors over K drawn systems, whose bodies have n unknowns.
+    """Errors over K drawn systems, whose bodies have n unknowns."""
 
-    Attributes
-    ----------
-    distances : (K,) array
-        Squared distances of the true bodies from the mode; chi-square with n degrees of freedom if all is right.
-    scores : (K, 3) array
-        Errors of the masses of the groups `SCORED` in their standard deviations.
-    unknowns : int
-        Number n of unknowns.
-    """
-
+    # (K,): squared distances of the true bodies from the mode; chi-square with n degrees of freedom if all is right
     distances: Floats
-    scores: Floats
-    unknowns: int
+    scores: Floats  # (K, 3): errors of the masses of the groups `SCORED` in their standard deviations
+    unknowns: int  # number n of unknowns
 
     @property
     def p_value(self) -> float:

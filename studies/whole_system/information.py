@@ -34,24 +34,12 @@ class Sensors(Enum):
 
 @dataclass(frozen=True)
 class Known:
-    """Knowledge of the bodies after a manoeuvre, in coordinates whose prior is standard normal.
+    """Knowledge of the bodies after a manoeuvre, in coordinates whose prior is standard normal."""
 
-    Attributes
-    ----------
-    robot : Robot
-        Robot about which the posterior was linearised.
-    names : tuple of str
-        Names of the unknown bodies, whose ten coordinates each come first.
-    widths : mapping of str to float
-        Width of every body's prior.
-    covariance : (n, n) array
-        Posterior covariance of the coordinates.
-    """
-
-    robot: Robot
-    names: tuple[str, ...]
-    widths: Mapping[str, float]
-    covariance: Floats
+    robot: Robot  # robot about which the posterior was linearised
+    names: tuple[str, ...]  # names of the unknown bodies, whose ten coordinates each come first
+    widths: Mapping[str, float]  # width of every body's prior
+    covariance: Floats  # (n, n): posterior covariance of the coordinates
 
     def mass(self, *members: str) -> tuple[float, float]:
         """Return the relative standard deviation of the sum of some bodies' masses, prior and posterior."""
@@ -81,18 +69,10 @@ class Known:
 
 @dataclass(frozen=True)
 class Information:
-    """Information of a manoeuvre with all sensors.
+    """Information of a manoeuvre with all sensors."""
 
-    Attributes
-    ----------
-    robot : Robot
-        True robot, about which the posterior was linearised.
-    jacobian : (rows, columns, n) array
-        Jacobian of the whitened residuals.
-    """
-
-    robot: Robot
-    jacobian: Floats
+    robot: Robot  # true robot, about which the posterior was linearised
+    jacobian: Floats  # (rows, columns, n): Jacobian of the whitened residuals
 
     def knowledge(
         self, sensors: Sensors, *, known: Sequence[str] = (), widths: Mapping[str, float] | None = None

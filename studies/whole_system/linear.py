@@ -28,21 +28,17 @@ from studies.whole_system.setting import LOAD, bodies, spreads
 
 __all__ = ["linear_prior", "regress"]
 
-WINDOW, ORDER = 9, 3
-"""Number of samples, and order, of the local polynomials through the rates."""
+WINDOW, ORDER = 9, 3  # number of samples, and order, of the local polynomials through the rates
+ROUNDS = 4  # number of iterations that weight the equations by their residuals; more change the masses by less than 1 %
 
-ROUNDS = 4
-"""Number of iterations that weight the equations by their residuals; more change the masses by less than 1 %."""
-
+# speed of a joint above which its torque is used [rad/s]; below it the sign of the friction is not certain
 MOVING = 5e-4
-"""Speed of a joint above which its torque is used [rad/s]; below it the sign of the friction is not certain."""
 
-FRICTION_PRIOR = (5.0, 50.0)
-"""Standard deviations of the priors of dry and viscous friction [N m, N m s]."""
+FRICTION_PRIOR = (5.0, 50.0)  # standard deviations of the priors of dry and viscous friction [N m, N m s]
 
+# factor on the precision of the load's prior, which made normal in the linear parameters at a width of 100 % would
+# exclude a load twice as heavy
 VAGUE = 1e-4
-"""Factor on the precision of the load's prior, which made normal in the linear parameters at a width of 100 % would
-exclude a load twice as heavy."""
 
 
 def linear_prior(drawings: Robot) -> tuple[Floats, Floats]:

@@ -39,55 +39,30 @@ from studies.whole_system.setting import BASE_SPREAD, COULOMB, LOAD_SPREAD, TORQ
 
 __all__ = ["Result", "goals_of", "write_report"]
 
-GROUPS = ("base", "load", "arm", "whole system")
-"""Titles of the columns for the masses of `groups`."""
+GROUPS = ("base", "load", "arm", "whole system")  # titles of the columns for the masses of `groups`
 
+# titles of the ten log-Cholesky coordinates of a body
 COORDINATES = ("α", "d1", "d2", "d3", "s12", "s23", "s13", "t1", "t2", "t3")
-"""Titles of the ten log-Cholesky coordinates of a body."""
 
-LEVEL = 0.05
-"""P-value below which a test fails."""
-
-WANTED = 0.01
-"""Wanted relative standard deviation of the mass of the whole system."""
-
-FAR = 3.0
-"""Mean error of a method in its own stated standard deviations from which on it is biased."""
-
-CONTENT = float(stats.chi2.cdf(1.0, 1))
-"""Probability within one standard deviation of a normal distribution."""
+LEVEL = 0.05  # P-value below which a test fails
+WANTED = 0.01  # wanted relative standard deviation of the mass of the whole system
+FAR = 3.0  # mean error of a method in its own stated standard deviations from which on it is biased
+CONTENT = float(stats.chi2.cdf(1.0, 1))  # probability within one standard deviation of a normal distribution
 
 
 @dataclass(frozen=True)
 class Result:
-    """Outcome of the study; samples and coverage are evaluated in a full run only.
+    """Outcome of the study; samples and coverage are evaluated in a full run only."""
 
-    Attributes
-    ----------
-    truth, drawings : Robot
-        The robot as it truly is, and as the drawings state it.
-    known : mapping of str to Information
-        Information of every manoeuvre by name.
-    cases : tuple of Sampled
-        Identifications with emcee.
-    coverage : Coverage or None
-        Errors over systems drawn from the prior.
-    methods : tuple of Method
-        Errors of the linear and of the integral method.
-    duration : float
-        Duration of each manoeuvre [s].
-    hand_speed : float
-        Largest speed of the end-effector relative to the base with six joints moving [m/s].
-    """
-
+    # the robot as it truly is, and as the drawings state it
     truth: Robot
     drawings: Robot
-    known: Mapping[str, Information]
-    cases: tuple[Sampled, ...]
-    coverage: Coverage | None
-    methods: tuple[Method, ...]
-    duration: float
-    hand_speed: float
+    known: Mapping[str, Information]  # information of every manoeuvre by name
+    cases: tuple[Sampled, ...]  # identifications with emcee
+    coverage: Coverage | None  # errors over systems drawn from the prior
+    methods: tuple[Method, ...]  # errors of the linear and of the integral method
+    duration: float  # duration of each manoeuvre [s]
+    hand_speed: float  # largest speed of the end-effector relative to the base with six joints moving [m/s]
 
 
 def write_report(result: Result, output: Path, origin: str | None = None) -> None:
@@ -97,7 +72,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
     summary = Summary(
         "ETS-VII holds a load of 120 kg and the ten inertial parameters of no body are known exactly: what does one "
         "manoeuvre teach, with which sensors, and what must be known?",
-        f"Motion alone fixes ratios of masses and not their scale, which stays known as the drawings know it (whole "
+        "Motion alone fixes ratios of masses and not their scale, which stays known as the drawings know it (whole "
         f"system: {_percents(motion)[3]}); joint torques bring it to {_percents(torques)[3]} and a known thrust to "
         f"{_percents(thrust)[3]}, with a manoeuvre that moves the tip {_haste(result)}.",
         tuple(goals_of(result)),
@@ -119,12 +94,12 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
     write_study(document, summary, output, origin)
 
 
+# manoeuvres and sensors of the first page
 CHIEF = (
     ("six joints", Sensors.MOTION),
     ("six joints", Sensors.TORQUES),
     ("six joints, known thrust", Sensors.MOTION),
 )
-"""Manoeuvres and sensors of the first page."""
 
 
 def _haste(result: Result) -> str:

@@ -20,27 +20,15 @@ __all__ = ["Sampled", "sampled", "true_point"]
 
 @dataclass(frozen=True)
 class Sampled:
-    """One identification.
+    """One identification."""
 
-    Attributes
-    ----------
-    title : str
-        Sensors in use.
-    result : Identification
-        Posterior of all bodies.
-    distance : float
-        Squared Mahalanobis distance of the true bodies from the mean, in coordinates linear in the parameters.
-    p_value : float
-        Twice the probability of a larger distance under a normal posterior, or of a smaller one if that is less.
-    truth : mapping of str to (10,) array
-        True mass, centre of mass and inertia about it of every body.
-    """
-
-    title: str
-    result: Identification
+    title: str  # sensors in use
+    result: Identification  # posterior of all bodies
+    # squared Mahalanobis distance of the true bodies from the mean, in coordinates linear in the parameters
     distance: float
+    # twice the probability of a larger distance under a normal posterior, or of a smaller one if that is less
     p_value: float
-    truth: dict[str, Floats]
+    truth: dict[str, Floats]  # true mass, centre of mass and inertia about it of every body
 
 
 def sampled(

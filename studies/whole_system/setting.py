@@ -13,18 +13,14 @@ from studies.common.models import ARM_SPREAD, guess_about, orbiting_model
 
 __all__ = ["LOAD", "bodies", "drawn", "groups", "model_of", "spreads", "true_robot"]
 
-LOAD, HAND = "load", "link6"
-"""Name of the load, and link that carries it."""
+LOAD, HAND = "load", "link6"  # name of the load, and link that carries it
 
+# relative widths of the priors in log-Cholesky coordinates: links of the arm known from drawings, to 5 % of each mass
+# as in all studies, a base that has used some of its fuel, and a load
 ARM, BASE_SPREAD, LOAD_SPREAD = ARM_SPREAD, 0.3, 1.0
-"""Relative widths of the priors in log-Cholesky coordinates: links of the arm known from drawings, to 5 % of each mass
-as in all studies, a base that has used some of its fuel, and a load."""
 
-TORQUE = 0.1
-"""Noise per sample of the joint torques [N m]."""
-
-COULOMB, VISCOUS = 1.5, 8.0
-"""True friction of every joint, dry and viscous [N m, N m s]."""
+TORQUE = 0.1  # noise per sample of the joint torques [N m]
+COULOMB, VISCOUS = 1.5, 8.0  # true friction of every joint, dry and viscous [N m, N m s]
 
 
 def true_robot() -> Robot:

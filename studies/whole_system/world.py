@@ -16,14 +16,9 @@ from studies.whole_system.setting import COULOMB, TORQUE, VISCOUS
 
 __all__ = ["START_RATE", "flights", "fly", "hand_speed", "record"]
 
-STEP, INTERVAL = 0.1, 0.5
-"""Integration step of MuJoCo, and time between samples [s]."""
-
-START_RATE = np.array([2e-4, -1e-4, 3e-4])
-"""True rate of the base at the start [rad/s]."""
-
-CENTRE = np.array([0.2, -0.8, 1.2, -0.5, 0.6, 0.3])
-"""Joint positions before and after a manoeuvre [rad]."""
+STEP, INTERVAL = 0.1, 0.5  # integration step of MuJoCo, and time between samples [s]
+START_RATE = np.array([2e-4, -1e-4, 3e-4])  # true rate of the base at the start [rad/s]
+CENTRE = np.array([0.2, -0.8, 1.2, -0.5, 0.6, 0.3])  # joint positions before and after a manoeuvre [rad]
 
 
 def flights(duration: float) -> dict[str, dict[str, Any]]:

@@ -1,0 +1,407 @@
+"""What the first order does not say: closed forms of integration, the linear method (19), complete nonlinear fits.
+
+Integration. The velocity of the samples' white noise is a random walk. Let S be the integral of s and W the walk. Least
+squares that take the walk for white noise estimate the size A of an acceleration A s(t) from v = A S + W. With
+E[W(t) W(u)] = sigma^2 min(t, u) their variance is sigma^2 times the integral over t of (integral of S from t to the
+end)^2, over (integral of S^2)^2. The full covariance of the walk gives sigma^2 over the integral of s^2, so nothing is
+lost. The ratio of both variances is 3 for s = cos over whole periods, and 6/5 for a constant s. A bias b becomes a ramp
+and changes the cosine's A by -2 b, while least squares on the acceleration itself are not affected.
+
+Linear method. With the arm known, (19) is Phi_base p_base = -Phi_arm p_arm, which is not badly posed. But Phi holds
+measured rates, their derivatives and accelerations, which have errors e, and least squares take Phi as exact. With
+Psi_e = d Phi / d e, the normal matrix gains the covariance sum_e var_e Psi_e' Psi_e, and the estimate is
+
+    p = p_true - (Phi' Phi + sum_e var_e Psi_e' Psi_e)^-1 sum_e var_e Psi_e' (Psi_e p_true + d (Phi_arm p_arm) / d e)
+
+for large samples. This is attenuation: the more noise, the smaller the estimated mass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from bayesid import Manoeuvre, Posterior
+from bayesid._math.arrays import Floats
+from bayesid.identifiability.local_knowledge import Knowledge
+from bayesid.inference import maximise
+from bayesid.inference.body_quantities import linearise
+from bayesid.robot.composite_tables import composite_rows, link_table
+from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.regressors import balance_regressor
+from studies.base_body import paper
+from studies.common.ets7 import ACCELEROMETER, BASE, BIAS, INTERVAL, ets7
+from studies.common.monte_carlo import Workers, run_trials
+from studies.common.quantities import JUDGED, MASS, inertia_matrix
+from studies.sensors.estimators import (
+    LIKELIHOOD,
+    PIECES,
+    STEP,
+    Estimator,
+    Linear,
+    Solved,
+    Spread,
+    integral,
+    integrated,
+    linearised,
+    raw_posterior,
+    velocity_estimators,
+)
+from studies.sensors.signals import (
+    Differences,
+    Draws,
+    Flight,
+    LowPass,
+    Noise,
+    Treatment,
+    Wiener,
+    fly,
+    levels,
+    model_of,
+    motion,
+    recording_of,
+)
+
+__all__ = ["Balance", "Falsified", "Refits", "Regression", "Scalar", "attenuation", "falsified", "refit_all"]
+__all__ += ["regress", "scalars", "solve_balance"]
+
+PERIODS = 2  # number of periods of the cosine
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """Estimates of the unknown size of an acceleration of known shape."""
+
+    name: str  # shape of the acceleration
+    closed: float  # standard deviation with velocities taken as white over that with accelerations, in closed form
+    matrices: float  # the same from the matrices of the samples
+    # the same by simulation, and its Monte-Carlo error
+    simulated: float
+    error: float
+    whole: float  # the same with the full covariance of the velocities, from the matrices
+    # error of the size per unit bias, in closed form and from the matrices
+    bias_closed: float
+    bias: float
+
+
+def scalars(draws: int, rng: np.random.Generator, samples: int = 2401) -> list[Scalar]:
+    """Compare closed form, matrices and simulation for a cosine and a constant.
+
+    Parameters
+    ----------
+    draws : int
+        Number of simulated sets of noise.
+    rng : numpy.random.Generator
+        Source of the noise.
+    samples : int
+        Number of samples, so large that sums are integrals.
+    """
+    phase = 2.0 * np.pi * PERIODS * np.linspace(0.0, 1.0, samples)
+    rule = integral(phase)
+    noise = rng.standard_normal((draws, samples))
+    results = []
+    for name, shape, closed, bias in (
+        ("cosine over whole periods", np.cos(phase), np.sqrt(3.0), -2.0),
+        ("constant", np.ones(samples), np.sqrt(1.2), 1.0),
+    ):
+        velocity = rule @ shape
+        gain = velocity @ rule / (velocity @ velocity)
+        best = 1.0 / np.linalg.norm(shape)
+        simulated = (noise @ gain).std(ddof=1) / best
+        factor = np.linalg.cholesky(rule @ rule.T)
+        whole = 1.0 / np.linalg.norm(np.linalg.solve(factor, velocity))
+        results.append(
+            Scalar(
+                name,
+                float(closed),
+                float(np.linalg.norm(gain) / best),
+                float(simulated),
+                float(simulated / np.sqrt(2.0 * (draws - 1))),
+                float(whole / best),
+                bias,
+                float(gain.sum()),
+            )
+        )
+    return results
+
+
+@dataclass(frozen=True)
+class Falsified:
+    """Relative errors of the ten quantities without any noise."""
+
+    bias: Floats  # (10,): errors due to a constant error `BIAS` of the accelerometer on each axis
+    # (10,): errors due to integrating samples by the trapezoidal rule and comparing them with the exact velocity; zero
+    # where the accelerometer is not integrated
+    rule: Floats
+
+
+def falsified(flight: Flight, linear: Linear, noise: Noise) -> dict[str, Falsified]:
+    """Return the errors that a bias and the rule of integration cause in every use of the accelerometer."""
+    still, rule = np.zeros_like(flight.rate), integral(flight.time)
+    # the acceleration errors whose trapezoidal integral is that of the rule
+    missed = np.linalg.lstsq(rule, rule @ flight.accel - (flight.velocity[1:] - flight.velocity[0]))[0]
+    exact = np.zeros((1, 3, *flight.position.shape))
+    errors = [linear.residual(still[None], accel[None], exact) for accel in (still + BIAS, missed)]
+    results = {}
+    for name, estimator in velocity_estimators(linear, noise).items():
+        bias, quadrature = (estimator.solve(residual)[0][0] / np.abs(paper.TRUTH) for residual in errors)
+        results[name] = Falsified(bias, quadrature if name.startswith("velocity") else 0.0 * quadrature)
+    return results
+
+
+# treatments of joints, rates and accelerations alike
+TREATED: tuple[Treatment, ...] = (Differences(), LowPass(), PIECES, Wiener())
+
+
+class Balance:
+    """The balance of force and torque about the base's origin, linear in the base's parameters.
+
+    Parameters
+    ----------
+    states : (3, T, joints) array
+        Joint positions, velocities, accelerations.
+    """
+
+    def __init__(self, states: Floats) -> None:
+        robot = ets7()
+        moved = kinematics(robot, JointState(*states))
+        self.base = link_table(robot, BASE, moved)
+        self.arm = composite_rows(robot, moved, leave_out=(BASE,))[:, :, None]
+
+    def __call__(self, rate: Floats, change: Floats, accel: Floats) -> tuple[Floats, Floats]:
+        """Return the regressor (T, 6, 10) of the base and the wrench (T, 6) that moves the arm.
+
+        Parameters
+        ----------
+        rate, change : (T, 3) array
+            Angular velocity and its derivative, base axes [rad/s, rad/s2].
+        accel : (T, 3) array
+            Acceleration as the accelerometer reads it [m/s2].
+        """
+        base, arm = _balance(self.base, self.arm, rate, change, accel)
+        return np.asarray(base), np.asarray(arm)[..., 0]
+
+
+@jax.jit
+def _balance(
+    base: jax.Array, arm: jax.Array, rate: jax.Array, change: jax.Array, accel: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    point = jnp.array(ACCELEROMETER)
+    origin = accel - jnp.cross(change, point) - jnp.cross(rate, jnp.cross(rate, point))
+    return balance_regressor(base, rate, change, origin), balance_regressor(arm, rate, change, origin)
+
+
+@dataclass(frozen=True)
+class Regression:
+    """Estimates of (19) from N sets of noise."""
+
+    errors: Floats  # (N, 10): errors relative to the true quantities
+    unphysical: int  # number of estimates that no rigid body can have
+
+
+def regress(draws: Draws, noise: Noise, treatments: Sequence[Treatment] = TREATED) -> dict[str, Regression]:
+    """Solve (19) by least squares in SI units, every signal treated alike; first and last sample left out.
+
+    Parameters
+    ----------
+    draws : Draws
+        Sets of noise about a flight without gravity gradient, which (19) does not hold.
+    noise : Noise
+        Level of noise.
+    treatments : sequence of Treatment
+        Treatments to compare.
+
+    Returns
+    -------
+    dict of str to Regression
+        Estimates by the title of the treatment.
+    """
+    flight = draws.flight
+    truth = np.stack(motion().evaluate(flight.time))
+    results = {}
+    for treatment in treatments:
+        joints = truth + draws.joints(treatment, noise)
+        rate = draws.treated(treatment, "rate", noise)
+        accel = flight.accel + draws.treated(treatment, "accel", noise)[:, 0]
+        estimates = np.stack(
+            [
+                solve_balance(*Balance(states)(flight.rate + turning[0], turning[1], pulled))
+                for states, turning, pulled in zip(joints, rate, accel, strict=True)
+            ]
+        )
+        quantities = np.stack([mass_com_inertia(p) for p in estimates])
+        unphysical = [_physical(values) for values in quantities].count(False)
+        results[treatment.title] = Regression((quantities - paper.TRUTH) / np.abs(paper.TRUTH), unphysical)
+    return results
+
+
+def attenuation(flight: Flight, noise: Noise) -> Floats:
+    """Return the relative errors of the ten quantities that central differences give for large samples, shape (10,)."""
+    step = flight.time[1] - flight.time[0]
+    balance = Balance(np.stack(motion().evaluate(flight.time)))
+    signals = [flight.rate, flight.rate_change, flight.accel]
+    base, arm = (part[1:-1] for part in balance(*signals))
+    normal, right = np.einsum("tci,tcj->ij", base, base), np.zeros(10)
+    true = ets7().link(BASE).inertial.vector
+    for index, sd in enumerate((noise.rate, noise.rate / (np.sqrt(2.0) * step), noise.accel)):
+        for axis in range(3):
+            shifted = [np.array(signal) for signal in signals]
+            shifted[index][:, axis] += sd
+            psi, arm_part = (after[1:-1] - before for after, before in zip(balance(*shifted), (base, arm), strict=True))
+            normal += np.einsum("tci,tcj->ij", psi, psi)
+            right += np.einsum("tci,tc->i", psi, psi @ true + arm_part)
+    estimate = true - np.linalg.solve(normal, right)
+    return (np.asarray(mass_com_inertia(estimate)) - paper.TRUTH) / np.abs(paper.TRUTH)
+
+
+def solve_balance(base: Floats, arm: Floats) -> Floats:
+    """Return the ten linear parameters by least squares, first and last sample left out (`Balance`)."""
+    design = base[1:-1].reshape(-1, 10)
+    scale = np.linalg.norm(design, axis=0)
+    return np.asarray(np.linalg.lstsq(design / scale, -arm[1:-1].ravel())[0] / scale)
+
+
+def _physical(quantities: Floats) -> bool:
+    moments = np.linalg.eigvalsh(inertia_matrix(quantities))
+    return bool(quantities[MASS] > 0.0 and moments[0] > 0.0 and moments[2] < moments[0] + moments[1])
+
+
+@dataclass(frozen=True)
+class SampledJoints:
+    """Joint motion that is known at the samples alone."""
+
+    states: Floats  # (3, T, joints): positions, velocities and accelerations of the joints
+
+    def evaluate(self, time: Floats) -> JointState:
+        """Return the joint state at the times, shape (T,), which must be samples."""
+        rows = np.rint(np.asarray(time) / INTERVAL).astype(int)
+        if not np.allclose(rows * INTERVAL, time, atol=1e-9):
+            raise ValueError(
+                f"times from {np.min(time):g} to {np.max(time):g} s are not all samples {INTERVAL:g} s apart"
+            )
+        return JointState(*self.states[:, rows])
+
+
+@dataclass(frozen=True)
+class Refits:
+    """Nonlinear fits of N sets of noise, and the linear estimates from the same sets."""
+
+    nonlinear: Spread
+    linear: Spread
+
+    @property
+    def difference(self) -> Floats:
+        """Median absolute difference over the linear standard deviation, shape (10,)."""
+        gap = self.nonlinear.errors - self.linear.errors
+        return np.asarray(np.median(np.abs(gap), axis=0)) / self.linear.sd
+
+    @property
+    def diverged(self) -> NDArray[np.bool_]:
+        """Which fits have an error of more than the true value in the mass or a moment, shape (N,)."""
+        return np.asarray((np.abs(self.nonlinear.errors[:, JUDGED]) > 1.0).any(axis=1))
+
+
+def refit_all(
+    chosen: Sequence[str],
+    counts: Mapping[str, int],
+    seed: int,
+    store: Path | None,
+    workers: Workers,
+    progress: Callable[[str], None],
+) -> dict[str, dict[str, Refits]]:
+    """Fit fresh sets of noise by each procedure at each level of noise.
+
+    Parameters
+    ----------
+    chosen : sequence of str
+        Levels of noise.
+    counts : mapping of str to int
+        Number of fits by procedure, `LIKELIHOOD` or `PAPER`.
+    seed, store, workers, progress
+        See `studies.common.monte_carlo.run_trials`.
+
+    Returns
+    -------
+    dict of str to dict of str to Refits
+        Fits by level and procedure.
+    """
+    plan = [(level, procedure) for level in chosen for procedure, count in counts.items() for _ in range(count)]
+    trials = run_trials(refit, plan, store, seed=seed, workers=workers, progress=progress).complete()
+    results: dict[str, dict[str, Refits]] = {level: {} for level in chosen if plan}
+    for level, procedure in dict.fromkeys(plan):
+        made = [trial for task, trial in zip(plan, trials, strict=True) if task == (level, procedure)]
+        both = (Spread.of(_joined([trial[name] for trial in made])) for name in ("nonlinear", "linear"))
+        results[level][procedure] = Refits(*both)
+    return results
+
+
+def _joined(solved: Sequence[Solved]) -> Solved:
+    errors, stated, chi2 = (np.concatenate(parts) for parts in zip(*solved, strict=True))
+    return errors, stated, chi2
+
+
+def refit(task: tuple[str, str], rng: np.random.Generator) -> dict[str, Solved]:
+    """Fit one set of noise by a procedure at a level of noise, nonlinearly and to first order.
+
+    Fits start from the truth: the question is where the optimum lies, not whether it is reached.
+    """
+    level, procedure = task
+    noise = levels(fly())[level]
+    fit = _likelihood if procedure == LIKELIHOOD else _paper
+    return fit(Draws.of(fly(), 1, rng), noise, rng)
+
+
+def _likelihood(draws: Draws, noise: Noise, rng: np.random.Generator) -> dict[str, Solved]:
+    """Fit as the package does."""
+    measured, linear = draws.measured_motion(noise), linearised()
+    manoeuvre = Manoeuvre(draws.recording(noise), measured)
+    posterior = Posterior.of(model_of(noise, biased=False), [manoeuvre], step=STEP, flat_prior=True)
+    refined, optimum = maximise(posterior, rng, np.zeros(posterior.size))
+    chi2 = optimum.chi2 / (refined.samples - refined.size)
+    errors = linear.residual(draws.raw("rate", noise), draws.raw("accel", noise), draws.joints(Wiener(), noise))
+    return {
+        "nonlinear": _solved(Knowledge.at(refined, optimum.z), 1.0, chi2),
+        "linear": Estimator(linear, linear.whitening(noise, measured)).solve(errors),
+    }
+
+
+def _paper(draws: Draws, noise: Noise, rng: np.random.Generator) -> dict[str, Solved]:
+    """Fit as the paper does: signals treated, accelerations integrated, squares of SI units added."""
+    flight, linear = draws.flight, linearised()
+    rate, accel = (draws.treated(LowPass(), family, noise)[:, 0] for family in ("rate", "accel"))
+    joints = draws.joints(PIECES, noise)
+    moved = SampledJoints(np.stack(motion().evaluate(flight.time)) + joints[0])
+    recording = recording_of(flight.time, flight.rate + rate[0], flight.accel + accel[0])
+    posterior = raw_posterior(recording, moved, biased=False)
+    weight = integrated(flight.time, None)
+    scalars = weight.shape[1]  # the posterior's other rows are padding
+
+    def residual(z: Floats) -> Floats:
+        values: Floats = weight @ posterior.residuals(z).ravel()[:scalars]
+        return values
+
+    def jacobian(z: Floats) -> Floats:
+        slopes: Floats = weight @ posterior.jacobian(z)[:scalars]
+        return slopes
+
+    solution = least_squares(residual, np.zeros(posterior.size), jacobian, method="lm", x_scale="jac")
+    variance = 2.0 * solution.cost / (len(weight) - posterior.size)
+    knowledge = Knowledge(*linearise(posterior, solution.x), jacobian(solution.x))
+    equal_weights = Estimator(linear, weight, declared=False)
+    return {
+        "nonlinear": _solved(knowledge, np.sqrt(variance), variance),
+        "linear": equal_weights.solve(linear.residual(rate, accel, joints)),
+    }
+
+
+def _solved(knowledge: Knowledge, sigma: float, chi2: float) -> Solved:
+    return (knowledge.values - paper.TRUTH)[None], sigma * knowledge.sd[None], np.array([chi2])
