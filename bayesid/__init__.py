@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from bayesid.simulation.effects import Effect, Parameter, Wrench, register
     from bayesid.simulation.model import Manoeuvre, Model
     from bayesid.simulation.orbit import Orbit
-    from bayesid.simulation.sensors import Sensor, SensorKind, White
+    from bayesid.simulation.sensors import Instrument, Sensor, SensorKind, White
 
 __all__ = [
     "BodyPrior",
@@ -42,6 +42,7 @@ __all__ = [
     "Identification",
     "InertialParameters",
     "InputError",
+    "Instrument",
     "Load",
     "Manoeuvre",
     "MeasuredMotion",
@@ -70,6 +71,7 @@ _PLACES = {
     "Identification": "inference.identification",
     "InertialParameters": "robot.inertial_parameters",
     "InputError": "_io.errors",
+    "Instrument": "simulation.sensors",
     "SensorKind": "simulation.sensors",
     "Load": "robot.robot",
     "Manoeuvre": "simulation.model",

@@ -12,6 +12,7 @@ from bayesid.app.command_line import app
 from bayesid.report.effect_catalogue import catalogue, entry_of
 from bayesid.simulation.effects import known_effects
 from bayesid.simulation.effects.register import _REGISTER
+from bayesid.simulation.sensors import SensorKind
 
 DEMONSTRATION = Path(__file__).resolve().parents[1] / "bayesid" / "app" / "demonstration_data" / "study.toml"
 
@@ -26,6 +27,19 @@ class SteadyTorque(Effect):
     name = "steady-torque"
     parameters = (Parameter("x", "N m", 2e-3),)
 '''
+
+SENSOR = """
+from bayesid import Instrument, SensorKind
+
+
+@SensorKind.register
+class Field(SensorKind):
+    value, unit = "field", "T"
+    instrument = Instrument("magnetometer", "the field", bias_sigma=1e-7, drift_sigma=1e-9)
+
+    def read(self, sensed):
+        return sensed.instant.to_base(sensed.instant.environment.north)
+"""
 
 
 def run(*arguments: object) -> tuple[int, str]:
@@ -104,6 +118,21 @@ def test_sizes_are_those_of_a_study_with_its_plugins(tmp_path):
         assert "x [N m]: normal, mean 0, standard deviation 2 × 10⁻³" in output
     finally:
         _REGISTER.pop("steady-torque", None)
+
+
+def test_a_sensor_of_ones_own_has_faults(tmp_path, monkeypatch):
+    monkeypatch.setattr(SensorKind, "_known", dict(SensorKind._known))
+    text = DEMONSTRATION.read_text(encoding="utf-8").replace('urdf = "', f'urdf = "{DEMONSTRATION.parent}/')
+    section = "[sensors.other.field]\nsigma = 1e-5\n\n[sensors.rate]"
+    text = text.replace("[sensors.rate]", section, 1) + 'plugins = ["field.py"]\n'
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "field.py").write_text(SENSOR, encoding="utf-8")
+    status, output = run("--study", tmp_path / "study.toml")
+    assert status == 0, output
+    assert "rate-bias The rate sensor reads a constant" in output
+    assert "field-drift The magnetometer's zero wanders steadily" in output
+    assert "x, y, z [T/s]: normal, mean 0, standard deviation 1 × 10⁻⁹" in output
+    assert output.count("Needs: [sensors.other.field]") == 6
 
 
 def test_an_unknown_effect_is_answered_with_the_known_ones():

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from bayesid._math.resampling import resampled
-from bayesid.simulation.effects import AccelClock, AccelLatency, RateClock, RateLatency, Readings
+from bayesid.simulation.effects import Readings, SensorClock, SensorLatency
 from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.sensors import SensorKind
 from studies.truth import mujoco as mj
 from studies.truth.bodies import SERVICER3
 
@@ -76,7 +77,11 @@ def test_padding_changes_nothing(padding):
 # the effects ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("effect", [RateLatency(), AccelLatency()], ids=lambda effect: effect.name)
+@pytest.mark.parametrize(
+    "effect",
+    [SensorLatency.of(SensorKind.RATE)(), SensorLatency.of(SensorKind.ACCEL)()],
+    ids=lambda effect: effect.name,
+)
 def test_a_delayed_sample_shows_the_past(effect):
     """What the interpolation leaves is 2 % of what a delay of 0.3 s makes, at samples 0.05 to 0.4 s apart."""
     late = faulty(effect, 0.3, UNEVEN, signal(UNEVEN))
@@ -85,14 +90,25 @@ def test_a_delayed_sample_shows_the_past(effect):
     assert np.abs(late - signal(UNEVEN - 0.3))[inside].max() < 0.02 * change
 
 
-@pytest.mark.parametrize("effect", [RateLatency(), AccelLatency(), RateClock(), AccelClock()], ids=lambda e: e.name)
+@pytest.mark.parametrize(
+    "effect",
+    [
+        SensorLatency.of(SensorKind.RATE)(),
+        SensorLatency.of(SensorKind.ACCEL)(),
+        SensorClock.of(SensorKind.RATE)(),
+        SensorClock.of(SensorKind.ACCEL)(),
+    ],
+    ids=lambda e: e.name,
+)
 def test_without_fault_the_reading_is_exact(effect):
     """The interpolation's error is zero at the samples, so that none has to cancel."""
     truth = signal(UNEVEN)
     np.testing.assert_allclose(faulty(effect, 0.0, UNEVEN, truth), truth, atol=1e-14)
 
 
-@pytest.mark.parametrize("effect", [RateClock(), AccelClock()], ids=lambda effect: effect.name)
+@pytest.mark.parametrize(
+    "effect", [SensorClock.of(SensorKind.RATE)(), SensorClock.of(SensorKind.ACCEL)()], ids=lambda effect: effect.name
+)
 @pytest.mark.parametrize("rate", [5e-3, -5e-3])
 def test_a_clock_stamps_true_time_times_one_plus_its_rate(effect, rate):
     """A sensor that samples at true times and stamps them wrongly, against the truth at the stamps."""
@@ -112,7 +128,7 @@ def test_a_fast_clock_reads_what_mujoco_reads_at_the_true_times():
     true_time = np.arange(0.0, 40.0, 0.1)
     stamped, truth = true_time * 1.004, mj.TruthModel(SERVICER3, accel_position=(0.2, -0.1, 0.3))
     read, at_stamps = (truth.run(motion, time, rate0=(0.02, -0.03, 0.015), step=0.05) for time in (true_time, stamped))
-    for effect, key in ((RateClock(), "rate"), (AccelClock(), "accel")):
+    for effect, key in ((SensorClock.of(SensorKind.RATE)(), "rate"), (SensorClock.of(SensorKind.ACCEL)(), "accel")):
         given, exact = getattr(at_stamps, key), getattr(read, key)
         found = faulty(effect, 4e-3, stamped, given)
         assert np.linalg.norm(found - exact) < 0.02 * np.linalg.norm(given - exact)

@@ -20,9 +20,9 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import predicted_readings
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
-from bayesid.simulation.effects import AccelBias, Payload
+from bayesid.simulation.effects import Payload, SensorBias
 from bayesid.simulation.model import Manoeuvre
-from bayesid.simulation.sensors import White
+from bayesid.simulation.sensors import SensorKind, White
 
 COMPILED = "/jax/core/compile/backend_compile_duration"
 
@@ -64,7 +64,7 @@ def compiled(planar_posterior: Callable[..., Posterior]) -> Posterior:
     readings are whitened by windows.
     """
     base = planar_posterior(np.random.default_rng(3), step=0.5)
-    model = base.model.extend(AccelBias(1e-4)).extend(Payload("link2", 0.2))
+    model = base.model.extend(SensorBias.of(SensorKind.ACCEL)(1e-4)).extend(Payload("link2", 0.2))
     model = replace(model, sensors=tuple(replace(sensor, noise=White(2e-5)) for sensor in model.sensors))
     posterior = Posterior.of(model, base.manoeuvres, step=0.5)
     with counted() as seen:
@@ -77,7 +77,7 @@ def compiled(planar_posterior: Callable[..., Posterior]) -> Posterior:
 def test_another_prior_compiles_nothing(compiled):
     model = compiled.model
     wider = tuple(replace(prior, spread=1.7 * prior.spread) for prior in model.priors)
-    effects = (*model.effects[:-2], AccelBias(3e-4), Payload("link2", 0.1))
+    effects = (*model.effects[:-2], SensorBias.of(SensorKind.ACCEL)(3e-4), Payload("link2", 0.1))
     with counted() as seen:
         other = Posterior.of(
             replace(model, priors=wider, rate_sigma=0.2, effects=effects), compiled.manoeuvres, step=0.5

@@ -20,7 +20,7 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.log_cholesky import relative
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import Effect, Parameter, Readings, Resonance, Wrench, create, known_effects
-from bayesid.simulation.effects.instant import Composite, Environment, Instant
+from bayesid.simulation.instant import Composite, Environment, Instant
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Model
 from bayesid.simulation.orbit import Orbit

@@ -16,7 +16,8 @@ from test_cli import copy, run, scale
 from bayesid._io.errors import InputError
 from bayesid._io.files import claimed_folder, complete_folder
 from bayesid.app.schema import Study
-from bayesid.app.study_to_model import load_model
+from bayesid.app.study_to_model import load_model, load_posterior
+from bayesid.inference.posterior import Posterior
 from bayesid.simulation.own_effects import check_own_effect
 from studies.faults.fuzz import Spoilt, answer_to, spoilt
 from studies.faults.surroundings import with_plugin
@@ -79,7 +80,7 @@ def test_a_faulty_plug_in_is_named(kind: str, study: Path, tmp_path: Path) -> No
     assert not (tmp_path / "out").exists()
 
 
-def test_a_faulty_effect_is_named_before_a_model_is_extended(study: Path, tmp_path: Path) -> None:
+def test_a_faulty_effect_of_a_program_is_named_before_a_simulation(study: Path, tmp_path: Path) -> None:
     from bayesid.simulation.effects import Effect, Parameter
 
     class Wrong(Effect):
@@ -89,8 +90,9 @@ def test_a_faulty_effect_is_named_before_a_model_is_extended(study: Path, tmp_pa
         def wrench(self, values, instant, inner):
             return values
 
+    loaded = load_posterior(Study.load(study))
     with pytest.raises(InputError, match=r"test_faults.py: effect 'wrong': wrench: it returns the shape"):
-        load_model(Study.load(study)).extend(Wrong())
+        Posterior.of(loaded.model.extend(Wrong()), loaded.manoeuvres)
 
 
 NARROW = settings(

@@ -14,13 +14,14 @@ from bayesid.inference.linear_responses import LinearResponses
 from bayesid.inference.perturbed_posterior import Perturbation, perturbed, residual_of
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import (
-    AccelBias,
-    AccelLatency,
     FlexibleAppendage,
     FuelSlosh,
-    RateScale,
+    SensorBias,
+    SensorLatency,
+    SensorScale,
     WheelMomentum,
 )
+from bayesid.simulation.sensors import SensorKind
 
 
 def pushes_of(posterior: Posterior, rng: np.random.Generator, count: int) -> Perturbation:
@@ -43,7 +44,12 @@ def by_differences(posterior: Posterior, z: np.ndarray, arrays, push: Perturbati
     "effects",
     [
         (),
-        (WheelMomentum(), AccelBias(1e-3), RateScale(), AccelLatency()),
+        (
+            WheelMomentum(),
+            SensorBias.of(SensorKind.ACCEL)(1e-3),
+            SensorScale.of(SensorKind.RATE)(),
+            SensorLatency.of(SensorKind.ACCEL)(),
+        ),
         pytest.param((FuelSlosh(), FlexibleAppendage()), marks=pytest.mark.slow),
     ],
     ids=["rigid", "sensors and wheels", "vibrations"],

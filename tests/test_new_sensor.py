@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import pickle
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -13,6 +15,7 @@ import pytest
 from bayesid._io.errors import InputError
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_model, load_posterior
+from bayesid.diagnosis import diagnose
 from bayesid.inference.mode import maximise
 from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.posterior import Posterior
@@ -23,10 +26,10 @@ from bayesid.recording.joint_motion import Excitation, MeasuredMotion, sample_jo
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects import GravityGradient
+from bayesid.simulation.effects import GravityGradient, SensorBias, create, known_effects
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Coloured, Sensor, SensorKind, White
+from bayesid.simulation.sensors import Coloured, Instrument, Sensor, SensorKind, White
 from tests.conftest import PLANAR
 
 SUN = (0.6, 0.64, 0.48)
@@ -36,7 +39,6 @@ STEP = 0.25
 """Step of the integration [s]: where the ramps end, the jerk jumps, and longer steps cost accuracy."""
 
 
-@SensorKind.register
 class SunDirection(SensorKind):
     """Direction of the Sun in the axes of a Sun sensor: a unit vector."""
 
@@ -48,11 +50,11 @@ class SunDirection(SensorKind):
         return sensed.instant.to_base(sensed.instant.environment.sun)
 
 
-@SensorKind.register
 class SecondGyro(SensorKind):
     """A gyro about two axes, recorded at times of its own."""
 
     value, unit = "gyro2", "rad/s"
+    instrument = Instrument("second gyro", bias_sigma=2e-4)
     axes: ClassVar[tuple[str, ...]] = ("a", "b")
     rest: ClassVar[tuple[float, ...]] = (0.0, 0.0)
     size, mounted = 2, False
@@ -60,6 +62,17 @@ class SecondGyro(SensorKind):
 
     def read(self, sensed):
         return sensed.instant.rate[jnp.array([0, 2])]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _registered() -> Iterator[None]:
+    """The kinds are known to this file alone."""
+    before = dict(SensorKind._known)
+    for kind in (SunDirection, SecondGyro):
+        SensorKind.register(kind)
+    yield
+    SensorKind._known.clear()
+    SensorKind._known.update(before)
 
 
 @dataclass(frozen=True)
@@ -160,6 +173,49 @@ def test_other_recordings_and_noise_draws(flown):
     drawn = noisy(posterior, 0, predicted, np.random.default_rng(1))
     off = drawn.gyro2 - predicted.gyro2
     assert 0.7e-6 < off.std() < 1.3e-6
+
+
+def test_it_has_the_faults_of_all_sensors(flown):
+    """Units follow from the sensor's, priors from its instruments; only a vector can be mounted wrongly."""
+    expected = {
+        "sun-bias": (("x", "y", "z"), "1", 0.03),
+        "sun-drift": (("x", "y", "z"), "1/s", 0.03 / 60.0),
+        "sun-scale": (("x", "y", "z"), "1", 0.03),
+        "sun-misalignment": (("x", "y", "z"), "rad", 0.03),
+        "sun-latency": (("delay",), "s", 0.2),
+        "sun-clock": (("rate",), "1", 1e-3),
+        "gyro2-bias": (("a", "b"), "rad/s", 2e-4),
+        "gyro2-drift": (("a", "b"), "rad/s2", 2e-4 / 60.0),
+        "gyro2-scale": (("a", "b"), "1", 0.03),
+        "gyro2-latency": (("delay",), "s", 0.2),
+        "gyro2-clock": (("rate",), "1", 1e-3),
+    }
+    faults = {name: kind for name, kind in known_effects().items() if name.partition("-")[0] in ("sun", "gyro2")}
+    for name, fault in faults.items():
+        (effect,) = fault.instances(flown[0])
+        names, units, sigmas = zip(*((p.name, p.unit, p.sigma) for p in effect.parameters), strict=True)
+        assert (names, set(units), set(sigmas)) == (names, {expected[name][1]}, {expected[name][2]})
+        assert effect.parameters == create(name).parameters
+    assert set(faults) == set(expected)
+    assert faults["gyro2-bias"].summary == "The second gyro reads a constant beside what it measures."
+    assert "sun sensor" in faults["sun-clock"].summary
+
+
+def test_its_faults_go_to_another_process_and_back():
+    effect = SensorBias.of(SensorKind.of("gyro2"))((1e-3, 2e-3))
+    again = pickle.loads(pickle.dumps(effect))
+    assert (type(again), again.parameters) == (type(effect), effect.parameters)
+
+
+def test_its_hidden_fault_is_named(flown):
+    model, posterior, _ = flown
+    (manoeuvre,) = posterior.manoeuvres
+    faults = [name for name in known_effects() if name.startswith("sun-")]
+    effects = [create(name) for name in (*faults, "wheel-momentum")]
+    scaled = {f"sun.{axis}": 1.02 * manoeuvre.recording.channels[f"sun.{axis}"] for axis in "xyz"}
+    wrong = replace(manoeuvre.recording, channels={**manoeuvre.recording.channels, **scaled})
+    diagnosis = diagnose(model, [replace(manoeuvre, recording=wrong)], effects=effects)
+    assert diagnosis.verdict.causes == ("sun-scale",)
 
 
 PLUGIN = """

@@ -15,7 +15,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects import GravityGradient
-from bayesid.simulation.effects.instant import Environment, Instant
+from bayesid.simulation.instant import Environment, Instant
 from bayesid.simulation.orbit import EARTH, Orbit
 from studies.truth.stepwise import Reference, circular_zenith
 

@@ -19,7 +19,7 @@ from bayesid.recording.recording import Recording
 from bayesid.report.numbers import format_quantity
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects import GravityGradient, RateBias
+from bayesid.simulation.effects import GravityGradient, SensorBias
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Sensor, SensorKind, White
@@ -49,7 +49,7 @@ def predictor(motion, formula_motion) -> BasePredictor:
     robot = Robot.from_urdf(PLANAR)
     prior = BodyPrior("base_link", robot.link("base_link").inertial, 0.01)
     sensors = (Sensor(SensorKind.RATE, White(1e-5)),)
-    model = Model(robot, sensors, (prior,), Orbit(ORBIT.radius), (GravityGradient(), RateBias()))
+    model = Model(robot, sensors, (prior,), Orbit(ORBIT.radius), (GravityGradient(), SensorBias.of(SensorKind.RATE)()))
     time = np.linspace(0.0, DURATION, 81)
     planned = formula_motion(motion, PLANAR, robot)
     position = planned.evaluate(time).position

@@ -39,7 +39,7 @@ from bayesid.report.sentences.model_assumptions import model_sentences
 from bayesid.report.tables import identification_tables
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects import AccelBias, GravityGradient
+from bayesid.simulation.effects import GravityGradient, SensorBias
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.sensors import Filter, Sensor, SensorKind, White
@@ -81,7 +81,7 @@ def attitude_posterior():
     prior = BodyPrior(robot.base, robot.link(robot.base).inertial, 0.2)
     link = next(name for name, link in robot.links.items() if name != robot.base and link.inertial.mass > 0.0)
     nuisance = BodyPrior(link, robot.link(link).inertial, 0.05, nuisance=True)
-    model = Model(robot, sensors, (prior, nuisance), Orbit(7e6), (GravityGradient(), AccelBias()))
+    model = Model(robot, sensors, (prior, nuisance), Orbit(7e6), (GravityGradient(), SensorBias.of(SensorKind.ACCEL)()))
     time = np.arange(0.0, motion.duration, 0.4)
     blank = {
         f"{kind.value}.{axis}": np.zeros(len(time)) for kind in (SensorKind.RATE, SensorKind.ACCEL) for axis in "xyz"

@@ -24,7 +24,7 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
 from bayesid.simulation.channels import Channels
 from bayesid.simulation.effects import EncoderOffset, GravityGradient, JointFriction, LinkInertia, TorqueBias
-from bayesid.simulation.effects.instant import Environment
+from bayesid.simulation.instant import Environment
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit

@@ -8,7 +8,7 @@ from jax.scipy.spatial.transform import Rotation
 
 from bayesid._math.small_matrices import cross
 
-__all__ = ["quaternion_product", "quaternion_rate", "rotation", "rotation_between", "tilted"]
+__all__ = ["quaternion_product", "quaternion_rate", "rotation", "rotation_between", "tilted", "turned"]
 
 
 def rotation(quaternion: Array) -> Array:
@@ -31,6 +31,13 @@ def tilted(quaternion: Array, tilt: Array) -> Array:
     """Return an attitude rotated by a small rotation vector (3,) in its moving axes [rad]."""
     small = jnp.concatenate([0.5 * tilt, jnp.ones(1)])
     return quaternion_product(quaternion, small / jnp.linalg.norm(small))
+
+
+def turned(quaternion: Array, vector: Array) -> Array:
+    """Return an attitude rotated by a rotation vector (3,) in its moving axes [rad], by a series smooth at zero."""
+    square = vector @ vector
+    # `tilted` turns by twice the arctangent of half of what it is given
+    return tilted(quaternion, vector * (1.0 + square / 12.0 + square**2 / 120.0))
 
 
 def rotation_between(first: Array, second: Array) -> Array:

@@ -34,6 +34,7 @@ from bayesid.robot.end_effector import Tip
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import create
 from bayesid.simulation.model import Model
+from bayesid.simulation.own_effects import check_own_effect
 
 __all__ = ["load_loop_problem", "load_problem", "separating"]
 
@@ -135,7 +136,9 @@ def _with_rivals(model: Model, section: DesignSection) -> Model:
     try:
         for label in section.rivals:
             if label not in [effect.label for effect in model.effects]:
-                model = model.extend(create(label))
+                rival = create(label)
+                check_own_effect(rival, model.robot, model.sensors)
+                model = model.extend(rival)
     except InputError as error:
         raise error.within(place="design.rivals") from None
     for effect in model.effects:

@@ -23,7 +23,7 @@ from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
 from bayesid.robot.robot_size import RobotSize
-from bayesid.simulation.effects import AccelBias, Effect, RateBias, create, known_effects
+from bayesid.simulation.effects import Effect, SensorBias, create, known_effects
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
 from bayesid.simulation.orbit import Orbit
@@ -283,7 +283,10 @@ def _effects(study: Study) -> tuple[Effect, ...]:
     # a sensor with a bias_sigma in the study has a bias in the model, whether the effects name it or not
     biases: dict[str, Effect] = {
         kind.name: kind(section.bias_sigma)
-        for section, kind in ((study.sensors.rate, RateBias), (study.sensors.accel, AccelBias))
+        for section, kind in (
+            (study.sensors.rate, SensorBias.of(SensorKind.RATE)),
+            (study.sensors.accel, SensorBias.of(SensorKind.ACCEL)),
+        )
         if section is not None and section.bias_sigma is not None
     }
     effects = [

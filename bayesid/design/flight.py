@@ -24,7 +24,7 @@ from bayesid.robot.kinematics import Kinematics, joint_motion, kinematics
 from bayesid.robot.regressors import balance_regressor
 from bayesid.robot.row_sensitivity import Screws, beyond, row_sensitivity, screws
 from bayesid.simulation.dynamics import Grid, Samples, Start, TimeTables, UnitSpeed
-from bayesid.simulation.effects.instant import Readings
+from bayesid.simulation.instant import Readings
 from bayesid.simulation.simulator import Values
 from bayesid.simulation.time_grid import time_tables
 from bayesid.simulation.variation import Equations, propagate

@@ -9,7 +9,7 @@ from jax import Array
 
 from bayesid._math.arrays import Floats
 from bayesid.robot.joint_state import JointState
-from bayesid.simulation.effects.instant import Instant
+from bayesid.simulation.instant import Instant
 
 __all__ = ["BaseAtStart", "Trajectory", "base_quantities", "trajectory_of"]
 

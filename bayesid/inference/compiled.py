@@ -22,7 +22,7 @@ from bayesid._math.on_device import on_device
 from bayesid.inference import whitening
 from bayesid.inference.layout import Layout, PriorNumbers
 from bayesid.simulation.dynamics import Grid, LinearMotion
-from bayesid.simulation.effects.instant import Instant, Readings
+from bayesid.simulation.instant import Instant, Readings
 from bayesid.simulation.simulator import ModelConstants, Simulator
 
 __all__ = [

@@ -16,7 +16,7 @@ from bayesid.inference.recorded_samples import RecordedSamples, Series
 from bayesid.inference.whitening import Whitening
 from bayesid.recording.actions import Actions
 from bayesid.simulation.dynamics import Grid
-from bayesid.simulation.effects.instant import Readings
+from bayesid.simulation.instant import Readings
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import SensorKind
 from bayesid.simulation.time_grid import build_grid, lengthened, pad_grids, rounded

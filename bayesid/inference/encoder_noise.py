@@ -28,7 +28,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 from bayesid.simulation.channels import Channels
 from bayesid.simulation.dynamics import composite
-from bayesid.simulation.effects.instant import Environment, Instant
+from bayesid.simulation.instant import Environment, Instant
 from bayesid.simulation.joint_torques import BaseMotion, Beyond, beyond_joints, joint_torques, no_joints
 from bayesid.simulation.sensors import Sensed, Sensor, SensorKind
 from bayesid.simulation.time_grid import lengthened, rounded

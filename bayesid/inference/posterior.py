@@ -24,6 +24,7 @@ from bayesid.inference.unknowns import Unknowns
 from bayesid.inference.whitening import Whitening
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.simulation.model import Manoeuvre, Model
+from bayesid.simulation.own_effects import check_own_effect
 from bayesid.simulation.simulator import ModelConstants, Simulator
 
 __all__ = ["BATCH", "Posterior"]
@@ -84,8 +85,11 @@ class Posterior:
         Raises
         ------
         InputError
-            If there is no recording, or one lacks a sensor that the model declares.
+            If there is no recording, one lacks a sensor that the model declares, or a hook of an effect of the user's
+            own breaks its contract.
         """
+        for effect in model.effects:
+            check_own_effect(effect, model.robot, model.sensors)
         if not manoeuvres:
             raise InputError("there is no recording", remedy="Give at least one")
         recorded = tuple(RecordedSamples.of(model, manoeuvre) for manoeuvre in manoeuvres)

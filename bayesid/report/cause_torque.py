@@ -13,7 +13,7 @@ from bayesid._math.arrays import Floats
 from bayesid._math.on_device import on_device
 from bayesid.diagnosis import Hypothesis
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.instant import Instant
+from bayesid.simulation.instant import Instant
 
 __all__ = ["cause_torque"]
 

@@ -96,7 +96,7 @@ def example_model(*, torque: bool = False) -> Model:
     joints = tuple(joint.name for joint in robot.joints)
     return Model(
         robot,
-        tuple(Sensor(kind, White(1e-5)) for kind in (SensorKind.RATE, SensorKind.ACCEL, SensorKind.ATTITUDE)),
+        tuple(Sensor(kind, White(1e-5)) for kind in SensorKind.known()),
         (BodyPrior(robot.base, robot.link(robot.base).inertial, 1.0),),
         Orbit(6.916e6, inclination=0.6, sun=(1.0, 0.0, 0.0)),
         torque=TorqueSensor(joints, (0.1,) * len(joints)) if torque else None,
@@ -190,9 +190,6 @@ TAKEN_AWAY: dict[str, Callable[[Model], Model]] = {
     "[orbit]": lambda model: replace(model, orbit=None),
     "inclination in [orbit]": _in_orbit(lambda orbit: replace(orbit, inclination=None)),
     "sun in [orbit]": _in_orbit(lambda orbit: replace(orbit, sun=None)),
-    "[sensors.rate]": _without(SensorKind.RATE),
-    "[sensors.accel]": _without(SensorKind.ACCEL),
-    "[sensors.attitude]": _without(SensorKind.ATTITUDE),
     "[sensors.torque]": lambda model: replace(model, torque=None),
 }
 """Parts of a study, and how a model loses them."""
@@ -203,7 +200,9 @@ def _needs(kind: type[Effect]) -> tuple[str, ...]:
     whole = _example_with(kind)
     if not kind.instances(whole):
         return ("arguments of its own, since it does not occur in the example by itself",)
-    needs = [part for part, take in TAKEN_AWAY.items() if not kind.instances(take(whole))]
+    sensors = {f"[{sensor.kind.section}]": _without(sensor.kind) for sensor in whole.sensors}
+    taken = {**TAKEN_AWAY, **sensors}
+    needs = [part for part, take in taken.items() if not kind.instances(take(whole))]
     if kind.needs_latitude:
         needs.append("argument_of_latitude in every recording")
     return tuple(needs)

@@ -24,7 +24,7 @@ from bayesid._math.runge_kutta import runge_kutta_stages, runge_kutta_step, stag
 from bayesid._math.small_matrices import cross, inverse, solve_small, symmetric, trace_less
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.instant import Composite, Environment, Instant, Modes, Wrench
+from bayesid.simulation.instant import Composite, Environment, Instant, Modes, Wrench
 from bayesid.simulation.joint_torques import BaseMotion, Beyond, joint_torques
 
 __all__ = [

@@ -18,7 +18,6 @@ from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.own_effects import check_own_effect
 from bayesid.simulation.sensors import Sensor, SensorKind
 
 __all__ = ["Manoeuvre", "Model"]
@@ -136,14 +135,7 @@ class Model:
         return self if self.torque is None and rest == self.effects else replace(self, torque=None, effects=rest)
 
     def extend(self, effect: Effect) -> Model:
-        """Return the model with one more effect.
-
-        Raises
-        ------
-        InputError
-            If a hook of an effect of the user's own breaks its contract.
-        """
-        check_own_effect(effect, self.robot, self.sensors)
+        """Return the model with one more effect."""
         return replace(self, effects=(*self.effects, effect))
 
     @property

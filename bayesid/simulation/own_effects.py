@@ -18,7 +18,8 @@ from bayesid.recording.joint_motion import Excitation
 from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.instant import Environment, Instant, Modes, Readings, Wrench
+from bayesid.simulation.effects.effect_key import EffectKey
+from bayesid.simulation.instant import Environment, Instant, Modes, Readings, Wrench
 from bayesid.simulation.sensors import Sensor
 from bayesid.simulation.time_grid import time_tables
 
@@ -32,9 +33,20 @@ TIMES = np.linspace(0.0, 8.0, 17)
 TYPICAL = 0.1
 """Coordinates of standard-normal prior at which the hooks are called: neither zero nor far away."""
 
+_PASSED: set[tuple[object, ...]] = set()
+"""What has been tried, so that a search that builds many models of one effect tries it once."""
+
 
 def check_own_effect(effect: Effect, robot: Robot, sensors: Sequence[Sensor]) -> None:
-    """Call the hooks of an effect of the user's own; those of the package are tested with it.
+    """Call the hooks of an effect of the user's own, once for each robot; those of the package are tested with it.
+
+    Parameters
+    ----------
+    effect : Effect
+        Effect as it enters from a study, a plugin or a program.
+    robot : Robot
+    sensors : sequence of Sensor
+        Sensors whose readings the effect may change.
 
     Raises
     ------
@@ -43,6 +55,9 @@ def check_own_effect(effect: Effect, robot: Robot, sensors: Sequence[Sensor]) ->
         names the effect's file, the effect and the hook.
     """
     if type(effect).__module__.partition(".")[0] == PACKAGE:
+        return
+    trial = (EffectKey(effect), robot.name, len(robot.joints), tuple(sensor.kind for sensor in sensors))
+    if trial in _PASSED:
         return
     for hook, call, wanted in _trials(effect, robot, sensors):
         if not effect.uses(hook):
@@ -57,6 +72,7 @@ def check_own_effect(effect: Effect, robot: Robot, sensors: Sequence[Sensor]) ->
             raise _fault(effect, hook, f"it returns the shape {shapes} where {wanted} is due")
         if not all(np.isfinite(np.asarray(leaf)).all() for leaf in jax.tree.leaves(result)):
             raise _fault(effect, hook, "it returns numbers that are not finite")
+    _PASSED.add(trial)
 
 
 def _fault(effect: Effect, hook: str, problem: str) -> InputError:

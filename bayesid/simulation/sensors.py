@@ -31,13 +31,14 @@ from bayesid.simulation.sensor_noise import (
 if TYPE_CHECKING:
     from jax import Array
 
-    from bayesid.simulation.effects.instant import Instant
+    from bayesid.simulation.instant import Instant
 
 __all__ = [
     "ARCSEC",
     "AngleRandomWalk",
     "Coloured",
     "Filter",
+    "Instrument",
     "Noise",
     "NoiseDensity",
     "Quantised",
@@ -71,6 +72,43 @@ class Sensed(NamedTuple):
     specific_force: Array
 
 
+class Poorest(NamedTuple):
+    """Constant error [unit of the sensor] of instruments of the poorest grade, what these are called, and in words.
+
+    Those of the package are the largest of the grades in El-Sheimy and Youssef, Inertial sensors technologies for
+    navigation applications, Satellite Navigation 1:2, 2020, table 1.
+    """
+
+    error: float
+    instruments: str
+    words: str
+
+
+class Instrument(NamedTuple):
+    """What is known of the instruments of a kind, from which the names, priors and bounds of its faults follow.
+
+    Attributes
+    ----------
+    name : str
+        What an instrument is called, by default the kind's name and "sensor".
+    measures, idle : str
+        What the readings are proportional to, and when they should be zero.
+    bias_sigma : float
+        Standard deviation of the prior of a constant error, in the kind's unit.
+    drift_sigma : float, optional
+        That of an error that grows with time, per second; by default the constant error within a minute.
+    poorest : Poorest, optional
+        Largest plausible constant error, by default three standard deviations.
+    """
+
+    name: str = ""
+    measures: str = "what it measures"
+    idle: str = "beside what it measures"
+    bias_sigma: float = 0.03
+    drift_sigma: float | None = None
+    poorest: Poorest | None = None
+
+
 class SensorKind:
     """Kind of sensor. To add one, subclass it, set the attributes, define `read`, and apply `SensorKind.register`.
 
@@ -92,6 +130,8 @@ class SensorKind:
         Meaning and axes of the reading, in the files of results.
     slip : str
         Unit that users most often give by mistake.
+    instrument : Instrument
+        What is known of its instruments, from which the systematic faults of the sensor follow.
     """
 
     value: ClassVar[str]
@@ -102,6 +142,7 @@ class SensorKind:
     feels_force: ClassVar[bool] = False
     frame: ClassVar[str] = ""
     slip: ClassVar[str] = "another unit"
+    instrument: ClassVar[Instrument] = Instrument()
 
     size: ClassVar[int] = 3
     """Number of components of the residual."""
@@ -128,6 +169,22 @@ class SensorKind:
         if value not in SensorKind._known:
             raise InputError(f"unknown sensor {value!r}", remedy=f"Choose from {', '.join(sorted(SensorKind._known))}")
         return SensorKind._known[value]
+
+    @staticmethod
+    def known() -> tuple[SensorKind, ...]:
+        """Return all registered kinds, in the order of registration."""
+        return tuple(SensorKind._known.values())
+
+    @property
+    def section(self) -> str:
+        """Section of a study file that declares a sensor of this kind."""
+        own = type(self).__module__ != __name__
+        return f"sensors.other.{self.value}" if own else f"sensors.{self.value}"
+
+    @property
+    def is_difference(self) -> bool:
+        """Whether the residual is the difference of the readings, component by component."""
+        return type(self).residual is SensorKind.residual and len(self.axes) == self.size
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -175,6 +232,15 @@ class AngularRate(SensorKind):
     value, unit = "rate", "rad/s"
     frame = "angular velocity of the base relative to inertial space, sensor axes"
     slip = "degrees per second"
+    # ten degrees per hour, and a tenth of a degree per second
+    instrument = Instrument(
+        "rate sensor",
+        "the rate",
+        "when the base is at rest",
+        bias_sigma=5.0e-5,
+        drift_sigma=1.0e-6,
+        poorest=Poorest(1.745e-3, "Gyroscopes of the poorest grade", "0.1 degree per second"),
+    )
 
     def read(self, sensed: Sensed) -> Array:
         """Return the angular velocity of the base."""
@@ -189,6 +255,15 @@ class SpecificForce(SensorKind):
     feels_force = True
     frame = "non-gravitational acceleration of the mounting point, sensor axes"
     slip = "mm/s2 or micro-g"
+    # ten micro-g, and five milli-g
+    instrument = Instrument(
+        "accelerometer",
+        "the acceleration",
+        "in free fall",
+        bias_sigma=1.0e-4,
+        drift_sigma=2.0e-6,
+        poorest=Poorest(0.049, "Accelerometers of the poorest grade", "5 milli-g"),
+    )
 
     def read(self, sensed: Sensed) -> Array:
         """Return the specific force at the base origin, with the parts that rotation and effects add at the point."""

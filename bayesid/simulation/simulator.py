@@ -18,7 +18,7 @@ from bayesid.simulation.channels import Channels
 from bayesid.simulation.dynamics import Grid, LinearMotion, Samples, Start, linearise, simulate, trace
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_key import EffectKey
-from bayesid.simulation.effects.instant import Instant, Readings
+from bayesid.simulation.instant import Instant, Readings
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Sensed
 

@@ -18,7 +18,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import Grid, TimeTables, UnitSpeed
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.instant import Environment
+from bayesid.simulation.instant import Environment
 from bayesid.simulation.joint_torques import beyond_joints, no_joints
 from bayesid.simulation.orbit import Orbit, OrbitState
 

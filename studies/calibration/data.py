@@ -20,7 +20,7 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.log_cholesky import log_cholesky_vector
 from bayesid.robot.robot import Load
 from bayesid.simulation.dynamics import composite
-from bayesid.simulation.effects import AccelBias
+from bayesid.simulation.effects import SensorBias
 from studies.common.ets7 import ACCEL, BASE, BIAS, ENCODER, INTERVAL, RATE, ets7
 from studies.common.flight import prescribed, readings, smoothed, true_robot
 from studies.common.models import ARM_SPREAD, NOISE, base_model
@@ -143,7 +143,7 @@ def point(posterior: Posterior, truth: Truth) -> Floats:
     unknowns, layout = posterior.unknowns, posterior.unknowns.layout
     z = np.zeros(posterior.size)
     z[layout.all_bodies] = truth.bodies
-    z[unknowns.effect_indices(AccelBias.name)] = truth.bias
+    z[unknowns.effect_indices(SensorBias.of(SensorKind.ACCEL).name)] = truth.bias
     if layout.rates:
         z[layout.all_rates] = (truth.rates / unknowns.rate_sigma).ravel()
     if layout.joints:  # joints that truly rest at time 0

@@ -11,7 +11,7 @@ import numpy as np
 from bayesid import BodyPrior, Effect, InertialParameters, Model, Orbit, Robot, Sensor, SensorKind, White
 from bayesid.robot.inertial_parameters import parameters_from_pseudo_inertia
 from bayesid.robot.log_cholesky import log_cholesky_factor, upper_cholesky
-from bayesid.simulation.effects import AccelBias, GravityGradient
+from bayesid.simulation.effects import GravityGradient, SensorBias
 from bayesid.simulation.model import RATE_SIGMA, spread_links
 from studies.common.ets7 import ACCEL, ACCELEROMETER, BIAS, ENCODER, RADIUS, RATE, ets7
 
@@ -85,7 +85,10 @@ def base_model(
         sensors=_sensors(noise),
         priors=(BodyPrior(robot.base, centre, base_spread), *spread_links(robot, arm_spread, (robot.base,))),
         orbit=Orbit(RADIUS),
-        effects=(*([GravityGradient()] if gradient else []), *([AccelBias(bias)] if bias > 0.0 else [])),
+        effects=(
+            *([GravityGradient()] if gradient else []),
+            *([SensorBias.of(SensorKind.ACCEL)(bias)] if bias > 0.0 else []),
+        ),
         rate_sigma=rate_sigma,
     )
 

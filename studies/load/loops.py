@@ -34,8 +34,9 @@ from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
 from bayesid.robot.inertial_parameters import mass_com_inertia
-from bayesid.simulation.effects import AccelBias
+from bayesid.simulation.effects import SensorBias
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, spread_links
+from bayesid.simulation.sensors import SensorKind
 from studies.common import mission
 from studies.common.ets7 import BASE, BIAS, INTERVAL, LIMITS
 from studies.common.flight import flown_along, readings
@@ -75,7 +76,7 @@ def load_unknown(spread: float, arm_spread: float) -> Model:
     robot = ship()
     links = spread_links(robot, arm_spread, (BASE, LOAD))
     prior = BodyPrior(LOAD, body_of(paper.GUESS), spread)
-    return orbiting_model(robot, [prior, *links], AccelBias(BIAS), rate_sigma=RATE_SIGMA)
+    return orbiting_model(robot, [prior, *links], SensorBias.of(SensorKind.ACCEL)(BIAS), rate_sigma=RATE_SIGMA)
 
 
 def excitation() -> PaperExcitation:

@@ -26,7 +26,7 @@ from bayesid import (
     SensorKind,
     White,
 )
-from bayesid.simulation.effects import AccelBias, Effect, Instant, Parameter, Readings, Wrench
+from bayesid.simulation.effects import Effect, Instant, Parameter, Readings, SensorBias, Situation, Wrench
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from studies.throws.data import SMOOTH, WHEEL_COUNT, WHEEL_INERTIA, quiet_noise
 
@@ -59,7 +59,7 @@ class GSensitivity(Effect):
     def __init__(self, sigma: float = 2e-4) -> None:
         self.parameters = tuple(Parameter(a + b, "rad s/m", sigma) for a in "xyz" for b in "xyz")
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the sensitivity of a poor micromechanical gyro."""
         return (PhysicalBound("rad s/m", 6e-4, "Micromechanical gyros read up to 0.3 degree per second and g."),)
 
@@ -95,7 +95,7 @@ class WheelDelay(Effect):
     def __init__(self, sigma: float = 0.002) -> None:
         self.parameters = (Parameter("delay", "s", sigma),)
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the time of one reading of the wheel at its lowest speed."""
         return (PhysicalBound("s", 0.006, "A reading is an average over an electrical period, up to 6 ms here."),)
 
@@ -209,10 +209,12 @@ class SmoothForce(Smooth):
         return self.course(values, instant.environment.time)
 
 
-class ThrowBias(AccelBias):
+class ThrowBias(SensorBias):
     """Constant error of the accelerometer, another one in every throw; it stands in for the drag force as well."""
 
     name = "throw-bias"
+    summary = "The accelerometer reads a constant in free fall."
+    sensor = SensorKind.ACCEL
     per_recording = True
 
     @property

@@ -31,9 +31,9 @@ from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_view import ResidualView
+from bayesid.simulation.effects import PhysicalBound, bounds_by_label
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Quantity
-from bayesid.simulation.effects.physical_bound import PhysicalBound, bounds_by_label
 from bayesid.simulation.effects.register import known_effects
 from bayesid.simulation.model import Model
 

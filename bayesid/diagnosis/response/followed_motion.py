@@ -23,8 +23,8 @@ from bayesid.diagnosis.search.linearisation import Linearisation, linearise
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter
-from bayesid.simulation.effects.instant import Instant, Wrench
 from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.instant import Instant, Wrench
 
 __all__ = ["FollowingTorque", "follow", "linearise_along_data", "step_along_data", "without_torque"]
 

@@ -22,7 +22,7 @@ from bayesid._math.runge_kutta import runge_kutta_step
 from bayesid._math.small_matrices import inverse_small
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.instant import Instant
+from bayesid.simulation.instant import Instant
 
 __all__ = ["Vibration"]
 

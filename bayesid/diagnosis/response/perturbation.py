@@ -25,7 +25,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_key import EffectKey
-from bayesid.simulation.effects.instant import Instant, Readings
+from bayesid.simulation.instant import Instant, Readings
 from bayesid.simulation.sensors import SensorKind
 
 __all__ = [

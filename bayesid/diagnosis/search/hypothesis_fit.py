@@ -19,8 +19,8 @@ from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.diagnosis.search.linearisation import Linearisation
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.instant import Resonance
 from bayesid.simulation.effects.mass_shift import MassShift
+from bayesid.simulation.instant import Resonance
 
 __all__ = ["fit_hypothesis"]
 

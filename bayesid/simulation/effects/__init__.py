@@ -4,11 +4,22 @@ This file lists the shipped effects. The import of a class that is decorated wit
 study files; the class states everything else that the package needs to know of the effect.
 """
 
+# the order of registration is that of the catalogue
+# isort: off
 from bayesid.simulation.effects.arm_effects import LinkInertia, Payload
 from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointFlexibility, JointLatency
-from bayesid.simulation.effects.attitude_misalignment import AttitudeMisalignment
-from bayesid.simulation.effects.clock_faults import AccelClock, AccelLatency, RateClock, RateLatency
-from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.sensor_faults import (
+    AccelPosition,
+    AttitudeMisalignment,
+    SensorBias,
+    SensorClock,
+    SensorDrift,
+    SensorFault,
+    SensorLatency,
+    SensorMisalignment,
+    SensorScale,
+)
+from bayesid.simulation.effects.effect import Effect, Situation, bounds_by_label
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity
 from bayesid.simulation.effects.environment_effects import (
     AerodynamicDrag,
@@ -18,34 +29,18 @@ from bayesid.simulation.effects.environment_effects import (
     SolarPressure,
     ThrusterLeak,
 )
-from bayesid.simulation.effects.instant import Instant, Modes, Readings, Resonance, Wrench
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh, WheelMomentum
 from bayesid.simulation.effects.joint_friction import JointFriction, TorqueBias
 from bayesid.simulation.effects.mass_shift import MassShift
-from bayesid.simulation.effects.physical_bound import PhysicalBound, bounds_by_label
+from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.effects.register import create, known_effects, register
-from bayesid.simulation.effects.sensor_faults import (
-    AccelBias,
-    AccelDrift,
-    AccelMisalignment,
-    AccelPosition,
-    AccelScale,
-    RateBias,
-    RateDrift,
-    RateMisalignment,
-    RateScale,
-    SensorFault,
-)
 from bayesid.simulation.effects.wheel_history import WheelHistory
+from bayesid.simulation.instant import Instant, Modes, Readings, Resonance, Wrench
+
+# isort: on
 
 __all__ = [
-    "AccelBias",
-    "AccelClock",
-    "AccelDrift",
-    "AccelLatency",
-    "AccelMisalignment",
     "AccelPosition",
-    "AccelScale",
     "AerodynamicDrag",
     "AttitudeMisalignment",
     "Effect",
@@ -66,16 +61,17 @@ __all__ = [
     "PhysicalBound",
     "Prior",
     "Quantity",
-    "RateBias",
-    "RateClock",
-    "RateDrift",
-    "RateLatency",
-    "RateMisalignment",
-    "RateScale",
     "Readings",
     "Resonance",
     "RotationalDrag",
+    "SensorBias",
+    "SensorClock",
+    "SensorDrift",
     "SensorFault",
+    "SensorLatency",
+    "SensorMisalignment",
+    "SensorScale",
+    "Situation",
     "SolarPressure",
     "ThrusterLeak",
     "TorqueBias",

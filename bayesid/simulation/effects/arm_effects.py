@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,14 +18,11 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.log_cholesky import LOG_CHOLESKY, upper_cholesky, vector_from_factor
 from bayesid.robot.robot import Robot
 from bayesid.robot.robot_size import RobotSize, link_radius
-from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect import Effect, Situation
 from bayesid.simulation.effects.effect_parameters import Parameter, Quantity
 from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.placed import Placed
 from bayesid.simulation.effects.register import register
-
-if TYPE_CHECKING:
-    from bayesid.simulation.model import Model
 
 __all__ = ["LinkInertia", "LinkMoments", "Payload"]
 
@@ -67,7 +64,7 @@ class _OnLink(Placed):
         self.parameters = tuple(Parameter(key, "1", width) for key in LOG_CHOLESKY)
 
     @classmethod
-    def instances(cls, model: Model) -> Sequence[Effect]:
+    def instances(cls, model: Situation) -> Sequence[Effect]:
         """Return the effect on every link with volume that the model does not identify anyway."""
         unknown = {prior.name for prior in model.bodies}
         links = model.robot.links.items()
@@ -145,7 +142,7 @@ class LinkMoments(Placed):
         """Link that changes."""
         return self.place
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the bounds of the effect on the link."""
         return self.kind.physical_bounds(model)
 
@@ -185,7 +182,7 @@ class Payload(_OnLink):
         """Return the changes of the ten linear parameters."""
         return self.loads(values)
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the moments of a body as heavy and as large as the robot without it, fixed at the end of the link."""
         mass = RobotSize.of(model.robot).mass
         reach = link_radius(model.robot, self.place) + RobotSize.of(model.robot).radius
@@ -214,7 +211,7 @@ class LinkInertia(_OnLink):
     )
     spread = 0.1
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the log-Cholesky coordinates at which half of the link's mass is missing or misplaced."""
         mass = LINK_ERROR * model.robot.link(self.place).inertial.mass
         share = f"{100.0 * LINK_ERROR:g} % of the link's mass, {three_digits(mass)} kg"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,14 +17,11 @@ from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import configuration, kinematics
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.displaced_motion import Displaced, DisplacedMotion
-from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect import Effect, Situation
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.effects.register import register
-
-if TYPE_CHECKING:
-    from bayesid.simulation.model import Model
 
 __all__ = ["EncoderOffset", "JointFlexibility", "JointLatency"]
 
@@ -66,7 +63,7 @@ class EncoderOffset(DisplacedMotion, OnJoint):
         changed.parameters = tuple(parameter._replace(unit=unit) for parameter in self.parameters)
         return changed
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return an error of the zero that the eye would see."""
         if model.robot.joints[self.index_in(model.robot)].kind == "prismatic":
             reason = f"A slide whose zero is wrong by more than {LARGEST_OFFSET_OF_SLIDE:g} m is seen with the eye."
@@ -110,14 +107,14 @@ class JointLatency(DisplacedMotion):
     )
 
     @classmethod
-    def instances(cls, model: Model) -> Sequence[Effect]:
+    def instances(cls, model: Situation) -> Sequence[Effect]:
         """Return the effect if the robot has a moving joint."""
         return super().instances(model) if model.robot.joints else []
 
     def __init__(self, sigma: float = 0.2) -> None:
         self.parameters = (Parameter("delay", "s", sigma),)
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return a cycle of slow telemetry."""
         return (PhysicalBound("s", LARGEST_DELAY, "A slow telemetry stamps its samples once in a second."),)
 
@@ -175,7 +172,7 @@ class JointFlexibility(DisplacedMotion, OnJoint):
         omega = 2.0 * np.pi * values[0]
         return namespace(values).stack([omega**-2, 2.0 * values[1] * omega**-3])
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the compliance of the softest joints, and the lag of strong damping in them."""
         omega = 2.0 * float(np.pi) * SOFTEST
         soft = f"Only the longest arms with heavy payloads swing as slowly as {SOFTEST:g} Hz"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import jax.numpy as jnp
 from jax import Array
@@ -13,10 +13,7 @@ from bayesid.recording.joint_motion import Motion
 from bayesid.robot.composite_tables import composite_rows, link_table
 from bayesid.robot.kinematics import Kinematics
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects.effect import Effect
-
-if TYPE_CHECKING:
-    from bayesid.simulation.model import Model
+from bayesid.simulation.effects.effect import Effect, Situation
 
 __all__ = ["Displaced", "DisplacedMotion"]
 
@@ -53,7 +50,7 @@ class DisplacedMotion(Effect):
     """
 
     @classmethod
-    def instances(cls, model: Model) -> Sequence[Effect]:
+    def instances(cls, model: Situation) -> Sequence[Effect]:
         """Return the effect wherever it can occur, and nowhere in a model with torque sensors."""
         return [] if model.torque is not None else super().instances(model)
 

@@ -9,8 +9,8 @@ are the effect's inner states. Vectors are in base axes unless stated otherwise.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Protocol, Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,17 +18,40 @@ from jax import Array
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
+from bayesid.recording.joint_motion import Motion
+from bayesid.robot.body_prior import BodyPrior
+from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect_parameters import Parameter, Quantity
-from bayesid.simulation.effects.instant import Instant, Modes, Readings, Resonance, Wrench
 from bayesid.simulation.effects.physical_bound import PhysicalBound, bounds_of_priors
+from bayesid.simulation.instant import Instant, Modes, Readings, Resonance, Wrench
+from bayesid.simulation.joint_torques import TorqueSensor
+from bayesid.simulation.orbit import Orbit
+from bayesid.simulation.sensors import Sensor, SensorKind
 
-if TYPE_CHECKING:
-    from bayesid.recording.joint_motion import Motion
-    from bayesid.robot.robot import Robot
-    from bayesid.simulation.model import Model
-    from bayesid.simulation.orbit import Orbit
+__all__ = ["Effect", "Situation", "bounds_by_label"]
 
-__all__ = ["Effect"]
+
+class Situation(Protocol):
+    """What an effect may know of the `Model` that it is part of, or would be."""
+
+    @property
+    def robot(self) -> Robot:
+        """Robot."""
+
+    @property
+    def orbit(self) -> Orbit | None:
+        """Orbit of the robot, None in a laboratory."""
+
+    @property
+    def bodies(self) -> Sequence[BodyPrior]:
+        """Priors of the bodies to identify."""
+
+    @property
+    def torque(self) -> TorqueSensor | None:
+        """Sensors of the joint torques."""
+
+    def sensor(self, kind: SensorKind) -> Sensor | None:
+        """Return the sensor of a kind, or None if none is declared."""
 
 
 class Effect:
@@ -70,7 +93,7 @@ class Effect:
     modes_count: ClassVar[int] = 0
 
     @classmethod
-    def lacks(cls, model: Model) -> str | None:
+    def lacks(cls, model: Situation) -> str | None:
         """Return what a model does not have and the effect cannot act or show without, None where nothing is lacking.
 
         By default that is the orbit, for an effect that exists only there.
@@ -78,7 +101,7 @@ class Effect:
         return "[orbit]" if cls.needs_orbit and model.orbit is None else None
 
     @classmethod
-    def instances(cls, model: Model) -> Sequence[Effect]:
+    def instances(cls, model: Situation) -> Sequence[Effect]:
         """Return the effect at every place of a model's robot where it can occur and show in the model's sensors.
 
         By default it occurs once; it does not occur if the model lacks what it needs, or if the class needs arguments,
@@ -90,6 +113,11 @@ class Effect:
             return [cls().attach(model.robot)]
         except (InputError, TypeError):
             return []
+
+    @classmethod
+    def members(cls) -> Sequence[type[Effect]]:
+        """Return the effects that the registration of the class makes known, by default itself."""
+        return [cls]
 
     @classmethod
     def uses_latitude(cls, orbit: Orbit | None) -> bool:
@@ -169,7 +197,7 @@ class Effect:
         pairs = zip(linear.parameters, linear.absent, strict=True)
         return [parameter for parameter, absent in pairs if parameter.is_amplitude or absent != parameter.mean]
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the largest size of the amplitudes that is plausible, one bound for each of `amplitude_units`.
 
         By default it is the size at three standard deviations of the priors. An effect overrides this where the robot's
@@ -282,3 +310,38 @@ class Effect:
     def uses(self, hook: str) -> bool:
         """Return whether the class overrides a hook."""
         return getattr(type(self), hook) is not getattr(Effect, hook)
+
+
+def bounds_by_label(
+    effects: Sequence[Effect], model: Situation, stated: Mapping[str, Sequence[PhysicalBound]] | None = None
+) -> dict[str, tuple[PhysicalBound, ...]]:
+    """Return the bounds of effects by their labels, in the order of `Effect.amplitude_units`.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Effects that are attached to the model's robot, such as those of `Effect.instances`.
+    model : Situation
+        Robot and orbit from which the bounds follow.
+    stated : mapping of str to sequence of PhysicalBound, optional
+        Bounds by label that the user knows better; each replaces that of its unit.
+
+    Raises
+    ------
+    InputError
+        If a stated bound belongs to no effect, or to none of the effect's units.
+    """
+    given = {} if stated is None else stated
+    bounds = {effect.label: {bound.unit: bound for bound in effect.physical_bounds(model)} for effect in effects}
+    for label, better in given.items():
+        if label not in bounds:
+            raise InputError(
+                f"a bound is stated for {label!r}, which does not occur", remedy=f"Choose from {', '.join(bounds)}"
+            )
+        for bound in better:
+            if bound.unit not in bounds[label]:
+                raise InputError(
+                    f"a bound of {label!r} is stated in {bound.unit!r}", remedy=f"Use one of {', '.join(bounds[label])}"
+                )
+            bounds[label][bound.unit] = bound
+    return {label: tuple(units.values()) for label, units in bounds.items()}

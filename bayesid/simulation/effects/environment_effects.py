@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -12,14 +10,11 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.atmosphere import largest_density
-from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect import Effect, Situation
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior
-from bayesid.simulation.effects.instant import Instant, Wrench
 from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.register import register
-
-if TYPE_CHECKING:
-    from bayesid.simulation.model import Model
+from bayesid.simulation.instant import Instant, Wrench
 
 __all__ = ["AerodynamicDrag", "GravityGradient", "MagneticDipole", "RotationalDrag", "SolarPressure", "ThrusterLeak"]
 
@@ -112,12 +107,12 @@ class _Pressure(Effect):
         """Return the force and its product with the lever."""
         return jnp.concatenate([values[:1], values[0] * values[1:]])
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the pressure on all of the robot's area, and on its area times the distance from the base origin."""
         return _pressure_bounds(type(self), model)
 
     @staticmethod
-    def largest_pressure(model: Model) -> tuple[float, str]:
+    def largest_pressure(model: Situation) -> tuple[float, str]:
         """Return the largest pressure on a surface that faces it [Pa], and the start of a sentence that names it."""
         raise NotImplementedError
 
@@ -154,7 +149,7 @@ class _LinearPressure(Effect):
         """Name of the pressure effect."""
         return self.kind.name
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the bounds of the pressure effect."""
         return _pressure_bounds(self.kind, model)
 
@@ -164,7 +159,7 @@ class _LinearPressure(Effect):
         return Wrench(values[0] * unit, jnp.cross(values[1:], unit))
 
 
-def _pressure_bounds(kind: type[_Pressure], model: Model) -> tuple[PhysicalBound, ...]:
+def _pressure_bounds(kind: type[_Pressure], model: Situation) -> tuple[PhysicalBound, ...]:
     """Return the largest force, and the largest torque about the base origin, of a pressure on the whole robot."""
     pressure, reason = kind.largest_pressure(model)
     size = RobotSize.of(model.robot)
@@ -197,7 +192,7 @@ class AerodynamicDrag(_Pressure):
         super().__init__(force, spread)
 
     @staticmethod
-    def largest_pressure(model: Model) -> tuple[float, str]:
+    def largest_pressure(model: Situation) -> tuple[float, str]:
         """Return the drag per area at the lowest point of the orbit in the densest air there."""
         if model.orbit is None:
             raise InputError("drag of the upper atmosphere exists only in orbit", remedy="Give the orbit")
@@ -235,7 +230,7 @@ class SolarPressure(_Pressure):
     needs_latitude = True
 
     @classmethod
-    def lacks(cls, model: Model) -> str | None:
+    def lacks(cls, model: Situation) -> str | None:
         """Return the orbit or the direction of the Sun where it is not known."""
         return super().lacks(model) or ("sun in [orbit]" if model.orbit is None or model.orbit.sun is None else None)
 
@@ -243,7 +238,7 @@ class SolarPressure(_Pressure):
         super().__init__(force, spread)
 
     @staticmethod
-    def largest_pressure(model: Model) -> tuple[float, str]:
+    def largest_pressure(model: Situation) -> tuple[float, str]:
         """Return the pressure of sunlight on a mirror that faces the Sun."""
         return MIRROR * SUNLIGHT, f"Sunlight of {1e6 * SUNLIGHT:.3g} micropascal, which a mirror reflects back,"
 
@@ -270,7 +265,7 @@ class MagneticDipole(Effect):
     needs_orbit = True
 
     @classmethod
-    def lacks(cls, model: Model) -> str | None:
+    def lacks(cls, model: Situation) -> str | None:
         """Return the orbit or its inclination, and with it the direction of the field, where it is not known."""
         inclination = None if model.orbit is None else model.orbit.inclination
         return super().lacks(model) or ("inclination in [orbit]" if inclination is None else None)
@@ -278,7 +273,7 @@ class MagneticDipole(Effect):
     def __init__(self, sigma: float = 10.0) -> None:
         self.parameters = tuple(Parameter(axis, "A m2", sigma) for axis in "xyz")
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the dipole of a spacecraft of the robot's mass that was built without regard to magnetism."""
         mass = model.robot.mass
         reason = (
@@ -316,7 +311,7 @@ class ThrusterLeak(Effect):
             for axis in "xyz"
         )
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return one per cent of the thrust for a robot of this mass, and its torque at the edge of the base."""
         size = RobotSize.of(model.robot)
         force = LEAK * THRUST * size.mass
@@ -348,7 +343,7 @@ class RotationalDrag(Effect):
     def __init__(self, sigma: float = 0.1) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the coefficient that stops the base within ten seconds.
 
         In orbit, air and eddy currents brake some million times less; what may act like this there is a control of the

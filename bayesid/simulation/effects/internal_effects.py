@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,14 +12,11 @@ from jax import Array
 from bayesid._math.arrays import Floats
 from bayesid.robot.robot import Robot
 from bayesid.robot.robot_size import RobotSize
-from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect import Effect, Situation
 from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity, coordinates_of
-from bayesid.simulation.effects.instant import Instant, Modes, Resonance
 from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.register import register
-
-if TYPE_CHECKING:
-    from bayesid.simulation.model import Model
+from bayesid.simulation.instant import Instant, Modes, Resonance
 
 __all__ = ["FlexibleAppendage", "FuelSlosh", "WheelMomentum", "wheel_bound"]
 
@@ -83,7 +80,7 @@ class WheelMomentum(Effect):
     def __init__(self, sigma: float = 1.0) -> None:
         self.parameters = tuple(Parameter(axis, "N m s", sigma) for axis in "xyz")
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the momentum of all wheels that a robot of this mass and size carries, at full speed."""
         return (wheel_bound(model.robot),)
 
@@ -148,7 +145,7 @@ class FlexibleAppendage(_Vibration):
         sign = jnp.sign(coupling[3 + jnp.argmax(jnp.abs(coupling[3:]))])
         return jnp.concatenate([values[:2], jnp.linalg.norm(coupling[3:])[None], sign * coupling])
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the roots of the mass that swings and of its inertia at the edge of the base about the base origin."""
         size = RobotSize.of(model.robot)
         root = float(np.sqrt(APPENDAGES * size.mass))
@@ -199,7 +196,7 @@ class FuelSlosh(_Vibration):
         """Values with zero mass and all others at the middle of the prior."""
         return np.array([0.0, *(parameter.mean for parameter in self.parameters[1:])])
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the fuel that can slosh in a base of this mass."""
         mass = RobotSize.of(model.robot).base_mass
         reason = f"At most half of a base of {three_digits(mass)} kg is fuel, of which at most 60 % sloshes."

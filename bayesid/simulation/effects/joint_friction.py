@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import jax.numpy as jnp
 from jax import Array
 
 from bayesid.robot.robot import Robot
 from bayesid.robot.robot_size import beyond_joint
-from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect import Effect, Situation
 from bayesid.simulation.effects.effect_parameters import Parameter
 from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.effects.register import register
-
-if TYPE_CHECKING:
-    from bayesid.simulation.model import Model
 
 __all__ = ["STANDSTILL", "JointFriction", "TorqueBias"]
 
@@ -45,7 +42,7 @@ class _OnTorque(OnJoint):
     """Effect on the reading of the torque sensor of one joint."""
 
     @classmethod
-    def instances(cls, model: Model) -> Sequence[Effect]:
+    def instances(cls, model: Situation) -> Sequence[Effect]:
         """Return the effect at every joint whose torque is measured."""
         return [] if model.torque is None else [cls(joint).attach(model.robot) for joint in model.torque.joints]
 
@@ -102,7 +99,7 @@ class JointFriction(_OnTorque):
         super().__init__(place)
         self.parameters = (Parameter("coulomb", "N m", coulomb), Parameter("viscous", "N m s", viscous))
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the torque of the joint's drive, which could move nothing against more friction."""
         torque, drive = self.drive(model.robot)
         moves = f"A joint moves only if its friction takes less than {drive}"
@@ -130,7 +127,7 @@ class TorqueBias(_OnTorque):
         super().__init__(place)
         self.parameters = (Parameter("offset", "N m", sigma),)
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return a tenth of the torque of the joint's drive."""
         torque, drive = self.drive(model.robot)
         reason = f"The zero of a torque sensor is wrong by at most {100.0 * SENSOR_ERROR:g} % of {drive}."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from jax import Array
@@ -15,13 +15,10 @@ from bayesid.recording.joint_motion import Motion
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.robot.robot import Robot
 from bayesid.robot.robot_size import RobotSize
-from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect import Effect, Situation
 from bayesid.simulation.effects.effect_parameters import Parameter
 from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.register import register
-
-if TYPE_CHECKING:
-    from bayesid.simulation.model import Model
 
 __all__ = ["MassShift"]
 
@@ -121,7 +118,7 @@ class MassShift(Effect):
         instant = self._instant(end)
         return (instant,) if 0.0 <= instant < end else ()
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the moments of the largest part that moves from one side of the base to the other."""
         size = RobotSize.of(model.robot)
         mass = LOOSE * size.base_mass

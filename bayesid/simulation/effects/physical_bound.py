@@ -7,20 +7,15 @@ loses less than a tenth of a nat over four decades; where it is too narrow, a ca
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid.simulation.effects.effect_parameters import Parameter
 
-if TYPE_CHECKING:
-    from bayesid.simulation.effects.effect import Effect
-    from bayesid.simulation.model import Model
-
-__all__ = ["PhysicalBound", "bounds_by_label", "bounds_of_priors", "three_digits"]
+__all__ = ["PhysicalBound", "bounds_of_priors", "three_digits"]
 
 SPREADS = 3.0
 """Prior standard deviations at which the largest size lies where no physical bound is known."""
@@ -77,38 +72,3 @@ def bounds_of_priors(parameters: Sequence[Parameter]) -> tuple[PhysicalBound, ..
         reason = f"No physical bound is stated; this is the size at {SPREADS:g} standard deviations of the prior."
         bounds.append(PhysicalBound(unit, max(ends), reason))
     return tuple(bounds)
-
-
-def bounds_by_label(
-    effects: Sequence[Effect], model: Model, stated: Mapping[str, Sequence[PhysicalBound]] | None = None
-) -> dict[str, tuple[PhysicalBound, ...]]:
-    """Return the bounds of effects by their labels, in the order of `Effect.amplitude_units`.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-        Effects that are attached to the model's robot, such as those of `Effect.instances`.
-    model : Model
-        Robot and orbit from which the bounds follow.
-    stated : mapping of str to sequence of PhysicalBound, optional
-        Bounds by label that the user knows better; each replaces that of its unit.
-
-    Raises
-    ------
-    InputError
-        If a stated bound belongs to no effect, or to none of the effect's units.
-    """
-    given = {} if stated is None else stated
-    bounds = {effect.label: {bound.unit: bound for bound in effect.physical_bounds(model)} for effect in effects}
-    for label, better in given.items():
-        if label not in bounds:
-            raise InputError(
-                f"a bound is stated for {label!r}, which does not occur", remedy=f"Choose from {', '.join(bounds)}"
-            )
-        for bound in better:
-            if bound.unit not in bounds[label]:
-                raise InputError(
-                    f"a bound of {label!r} is stated in {bound.unit!r}", remedy=f"Use one of {', '.join(bounds[label])}"
-                )
-            bounds[label][bound.unit] = bound
-    return {label: tuple(units.values()) for label, units in bounds.items()}

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from bayesid._io.errors import InputError
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects.effect import Effect
-
-if TYPE_CHECKING:
-    from bayesid.simulation.model import Model
+from bayesid.simulation.effects.effect import Effect, Situation
 
 __all__ = ["OnJoint", "Placed"]
 
@@ -41,7 +38,7 @@ class OnJoint(Placed):
     """Effect at one joint."""
 
     @classmethod
-    def instances(cls, model: Model) -> Sequence[Effect]:
+    def instances(cls, model: Situation) -> Sequence[Effect]:
         """Return the effect at every moving joint."""
         return [cls(joint.name).attach(model.robot) for joint in model.robot.joints]
 

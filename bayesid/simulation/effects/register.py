@@ -26,7 +26,7 @@ def register(effect: E) -> E:
 
 def known_effects() -> dict[str, type[Effect]]:
     """Return all registered effects by their names, in the order of registration."""
-    return dict(_REGISTER)
+    return {member.name: member for effect in _REGISTER.values() for member in effect.members()}
 
 
 def create(label: str, **options: Any) -> Effect:
@@ -37,12 +37,12 @@ def create(label: str, **options: Any) -> Effect:
     InputError
         If no effect of that name is registered, or it cannot be made.
     """
-    name, _, place = label.partition(":")
-    if name not in _REGISTER:
-        near = difflib.get_close_matches(name, _REGISTER, n=1)
-        remedy = f"Did you mean '{near[0]}'?" if near else f"Choose from {', '.join(sorted(_REGISTER))}."
+    (name, _, place), known = label.partition(":"), known_effects()
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1)
+        remedy = f"Did you mean '{near[0]}'?" if near else f"Choose from {', '.join(sorted(known))}."
         raise InputError(f"unknown effect {label!r}", remedy=f"{remedy} Or name your file under model.plugins")
-    build: Callable[..., Effect] = _REGISTER[name]
+    build: Callable[..., Effect] = known[name]
     try:
         return build(place, **options) if place else build(**options)
     except InputError:

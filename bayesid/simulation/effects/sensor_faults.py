@@ -1,47 +1,43 @@
-"""Faults of sensors, in sensor axes; those of their clocks are in `bayesid.simulation.effects.clock_faults`.
+"""Systematic faults of sensors, in sensor axes: six that every kind of sensor can have, and two of one kind each.
 
 The reading is ``measured = (1 + scale) * (rotation(misalignment) * true(t - latency)) + bias + drift * t``; with a
-positive latency the sample stamped t shows the past.
+positive latency the sample stamped t shows the past, and a clock that runs fast stamps ``true time * (1 + rate)``. The
+true reading is known at the sample times and interpolated between them (`bayesid._math.resampling`); what a sensor
+would have read before the first or after the last of them is taken from the slope there.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+import re
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, ClassVar, Self
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
+from bayesid._math.resampling import resampled
+from bayesid._math.rotation import rotation, turned
 from bayesid.robot.robot_size import RobotSize
-from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect import Effect, Situation
 from bayesid.simulation.effects.effect_parameters import Parameter
-from bayesid.simulation.effects.instant import Instant, Readings
 from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
 from bayesid.simulation.effects.register import register
+from bayesid.simulation.instant import Instant, Readings
 from bayesid.simulation.sensors import SensorKind
 
-if TYPE_CHECKING:
-    from bayesid.simulation.model import Model
-
 __all__ = [
-    "AccelBias",
-    "AccelDrift",
-    "AccelMisalignment",
     "AccelPosition",
-    "AccelScale",
-    "RateBias",
-    "RateDrift",
-    "RateMisalignment",
-    "RateScale",
+    "AttitudeMisalignment",
+    "SensorBias",
+    "SensorClock",
+    "SensorDrift",
     "SensorFault",
+    "SensorLatency",
+    "SensorMisalignment",
+    "SensorScale",
 ]
-
-
-RATE_BIAS, ACCEL_BIAS = 1.745e-3, 0.049
-"""Constant errors of the poorest instruments [rad/s, m/s2]: 0.1 degree per second and 5 milli-g.
-
-They are the largest of the grades in El-Sheimy and Youssef, Inertial sensors technologies for navigation applications,
-Satellite Navigation 1:2, 2020, table 1.
-"""
 
 MISMOUNTED = 0.1, "A sensor that was mounted without a measurement of its axes is within six degrees of them."
 """Largest rotation of a sensor against its stated mounting [rad], and the reason."""
@@ -62,12 +58,12 @@ class SensorFault(Effect):
     sensor: ClassVar[SensorKind]
 
     @classmethod
-    def lacks(cls, model: Model) -> str | None:
+    def lacks(cls, model: Situation) -> str | None:
         """Return the sensor where it is not declared."""
-        return super().lacks(model) or (None if model.sensor(cls.sensor) else f"[sensors.{cls.sensor.value}]")
+        return super().lacks(model) or (None if model.sensor(cls.sensor) else f"[{cls.sensor.section}]")
 
     def change(self, values: Array, time: Array, reading: Array) -> Array:
-        """Return the reading of the faulty sensor from the true reading, both of shape (T, 3)."""
+        """Return the reading of the faulty sensor from the true reading, both of shape (T, axes)."""
         raise NotImplementedError
 
     def read(self, values: Array, readings: Readings) -> Readings:
@@ -76,146 +72,196 @@ class SensorFault(Effect):
         return readings.replace(**{key: self.change(values, readings.time, readings.channels[key])})
 
 
-class _Axes(SensorFault):
-    """Fault with one parameter per sensor axis."""
+class FaultOfAnyKind(SensorFault):
+    """Fault that sensors of all kinds can have; `of` gives the effect for one kind.
 
-    unit: ClassVar[str]
-    sigma: ClassVar[float]
-    largest: ClassVar[float]
-    reason: ClassVar[str]
+    In the name SENSOR stands for the kind, and the summary has places for the words of its `Instrument`. A sensor whose
+    residual is not the difference of two readings, such as an attitude, has faults of its own instead.
+    """
 
-    def __init__(self, sigma: float | tuple[float, float, float] | None = None) -> None:
-        given = self.sigma if sigma is None else sigma
-        values = (given,) * 3 if isinstance(given, int | float) else given
-        self.parameters = tuple(
-            Parameter(axis, self.unit, float(value)) for axis, value in zip("xyz", values, strict=True)
-        )
+    @classmethod
+    @cache
+    def of(cls, kind: SensorKind) -> type[Self]:
+        """Return the fault of sensors of a kind."""
+        instrument = kind.instrument
+        words = {
+            "instrument": instrument.name or f"{kind.value} sensor",
+            "measures": instrument.measures,
+            "idle": instrument.idle,
+        }
+        made = {
+            "name": cls.name.replace("SENSOR", kind.value),
+            "summary": cls.summary.format(**words),
+            "sensor": kind,
+            "__doc__": cls.__doc__,
+            "__module__": type(kind).__module__,  # one of the user's own makes faults of the user's own
+            "__reduce__": lambda self: (_restored, (cls, kind, vars(self))),
+        }
+        return type(f"{cls.__name__}[{type(kind).__qualname__}]", (cls,), made)
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
-        """Return the bound that the class states for instruments of the poorest grade."""
-        return (PhysicalBound(self.unit, self.largest, self.reason),)
+    @classmethod
+    def members(cls) -> Sequence[type[Effect]]:
+        """Return the faults of all registered kinds of sensors that can have it."""
+        return [cls.of(kind) for kind in SensorKind.known() if cls.occurs_in(kind)]
+
+    @classmethod
+    def occurs_in(cls, kind: SensorKind) -> bool:
+        """Return whether sensors of a kind can have the fault."""
+        return kind.is_difference
 
 
-class _Bias(_Axes):
+def _restored(fault: type[FaultOfAnyKind], kind: SensorKind, attributes: dict[str, Any]) -> FaultOfAnyKind:
+    """Return an effect of a class that is made and therefore not found by its name, for `pickle`."""
+    effect = fault.of(kind)()
+    vars(effect).update(attributes)
+    return effect
+
+
+class FaultByAxis(FaultOfAnyKind):
+    """Fault with one parameter for each axis of the sensor.
+
+    Parameters
+    ----------
+    sigma : float or tuple of float, optional
+        Standard deviation of the prior, of all axes or of each, in `unit`.
+    """
+
+    def __init__(self, sigma: float | tuple[float, ...] | None = None) -> None:
+        axes = self.sensor.axes[: self.sensor.size]
+        given = self.typical() if sigma is None else sigma
+        values = (given,) * len(axes) if isinstance(given, int | float) else given
+        unit = self.unit()
+        self.parameters = tuple(Parameter(axis, unit, float(value)) for axis, value in zip(axes, values, strict=True))
+
+    @classmethod
+    def unit(cls) -> str:
+        """Return the unit of the parameters."""
+        return "1"
+
+    @classmethod
+    def typical(cls) -> float:
+        """Return the standard deviation of the prior."""
+        return 0.03
+
+
+@register
+class SensorBias(FaultByAxis):
+    """Constant error of a sensor; the default prior is that of `Instrument`."""
+
+    name = "SENSOR-bias"
+    summary = "The {instrument} reads a constant {idle}."
     separated_by = (
         "It is present at rest and does not depend on motion: record a longer rest before and after the motion, and "
         "run the motion the other way; the readings due to the motion change their sign, a bias does not."
     )
 
+    @classmethod
+    def unit(cls) -> str:
+        """Return the unit of the readings."""
+        return cls.sensor.unit
+
+    @classmethod
+    def typical(cls) -> float:
+        """Return the constant error of the kind's instruments."""
+        return cls.sensor.instrument.bias_sigma
+
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
+        """Return the error of the poorest instruments, where the kind states it."""
+        poorest = self.sensor.instrument.poorest
+        if poorest is None:
+            return super().physical_bounds(model)
+        return (PhysicalBound(self.unit(), poorest.error, f"{poorest.instruments} are wrong by {poorest.words}."),)
+
     def change(self, values: Array, time: Array, reading: Array) -> Array:
+        """Return the readings with a constant added."""
         return reading + values
 
 
-class _Drift(_Axes):
+@register
+class SensorDrift(FaultByAxis):
+    """Error of a sensor that grows with time; with the default prior it gains about the prior bias in a minute."""
+
+    name = "SENSOR-drift"
+    summary = "The {instrument}'s zero wanders steadily, as when it warms up."
     separated_by = (
         "It grows with time and does not depend on motion: record a longer rest before and after the motion, and "
         "repeat the motion the other way."
     )
 
+    @classmethod
+    def unit(cls) -> str:
+        """Return the unit of the readings per second, such as m/s3 for m/s2."""
+        unit = cls.sensor.unit
+        power = re.search(r"/s(\d?)$", unit)
+        return f"{unit}/s" if power is None else f"{unit[: power.start()]}/s{int(power[1] or 1) + 1}"
+
+    @classmethod
+    def typical(cls) -> float:
+        """Return the drift of the kind's instruments."""
+        return cls.sensor.instrument.drift_sigma or cls.sensor.instrument.bias_sigma / 60.0
+
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
+        """Return the error that the poorest instruments gain while they warm up, where the kind states it."""
+        poorest = self.sensor.instrument.poorest
+        if poorest is None:
+            return super().physical_bounds(model)
+        reason = f"{poorest.instruments} gain {poorest.words} within ten minutes of warming up."
+        return (PhysicalBound(self.unit(), poorest.error / WARM_UP, reason),)
+
     def change(self, values: Array, time: Array, reading: Array) -> Array:
+        """Return the readings with an error added that grows from zero at time 0."""
         return reading + values * time[:, None]
 
 
-class _Scale(_Axes):
-    unit = "1"
-    largest, reason = 0.1, "The scale of a sensor without calibration is within a tenth of its nominal value."
+@register
+class SensorScale(FaultByAxis):
+    """Error of a sensor's scale factor; the prior is 3 %, far above that of a calibrated sensor."""
+
+    name = "SENSOR-scale"
+    summary = "The {instrument} reads too much or too little in proportion to {measures}."
     separated_by = (
         "It grows with the reading: move the other way and faster, with larger readings about each axis in turn."
     )
 
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
+        """Return the error of a scale that nobody calibrated."""
+        reason = "The scale of a sensor without calibration is within a tenth of its nominal value."
+        return (PhysicalBound("1", 0.1, reason),)
+
     def change(self, values: Array, time: Array, reading: Array) -> Array:
+        """Return the readings multiplied."""
         return (1.0 + values) * reading
 
 
-class _Misalignment(_Axes):
-    unit = "rad"
-    largest, reason = MISMOUNTED
+@register
+class SensorMisalignment(FaultByAxis):
+    """Rotation of a sensor of a vector against its stated mounting; the prior is two degrees per axis."""
+
+    name = "SENSOR-misalignment"
+    summary = "The {instrument} is turned against its stated mounting."
     separated_by = "It mixes the axes: turn about one axis at a time, with large readings."
 
+    @classmethod
+    def occurs_in(cls, kind: SensorKind) -> bool:
+        """Return whether the readings are vectors in sensor axes."""
+        return kind.is_difference and kind.mounted
+
+    @classmethod
+    def unit(cls) -> str:
+        """Return the unit of an angle."""
+        return "rad"
+
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
+        """Return the rotation of a sensor that nobody measured."""
+        return (PhysicalBound("rad", *MISMOUNTED),)
+
     def change(self, values: Array, time: Array, reading: Array) -> Array:
-        return reading @ _rotation(values).T
+        """Return the readings rotated."""
+        return reading @ rotation(turned(jnp.array([0.0, 0.0, 0.0, 1.0]), values)).T
 
 
 @register
-class RateBias(_Bias):
-    """Constant error of the measured rate; the default prior is ten degrees per hour."""
-
-    name = "rate-bias"
-    summary = "The rate sensor reads a constant when the base is at rest."
-    sensor, unit, sigma = SensorKind.RATE, "rad/s", 5.0e-5
-    largest, reason = RATE_BIAS, "Gyroscopes of the poorest grade are wrong by 0.1 degree per second."
-
-
-@register
-class AccelBias(_Bias):
-    """Constant error of the accelerometer; the default prior is 10 micro-g."""
-
-    name = "accel-bias"
-    summary = "The accelerometer reads a constant in free fall."
-    sensor, unit, sigma = SensorKind.ACCEL, "m/s2", 1.0e-4
-    largest, reason = ACCEL_BIAS, "Accelerometers of the poorest grade are wrong by 5 milli-g."
-
-
-@register
-class RateDrift(_Drift):
-    """Error of the measured rate that grows with time; in a minute it gains about the prior bias."""
-
-    name = "rate-drift"
-    summary = "The rate sensor's zero wanders steadily, as when it warms up."
-    sensor, unit, sigma = SensorKind.RATE, "rad/s2", 1.0e-6
-    largest = RATE_BIAS / WARM_UP
-    reason = "Gyroscopes of the poorest grade gain 0.1 degree per second within ten minutes of warming up."
-
-
-@register
-class AccelDrift(_Drift):
-    """Error of the accelerometer that grows with time; in a minute it gains about the prior bias."""
-
-    name = "accel-drift"
-    summary = "The accelerometer's zero wanders steadily, as when it warms up."
-    sensor, unit, sigma = SensorKind.ACCEL, "m/s3", 2.0e-6
-    largest = ACCEL_BIAS / WARM_UP
-    reason = "Accelerometers of the poorest grade gain 5 milli-g within ten minutes of warming up."
-
-
-@register
-class RateScale(_Scale):
-    """Error of the rate sensor's scale factor; the prior is 3 %, far above that of a calibrated sensor."""
-
-    name = "rate-scale"
-    summary = "The rate sensor reads too much or too little in proportion to the rate."
-    sensor, sigma = SensorKind.RATE, 0.03
-
-
-@register
-class AccelScale(_Scale):
-    """Error of the accelerometer's scale factor; the prior is 3 %, far above that of a calibrated sensor."""
-
-    name = "accel-scale"
-    summary = "The accelerometer reads too much or too little in proportion to the acceleration."
-    sensor, sigma = SensorKind.ACCEL, 0.03
-
-
-@register
-class RateMisalignment(_Misalignment):
-    """Rotation of the rate sensor against its stated mounting; the prior is two degrees per axis."""
-
-    name = "rate-misalignment"
-    summary = "The rate sensor is turned against its stated mounting."
-    sensor, sigma = SensorKind.RATE, 0.03
-
-
-@register
-class AccelMisalignment(_Misalignment):
-    """Rotation of the accelerometer against its stated mounting; the prior is two degrees per axis."""
-
-    name = "accel-misalignment"
-    summary = "The accelerometer is turned against its stated mounting."
-    sensor, sigma = SensorKind.ACCEL, 0.03
-
-
-@register
-class AccelPosition(_Axes):
+class AccelPosition(SensorFault):
     """Error of the accelerometer's mounting point: true less stated position, base axes; the prior is 5 cm.
 
     The gravity gradient over the error is left out, since it is below 2e-7 m/s2 for 5 cm in any orbit.
@@ -226,13 +272,16 @@ class AccelPosition(_Axes):
     separated_by = (
         "It grows with the base's rate squared and angular acceleration: turn the base faster about each axis in turn."
     )
-    sensor, unit, sigma = SensorKind.ACCEL, "m", 0.05
+    sensor = SensorKind.ACCEL
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def __init__(self, sigma: float = 0.05) -> None:
+        self.parameters = tuple(Parameter(axis, "m", sigma) for axis in "xyz")
+
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the radius of the base, somewhere within which the accelerometer is."""
         radius = RobotSize.of(model.robot).radius
         reason = f"An accelerometer of the base is somewhere within its radius of {three_digits(radius)} m."
-        return (PhysicalBound(self.unit, radius, reason),)
+        return (PhysicalBound("m", radius, reason),)
 
     def specific_force(self, values: Array, instant: Instant, lever: Array) -> Array:
         """Return the acceleration by rotation over the error of position."""
@@ -241,14 +290,88 @@ class AccelPosition(_Axes):
     read = Effect.read
 
 
-def _rotation(vector: Array) -> Array:
-    """Return the rotation matrix of a rotation vector, by a series that is smooth at zero."""
-    x, y, z = vector
-    zero = jnp.zeros(())
-    hat = jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])
-    square = vector @ vector
-    return (
-        jnp.eye(3)
-        + hat * (1.0 - square / 6.0 + square**2 / 120.0)
-        + hat @ hat * (0.5 - square / 24.0 + square**2 / 720.0)
+@register
+class AttitudeMisalignment(SensorFault):
+    """Constant rotation of the measured attitude in base axes, the prior being two degrees per axis.
+
+    The measured base axes are the true ones turned by the rotation vector (x, y, z) in base axes, which is also the
+    sense of the sensor's noise and residual: ``measured = true * rotation(x, y, z)`` for attitudes from base to orbit
+    axes.
+
+    The reading at the first sample shows it where the recording's initial attitude is exact. Where that attitude is
+    unknown, its error takes up the rotation at that instant. What is left then shows while the base turns about another
+    axis, by the angle of turn times the misalignment, and where the recorded rate, or the direction of the Earth in a
+    gravity gradient, tells the true axes. The same error in all recordings, with initial attitudes of their own, is a
+    misalignment more than it is any of those.
+    """
+
+    name = "attitude-misalignment"
+    summary = "The star sensor is turned against its stated mounting: every measured attitude has the same error."
+    separated_by = (
+        "It is the same rotation in base axes in every attitude: turn the base by large angles about each axis in turn."
     )
+    sensor = SensorKind.ATTITUDE
+
+    def __init__(self, sigma: float = 0.03) -> None:
+        self.parameters = tuple(Parameter(axis, "rad", sigma) for axis in "xyz")
+
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
+        """Return the rotation of a sensor that nobody measured."""
+        return (PhysicalBound("rad", *MISMOUNTED),)
+
+    def change(self, values: Array, time: Array, reading: Array) -> Array:
+        """Return the turned attitudes, quaternions (T, 4)."""
+        return jax.vmap(turned, (0, None))(reading, values)
+
+
+@register
+class SensorLatency(FaultOfAnyKind):
+    """Delay of a sensor; the prior is a few cycles of a slow data bus."""
+
+    name = "SENSOR-latency"
+    summary = "The {instrument}'s samples are stamped late: each shows the past."
+    separated_by = (
+        "It grows with speed: repeat the same motion twice as fast; errors of bodies stay in proportion to the motion, "
+        "those of a delay grow with frequency."
+    )
+
+    def __init__(self, sigma: float = 0.2) -> None:
+        self.parameters = (Parameter("delay", "s", sigma),)
+
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
+        """Return a cycle of slow telemetry."""
+        return (PhysicalBound("s", 1.0, "A slow telemetry stamps its samples once in a second."),)
+
+    def change(self, values: Array, time: Array, reading: Array) -> Array:
+        """Return the true readings of earlier times."""
+        return resampled(time - values[0], time, reading)
+
+
+@register
+class SensorClock(FaultOfAnyKind):
+    """Error of a sensor's clock: stamped = true time (1 + rate); the prior is ten times a crystal's error.
+
+    Where the clock is slow, the last samples lie after the end of the recording by ``-rate`` times its length.
+    """
+
+    name = "SENSOR-clock"
+    summary = "The {instrument}'s clock runs fast or slow: its samples drift away from the motion of the arm."
+    separated_by = (
+        "It is a delay that grows with time: repeat the same motion early and late in one recording; a delay that "
+        "stays the same is no fault of the clock's rate."
+    )
+
+    def __init__(self, sigma: float = 1.0e-3) -> None:
+        self.parameters = (Parameter("rate", "1", sigma),)
+
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
+        """Return the error of a nominal sampling rate that is rounded."""
+        reason = (
+            "A crystal keeps time to 1e-4; time stamps that are counted with a rounded sampling rate, such as 100 in "
+            "place of 101 samples per second, are wrong by 1 %."
+        )
+        return (PhysicalBound("1", 1.0e-2, reason),)
+
+    def change(self, values: Array, time: Array, reading: Array) -> Array:
+        """Return the true readings of the true times."""
+        return resampled(time / (1.0 + values[0]), time, reading)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import ClassVar, Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,16 +12,13 @@ from jax import Array
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect import Effect, Situation
 from bayesid.simulation.effects.effect_parameters import Parameter
-from bayesid.simulation.effects.instant import Instant
 from bayesid.simulation.effects.internal_effects import wheel_bound
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.effects.placed import Placed
 from bayesid.simulation.effects.register import register
-
-if TYPE_CHECKING:
-    from bayesid.simulation.model import Model
+from bayesid.simulation.instant import Instant
 
 __all__ = ["KNOTS", "WheelHistory"]
 
@@ -74,7 +71,7 @@ class WheelHistory(Placed):
         self.parameters = tuple(Parameter(f"momentum.{knot}", "N m s", sigma) for knot in range(1, KNOTS + 1))
 
     @classmethod
-    def instances(cls, model: Model) -> Sequence[Effect]:
+    def instances(cls, model: Situation) -> Sequence[Effect]:
         """Return the effect about every base axis."""
         return [cls(axis) for axis in AXES]
 
@@ -96,7 +93,7 @@ class WheelHistory(Placed):
         """Times of the parameters, shape (24,) [s]."""
         return np.linspace(0.0, self.end, KNOTS)
 
-    def physical_bounds(self, model: Model) -> tuple[PhysicalBound, ...]:
+    def physical_bounds(self, model: Situation) -> tuple[PhysicalBound, ...]:
         """Return the momentum of all wheels that a robot of this mass and size carries, at full speed."""
         return (wheel_bound(model.robot),)
 
