@@ -27,23 +27,20 @@ from bayesid.diagnosis import (
     diagnose,
 )
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
-from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
+from bayesid.diagnosis.outcome.candidate_table import CauseAmplitude, amplitudes_of
+from bayesid.diagnosis.outcome.cause_sizes import VectorSize, vector_size
 from bayesid.diagnosis.outcome.disturbance import torque_correlations
-from bayesid.diagnosis.response.effect_functions import CauseAmplitude
+from bayesid.diagnosis.outcome.inseparable_causes import cause_cosines
+from bayesid.diagnosis.outcome.model_change import strongest_recording
+from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes, torque_spectrum
 from bayesid.inference.residual_view import ResidualView
 from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.recording import Recording
 from bayesid.report import diagnosis_report, figures
 from bayesid.report.cause_marks import cause_marks
-from bayesid.report.cause_torque import cause_torque
-from bayesid.report.class_probabilities import alternative_probability, cause_probability
 from bayesid.report.diagnosis_pages.decision_page import decision_entries
-from bayesid.report.diagnosis_pages.limits_page import unseen_candidates
 from bayesid.report.figures.cause_picture import moved_axis
-from bayesid.report.figures.diagnosis_figures import torque_amplitudes
 from bayesid.report.figures.residual_figures import NOISE_BAND
-from bayesid.report.given_values import parameter_changes
-from bayesid.report.inseparable_causes import cause_cosines, inseparable_pairs
 from bayesid.report.numbers import format_number, format_probability, format_quantity, format_text
 from bayesid.report.sentences import diagnosis_sentences as sentences
 from bayesid.report.sentences.amplitude_words import amplitude_text
@@ -51,14 +48,11 @@ from bayesid.report.sentences.conditions import conditions_text
 from bayesid.report.sentences.diagnosis_method import GLOSSARY, computation_sentence, method_sentences
 from bayesid.report.sentences.model_assumptions import model_sentences
 from bayesid.report.sentences.next_experiment import ANYTHING, advice
-from bayesid.report.sentences.next_steps import action_sentence, advice_sentences, rival_pair
+from bayesid.report.sentences.next_steps import action_sentence, advice_sentences
 from bayesid.report.sentences.size_words import size_text, vector_text
-from bayesid.report.set_sizes import set_sizes
-from bayesid.report.simulation_errors import simulation_errors, strongest_recording
 from bayesid.report.tables import change_tables, probability_tables
 from bayesid.report.tables import diagnosis_tables as tables
 from bayesid.report.tables.identification_tables import joint_rows
-from bayesid.report.vector_size import of_normal, vector_size
 from bayesid.robot.kinematics import kinematics
 from bayesid.simulation.effects import known_effects
 from bayesid.simulation.effects.effect_parameters import Quantity
@@ -187,7 +181,7 @@ def test_the_alternatives_are_said_with_their_probabilities_and_other_names(bias
     )
     verdict, cause, *others, gain = sentences.diagnosis_sentences(result)
     assert "comes from accel-bias; or rate-bias + wheel-momentum; or nothing; or something unknown." in verdict
-    p = [alternative_probability(result, names) for names in (("accel-bias",), *ALTERNATIVES)]
+    p = [result.probability_of(names) for names in (("accel-bias",), *ALTERNATIVES)]
     assert len({format_probability(value) for value in p}) == 4  # so that none can stand for another
     assert sum(p) == pytest.approx(1.0)
     assert f"The probability that it is at work is {format_probability(p[0])}." in cause
@@ -204,11 +198,11 @@ def test_an_alternative_holds_what_accompanies_it_and_a_cause_its_equivalents(bi
     sets = ((("accel-bias",), None, 3.0), (("accel-bias", "rate-bias"), None, 5.0), (("thruster-leak",), None, 2.0))
     result = replace(weighed(biased, *sets), classes=(("accel-bias", "thruster-leak"), ("rate-bias",)))
     p = {item.names: item.probability for item in result.probabilities.sets}
-    assert alternative_probability(result, ()) == pytest.approx(p[()])
+    assert result.probability_of(()) == pytest.approx(p[()])
     pair = p["accel-bias", "rate-bias"]
-    assert alternative_probability(result, ("accel-bias", "rate-bias")) == pytest.approx(pair)
+    assert result.probability_of(("accel-bias", "rate-bias")) == pytest.approx(pair)
     either = pair + p["accel-bias",] + p["thruster-leak",]
-    assert cause_probability(result, "thruster-leak") == pytest.approx(either)
+    assert result.cause_probability("thruster-leak") == pytest.approx(either)
     assert probability_tables.probability_rows(result, 1) == [
         ["accel-bias or thruster-leak", format_probability(either)],
         ["something unknown", "< 0.001"],
@@ -288,13 +282,13 @@ def test_a_vector_has_its_magnitude_and_direction(biased):
 def test_the_cone_and_the_interval_of_a_vector_hold_95_percent():
     rng = np.random.default_rng(0)
     mean, root = np.array([3.0, -1.0, 0.5]), 0.05 * rng.normal(size=(3, 3))
-    size = of_normal(("x", "y", "z"), "N", mean, root @ root.T)
+    size = VectorSize.of_normal("N", mean, root @ root.T)
     drawn = mean + rng.normal(size=(20000, 3)) @ root.T
     length = np.linalg.norm(drawn, axis=1)
     assert np.mean(np.abs(length - size.magnitude) < 1.96 * size.sd) == pytest.approx(0.95, abs=0.01)
     inside = np.mean(np.arccos(drawn @ size.direction / length) < size.angle)
     assert 0.94 < inside < 0.999
-    assert not of_normal(("x", "y", "z"), "N", mean, 100.0 * np.eye(3)).directed
+    assert not VectorSize.of_normal("N", mean, 100.0 * np.eye(3)).directed
 
 
 def test_a_candidate_that_is_not_seen_has_a_limit():
@@ -321,12 +315,11 @@ def test_a_candidate_that_is_not_seen_has_a_limit():
     assert noise[4] == noise[6] == ""
 
 
-def test_candidates_out_of_reach_are_those_of_low_power():
+def test_candidates_out_of_reach_are_those_of_low_power(biased):
     rows = [candidate(power=0.9), candidate(name="b", power=0.3), candidate(name="c", power=0.1), candidate(power=None)]
-    assert [row.name for row in unseen_candidates(rows)] == ["c", "b"]
-    assert tables.unseen_rows(unseen_candidates(rows)[:1]) == [
-        ["c", "0.10", "x < 1.2 × 10⁻⁵, y < 2 × 10⁻⁶, z < 2 × 10⁻⁶ m/s²"]
-    ]
+    unseen = replace(biased, candidates=rows).unseen_candidates
+    assert [row.name for row in unseen] == ["c", "b"]
+    assert tables.unseen_rows(unseen[:1]) == [["c", "0.10", "x < 1.2 × 10⁻⁵, y < 2 × 10⁻⁶, z < 2 × 10⁻⁶ m/s²"]]
 
 
 SHIPPED = sorted(name for name, effect in known_effects().items() if effect.__module__.startswith("bayesid."))
@@ -353,15 +346,15 @@ def test_the_advice_is_on_the_causes_in_which_the_alternatives_differ(biased):
     assert said == [f"{name}: {advice(name)}" for name in ("rate-bias", "wheel-momentum")]
     assert design.endswith("bayesid design STUDY.toml --separate rate-bias wheel-momentum")
     assert f"rate-bias: {advice('rate-bias')}" in action_sentence(result)
-    assert rival_pair(result) == ("rate-bias", "wheel-momentum")
+    assert result.rivals == ("rate-bias", "wheel-momentum")
     assert list(advice_sentences(judged(biased, Status.EXPLAINED))) == []
-    assert rival_pair(judged(biased, Status.EXPLAINED)) is None
+    assert judged(biased, Status.EXPLAINED).rivals is None
 
 
 def test_rivals_of_an_unresolved_verdict_are_the_most_probable_of_unknown_size(biased):
     """A fault of the noise has no size that a manoeuvre could tell from another's."""
     sets = ((("rate-noise",), None, 40.0), (("accel-bias",), None, 38.0), (("rate-bias",), None, 37.0))
-    assert rival_pair(judged(weighed(biased, *sets), Status.UNRESOLVED)) == ("accel-bias", "rate-bias")
+    assert judged(weighed(biased, *sets), Status.UNRESOLVED).rivals == ("accel-bias", "rate-bias")
 
 
 def test_what_to_do_follows_from_the_verdict(biased):
@@ -372,21 +365,21 @@ def test_what_to_do_follows_from_the_verdict(biased):
 
 
 def test_a_cause_imitates_itself_and_others_less(biased):
-    largest, smallest = cause_cosines(biased, "accel-bias", "accel-drift")
+    largest, smallest = cause_cosines(biased.evidence, "accel-bias", "accel-drift")
     # a drift grows from zero to twice its mean: in white noise the cosine with a constant is the root of 3/4
     assert 0.5 < smallest <= largest < 0.95
-    assert cause_cosines(biased, "accel-drift", "accel-bias") == pytest.approx((largest, smallest))
-    pairs = inseparable_pairs(biased, 20)
+    assert cause_cosines(biased.evidence, "accel-drift", "accel-bias") == pytest.approx((largest, smallest))
+    pairs = biased.inseparable_pairs[:20]
     assert {(pair.first, pair.second) for pair in pairs} == {("accel-bias", name) for name in HIDDEN[1:]}
     smallest = [pair.smallest for pair in pairs]
     assert smallest == sorted(smallest, reverse=True)
     drift = next(pair for pair in pairs if pair.second == "accel-drift")
-    assert drift[2:4] == pytest.approx(cause_cosines(biased, "accel-bias", "accel-drift"))
+    assert (drift.largest, drift.smallest) == pytest.approx(cause_cosines(biased.evidence, "accel-bias", "accel-drift"))
 
 
 def test_equivalents_stand_first_among_the_pairs(biased):
     result = replace(biased, classes=(("accel-bias", "wheel-momentum"),))
-    first, second, *_ = probability_tables.pair_rows(inseparable_pairs(result, 20))
+    first, second, *_ = probability_tables.pair_rows(result.inseparable_pairs[:20])
     assert [first[1], first[4], second[4]] == ["wheel-momentum", "equivalent", ""]
 
 
@@ -407,7 +400,7 @@ def test_the_spectrum_of_a_wave_is_its_amplitude():
     torque = [np.stack([wave, 0.0 * time, 0.0 * time], axis=1)]
     same = dict.fromkeys(Frame, torque)
     disturbance = DisturbingWrench(1.0, ("a",), [time], same, same, torque, torque, None, 0.0)
-    frequency, amplitude = torque_amplitudes(disturbance, 0)
+    frequency, amplitude = torque_spectrum(disturbance, 0)
     assert frequency[np.argmax(amplitude[:, 0])] == pytest.approx(0.05, rel=0.01)
     assert amplitude[:, 0].max() == pytest.approx(0.3, rel=0.02)
 
@@ -489,7 +482,7 @@ def test_the_reconstructed_wrench_is_drawn_with_its_uncertainty(disturbance):
     assert band[:, 1].min() == pytest.approx((value - sd).min())
     assert band[:, 1].max() == pytest.approx((value + sd).max())
     spectrum = figures.wrench_spectrum(disturbance).axes[0]
-    frequency, amplitude = torque_amplitudes(disturbance, 0)
+    frequency, amplitude = torque_spectrum(disturbance, 0)
     drawn = spectrum.lines[0].get_xydata()
     np.testing.assert_array_equal(drawn[:, 0], frequency)
     np.testing.assert_allclose(drawn[:, 1] / amplitude[:, 0], drawn[0, 1] / amplitude[0, 0])
@@ -539,7 +532,7 @@ def test_held_out_scores_are_tabled_by_recording(biased):
 
 def test_the_parameters_are_those_given_and_of_both_fits(biased):
     before, after = biased.gain.before.bodies, biased.gain.after.bodies
-    changes = parameter_changes(biased)
+    changes = biased.parameter_changes
     given = biased.before.fit.posterior.model.bodies[0].centre
     assert [item.name for item in changes] == list(before.names)
     assert [item.unit for item in changes] == ["kg", "m", "m", "m", *["kg m2"] * 6]
@@ -558,7 +551,7 @@ def test_the_parameters_are_those_given_and_of_both_fits(biased):
 
 
 def test_those_that_move_most_stand_in_their_usual_order(biased):
-    changes = parameter_changes(biased)
+    changes = biased.parameter_changes
     moved = change_tables.most_moved(changes, 3)
     assert moved == [item for item in changes if item in moved]
     least = min(abs(item.shift) for item in moved)
@@ -566,7 +559,7 @@ def test_those_that_move_most_stand_in_their_usual_order(biased):
 
 
 def test_the_errors_are_in_the_units_of_the_sensors(biased):
-    rate, accel = simulation_errors(biased)
+    rate, accel = biased.simulation_errors
     assert (rate.kind, accel.kind) == (SensorKind.RATE, SensorKind.ACCEL)
     for item in (rate, accel):
         assert item.noise == pytest.approx(np.sqrt(3.0) * SIGMA)
@@ -577,15 +570,12 @@ def test_the_errors_are_in_the_units_of_the_sensors(biased):
 
 
 def test_the_strongest_recording_is_the_one_that_gains_most(biased):
-    def study(before, after, causes=("a",)):
-        fits = [
-            SimpleNamespace(fit=SimpleNamespace(posterior=two, residual=np.array(side))) for side in (before, after)
-        ]
-        return SimpleNamespace(before=fits[0], after=fits[1], verdict=SimpleNamespace(causes=causes))
+    def model(*residual):
+        return SimpleNamespace(fit=SimpleNamespace(posterior=two, residual=np.array(residual)))
 
     two = SimpleNamespace(manoeuvres=(0, 1))
-    assert strongest_recording(study([3.0, 0.0, 0.0, 2.0], [2.9, 0.0, 0.0, 0.0])) == 1
-    assert strongest_recording(study([3.0, 0.0, 0.0, 2.0], [3.0, 0.0, 0.0, 2.0], ())) == 0
+    assert strongest_recording(model(3.0, 0.0, 0.0, 2.0), model(2.9, 0.0, 0.0, 0.0)) == 1
+    assert strongest_recording(model(3.0, 0.0, 0.0, 2.0), None) == 0
 
 
 def test_the_table_of_causes_has_value_distance_and_bound(biased):
@@ -599,7 +589,7 @@ def test_the_table_of_causes_has_value_distance_and_bound(biased):
 def test_the_most_probable_sets_have_sizes_beside_their_bounds(biased):
     best = biased.probabilities.sets[0]
     assert best.causes == ("accel-bias",)
-    (size,) = set_sizes(biased, best)
+    (size,) = biased.sizes_of(best)
     values = [item.mean for item in amplitudes_of(biased.after, "accel-bias")]
     assert size.size == pytest.approx(np.sqrt(np.mean(np.square(values))), rel=0.05)
     (bound,) = biased.bounds["accel-bias"]
@@ -696,7 +686,7 @@ def test_no_cause_is_drawn_where_none_is_named(clean):
 
 
 def test_the_forest_shows_what_was_given_and_both_fits(biased):
-    changes = parameter_changes(biased)
+    changes = biased.parameter_changes
     axes = figures.parameter_forest(changes).axes[0]
     assert axes.get_legend_handles_labels()[1] == ["given, prior", "without", "with"]
     given, without, fitted = (np.asarray(container.lines[0].get_xdata(), float) for container in axes.containers)
@@ -717,14 +707,14 @@ def test_what_is_no_effect_is_put_elsewhere_into_the_model(biased):
 
 
 def test_the_torque_of_the_causes_is_that_of_their_formulas(biased):
-    assert cause_torque(biased.after) is None  # a reading, not a torque
+    assert torque_of_causes(biased.after) is None  # a reading, not a torque
     both = biased.fitted(("wheel-momentum", "thruster-leak"))
     values = {effect.label: both.fit.values(index) for index, effect in enumerate(both.fit.effects)}
     node = both.fit.operating.node
     rate, com = np.asarray(node.rate)[0], np.asarray(node.body.com)[0]
     leak = np.ravel(values["thruster-leak"])
     expected = leak[3:] - np.cross(com, leak[:3]) - np.cross(rate, np.ravel(values["wheel-momentum"]))
-    (torque,) = cause_torque(both)
+    (torque,) = torque_of_causes(both)
     assert len(torque) == len(biased.disturbance.time[0])
     own = np.concatenate([[True], np.diff(np.asarray(node.environment.time)[0]) > 0.0])
     np.testing.assert_allclose(torque, expected[own], atol=1e-12)
@@ -756,7 +746,9 @@ def printed(biased, clean, disturbance, readings, tmp_path_factory):
             Status.EXPLAINED: lambda: judged(biased, Status.EXPLAINED),
             Status.ADEQUATE: lambda: judged(clean, Status.ADEQUATE),
             Status.AMBIGUOUS: lambda: judged(biased, Status.AMBIGUOUS, *ALTERNATIVES),
-            Status.UNKNOWN: lambda: replace(judged(biased, Status.UNKNOWN), unexplained=disturbance),
+            Status.UNKNOWN: lambda: replace(
+                judged(biased, Status.UNKNOWN), disturbance=disturbance, unexplained=disturbance
+            ),
             Status.UNRESOLVED: lambda: judged(biased, Status.UNRESOLVED),
         }[status]()
         vars(result)["posterior"] = biased.before.fit.posterior  # for its sentences only; not built again
@@ -812,11 +804,11 @@ def test_the_report_of_every_verdict_holds_its_sentences_and_tables(printed, sta
         *(meaning for _, meaning in GLOSSARY),
     ):
         assert sentence in text
-    for row in change_tables.error_rows(simulation_errors(result), named):
+    for row in change_tables.error_rows(result.simulation_errors, named):
         assert text.row(*row)
     for row in tables.gain_rows(result):
         assert text.row(*row) if named else text.row(row[0], row[1], row[3])
-    for row in change_tables.change_rows(parameter_changes(result), named):
+    for row in change_tables.change_rows(result.parameter_changes, named):
         assert text.row(*row)
     for row in tables.candidate_rows(result.candidates, 0.01):
         assert text.row(*row)
@@ -826,8 +818,8 @@ def test_the_report_of_every_verdict_holds_its_sentences_and_tables(printed, sta
         probability_tables.set_rows(result, 6),
         probability_tables.sensitivity_rows(result),
         probability_tables.bound_rows(dict(result.bounds)),
-        probability_tables.pair_rows(inseparable_pairs(result, 10)),
-        tables.unseen_rows(unseen_candidates(result.candidates)),
+        probability_tables.pair_rows(result.inseparable_pairs[:10]),
+        tables.unseen_rows(result.unseen_candidates),
         joint_rows(result.posterior),
     ):
         for row in rows:
@@ -840,7 +832,7 @@ def test_the_decision_stands_on_the_first_page(printed, status):
     assert ADVICE in text
     first = PdfText(text.pages[:1])
     assert "Decision. " + status.value.capitalize() in first
-    entries = decision_entries(result, parameter_changes(result), simulation_errors(result), RECORD)
+    entries = decision_entries(result, result.parameter_changes, result.simulation_errors, RECORD)
     for name, said in entries:
         assert f"{name}{said}" in first
     for row in probability_tables.probability_rows(result, 4):
@@ -850,7 +842,7 @@ def test_the_decision_stands_on_the_first_page(printed, status):
 
 
 def test_without_a_record_the_box_has_none(biased):
-    entries = dict(decision_entries(biased, parameter_changes(biased), simulation_errors(biased)))
+    entries = dict(decision_entries(biased, biased.parameter_changes, biased.simulation_errors))
     assert "Record" not in entries
     assert entries["Cause"].startswith("accel-bias, probability > 0.999. The accelerometer")
     assert entries["Size, ± 95 %"] == size_text(biased.after, "accel-bias")

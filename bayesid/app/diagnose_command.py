@@ -109,7 +109,6 @@ def _written(
     from bayesid.report import diagnosis_report
     from bayesid.report.sentences.design_sentences import separation_sentence
     from bayesid.report.sentences.diagnosis_sentences import diagnosis_sentences
-    from bayesid.report.sentences.next_steps import rival_pair
     from bayesid.report.verdict_record import record_sentence
 
     knows = all(section.argument_of_latitude is not None for section in study.recordings)
@@ -124,7 +123,7 @@ def _written(
     )
     keep(result)
     yield from diagnosis_sentences(result)
-    rivals = rival_pair(result) if plan else None
+    rivals = result.rivals if plan else None
     if effective_samples is not None or rivals:  # both take long: the verdict is not to be lost with them
         with complete_folder(output) as folder:
             result.unexplained.write(folder / "unexplained.csv")

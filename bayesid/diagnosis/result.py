@@ -9,13 +9,22 @@ from typing import Any
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.jump_instants import jump_instants
-from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
+from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.verdict import ProbableVerdict, VerdictSensitivity
+from bayesid.diagnosis.evidence.verdict import NAMED, UNKNOWN, ProbableVerdict, Status, VerdictSensitivity
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.outcome.candidate_table import Candidate, amplitudes_of, amplitudes_of_others
-from bayesid.diagnosis.outcome.disturbance import DisturbingWrench
+from bayesid.diagnosis.outcome.cause_sizes import GroupSize, group_sizes, vector_size
+from bayesid.diagnosis.outcome.disturbance import DisturbingWrench, TorqueCorrelation, torque_correlations
 from bayesid.diagnosis.outcome.gain import Gain
+from bayesid.diagnosis.outcome.inseparable_causes import CausePair, inseparable_pairs
+from bayesid.diagnosis.outcome.model_change import (
+    ParameterChange,
+    SimulationError,
+    parameter_changes,
+    simulation_errors,
+    strongest_recording,
+)
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead
 from bayesid.diagnosis.search.cause_weighing import WeighedCauses
 from bayesid.diagnosis.search.extended_model import extended_posterior, extended_start
@@ -32,6 +41,12 @@ __all__ = ["Diagnosis"]
 
 SHOWN = 0.01
 """Probability down to which sets of causes are listed; the most probable one always is."""
+
+WEAK = 0.5
+"""Power below which a candidate could hardly have been seen."""
+
+PAIRS = 10
+"""Largest number of pairs of causes that imitate each other in diagnosis.json."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +123,80 @@ class Diagnosis:
         """Evidence of sets of causes about the present model's fit."""
         return self.weighed.base.evidence
 
+    @property
+    def alternatives(self) -> tuple[tuple[str, ...], ...]:
+        """Explanations that the verdict names, its own causes first; none where it names nothing."""
+        verdict = self.verdict
+        return (verdict.causes, *verdict.ambiguous_with) if verdict.causes else ()
+
+    @property
+    def differing_causes(self) -> tuple[str, ...]:
+        """Causes that only some of the alternatives of the verdict hold, the most probable alternative first."""
+        if len(self.alternatives) < 2:
+            return ()
+        common = set.intersection(*map(set, self.alternatives))
+        names = (name for causes in self.alternatives for name in causes if name not in common and name != UNKNOWN)
+        return tuple(dict.fromkeys(names))
+
+    @property
+    def rivals(self) -> tuple[str, str] | None:
+        """Two causes that the next manoeuvre should tell apart; None where the verdict has none of unknown size.
+
+        They are the first two in which the alternatives of an ambiguous verdict differ, and the most probable two
+        classes of an unresolved one.
+        """
+        match self.verdict.status:
+            case Status.AMBIGUOUS:
+                names = self.differing_causes
+            case Status.UNRESOLVED:
+                inclusion = self.probabilities.inclusion
+                leading = [max(members, key=lambda name: inclusion[name]) for members in self.classes]
+                names = tuple(sorted(leading, key=lambda name: -inclusion[name]))
+            case _:
+                return None
+        sized = {effect.label for effect in self.effects if effect.parameters}
+        pair = [name for name in names if name in sized][:2]
+        return (pair[0], pair[1]) if len(pair) == 2 else None
+
+    @property
+    def likely_causes(self) -> tuple[str, ...]:
+        """Causes of `NAMED` probability and more, the most probable of each class; not all may be named."""
+        inclusion = self.probabilities.inclusion
+        likely = [members for members in self.classes if self.probabilities.of_any(members) >= NAMED]
+        return tuple(max(members, key=lambda name: inclusion[name]) for members in likely)
+
+    @property
+    def unseen_candidates(self) -> tuple[Candidate, ...]:
+        """Candidates that these manoeuvres could hardly have shown, the least visible first."""
+        weak = [(row.power, row) for row in self.candidates if row.power is not None and row.power < WEAK]
+        return tuple(row for _, row in sorted(weak, key=lambda entry: entry[0]))
+
+    @cached_property
+    def parameter_changes(self) -> tuple[ParameterChange, ...]:
+        """Inertial parameters of the identified bodies: given, without the named causes, with them."""
+        return parameter_changes(self.before, self.gain)
+
+    @cached_property
+    def simulation_errors(self) -> tuple[SimulationError, ...]:
+        """Errors of the simulation of every sensor, before and after."""
+        return simulation_errors(self.before, self.after, self.gain)
+
+    @property
+    def strongest_recording(self) -> int:
+        """Recording whose chi-square decreases most by the named causes, or is largest where none is named."""
+        return strongest_recording(self.before, self.after if self.verdict.causes else None)
+
+    @cached_property
+    def inseparable_pairs(self) -> tuple[CausePair, ...]:
+        """Pairs of a named cause, or of the most probable ones, with every other, those that imitate best first."""
+        named = [name for names in self.alternatives for name in names]
+        return inseparable_pairs(self.evidence, named, self.probabilities.inclusion, self.classes)
+
+    @cached_property
+    def torque_correlations(self) -> list[TorqueCorrelation]:
+        """Largest correlations of the torque of `disturbance` with motion, orbit and clock."""
+        return torque_correlations(self.disturbance, self.before)
+
     @cached_property
     def posterior(self) -> Posterior:
         """The extended model's posterior, simulated in full."""
@@ -117,6 +206,38 @@ class Diagnosis:
     def start(self) -> Floats:
         """The mode found, as a starting point for `posterior`."""
         return extended_start(self.after, self.posterior)
+
+    def class_of(self, cause: str) -> tuple[str, ...]:
+        """Return the causes that change the model as one does, as far as the data can tell, itself among them."""
+        return next((tuple(members) for members in self.classes if cause in members), (cause,))
+
+    def probability_of(self, names: Sequence[str]) -> float:
+        """Return the probability that all of some causes are at work, whatever accompanies them; of none, of nothing.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Causes, each of which stands for its class; ``unknown`` stands for any generic candidate.
+        """
+        if not names:
+            return self.probabilities.nothing
+        classes = [set(self.class_of(name)) for name in names if name != UNKNOWN]
+        return float(
+            sum(
+                considered.probability
+                for considered in self.probabilities.sets
+                if all(not members.isdisjoint(considered.causes) for members in classes)
+                and (UNKNOWN not in names or considered.generic is not None)
+            )
+        )
+
+    def cause_probability(self, cause: str) -> float:
+        """Return the probability that a cause or one of its equivalents is at work, whatever accompanies it."""
+        return self.probabilities.of_any(self.class_of(cause))
+
+    def sizes_of(self, cause_set: CauseSet) -> list[GroupSize]:
+        """Return the sizes of all causes of a set beside their bounds, by cause and group of amplitudes."""
+        return group_sizes(cause_set, self.weighed.state(cause_set.causes), self.bounds, self.candidates)
 
     def fitted(self, causes: Sequence[str]) -> Hypothesis:
         """Fit the present model with some causes of the catalogue."""
@@ -150,9 +271,21 @@ class Diagnosis:
                 "signal_to_noise": self.unexplained.signal_to_noise,
                 "fixed_in": None if self.unexplained.fixed_in is None else self.unexplained.fixed_in.value,
             },
+            "disturbance": {
+                "signal_to_noise": self.disturbance.signal_to_noise,
+                "fixed_in": None if self.disturbance.fixed_in is None else self.disturbance.fixed_in.value,
+                "correlations": [correlation._asdict() for correlation in self.torque_correlations],
+            },
             "joint_torques": _torques(self.torques),
             "bodies_held": self.held,
             "gain": _gain(self),
+            "inertial_parameters": {change.name: change.to_dict() for change in self.parameter_changes},
+            "simulation_error": {error.kind.value: error.to_dict() for error in self.simulation_errors},
+            "strongest_recording": self.before.fit.posterior.manoeuvres[self.strongest_recording].recording.name,
+            "vectors": {name: vector.to_dict() for name in verdict.causes if (vector := vector_size(self.after, name))},
+            "inseparable": [pair.to_dict() for pair in self.inseparable_pairs[:PAIRS]],
+            "unseen": [row.name for row in self.unseen_candidates],
+            "rivals": None if self.rivals is None else list(self.rivals),
             "p_value": self.alarm.p_value,
             "most_significant": self.alarm.loudest,
             "sensitivity": {
@@ -187,6 +320,7 @@ def _sets(result: Diagnosis) -> list[dict[str, Any]]:
             "probability": item.probability,
             "log_evidence": item.log_evidence,
             "refitted": item.generic is None and frozenset(item.causes) in fitted,
+            "sizes": [size.to_dict() for size in result.sizes_of(item)],
         }
         for item in shown
     ]

@@ -9,7 +9,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Hypothesis
 from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
-from bayesid.report.vector_size import vector_size
+from bayesid.diagnosis.outcome.cause_sizes import vector_size
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.sensors import SensorKind

@@ -14,7 +14,6 @@ from bayesid.report.diagnosis_pages.decision_page import add_decision
 from bayesid.report.diagnosis_pages.evidence_page import add_evidence
 from bayesid.report.diagnosis_pages.limits_page import add_assumptions, add_limits
 from bayesid.report.document import Document
-from bayesid.report.given_values import parameter_changes
 from bayesid.report.identification_report import add_identification
 
 __all__ = ["diagnosis_report"]
@@ -47,7 +46,7 @@ def diagnosis_report(
     origin : str, optional
         Where the report comes from: files with their hashes, version, seed and command.
     """
-    changes = parameter_changes(result)
+    changes = result.parameter_changes
     document = Document(title, "Diagnosis")
     add_decision(document, result, changes, record, origin)
     document.page()

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Status
-from bayesid.diagnosis.outcome.disturbance import torque_correlations
+from bayesid.diagnosis.outcome.model_change import ParameterChange
+from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes
 from bayesid.report import figures
-from bayesid.report.cause_torque import cause_torque
 from bayesid.report.document import Document
-from bayesid.report.given_values import ParameterChange
 from bayesid.report.sentences.diagnosis_sentences import wrench_sentence
-from bayesid.report.simulation_errors import simulation_errors
 from bayesid.report.tables import change_tables
 from bayesid.report.tables.diagnosis_tables import correlation_rows
 
@@ -44,7 +42,7 @@ def add_consequences(document: Document, result: Diagnosis, changes: Sequence[Pa
         )
     document.table(
         ["sensor", "unit", *(["before", "after"] if named else ["error"]), "noise alone"],
-        change_tables.error_rows(simulation_errors(result), named),
+        change_tables.error_rows(result.simulation_errors, named),
         "Root mean square error of the simulation, length of all axes, freed of its correlation.",
         ["left", "left", *["right"] * (3 if named else 2)],
     )
@@ -56,7 +54,7 @@ def _add_disturbance(document: Document, result: Diagnosis) -> None:
     named = bool(result.verdict.causes)
     if result.verdict.status is Status.ADEQUATE or (named and not _may_be_disturbance(result)):
         return
-    wrench = result.disturbance if named else result.unexplained
+    wrench = result.disturbance
     document.paragraph(
         f"This disturbance of the base would explain the residual{' without the named causes' if named else ''}: "
         "torque about and force through the common centre of mass, smooth in time, with a size estimated from the "
@@ -81,7 +79,7 @@ def _add_wrench(document: Document, result: Diagnosis, wrench: DisturbingWrench,
     in_orbit = result.before.fit.posterior.model.orbit is not None
     for frame, name in AXES.items():
         if frame is Frame.BASE or (whole and (in_orbit or frame is Frame.INERTIAL)):
-            cause = cause_torque(result.after) if not whole else None
+            cause = torque_of_causes(result.after) if not whole else None
             document.figure(
                 figures.wrench_histories(wrench, frame, cause),
                 f"Reconstructed torque and force, {name} axes."
@@ -98,7 +96,7 @@ def _add_wrench(document: Document, result: Diagnosis, wrench: DisturbingWrench,
             "Amplitude of the reconstructed torque by frequency, base axes, up to the frequency that is resolved.",
             floating=True,
         )
-    if rows := correlation_rows(torque_correlations(wrench, result.before)):
+    if rows := correlation_rows(result.torque_correlations):
         document.table(
             ["component, base axes", "moves with", "correlation"],
             rows,

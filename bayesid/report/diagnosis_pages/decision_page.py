@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bayesid.diagnosis import Diagnosis, Status
+from bayesid.diagnosis.outcome.model_change import ParameterChange, SimulationError
 from bayesid.report import figures
-from bayesid.report.class_probabilities import alternative_probability, cause_probability
 from bayesid.report.document import Document
-from bayesid.report.given_values import ParameterChange
 from bayesid.report.numbers import format_number, format_probability, format_quantity, format_unit
 from bayesid.report.sentences.conditions import conditions_text
 from bayesid.report.sentences.diagnosis_sentences import cause_summary, verdict_sentence, wrench_sentence
@@ -16,7 +15,6 @@ from bayesid.report.sentences.next_steps import action_sentence
 from bayesid.report.sentences.set_words import set_text, verdict_text
 from bayesid.report.sentences.size_words import size_text
 from bayesid.report.sentences.torque_sentences import torque_sentence
-from bayesid.report.simulation_errors import SimulationError, simulation_errors, strongest_recording
 from bayesid.report.tables import change_tables, probability_tables
 
 __all__ = ["add_decision", "decision_entries"]
@@ -48,7 +46,7 @@ def add_decision(
     origin : str, optional
         Files with their hashes, version, seed and command.
     """
-    errors = simulation_errors(result)
+    errors = result.simulation_errors
     document.decision(
         f"Decision. {_capital(verdict_text(result.verdict))}", decision_entries(result, changes, errors, record)
     )
@@ -76,7 +74,7 @@ def decision_entries(
             ("Size, ± 95 %", size_text(result.after, cause)),
         ]
     entries += [
-        ("Alternative", f"{set_text(names)}, probability {format_probability(alternative_probability(result, names))}")
+        ("Alternative", f"{set_text(names)}, probability {format_probability(result.probability_of(names))}")
         for names in verdict.ambiguous_with
     ]
     if verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
@@ -94,7 +92,7 @@ def decision_entries(
 
 
 def _cause_text(result: Diagnosis, cause: str) -> str:
-    probability = format_probability(cause_probability(result, cause))
+    probability = format_probability(result.cause_probability(cause))
     return f"{cause}, probability {probability}. {cause_summary(result.after, cause)}".rstrip()
 
 
@@ -123,9 +121,9 @@ def _errors_text(errors: Sequence[SimulationError], named: bool) -> str:
 
 def _add_picture(document: Document, result: Diagnosis) -> None:
     document.figure(
-        figures.cause_picture(result, strongest_recording(result)),
+        figures.cause_picture(result, result.strongest_recording),
         "Left: the robot as given, with the cause where it acts. Right: what the simulation of "
-        f"{result.before.fit.posterior.manoeuvres[strongest_recording(result)].recording.name} misses on the axis that "
+        f"{result.before.fit.posterior.manoeuvres[result.strongest_recording].recording.name} misses on the axis that "
         "changes most, in standard deviations of the noise, with running means; the grey band is ± 2 σ.",
     )
 

@@ -7,7 +7,6 @@ from bayesid.inference.residual_view import ResidualView
 from bayesid.report import figures
 from bayesid.report.document import Document
 from bayesid.report.sentences.diagnosis_sentences import alarm_sentence, gain_sentence
-from bayesid.report.simulation_errors import strongest_recording
 from bayesid.report.tables import diagnosis_tables as tables
 
 __all__ = ["add_evidence", "add_other_residuals"]
@@ -20,7 +19,7 @@ def add_evidence(document: Document, result: Diagnosis) -> None:
     """Add the residuals of the strongest recording, the spectra of all, and what the causes gain."""
     document.section("Evidence")
     sides = _sides(result)
-    strongest = strongest_recording(result)
+    strongest = result.strongest_recording
     document.paragraph(
         f"{alarm_sentence(result)} {gain_sentence(result)} Residuals are in units of their noise σ and freed of their "
         "correlation, so that a right model leaves independent values of standard deviation one. "
@@ -48,7 +47,7 @@ def add_evidence(document: Document, result: Diagnosis) -> None:
 
 def add_other_residuals(document: Document, result: Diagnosis) -> None:
     """Add the residuals of the other recordings over time."""
-    sides, strongest = _sides(result), strongest_recording(result)
+    sides, strongest = _sides(result), result.strongest_recording
     others = [index for index in range(len(_names(result))) if index != strongest]
     for index in others[:RECORDINGS]:
         document.figure(figures.residual_histories(sides, index), f"Residuals in {_names(result)[index]}, sensor axes.")

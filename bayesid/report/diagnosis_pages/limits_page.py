@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from bayesid.diagnosis import Candidate, Diagnosis, Status
+from bayesid.diagnosis import Diagnosis, Status
 from bayesid.inference.predicted_readings import integration_error_at
 from bayesid.report.document import Document
 from bayesid.report.identification_report import add_joints
-from bayesid.report.inseparable_causes import inseparable_pairs
 from bayesid.report.sentences.diagnosis_method import computation_sentence, method_sentences
 from bayesid.report.sentences.model_assumptions import model_sentences
 from bayesid.report.sentences.next_steps import action_sentence, advice_sentences
 from bayesid.report.tables import diagnosis_tables, probability_tables
 
-__all__ = ["NEXT", "add_assumptions", "add_limits", "unseen_candidates"]
+__all__ = ["NEXT", "add_assumptions", "add_limits"]
 
 NEXT = "Next experiment and limits"
 """Title of the section that says what to fly next."""
-
-WEAK = 0.5
-"""Power below which a candidate could hardly have been seen."""
 
 PAIRS = 10
 """Largest number of pairs in the table of causes that imitate each other."""
@@ -32,7 +26,7 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
     document.paragraph(action_sentence(result))
     document.items([*advice_sentences(result), *([advice] if advice else [])])
     _add_unseen(document, result)
-    if pairs := inseparable_pairs(result, PAIRS):
+    if pairs := result.inseparable_pairs[:PAIRS]:
         document.table(
             ["cause", "other", "largest cosine", "smallest cosine", ""],
             probability_tables.pair_rows(pairs),
@@ -47,7 +41,7 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
 
 
 def _add_unseen(document: Document, result: Diagnosis) -> None:
-    if hidden := unseen_candidates(result.candidates):
+    if hidden := result.unseen_candidates:
         document.paragraph(
             "The following candidates could not have been seen: drawn from their priors, these manoeuvres would have "
             "raised no alarm in more than half of all cases. Their absence from the verdict says little about them."
@@ -63,12 +57,6 @@ def _add_unseen(document: Document, result: Diagnosis) -> None:
             "Every candidate whose power is known, drawn from its prior, would have raised the alarm in at least half "
             "of all cases: these manoeuvres are enough."
         )
-
-
-def unseen_candidates(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Return the candidates that these manoeuvres could hardly have shown, the least visible first."""
-    weak = [(row.power, row) for row in candidates if row.power is not None and row.power < WEAK]
-    return [row for _, row in sorted(weak, key=lambda item: item[0])]
 
 
 def add_assumptions(document: Document, result: Diagnosis) -> None:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Candidate, DisturbingWrench, Frame
-from bayesid.diagnosis.outcome.disturbance import WAVES
+from bayesid.diagnosis.outcome.torque_of_causes import torque_spectrum
 from bayesid.report.figures.figure_style import (
     COLOURS,
     curve_style,
@@ -20,7 +20,7 @@ from bayesid.report.figures.figure_style import (
     wide_figure,
 )
 
-__all__ = ["candidate_strengths", "torque_amplitudes", "wrench_histories", "wrench_spectrum"]
+__all__ = ["candidate_strengths", "wrench_histories", "wrench_spectrum"]
 
 FEW = 7
 """Largest number of recordings in one figure."""
@@ -107,7 +107,7 @@ def wrench_spectrum(wrench: DisturbingWrench) -> Figure:
     """Draw the amplitude of the reconstructed torque by frequency, in base axes, one curve per recording."""
     figure = wide_figure(1.9)
     panels = figure.subplots(1, 3, squeeze=False)
-    series = [torque_amplitudes(wrench, index) for index in range(len(wrench.names[:FEW]))]
+    series = [torque_spectrum(wrench, index) for index in range(len(wrench.names[:FEW]))]
     scale, prefix = decimal_scale(np.concatenate([amplitude.ravel() for _, amplitude in series]))
     for axis in range(3):
         axes = panels[0, axis]
@@ -121,14 +121,3 @@ def wrench_spectrum(wrench: DisturbingWrench) -> Figure:
     panels[0, 0].set_ylabel("amplitude")
     shared_legend(figure, panels[0, 0], columns=4)
     return figure
-
-
-def torque_amplitudes(wrench: DisturbingWrench, index: int) -> tuple[Floats, Floats]:
-    """Return frequencies [Hz], as far as resolved, and amplitudes [N m] of one recording's torque about its mean."""
-    time, torque = wrench.time[index], wrench.torque[Frame.BASE][index]
-    uniform = np.linspace(time[0], time[-1], len(time))
-    even = np.stack([np.interp(uniform, time, column) for column in torque.T], axis=1)
-    amplitude = 2.0 * np.abs(np.fft.rfft(even - even.mean(axis=0), axis=0)) / len(even)
-    frequency = np.fft.rfftfreq(len(even), float(uniform[1] - uniform[0]))
-    shown = (frequency > 0.0) & (frequency <= 0.5 * WAVES / float(np.ptp(time)))
-    return np.asarray(frequency[shown], dtype=float), np.asarray(amplitude[shown], dtype=float)

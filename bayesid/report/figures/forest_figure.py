@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesid.diagnosis.outcome.cause_sizes import Z95
+from bayesid.diagnosis.outcome.model_change import ParameterChange
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
-from bayesid.report.given_values import ParameterChange
-from bayesid.report.vector_size import Z95
 
 __all__ = ["parameter_forest"]
 

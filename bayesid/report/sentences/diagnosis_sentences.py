@@ -10,7 +10,6 @@ from bayesid.diagnosis.candidates.jump_instants import jump_instants
 from bayesid.diagnosis.evidence.verdict import COVERED, NAMED, UNKNOWN
 from bayesid.diagnosis.noise.noise_faults import SUMMARIES
 from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
-from bayesid.report.class_probabilities import alternative_probability, alternatives, cause_probability
 from bayesid.report.numbers import (
     format_fixed,
     format_number,
@@ -86,10 +85,10 @@ def verdict_sentence(result: Diagnosis) -> str:
             return (
                 f"Explained by {causes}: with {'it' if one else 'them'} the simulation {beside} "
                 f"The probability that {'it is' if one else 'all are'} at work is "
-                f"{_is(alternative_probability(result, result.verdict.causes))}."
+                f"{_is(result.probability_of(result.verdict.causes))}."
             )
         case Status.AMBIGUOUS:
-            names = "; or ".join(map(set_text, alternatives(result)))
+            names = "; or ".join(map(set_text, result.alternatives))
             return (
                 f"Ambiguous: what the simulation leaves comes from {names}. Together these alternatives have a "
                 f"probability of at least {format_percent(COVERED, 2)}, and the recordings do not decide between them."
@@ -115,10 +114,7 @@ def verdict_sentence(result: Diagnosis) -> str:
 
 def _nearly_certain(result: Diagnosis) -> str:
     """Return a sentence on causes that would be named if they left nothing without a name, or nothing."""
-    found = result.probabilities
-    inclusion = found.inclusion
-    likely = [members for members in result.classes if found.of_any(members) >= NAMED]
-    certain = [max(members, key=lambda name: inclusion[name]) for members in likely]
+    certain = result.likely_causes
     if not certain:
         return ""
     one = len(certain) == 1
@@ -151,7 +147,7 @@ def cause_sentences(result: Diagnosis) -> Iterator[str]:
     for label in result.verdict.causes:
         parts = [
             f"{label}. {cause_summary(result.after, label)}".rstrip(),
-            f"The probability that it is at work is {_is(cause_probability(result, label))}.",
+            f"The probability that it is at work is {_is(result.cause_probability(label))}.",
         ]
         if amplitude := amplitudes_of(result.after, label):
             rest = "; all are in the table of the named causes" if len(amplitude) > AT_MOST else ""
@@ -166,7 +162,7 @@ def cause_sentences(result: Diagnosis) -> Iterator[str]:
 def alternative_sentences(result: Diagnosis) -> Iterator[str]:
     """Return each alternative to the named causes, with its probability and the other names of its causes."""
     for names in result.verdict.ambiguous_with:
-        text = f"Alternative: {set_text(names)} ({probability_text(alternative_probability(result, names))})."
+        text = f"Alternative: {set_text(names)} ({probability_text(result.probability_of(names))})."
         for name in names:
             if name != UNKNOWN and (others := result.verdict.equivalent_to.get(name)):
                 text += f" Other names for {name}: {joined(others)}."

@@ -7,11 +7,9 @@ from collections.abc import Iterator
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, Status
 from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
-from bayesid.diagnosis.evidence.verdict import UNKNOWN
-from bayesid.report.class_probabilities import alternatives
 from bayesid.report.sentences.next_experiment import advice
 
-__all__ = ["SEPARATE_UNKNOWN", "action_sentence", "advice_sentences", "differing_causes", "rival_pair"]
+__all__ = ["SEPARATE_UNKNOWN", "action_sentence", "advice_sentences"]
 
 SEPARATE_UNKNOWN = (
     "Repeat a manoeuvre unchanged but later: what depends on the clock then comes back at another instant of the "
@@ -55,37 +53,7 @@ def _addition(result: Diagnosis) -> str:
 
 def advice_sentences(result: Diagnosis) -> Iterator[str]:
     """Return the manoeuvre that would bring out each cause in which the alternatives differ."""
-    for name in differing_causes(result):
+    for name in result.differing_causes:
         yield f"{name}: {advice(name)}"
-    if pair := rival_pair(result):
+    if pair := result.rivals:
         yield f"A manoeuvre that tells them apart is designed by: bayesid design STUDY.toml --separate {' '.join(pair)}"
-
-
-def rival_pair(result: Diagnosis) -> tuple[str, str] | None:
-    """Return the two causes that the next manoeuvre should tell apart; None where the verdict has none of unknown size.
-
-    They are the first two in which the alternatives of an ambiguous verdict differ, and the most probable two classes
-    of an unresolved one.
-    """
-    inclusion = result.probabilities.inclusion
-    match result.verdict.status:
-        case Status.AMBIGUOUS:
-            names = differing_causes(result)
-        case Status.UNRESOLVED:
-            leading = [max(members, key=lambda name: inclusion[name]) for members in result.classes]
-            names = tuple(sorted(leading, key=lambda name: -inclusion[name]))
-        case _:
-            return None
-    sized = {effect.label for effect in result.effects if effect.parameters}
-    pair = [name for name in names if name in sized][:2]
-    return (pair[0], pair[1]) if len(pair) == 2 else None
-
-
-def differing_causes(result: Diagnosis) -> tuple[str, ...]:
-    """Return the causes that only some of the alternatives of a verdict hold, the most probable alternative first."""
-    sets = alternatives(result)
-    if len(sets) < 2:
-        return ()
-    common = set.intersection(*map(set, sets))
-    names = (name for own in sets for name in own if name not in common and name != UNKNOWN)
-    return tuple(dict.fromkeys(names))

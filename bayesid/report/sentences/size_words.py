@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 from bayesid.diagnosis import Hypothesis
-from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
-from bayesid.diagnosis.response.effect_functions import CauseAmplitude
+from bayesid.diagnosis.outcome.candidate_table import CauseAmplitude, amplitudes_of
+from bayesid.diagnosis.outcome.cause_sizes import Z95, VectorSize, vector_size
 from bayesid.report.numbers import format_number, format_quantity, format_unit, format_vector
-from bayesid.report.vector_size import Z95, VectorSize, vector_size
 
 __all__ = ["size_text", "vector_text"]
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from bayesid.diagnosis.outcome.model_change import ParameterChange, SimulationError
 from bayesid.report.document import Rows
-from bayesid.report.given_values import ParameterChange
 from bayesid.report.numbers import format_number, format_quantity, format_signed, format_unit
-from bayesid.report.simulation_errors import SimulationError
 
 __all__ = ["change_rows", "error_rows", "most_moved"]
 

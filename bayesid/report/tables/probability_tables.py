@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bayesid.diagnosis import Diagnosis, TorqueReading
-from bayesid.report.class_probabilities import class_of
+from bayesid.diagnosis.outcome.cause_sizes import GroupSize
+from bayesid.diagnosis.outcome.inseparable_causes import CausePair
 from bayesid.report.document import Rows
-from bayesid.report.inseparable_causes import CausePair
 from bayesid.report.numbers import (
     format_fixed,
     format_number,
@@ -19,7 +19,6 @@ from bayesid.report.numbers import (
 )
 from bayesid.report.sentences.set_words import NOTHING, SOMETHING, verdict_text
 from bayesid.report.sentences.torque_sentences import torque_size
-from bayesid.report.set_sizes import GroupSize, set_sizes
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 __all__ = ["bound_rows", "pair_rows", "probability_rows", "sensitivity_rows", "set_rows", "torque_rows"]
@@ -35,7 +34,7 @@ def probability_rows(result: Diagnosis, most: int) -> Rows:
         Number of classes.
     """
     probabilities = result.probabilities
-    classes = dict.fromkeys(class_of(result, cause) for cause in probabilities.causes)
+    classes = dict.fromkeys(result.class_of(cause) for cause in probabilities.causes)
     ranked = sorted(classes, key=lambda members: (-probabilities.of_any(members), members))[:most]
     rows = [[" or ".join(members), format_probability(probabilities.of_any(members))] for members in ranked]
     return [
@@ -65,7 +64,7 @@ def set_rows(result: Diagnosis, most: int) -> Rows:
     for item in result.probabilities.sets[:most]:
         whole = [format_probability(item.probability), format_signed(item.log_evidence) if item.names else "0"]
         before = None
-        for size in set_sizes(result, item) or [GroupSize(NOTHING)]:
+        for size in result.sizes_of(item) or [GroupSize(NOTHING)]:
             name = size.cause if before is None else f"+ {size.cause}" if size.cause != before else ""
             rows.append([name, *(whole if before is None else ["", ""]), *_size_cells(size)])
             before = size.cause
