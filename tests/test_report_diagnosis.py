@@ -573,7 +573,7 @@ def test_the_strongest_recording_is_the_one_that_gains_most(biased):
     def model(*residual):
         return SimpleNamespace(fit=SimpleNamespace(posterior=two, residual=np.array(residual)))
 
-    two = SimpleNamespace(manoeuvres=(0, 1))
+    two = SimpleNamespace(residual_shape=(2, 2, 1))
     assert strongest_recording(model(3.0, 0.0, 0.0, 2.0), model(2.9, 0.0, 0.0, 0.0)) == 1
     assert strongest_recording(model(3.0, 0.0, 0.0, 2.0), None) == 0
 
