@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from studies.faults import attempt, tasks, write_report
+from studies.faults import STUDY, Result, attempt, tasks
 from studies.faults.kills import content_of, half_written, kill_and_resume
 from studies.faults.surroundings import FULL, SURROUNDINGS, can_fill_a_disk
 from tests.pdf_text import PdfText
@@ -59,7 +59,7 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
         {"around": "a full disk", "refused": True, "said": "Error: No space left"},
         killed,
     ]
-    write_report(made, ["a trial broke"], tmp_path / "faults.pdf")
+    STUDY.write(Result(made, ["a trial broke"]), tmp_path / "faults.pdf")
     text = PdfText.read(tmp_path / "faults.pdf")
     assert text.row("No unclear answer to a spoilt file", "1 of 7; 4 refused, 2 accepted", "FAIL")
     assert text.row("a full disk: one clear error", "refused", "PASS")
@@ -83,7 +83,8 @@ def test_the_report_says_what_failed_and_what_was_not_tested(tmp_path):
     ],
 )
 def test_another_cache_passes_only_where_it_could_have_failed(same, differs, reached, verdict, tmp_path):
-    write_report([{"cache": "another version", "same": same, "differs": differs}], [], tmp_path / "faults.pdf")
+    made = [{"cache": "another version", "same": same, "differs": differs}]
+    STUDY.write(Result(made, []), tmp_path / "faults.pdf")
     text = PdfText.read(tmp_path / "faults.pdf")
     assert text.row("a cache of another version: no effect", reached, verdict)
 

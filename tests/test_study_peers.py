@@ -14,7 +14,7 @@ from studies.common.monte_carlo import run_trials
 from studies.common.study import Verdict
 from studies.peers.contest import REFERENCE, Recipe, attempt, lines, tasks
 from studies.peers.recipes import with_scipy, with_sysid
-from studies.peers.report import goals_of, read, write_report
+from studies.peers.report import STUDY, goals_of, read
 from studies.peers.samplers import Sampler, bridge, effective_samples
 from studies.truth.bodies import SERVICER3
 from tests.pdf_text import PdfText
@@ -127,7 +127,7 @@ def test_peers_on_the_same_task_found_the_same():
 
 def test_the_report_is_that_of_the_trials(tmp_path):
     made = read(REPORTS / "peers.jsonl.gz")
-    write_report(made, tmp_path / "peers.pdf")
+    STUDY.write(made, tmp_path / "peers.pdf")
     rebuilt, kept = PdfText.read(tmp_path / "peers.pdf"), PdfText.read(REPORTS / "peers.pdf")
     for goal in goals_of(made):
         for text in (goal.text, goal.reached, goal.verdict.value):
@@ -147,5 +147,5 @@ def test_a_small_study(tmp_path):
         assert np.abs(np.subtract(result["mean"], reference["mean"])).max() < 0.3
     errors = np.subtract(known["mean"], known["truth"]) / np.array(known["sd"])
     assert np.abs(errors).max() < 5.0
-    write_report(read(tmp_path / "trials.jsonl"), tmp_path / "peers.pdf")
+    STUDY.write(read(tmp_path / "trials.jsonl"), tmp_path / "peers.pdf")
     assert broken_rules(tmp_path / "peers.pdf", full=False) == []

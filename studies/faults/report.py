@@ -1,10 +1,11 @@
-"""Report of the faults."""
+"""The study of faults: its trials, and what its report says of them."""
 
 from __future__ import annotations
 
 import re
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,9 @@ from matplotlib.figure import Figure
 from bayesid._io.words import counted
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
-from studies.common.monte_carlo import read_store, run_trials
-from studies.common.provenance import study_origin
+from studies.common.monte_carlo import Workers, read_store, run_trials
 from studies.common.report_parts import add_number_table
-from studies.common.study import TRIALS, Command, Goal, Verdict
-from studies.common.template import Summary, add_first_page, write_study
+from studies.common.study import MADE, TRIALS, Goal, Picture, Report, Study, Verdict, show
 from studies.faults.fuzz import KINDS, SLIPS
 from studies.faults.kills import COMMANDS
 from studies.faults.surroundings import SURROUNDINGS
@@ -28,108 +27,102 @@ from studies.faults.trials import attempt, tasks
 OUTCOMES = {"refused": "refused with a clear message", "accepted": "accepted", "faulty": "unclear answer"}
 """Titles of the outcomes by their keys."""
 
-
-@styled
-def answer_figure(answers: Mapping[str, Mapping[str, int]]) -> Figure:
-    """Draw the numbers of files by outcome, one bar for each kind of change."""
-    figure = wide_figure(0.75 + 0.2 * len(answers))
-    axes = figure.subplots()
-    place, left = np.arange(len(answers)), np.zeros(len(answers))
-    for (key, title), colour in zip(OUTCOMES.items(), COLOURS[2:5], strict=True):
-        counts = np.array([found.get(key, 0) for found in answers.values()])
-        axes.barh(place, counts, 0.65, left=left, color=colour, label=title)
-        left = left + counts
-    axes.set(xlabel="number of files", ylim=(len(answers) - 0.5, -0.5))
-    axes.set_yticks(place, list(answers))
-    shared_legend(figure, axes, len(OUTCOMES))
-    return figure
-
-
-Made = Mapping[str, Any]  # A task with its result
+Made = Mapping[str, Any]  # a task with its result
 NAMED = re.compile(r"\.(csv|toml|urdf): ")  # file in a message, with what follows on the place in it
 
-COMMAND = Command(
-    "faults",
-    "What commands make of spoilt files, mistaken units and kills at random moments.",
-    full="1,000 spoilt files, ten mistaken units, faults around a run, and kills of every command that takes long",
-    seed=1,
-    extra={**TRIALS, "--made": {"action": "store_true", "help": "report the trials made so far, make no more"}},
-)
+
+@dataclass(frozen=True)
+class Result:
+    """Tasks with their results, and the messages of trials that failed themselves."""
+
+    made: Sequence[Made]
+    failures: Sequence[str]
+
+    def by(self, key: str) -> dict[str, Made]:
+        """Return the tasks of one kind ("unit", "kill", "around") by what they try."""
+        return {item[key]: item for item in self.made if key in item}
+
+    @property
+    def spoilt(self) -> list[Made]:
+        """Tasks that spoil files."""
+        return [item for item in self.made if "spoil" in item]
+
+    @cached_property
+    def answers(self) -> dict[str, dict[str, int]]:
+        """Numbers of spoilt files by kind of change and outcome."""
+        return {
+            kind: {key: sum(item["answers"].get(kind, {}).get(key, 0) for item in self.spoilt) for key in OUTCOMES}
+            for kind in KINDS
+        }
+
+    @property
+    def numbers(self) -> dict[str, int]:
+        """Numbers of spoilt files by outcome."""
+        return {key: sum(counts[key] for counts in self.answers.values()) for key in OUTCOMES}
+
+    @property
+    def kills(self) -> int:
+        """Number of kills that found a command running."""
+        return sum(item["kills"] for item in self.by("kill").values())
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the study and write its report."""
-    options = COMMAND.parse(arguments)
-    if options.made:
-        lines = read_store(options.trials)
-        made = [{**line["task"], **line["result"]} for line in lines if "result" in line]
-        failures = [line["error"] for line in lines if "error" in line]
-        write_report(made, failures, options.output, study_origin("faults", options))
-        return
-    planned = tasks(options.full)
-    outcomes = run_trials(
-        attempt,
-        planned,
-        options.trials,
-        seed=options.seed,
-        workers=options.workers,
-        progress=lambda text: print(text, file=sys.stderr),
-    )
-    made = [{**task, **result} for task, result in zip(planned, outcomes.results, strict=True) if result is not None]
-    write_report(made, list(outcomes.failures.values()), options.output, study_origin("faults", options))
-    print(f"Wrote {options.output}.")
+def run(
+    *,
+    full: bool = False,
+    seed: int = 1,
+    trials: Path | None = None,
+    workers: Workers = 1,
+    made: bool = False,
+    progress: Callable[[str], None] = show,
+) -> Result:
+    """Make the trials that the store does not hold yet, or only read those ``made`` so far."""
+    if made and trials is not None:
+        lines = read_store(trials)
+        kept = [{**line["task"], **line["result"]} for line in lines if "result" in line]
+        return Result(kept, [line["error"] for line in lines if "error" in line])
+    planned = tasks(full)
+    outcomes = run_trials(attempt, planned, trials, seed=seed, workers=workers, progress=progress)
+    done = [{**task, **found} for task, found in zip(planned, outcomes.results, strict=True) if found is not None]
+    return Result(done, list(outcomes.failures.values()))
 
 
-def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, with its summary beside it.
-
-    Parameters
-    ----------
-    made : sequence of mappings
-        Tasks with their results.
-    failures : sequence of str
-        Messages of trials that failed themselves.
-    file : Path
-    origin : str, optional
-        Where the report comes from.
-    """
-    spoilt = [item for item in made if "spoil" in item]
-    units = {item["unit"]: item for item in made if "unit" in item}
-    killed = {item["kill"]: item for item in made if "kill" in item}
-    around = {item["around"]: item for item in made if "around" in item}
-    cache = next((item for item in made if "cache" in item), None)
-    answers = {
-        kind: {key: sum(item["answers"].get(kind, {}).get(key, 0) for item in spoilt) for key in OUTCOMES}
-        for kind in KINDS
-    }
-    numbers = {key: sum(counts[key] for counts in answers.values()) for key in OUTCOMES}
-    document = Document("Faults", "Spoilt files, mistaken units, kills at random moments")
-    planned, kills = len(tasks(full=True)), sum(item["kills"] for item in killed.values())
-    done = len(made) + len(failures)
-    summary = Summary(
+def _report(result: Result) -> Report[Result]:
+    planned, done = len(tasks(full=True)), len(result.made) + len(result.failures)
+    numbers, units, killed = result.numbers, result.by("unit"), result.by("kill")
+    caption = "What became of the spoilt files, by kind of change."
+    return Report(
+        title="Faults",
+        subtitle="Spoilt files, mistaken units, kills at random moments",
         question="What do commands make of spoilt files, mistaken units and kills at random moments?",
         answer=f"Of {sum(numbers.values())} spoilt files {numbers['faulty']} got an unclear answer, "
         f"{numbers['refused']} were refused with a clear message and {numbers['accepted']} were accepted; "
         f"{sum(item['refused'] for item in units.values())} of {counted(len(units), 'mistaken unit')} "
-        f"{'was' if len(units) == 1 else 'were'} refused; after {counted(kills, 'kill')} "
+        f"{'was' if len(units) == 1 else 'were'} refused; after {counted(result.kills, 'kill')} "
         f"{sum(item['same'] for item in killed.values())} of {counted(len(killed), 'command')} gave the answer of a "
         "run left alone.",
-        goals=tuple(_goals(numbers, units, killed, around, cache)),
+        goals=_goals(result),
         valid=f"files are those of a robot with three joints and one recording of 40 s; {done} of the {planned} trials "
         "of the full study were made.",
         full=done >= planned,
+        figure=Picture(answer_figure(result.answers), caption) if result.spoilt else None,
+        sections=[_failures, _kills, _said, _conditions],
+        credit=f"With {', '.join(f'{name} {version(name)}' for name in ('hypothesis', 'jax', 'numpy'))}.",
     )
-    figure = answer_figure(answers) if spoilt else None
-    add_first_page(document, summary, figure, "What became of the spoilt files, by kind of change.")
+
+
+def _failures(document: Document, result: Result) -> None:
     document.section("What went wrong")
-    wrong = [text for item in spoilt for text in item["faults"]]
-    wrong += [f"{unit}: {item['said'] or 'not refused'}" for unit, item in units.items() if not item["refused"]]
-    wrong += [f"{title}: {item['said'] or 'not refused'}" for title, item in around.items() if not item["refused"]]
-    wrong += [f"{name} after kills: {item['message']}" for name, item in killed.items() if not item["same"]]
-    wrong += [f"A trial failed: {text}" for text in failures]
+    wrong = [text for item in result.spoilt for text in item["faults"]]
+    for key in ("unit", "around"):
+        wrong += [f"{title}: {i['said'] or 'not refused'}" for title, i in result.by(key).items() if not i["refused"]]
+    wrong += [f"{name} after kills: {item['message']}" for name, item in result.by("kill").items() if not item["same"]]
+    wrong += [f"A trial failed: {text}" for text in result.failures]
     document.items([_short(text) for text in wrong])
     if not wrong:
         document.paragraph("Nothing in this run.")
+
+
+def _kills(document: Document, result: Result) -> None:
     document.section("Kills")
     document.paragraph(
         "A command is run alone, then killed with SIGKILL at moments drawn uniformly over the time that it took, and "
@@ -138,21 +131,25 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
     )
     rows = [
         [name, str(item["kills"]), str(len(item["half_written"])), "yes" if item["same"] else "no"]
-        for name, item in killed.items()
+        for name, item in result.by("kill").items()
     ]
     if rows:
         header = ["command", "kills while it ran", "files half written", "same answer"]
         add_number_table(document, header, rows, "Kills of every command, and what became of its results.")
-    if units:
-        document.section("Mistaken units")
-        said = [[unit, "yes" if item["refused"] else "no", _short(item["said"])] for unit, item in units.items()]
-        document.table(
-            ["unit", "refused", "what the command says"], said, "What the command check says of mistaken units."
-        )
-    if around:
-        document.section("Faults around a run")
-        said = [[title, "yes" if item["refused"] else "no", _short(item["said"])] for title, item in around.items()]
-        document.table(["fault", "refused", "what the command says"], said, "What commands say of faults around a run.")
+
+
+def _said(document: Document, result: Result) -> None:
+    for key, section, title, caption in (
+        ("unit", "Mistaken units", "unit", "What the command check says of mistaken units."),
+        ("around", "Faults around a run", "fault", "What commands say of faults around a run."),
+    ):
+        said = [[name, "yes" if i["refused"] else "no", _short(i["said"])] for name, i in result.by(key).items()]
+        if said:
+            document.section(section)
+            document.table([title, "refused", "what the command says"], said, caption)
+
+
+def _conditions(document: Document, result: Result) -> None:
     document.section("Conditions")
     document.paragraph(
         "MuJoCo makes the files. A spoilt file has one value replaced, text inserted, the end cut off, a line dropped "
@@ -161,43 +158,12 @@ def write_report(made: Sequence[Made], failures: Sequence[str], file: Path, orig
         "other version, whose cache an identification finds, computes a torque of the gravity gradient a hundred times "
         "as large."
     )
-    packages = ", ".join(f"{name} {version(name)}" for name in ("hypothesis", "jax", "numpy"))
-    write_study(document, summary, file, None if origin is None else f"{origin} With {packages}.")
 
 
-def _refused(title: str, item: Made | None) -> Goal:
-    """Return the goal on one fault around a run."""
-    text = f"{title}: one clear error"
-    if item is None:
-        return Goal(text, "not tried; see tests/test_faults.py", Verdict.NOT_TESTED)
-    return Goal(text, "refused" if item["refused"] else "not refused", Verdict.of(item["refused"]))
-
-
-def _unmoved(item: Made | None) -> Goal:
-    """Return the goal on a cache that another version filled."""
-    text = "a cache of another version: no effect"
-    if item is None:
-        return Goal(text, "not tried; a damaged file of it: tests/test_kept_jit.py", Verdict.NOT_TESTED)
-    if not item["differs"]:
-        return Goal(text, "the other version itself gives the same answer", Verdict.NOT_TESTED)
-    same = "same answer as" if item["same"] else "another answer than"
-    return Goal(text, f"{same} with an empty cache; the other version answers otherwise", Verdict.of(item["same"]))
-
-
-def _short(said: str) -> str:
-    """Return the beginning of a message, without the folders of files."""
-    return re.sub(r"/\S*/", "", said)[:300]
-
-
-def _goals(
-    numbers: Mapping[str, int],
-    units: Mapping[str, Made],
-    killed: Mapping[str, Made],
-    around: Mapping[str, Made],
-    cache: Made | None,
-) -> list[Goal]:
+def _goals(result: Result) -> list[Goal]:
     """Return each goal, what was reached, and whether that passes."""
-    total, kills = sum(numbers.values()), sum(item["kills"] for item in killed.values())
+    numbers, units, around = result.numbers, result.by("unit"), result.by("around")
+    total, kills, killed = sum(numbers.values()), result.kills, result.by("kill")
     broken = [name for item in killed.values() for name in item["half_written"]]
     refused = sum(item["refused"] for item in units.values())
     named = sum(item["refused"] and bool(NAMED.search(item["said"])) for item in units.values())
@@ -229,5 +195,56 @@ def _goals(
     return [
         *(Goal(goal, reached, Verdict.of(passed if tested else None)) for goal, reached, passed, tested in goals),
         *(_refused(title, around.get(title)) for title in SURROUNDINGS),
-        _unmoved(cache),
+        _unmoved(next((item for item in result.made if "cache" in item), None)),
     ]
+
+
+def _refused(title: str, item: Made | None) -> Goal:
+    """Return the goal on one fault around a run."""
+    text = f"{title}: one clear error"
+    if item is None:
+        return Goal(text, "not tried; see tests/test_faults.py", Verdict.NOT_TESTED)
+    return Goal(text, "refused" if item["refused"] else "not refused", Verdict.of(item["refused"]))
+
+
+def _unmoved(item: Made | None) -> Goal:
+    """Return the goal on a cache that another version filled."""
+    text = "a cache of another version: no effect"
+    if item is None:
+        return Goal(text, "not tried; a damaged file of it: tests/test_kept_jit.py", Verdict.NOT_TESTED)
+    if not item["differs"]:
+        return Goal(text, "the other version itself gives the same answer", Verdict.NOT_TESTED)
+    same = "same answer as" if item["same"] else "another answer than"
+    return Goal(text, f"{same} with an empty cache; the other version answers otherwise", Verdict.of(item["same"]))
+
+
+def _short(said: str) -> str:
+    """Return the beginning of a message, without the folders of files."""
+    return re.sub(r"/\S*/", "", said)[:300]
+
+
+@styled
+def answer_figure(answers: Mapping[str, Mapping[str, int]]) -> Figure:
+    """Draw the numbers of files by outcome, one bar for each kind of change."""
+    figure = wide_figure(0.75 + 0.2 * len(answers))
+    axes = figure.subplots()
+    place, left = np.arange(len(answers)), np.zeros(len(answers))
+    for (key, title), colour in zip(OUTCOMES.items(), COLOURS[2:5], strict=True):
+        counts = np.array([found.get(key, 0) for found in answers.values()])
+        axes.barh(place, counts, 0.65, left=left, color=colour, label=title)
+        left = left + counts
+    axes.set(xlabel="number of files", ylim=(len(answers) - 0.5, -0.5))
+    axes.set_yticks(place, list(answers))
+    shared_legend(figure, axes, len(OUTCOMES))
+    return figure
+
+
+STUDY = Study(
+    "faults",
+    "What commands make of spoilt files, mistaken units and kills at random moments.",
+    run=run,
+    report=_report,
+    full="1,000 spoilt files, ten mistaken units, faults around a run, and kills of every command that takes long",
+    seed=1,
+    extra={**TRIALS, **MADE},
+)

@@ -1,5 +1,7 @@
 """Peers: bayesid beside what its users would use instead, on the same density and on the same task."""
 
-from studies.peers.report import main
+from studies.peers.report import STUDY
 
-__all__ = ["main"]
+__all__ = ["STUDY", "main"]
+
+main = STUDY.main

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -18,11 +17,9 @@ from bayesid.report.figures.figure_style import COLOURS, TRUTH, styled, wide_fig
 from bayesid.report.numbers import format_signed
 from studies.common.ets7 import START, ets7
 from studies.common.figures import robot_outline
-from studies.common.monte_carlo import read_store, run_trials
-from studies.common.provenance import study_origin
+from studies.common.monte_carlo import Workers, read_store, run_trials
 from studies.common.report_parts import add_number_table
-from studies.common.study import TRIALS, Command, Goal, Verdict
-from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
+from studies.common.study import MADE, TRIALS, CsvTable, Goal, Picture, Report, Setup, Study, Verdict, show
 from studies.peers.contest import EFFECTIVE, LIMITS, LONG, NESTED, REFERENCE, Recipe, attempt, lines, tasks
 from studies.peers.density import CASES
 from studies.peers.samplers import ADAPTATION, BROAD, CHAINS, LIVE, Sampler
@@ -51,33 +48,22 @@ SHORT = {Recipe.BAYESID: "bayesid", Recipe.SCIPY: "SciPy, Pinocchio", Recipe.SYS
 TICKS = (5, 10, 20, 50, 100, 200, 500, 1000, 2000)  # ticks of times in the figure [s]
 Made = Sequence[Mapping[str, Any]]  # trials that were made: ``task`` and ``result``
 
-COMMAND = Command(
-    "peers",
-    "Compare the package with what its users would use instead.",
-    full="every case, every sampler and every recipe",
-    seed=1,
-    extra={**TRIALS, "--made": {"action": "store_true", "help": "report the trials made so far, make no more"}},
-)
 
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the study and write its report."""
-    options = COMMAND.parse(arguments)
-    if options.made:
-        made = read(options.trials)
-    else:
-        planned = tasks(options.full)
-        outcomes = run_trials(
-            attempt,
-            planned,
-            options.trials,
-            seed=options.seed,
-            workers=options.workers,
-            progress=lambda text: print(text, file=sys.stderr),
-        )
-        made = [{"task": task, "result": result} for task, result in zip(planned, outcomes.complete(), strict=True)]
-    write_report(made, options.output, study_origin("peers", options))
-    print(f"Wrote {options.output}.")
+def run(
+    *,
+    full: bool = False,
+    seed: int = 1,
+    trials: Path | None = None,
+    workers: Workers = 1,
+    made: bool = False,
+    progress: Callable[[str], None] = show,
+) -> Made:
+    """Make the trials that the store does not hold yet, or only read those ``made`` so far."""
+    if made and trials is not None:
+        return read(trials)
+    planned = tasks(full)
+    outcomes = run_trials(attempt, planned, trials, seed=seed, workers=workers, progress=progress)
+    return [{"task": task, "result": result} for task, result in zip(planned, outcomes.complete(), strict=True)]
 
 
 def read(store: Path) -> Made:
@@ -85,46 +71,68 @@ def read(store: Path) -> Made:
     return [line for line in read_store(store) if "result" in line]
 
 
-def write_report(made: Made, file: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, with its summary and the table of all trials on the density beside it."""
+def _report(made: Made) -> Report[Made]:
     planned = len(tasks(full=True))
-    document = Document("Peers", "The package beside what its users would use instead")
-    summary = Summary(
+    keys = ("seconds", "evaluations", "gradients", "effective_samples", "log_evidence", "log_evidence_error")
+    density = [item for item in made if "unknowns" in item["task"]]
+    return Report(
+        title="Peers",
+        subtitle="The package beside what its users would use instead",
         question="Is the package ahead of what its users would use instead, on the same density and on the same task?",
         answer=_answer(made),
-        goals=tuple(goals_of(made)),
+        goals=goals_of(made),
         valid="the density is that of ETS-VII's base from three recordings of 120 s, smooth and with one mode, and its "
         f"mode is known; {len(made)} of the {planned} trials of the full study were made.",
         full=len(made) >= planned,
+        figure=Picture(
+            time_figure(made),
+            f"Processor time to {EFFECTIVE:,.0f} effective samples against the number of unknowns. Filled: reached; "
+            "hollow: extrapolated from what was reached in the limit of time; triangle: at least, as less than a "
+            "quarter was reached. Those of one number of unknowns stand beside each other.",
+        ),
+        setup=_setup(),
+        outline=robot_outline(ets7(), START),
+        sections=[_failures, _task, _density],
+        tables=[
+            CsvTable(
+                "density",
+                [
+                    *("unknowns", "sampler", "seconds", "evaluations", "gradients", "effective samples"),
+                    *("log evidence", "error"),
+                ],
+                [
+                    [item["task"]["unknowns"], item["task"]["sampler"], *(item["result"][key] for key in keys)]
+                    for item in density
+                ],
+            )
+        ],
+        beside="",
+        credit=f"With {', '.join(f'{name} {_version(name)}' for name in PACKAGES)}.",
     )
-    add_first_page(
-        document,
-        summary,
-        time_figure(made),
-        f"Processor time to {EFFECTIVE:,.0f} effective samples against the number of unknowns. Filled: reached; "
-        "hollow: extrapolated from what was reached in the limit of time; triangle: at least, as less than a quarter "
-        "was reached. Those of one number of unknowns stand beside each other.",
-    )
-    add_setup(document, _setup(), outline=robot_outline(ets7(), START))
-    document.section("What went wrong")
-    document.items(_failures(made))
+
+
+def _task(document: Document, made: Made) -> None:
     recipes = _recipe_rows(made)
-    if recipes:
-        document.section("On the same task")
-        add_number_table(
-            document,
-            ["recipe", "studies", "lines", "time [s]", "mass [%]", "moments [%]", "in 95 %", "χ of errors"],
-            recipes,
-            "The base of a robot with three joints from two recordings of 80 s made by MuJoCo: lines that a user "
-            "writes, processor time, mean absolute errors of the mass and of the moments of inertia, true values "
-            "within the stated 95 % intervals (of ten a study), and the root mean square of errors in stated standard "
-            "deviations, 1 where the intervals are right.",
-        )
-        document.figure(
-            error_figure(made),
-            "Errors of the ten numbers of each study in the standard deviations that each recipe states. Between the "
-            "grey lines lie 95 % where the intervals are right.",
-        )
+    if not recipes:
+        return
+    document.section("On the same task")
+    add_number_table(
+        document,
+        ["recipe", "studies", "lines", "time [s]", "mass [%]", "moments [%]", "in 95 %", "χ of errors"],
+        recipes,
+        "The base of a robot with three joints from two recordings of 80 s made by MuJoCo: lines that a user writes, "
+        "processor time, mean absolute errors of the mass and of the moments of inertia, true values within the stated "
+        "95 % intervals (of ten a study), and the root mean square of errors in stated standard deviations, 1 where "
+        "the intervals are right.",
+    )
+    document.figure(
+        error_figure(made),
+        "Errors of the ten numbers of each study in the standard deviations that each recipe states. Between the grey "
+        "lines lie 95 % where the intervals are right.",
+    )
+
+
+def _density(document: Document, made: Made) -> None:
     document.section("On the same density")
     add_number_table(
         document,
@@ -135,58 +143,40 @@ def write_report(made: Made, file: Path, origin: str | None = None) -> None:
         "time, and the error of the log evidence, against that of bridge sampling, with the sampler's own standard "
         "error. A dash: none given. The package's time includes the evidence.",
     )
-    packages = ", ".join(f"{name} {_version(name)}" for name in PACKAGES)
-    write_table(
-        file,
-        "density",
-        ["unknowns", "sampler", "seconds", "evaluations", "gradients", "effective samples", "log evidence", "error"],
-        [
-            [item["task"]["unknowns"], item["task"]["sampler"]]
-            + [item["result"][key] for key in ("seconds", "evaluations", "gradients", "effective_samples")]
-            + [item["result"]["log_evidence"], item["result"]["log_evidence_error"]]
-            for item in made
-            if "unknowns" in item["task"]
-        ],
-    )
-    write_study(document, summary, file, None if origin is None else f"{origin}. With {packages}.")
 
 
 def goals_of(made: Made) -> list[Goal]:
     """Return the goals: speed and evidence by number of unknowns, then those of the task."""
-    goals = []
-    for unknowns in sorted(CASES):
-        own, peers = _found(made, unknowns, Sampler.OURS), _peers(made, unknowns)
-        text = f"{FASTER:g} times less time than the best peer, {unknowns} unknowns"
-        if own is None or not peers:
-            goals.append(Goal(text, "not run", Verdict.NOT_TESTED))
-            continue
-        ratios = {name: _needed(result) / own["seconds"] for name, result in peers.items()}
-        wanted = [name for name in list(Sampler)[1:] if unknowns <= NESTED or name not in _NESTED]
-        missing = [name for name in wanted if name not in peers]
-        reached = _fastest(own, peers)
-        if missing:
-            reached += f"; not run: {' / '.join(missing)}"
-        below = [name for name, ratio in ratios.items() if ratio < FASTER]
-        failed = any(not _is_bound(peers[name]) for name in below)
-        verdict = Verdict.FAIL if failed else Verdict.OPEN if below or missing else Verdict.PASS
-        goals.append(Goal(text, reached, verdict))
-        beyond = [name for name in _NESTED if unknowns > NESTED and name not in peers]
-        if beyond:
-            text = f"{FASTER:g} times less time than {joined(map(str, beyond))}, {unknowns} unknowns"
-            goals.append(Goal(text, "not run", Verdict.NOT_TESTED))
-    for unknowns in sorted(CASES):
-        error = _evidence_error(made, unknowns, Sampler.OURS)
-        text = f"log evidence within {EVIDENCE:g} of a long reference, {unknowns} unknowns"
-        if error is None:
-            goals.append(Goal(text, "not run", Verdict.NOT_TESTED))
-        else:
-            low, high = abs(error[0]) - 2.0 * error[1], abs(error[0]) + 2.0 * error[1]
-            verdict = Verdict.PASS if high <= EVIDENCE else Verdict.FAIL if low > EVIDENCE else Verdict.OPEN
-            goals.append(Goal(text, f"{abs(error[0]):.3f} ± {error[1]:.3f}", verdict))
-    return [*goals, *_task_goals(made)]
+    speed = [goal for unknowns in sorted(CASES) for goal in _speed_goals(made, unknowns)]
+    return [*speed, *(_evidence_goal(made, unknowns) for unknowns in sorted(CASES)), *_task_goals(made)]
 
 
-_NESTED = (Sampler.DYNESTY, Sampler.NAUTILUS)
+def _speed_goals(made: Made, unknowns: int) -> Iterator[Goal]:
+    own, peers = _found(made, unknowns, Sampler.OURS), _peers(made, unknowns)
+    text = f"{FASTER:g} times less time than the best peer, {unknowns} unknowns"
+    if own is None or not peers:
+        yield Goal(text, "not run", Verdict.NOT_TESTED)
+        return
+    slow = () if unknowns <= NESTED else (Sampler.DYNESTY, Sampler.NAUTILUS)  # not tried with so many unknowns
+    missing = [name for name in list(Sampler)[1:] if name not in peers and name not in slow]
+    reached = _fastest(own, peers) + (f"; not run: {' / '.join(missing)}" if missing else "")
+    below = [peer for peer in peers.values() if _needed(peer) / own["seconds"] < FASTER]
+    failed = not all(map(_is_bound, below))
+    yield Goal(text, reached, Verdict.FAIL if failed else Verdict.OPEN if below or missing else Verdict.PASS)
+    beyond = [name for name in slow if name not in peers]
+    if beyond:
+        text = f"{FASTER:g} times less time than {joined(map(str, beyond))}, {unknowns} unknowns"
+        yield Goal(text, "not run", Verdict.NOT_TESTED)
+
+
+def _evidence_goal(made: Made, unknowns: int) -> Goal:
+    error = _evidence_error(made, unknowns, Sampler.OURS)
+    text = f"log evidence within {EVIDENCE:g} of a long reference, {unknowns} unknowns"
+    if error is None:
+        return Goal(text, "not run", Verdict.NOT_TESTED)
+    low, high = abs(error[0]) - 2.0 * error[1], abs(error[0]) + 2.0 * error[1]
+    verdict = Verdict.PASS if high <= EVIDENCE else Verdict.FAIL if low > EVIDENCE else Verdict.OPEN
+    return Goal(text, f"{abs(error[0]):.3f} ± {error[1]:.3f}", verdict)
 
 
 def _fastest(own: Mapping[str, Any], peers: Mapping[Sampler, Mapping[str, Any]]) -> str:
@@ -218,9 +208,8 @@ def _task_goals(made: Made) -> list[Goal]:
 
 
 def _answer(made: Made) -> str:
-    parts = []
-    ratios: dict[int, str] = {}
-    bounds: list[float] = []
+    parts: list[str] = []
+    ratios, bounds = {}, []
     for unknowns in sorted(CASES):
         own, peers = _found(made, unknowns, Sampler.OURS), _peers(made, unknowns)
         if own is not None and peers:
@@ -229,20 +218,20 @@ def _answer(made: Made) -> str:
     if ratios:
         beside = f", those cut off by the limit of time at least {min(bounds):.1f}" if bounds else ""
         parts.append(
-            f"On the same density the fastest peer takes {joined(list(ratios.values()))} times the package's time "
-            f"with {joined(list(map(str, ratios)))} unknowns{beside}"
+            f"On the same density the fastest peer takes {joined(list(ratios.values()))} times the package's time with "
+            f"{joined(list(map(str, ratios)))} unknowns{beside}"
         )
     errors = [_evidence_error(made, unknowns, Sampler.OURS) for unknowns in CASES]
     known = [abs(error[0]) for error in errors if error is not None]
     if known:
         parts.append(f"its log evidence is within {max(known):.3f} of a long reference")
-    for hidden, words in ((True, "with wheels hidden"),):
-        own_errors, rivals = _errors(made, Recipe.BAYESID, hidden), _rivals(made, hidden)
-        if len(own_errors) and rivals:
-            others = " and ".join(f"{_inside(peer)} of {name}" for name, peer in rivals.items())
-            parts.append(
-                f"{words} {_inside(own_errors)} of its stated 95 % intervals hold the truth, where it is {others}"
-            )
+    own_errors, rivals = _errors(made, Recipe.BAYESID, True), _rivals(made, True)
+    if len(own_errors) and rivals:
+        others = " and ".join(f"{_inside(peer)} of {name}" for name, peer in rivals.items())
+        parts.append(
+            f"with wheels hidden {_inside(own_errors)} of its stated 95 % intervals hold the truth, where it is "
+            f"{others}"
+        )
     return "; ".join(parts) + "." if parts else "Nothing was run."
 
 
@@ -258,17 +247,18 @@ def _setup() -> Setup:
         + "; links are known to 5 % of their mass. Task: base and initial rates.",
         replicates=f"Each sampler runs alone in a process with one core, to {EFFECTIVE:,.0f} effective samples or "
         f"{min(LIMITS.values()):g} to {max(LIMITS.values()):g} s of processor time, more than five times what the "
-        f"package takes, compiled before. NUTS: {CHAINS} chains in batches with the unit mass matrix, "
-        f"{ADAPTATION} steps to adapt the step size. Nested samplers start from a normal prior of {BROAD:g} standard "
-        "deviations about the mode, with which the evidence is the posterior's; dynesty takes single points, "
-        f"{LIVE} live; both are tried up to {NESTED} unknowns. The reference of means and evidence: chains of the "
-        f"package's own walkers to {LONG:,.0f} effective samples, and bridge sampling (Meng and Wong 1996) between one "
-        "half of them and a Student-t fitted to the other; the chains are not independent of the package. "
-        "FIGAROH needs measured joint torques and so does not apply.",
+        f"package takes, compiled before. NUTS: {CHAINS} chains in batches with the unit mass matrix, {ADAPTATION} "
+        f"steps to adapt the step size. Nested samplers start from a normal prior of {BROAD:g} standard deviations "
+        f"about the mode, with which the evidence is the posterior's; dynesty takes single points, {LIVE} live; both "
+        f"are tried up to {NESTED} unknowns. The reference of means and evidence: chains of the package's own walkers "
+        f"to {LONG:,.0f} effective samples, and bridge sampling (Meng and Wong 1996) between one half of them and a "
+        "Student-t fitted to the other; the chains are not independent of the package. FIGAROH needs measured joint "
+        "torques and so does not apply.",
     )
 
 
-def _failures(made: Made) -> list[str]:
+def _failures(document: Document, made: Made) -> None:
+    document.section("What went wrong")
     sentences = _slower(made)
     late = [
         f"{item['task']['sampler']} ({item['task']['unknowns']})"
@@ -298,7 +288,7 @@ def _failures(made: Made) -> list[str]:
         "brings a simulation of its own, and takes parameters, optimiser and intervals from the toolbox. The tensor "
         "that the toolbox writes into a model needs one line more to be compiled by MuJoCo 4.0.0."
     )
-    return sentences
+    document.items(sentences)
 
 
 def _slower(made: Made) -> list[str]:
@@ -325,22 +315,15 @@ def _rows(made: Made, unknowns: int) -> list[list[str]]:
         result = _found(made, unknowns, name)
         if result is None:
             continue
-        sampled = result["effective_samples"] > 0.0
-        compared = name != REFERENCE and own is not None
-        ratio = f"{_needed(result) / own['seconds']:.1f}" if compared and own is not None else "-"
+        sampled = f"{result['effective_samples']:,.0f}" if result["effective_samples"] > 0.0 else "-"
+        compared = ["-", "-"]
+        if name != REFERENCE and own is not None:
+            least, needed = "> " if _is_bound(result) else "", _needed(result)
+            compared = [f"{least}{needed:,.0f}", f"{least}{needed / own['seconds']:.1f}"]
         error = _evidence_error(made, unknowns, name)
-        least = "> " if _is_bound(result) else ""
-        rows.append(
-            [
-                f"{unknowns}, {name}",
-                f"{result['seconds']:.0f}",
-                f"{result['evaluations']:,}",
-                f"{result['effective_samples']:,.0f}" if sampled else "-",
-                f"{least}{_needed(result):,.0f}" if compared else "-",
-                f"{least}{ratio}" if compared else "-",
-                "-" if error is None else f"{format_signed(error[0], 3)} ± {error[2]:.3f}",
-            ]
-        )
+        evidence = "-" if error is None else f"{format_signed(error[0], 3)} ± {error[2]:.3f}"
+        numbers = [f"{result['seconds']:.0f}", f"{result['evaluations']:,}", sampled, *compared, evidence]
+        rows.append([f"{unknowns}, {name}", *numbers])
     return rows
 
 
@@ -361,7 +344,7 @@ def _recipe_rows(made: Made) -> list[list[str]]:
                     f"{np.median([item['seconds'] for item in found]):.0f}",
                     f"{100.0 * relative[:, 0].mean():.3f}",
                     f"{100.0 * relative[:, 4:7].mean():.3f}",
-                    f"{int((np.abs(errors) < SIGMAS).sum())} of {errors.size}",
+                    _inside(errors),
                     f"{np.sqrt((errors**2).mean()):.1f}",
                 ]
             )
@@ -475,3 +458,14 @@ def error_figure(made: Made) -> Figure:
         axes.set_title(title)
     panels[0].set_ylabel("error [stated sd]")
     return figure
+
+
+STUDY = Study(
+    "peers",
+    "Compare the package with what its users would use instead.",
+    run=run,
+    report=_report,
+    full="every case, every sampler and every recipe",
+    seed=1,
+    extra={**TRIALS, **MADE},
+)
