@@ -11,7 +11,7 @@ from bayesid.identifiability import base_parameters
 from bayesid.robot.robot import Robot
 from studies.base_parameters import Result, run
 from studies.base_parameters.peers import compare
-from studies.base_parameters.report import goals_of, write_report
+from studies.base_parameters.report import STUDY, goals_of
 from studies.base_parameters.texts import regrouping_rows, symbol, unchanged
 from studies.common.study import Verdict
 from tests.report_rules import broken_rules
@@ -77,7 +77,7 @@ def test_pinocchios_rank_agrees_without_the_other_tool(result):
 
 
 def test_the_report_is_written(result, tmp_path):
-    write_report(result, tmp_path / "report.pdf")
+    STUDY.write(result, tmp_path / "report.pdf")
     assert broken_rules(tmp_path / "report.pdf") == []
     assert {goal.verdict for goal in goals_of(result)[:-1]} == {Verdict.PASS}
 

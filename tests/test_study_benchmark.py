@@ -10,8 +10,8 @@ import pytest
 
 from bayesid.inference.predicted_readings import integration_error_at
 from studies.benchmark.cases import chain, posterior_of
-from studies.benchmark.report import figures_of_merit, goals_of, write_report
-from studies.benchmark.run import Benchmark, Rival, Sampling, seconds_per_evaluation
+from studies.benchmark.report import STUDY, figures_of_merit, goals_of
+from studies.benchmark.run import Benchmark, Result, Rival, Sampling, seconds_per_evaluation
 from studies.common.study import Verdict
 from tests.pdf_text import PdfText
 from tests.report_rules import broken_rules
@@ -62,7 +62,7 @@ def test_goals_are_met_missed_or_open_over_all_runs(tmp_path: Path) -> None:
     assert values[cost] == pytest.approx([62.5] * 5)  # 250 evaluations a sample over 4
     verdicts = [goal.verdict for goal in goals_of(figures)]
     assert verdicts == [Verdict.PASS, Verdict.OPEN, Verdict.PASS, Verdict.FAIL, *[Verdict.PASS] * 3]
-    write_report(runs, tmp_path / "benchmark.pdf", full=True)
+    STUDY.write(Result(runs, True), tmp_path / "benchmark.pdf")
     text = PdfText.read(tmp_path / "benchmark.pdf")
     assert "150 (100 to 200) µs" in text
     assert "varies by a factor of 2, the ratios to the other simulators by 2 and 2" in text

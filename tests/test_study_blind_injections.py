@@ -10,7 +10,7 @@ import pytest
 
 from bayesid.diagnosis import Status
 from bayesid.report.verdict_record import Share, record_sentence, shipped_record
-from studies.blind_injections import Trial, plan, run, write_report
+from studies.blind_injections import STUDY, Campaign, Trial, plan, run
 from studies.blind_injections.goals import (
     _correlation,
     _coverage,
@@ -280,12 +280,12 @@ def test_statements_are_scored(trials):
 @pytest.mark.usefixtures("slow")
 def test_the_report_is_written(trials, tmp_path):
     outside = Trial(**{**vars(trials[0]), "kind": "unknown", "hidden": (), "true_frame": "base", "correlation": 0.9})
-    write_report([*trials, outside], tmp_path / "blind.pdf")
+    STUDY.write(Campaign([*trials, outside], 3), tmp_path / "blind.pdf")
     assert broken_rules(tmp_path / "blind.pdf", full=False) == []
 
 
 def test_the_report_is_that_of_the_committed_trials(committed, tmp_path):
-    write_report(committed, tmp_path / "blind.pdf", planned=len(plan(full=True)))
+    STUDY.write(Campaign(committed, len(plan(full=True))), tmp_path / "blind.pdf")
     assert broken_rules(tmp_path / "blind.pdf") == []
     made, kept = (json.loads(file.read_text()) for file in (tmp_path / "blind.json", REPORTS / "blind_injections.json"))
     assert {**made, "origin": kept["origin"]} == kept

@@ -9,7 +9,7 @@ import pytest
 from arviz.stats.ecdf_utils import ecdf_confidence_band
 from scipy import stats
 
-from studies.calibration import make, plan, read, write_report
+from studies.calibration import STUDY, make, plan, read
 from studies.calibration.data import REPLICATES, Case
 from studies.calibration.encoders import _ratios, smooth_share
 from studies.calibration.outcomes import ALL, POINTS, Replicates, coverage, holm, interval_coverage, uniform_p_value
@@ -101,7 +101,7 @@ def test_the_plan_holds_every_replicate_once_and_its_beginning_some_of_every_cas
 @pytest.mark.slow
 def test_the_report_is_that_of_the_outcomes(tmp_path):
     cases = read(REPORTS / "calibration.jsonl.gz")
-    write_report(cases, tmp_path / "calibration.pdf")
+    STUDY.write(cases, tmp_path / "calibration.pdf")
     rebuilt, kept = PdfText.read(tmp_path / "calibration.pdf"), PdfText.read(REPORTS / "calibration.pdf")
     for goal in goals_of(cases):
         for text in (goal.text, goal.reached, goal.verdict.value):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from studies.common.study import Verdict
-from studies.cost.report import goals_of, write_report
+from studies.cost.report import STUDY, goals_of
 from studies.cost.run import Cost, Floor, Nested, Run, run, run_command
 from studies.cost.search_times import SearchTimes, search_clock
 from tests.pdf_text import PdfText
@@ -43,7 +43,7 @@ def made_up(nested: Nested | None) -> Cost:
 
 
 def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
-    cost = made_up(Nested(100.0, 25, done=False))
+    cost = replace(made_up(Nested(100.0, 25, done=False)), full=True)
     goals = goals_of(cost)
     verdicts = {goal.text.partition(":")[0] + f" {goal.reached[:3]}": goal.verdict for goal in goals}
     by_text = [goal.verdict for goal in goals]
@@ -63,7 +63,7 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
         Verdict.PASS,
     ], verdicts
     assert "more than 1000: 46 candidates" in goals[6].reached  # 100 s for each of 46 over 4.6 s
-    write_report(cost, tmp_path / "cost.pdf", full=True)
+    STUDY.write(cost, tmp_path / "cost.pdf")
     text = PdfText.read(tmp_path / "cost.pdf")
     assert "10 times above that floor" in text  # 200 µs over 6e5 operations at 3e10 a second
     assert "5 s (nothing, leak, payload and link), missed by 2 of 4" in text
@@ -74,12 +74,11 @@ def test_goals_are_met_missed_or_open(tmp_path: Path) -> None:
 
 
 def test_times_of_an_earlier_run_stand_beside_these(tmp_path: Path) -> None:
-    cost = made_up(None)
-    write_report(cost, tmp_path / "earlier.pdf", full=True)
+    cost = replace(made_up(None), full=True)
+    STUDY.write(cost, tmp_path / "earlier.pdf")
     commands = {**cost.commands, "check": [Run(20.0, 20.0, 0.6, {}), Run(2.0, 2.0, 0.5, {"start": 0.5, "load": 1.5})]}
-    write_report(
-        replace(cost, commands=commands), tmp_path / "cost.pdf", full=True, before=tmp_path / "earlier-runs.csv"
-    )
+    now = replace(cost, commands=commands, before=tmp_path / "earlier-runs.csv")
+    STUDY.write(now, tmp_path / "cost.pdf")
     text = PdfText.read(tmp_path / "cost.pdf")
     assert "check 5.0 2.0 −60" in text
     assert "All that is not listed lies within 10 % of the run that wrote earlier-runs.csv" in text
@@ -112,7 +111,7 @@ def test_a_small_study(tmp_path: Path) -> None:
     assert 0.3 < warm.memory < 8.0
     assert max(cost.candidates) > 30
     assert cost.search is None
-    write_report(cost, tmp_path / "cost.pdf", full=False)
+    STUDY.write(cost, tmp_path / "cost.pdf")
     assert broken_rules(tmp_path / "cost.pdf", full=False) == []
 
 

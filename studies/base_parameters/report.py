@@ -2,31 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from threadpoolctl import threadpool_limits
 
+from bayesid import Robot
+from bayesid.identifiability import Base
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_number, format_percent, format_range, format_vector
-from studies.base_parameters.peers import Comparison
-from studies.base_parameters.structure import STATES, WRONG, Equations, Recovery, ScaleCase, Structure
-from studies.base_parameters.texts import regrouping_rows, symbol, unchanged
-from studies.common.report_parts import add_number_table
-from studies.common.study import Goal, Verdict
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
+from studies.base_parameters.peers import Comparison, compare
+from studies.base_parameters.structure import (
+    STATES,
+    WRONG,
+    Equations,
+    Recovery,
+    ScaleCase,
+    Structure,
+    equations_at,
+    identify_by_torques,
+    scale_cases,
+    structure,
 )
+from studies.base_parameters.texts import regrouping_rows, symbol, unchanged
+from studies.common.ets7 import ets7
+from studies.common.provenance import MODELS
+from studies.common.report_parts import add_number_table
+from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict, show
 
 COUNTS = (24, 52)  # numbers of base parameters by the paper's rules: 30 − 6 for two joints, 70 − 18 for six
 
@@ -34,8 +39,8 @@ EXACT = 1e-9
 """Largest relative error of a parameter, and largest angle between two spaces [rad], that count as rounding."""
 
 LETTERS = (
-    "Body 0 is the base, body i the link behind joint i. m is a mass, h a first moment of mass and I an inertia "
-    "about the origin of the body's frame, in its axes; m₂₋₄ stands for m₂ + m₃ + m₄."
+    "Body 0 is the base, body i the link behind joint i. m is a mass, h a first moment of mass and I an inertia about "
+    "the origin of the body's frame, in its axes; m₂₋₄ stands for m₂ + m₃ + m₄."
 )
 """Explanation of the symbols of tables."""
 
@@ -75,35 +80,46 @@ class Result:
     seed: int
 
 
-def write_report(result: Result, output: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, and beside it its summary and its further tables."""
-    document = Document(
-        "What can be identified at all: base inertial parameters",
-        "Section 3.1 of Lampariello and Hirzinger (IDETC 2005)",
+@threadpool_limits.wrap(limits=1)  # threads would slow the many small factorisations down
+def run(*, seed: int = 1, progress: Callable[[str], None] = show) -> Result:
+    """Run the study with random states that follow from the seed."""
+    planar, arm = Robot.shipped("planar"), ets7()
+    rngs = [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(5)]
+    return Result(
+        planar=structure(planar),
+        equations=equations_at(planar, rngs[0]),
+        arm=structure(arm),
+        grounded=(structure(planar, Base.FIXED), structure(arm, Base.FIXED)),
+        recovery=identify_by_torques(arm, rngs[1]),
+        scale=scale_cases(arm, rngs[2]),
+        peers=tuple(compare(robot, rngs[3]) for robot in (planar, arm)),
+        tilted=compare(arm, rngs[4], gravity=(3.0, 2.0, -9.0)),
+        seed=seed,
     )
+
+
+def _report(result: Result) -> Report[Result]:
     planar, arm = result.planar.base, result.arm.base
     open_cases = sum(case.open_scale for case in result.scale)
-    summary = Summary(
-        "Ten numbers describe the inertia of a rigid body. Which combinations of the robot's 10 (n + 1) numbers do "
-        "motion and joint torques show, and what gives the masses their scale, which motion alone leaves open?",
-        f"Motion and joint torques show {planar.count} sums of {len(planar.standard)} parameters with two joints and "
-        f"{arm.count} of {len(arm.standard)} for ETS-VII; motion alone leaves one more direction open, the scale of "
-        "all masses, which gravity gradient does not close and one known body, torque or thrust does.",
-        tuple(goals_of(result)),
-        "bodies are rigid and joints ideal, without friction and rotors. How well a manoeuvre with noisy sensors "
+    return Report(
+        title="What can be identified at all: base inertial parameters",
+        subtitle="Section 3.1 of Lampariello and Hirzinger (IDETC 2005)",
+        question="Ten numbers describe the inertia of a rigid body. Which combinations of the robot's 10 (n + 1) "
+        "numbers do motion and joint torques show, and what gives the masses their scale, which motion alone leaves "
+        "open?",
+        answer=f"Motion and joint torques show {planar.count} sums of {len(planar.standard)} parameters with two "
+        f"joints and {arm.count} of {len(arm.standard)} for ETS-VII; motion alone leaves one more direction open, the "
+        "scale of all masses, which gravity gradient does not close and one known body, torque or thrust does.",
+        goals=goals_of(result),
+        valid="bodies are rigid and joints ideal, without friction and rotors. How well a manoeuvre with noisy sensors "
         "determines each sum is another question, that of the posterior.",
-        True,
-    )
-    add_first_page(
-        document,
-        summary,
-        singular_figure(result),
-        "Singular values of the regressor in random states with columns of unit length, relative to the largest: those "
-        "kept (blue) and those dropped (grey), which are rounding errors. The line is the threshold.",
-    )
-    add_setup(
-        document,
-        Setup(
+        full=True,
+        figure=Picture(
+            singular_figure(result),
+            "Singular values of the regressor in random states with columns of unit length, relative to the largest: "
+            "those kept (blue) and those dropped (grey), which are rounding errors. The line is the threshold.",
+        ),
+        setup=Setup(
             robot="The shipped robot planar, a base of 60 kg and two links of about 5 kg that turn about z, in place "
             "of the paper's two-joint example, which has no numbers; and ETS-VII with six joints.",
             manoeuvre="None: random states, joint angles anywhere on the circle, speeds and accelerations of unit "
@@ -115,12 +131,13 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
             f"singular values agree with a threshold of 10⁻¹⁰. {len(result.scale)} kinds of data, {open_cases} of "
             "which leave the scale open.",
         ),
+        sections=[_negatives, _evidence],
+        statements=_statements(result),
+        tables=_tables(result),
+        beside="Beside this report: β of (24) for the two-joint robot ({0}), the sums of ETS-VII as formulas ({1}), "
+        "and the numbers of base parameters on a fixed base by bayesid, Pinocchio's rank and FIGAROH ({2}). "
+        f"{LETTERS}",
     )
-    _negatives(document, result)
-    files = _files(result, output)
-    _evidence(document, result, files)
-    add_statements(document, _statements(result))
-    write_study(document, summary, output, origin)
 
 
 def goals_of(result: Result) -> list[Goal]:
@@ -219,7 +236,7 @@ def _case(result: Result, data: str) -> ScaleCase:
     return next(case for case in result.scale if case.data == data)
 
 
-def _evidence(document: Document, result: Result, files: list[str]) -> None:
+def _evidence(document: Document, result: Result) -> None:
     document.section("Evidence")
     robots = [("free", one) for one in (result.planar, result.arm)] + [("fixed", one) for one in result.grounded]
     add_number_table(
@@ -248,15 +265,9 @@ def _evidence(document: Document, result: Result, files: list[str]) -> None:
         "on both sides of it. Known parameters and actions weigh as much as one equation of motion.",
         words=2,
     )
-    document.paragraph(
-        f"Beside this report: β of (24) for the two-joint robot ({files[0]}), the sums of ETS-VII as formulas "
-        f"({files[1]}), and the numbers of base parameters on a fixed base by bayesid, Pinocchio's rank and FIGAROH "
-        f"({files[2]}). {LETTERS}"
-    )
 
 
-def _files(result: Result, output: Path) -> list[str]:
-    """Write the further tables and return the names of their files."""
+def _tables(result: Result) -> list[CsvTable]:
     planar, arm = result.planar.base, result.arm.base
     bodies = list(dict.fromkeys(name.split(".", 1)[0] for name in planar.standard))
     beta = [
@@ -268,10 +279,9 @@ def _files(result: Result, output: Path) -> list[str]:
     sums = [*regrouping_rows(arm), *([name, name] for name in unchanged(arm))]
     peers: list[Comparison] = [*result.peers, result.tilted]
     return [
-        write_table(output, "beta", ["K1", *(symbol(name, bodies) for name in planar.dependent), "K1 + beta K2"], beta),
-        write_table(output, "sums", ["base parameter", "sum"], sums),
-        write_table(
-            output,
+        CsvTable("beta", ["K1", *(symbol(name, bodies) for name in planar.dependent), "K1 + beta K2"], beta),
+        CsvTable("sums", ["base parameter", "sum"], sums),
+        CsvTable(
             "peers",
             ["robot", "gravity [m/s2]", "bayesid", "rank of Pinocchio", "FIGAROH", "largest angle [rad]"],
             [(case.robot, format_vector(case.gravity), case.count, case.rank, case.peer, case.angle) for case in peers],
@@ -326,3 +336,13 @@ def singular_figure(result: Result) -> Figure:
         axes.set_ylabel("relative singular value")
         axes.legend(loc="center left")
     return figure
+
+
+STUDY = Study(
+    "base_parameters",
+    "Say which inertial parameters can be identified at all.",
+    run=run,
+    report=_report,
+    seed=1,
+    inputs=lambda options: [MODELS / f"{name}.urdf" for name in ("planar", "ets7")],
+)

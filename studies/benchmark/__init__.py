@@ -5,7 +5,9 @@ are made at the same accuracy, a hundredth of the sensors' noise. ``python -m st
 ``reports/benchmark.pdf``.
 """
 
-from studies.benchmark.report import main, write_report
-from studies.benchmark.run import Benchmark, run
+from studies.benchmark.report import STUDY
+from studies.benchmark.run import Benchmark, Result, run
 
-__all__ = ["Benchmark", "main", "run", "write_report"]
+__all__ = ["STUDY", "Benchmark", "Result", "main", "run"]
+
+main = STUDY.main

@@ -1,5 +1,5 @@
 """``python -m studies.benchmark``."""
 
-from studies.benchmark.report import main
+from studies.benchmark import main
 
 main()

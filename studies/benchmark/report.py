@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,15 +10,13 @@ from matplotlib.figure import Figure
 
 from bayesid._io.words import joined
 from bayesid._math.arrays import Floats
-from bayesid.app.compilation_cache import keep_compiled
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_number, format_text
-from studies.benchmark.run import EVALUATED, RUNS, Benchmark, run
-from studies.common.provenance import processor, study_origin
+from studies.benchmark.run import EVALUATED, RUNS, Benchmark, Result, run
+from studies.common.provenance import processor
 from studies.common.report_parts import columns
-from studies.common.study import Command, Goal, Verdict
-from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
+from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Study, Verdict
 
 RIVALS = {"Pinocchio, step by step in Python": 2000.0, "MuJoCo rollouts in C": 100.0}
 """Smallest wanted ratio of the time of each other simulator to that of an evaluation."""
@@ -99,50 +96,48 @@ def _varies(values: Floats) -> str:
     return format_number(float(values.max() / values.min()), 2)
 
 
-def write_report(runs: Sequence[Benchmark], output: Path, *, full: bool, origin: str | None = None) -> None:
-    """Write the report as PDF, and beside it its summary and the times of every run."""
-    document = Document("Benchmark", "Cost of simulations and of effective samples")
-    figures, first = figures_of_merit(runs), runs[0]
+def _report(result: Result) -> Report[Result]:
+    runs = result.runs
+    figures = figures_of_merit(runs)
     evaluations = np.array([item.evaluation for item in runs])
     ratios = [np.array([item.speedups[name] for item in runs]) for name in RIVALS]
-    summary = Summary(
-        "What does one simulation cost beside other simulators at the same accuracy, how does that depend on the "
-        "problem, and what does an effective sample cost?",
-        f"One evaluation, of ETS-VII with {EVALUATED}, takes {_spread(1e6 * evaluations)} µs, "
-        f"{_spread(figures[0][1])} times less than Pinocchio step by step in Python and "
-        f"{_spread(figures[1][1])} times less than MuJoCo's rollouts in C.",
-        tuple(goals_of(figures)),
-        f"run on {processor()}. Between the runs the time of an evaluation varies by a factor of "
+    rows = [(number, name, value) for name, values, _, _ in figures for number, value in enumerate(values, start=1)]
+    return Report(
+        title="Benchmark",
+        subtitle="Cost of simulations and of effective samples",
+        question="What does one simulation cost beside other simulators at the same accuracy, how does that depend on "
+        "the problem, and what does an effective sample cost?",
+        answer=f"One evaluation, of ETS-VII with {EVALUATED}, takes {_spread(1e6 * evaluations)} µs, "
+        f"{_spread(figures[0][1])} times less than Pinocchio step by step in Python and {_spread(figures[1][1])} times "
+        "less than MuJoCo's rollouts in C.",
+        goals=goals_of(figures),
+        valid=f"run on {processor()}. Between the runs the time of an evaluation varies by a factor of "
         f"{_varies(evaluations)}, the ratios to the other simulators by {joined(map(_varies, ratios))}.",
-        full,
-    )
-    caption = (
-        f"Every figure over its goal in {len(runs)} runs (dots: median; bars: smallest to largest). Right of the line "
-        "the goal is met; where less is better, the inverse is drawn."
-    )
-    add_first_page(document, summary, merit_figure(figures), caption)
-    add_setup(
-        document,
-        Setup(
+        full=result.full,
+        figure=Picture(
+            merit_figure(figures),
+            f"Every figure over its goal in {len(runs)} runs (dots: median; bars: smallest to largest). Right of the "
+            "line the goal is met; where less is better, the inverse is drawn.",
+        ),
+        setup=Setup(
             robot="ETS-VII; chains of 6 to 60 links that cut one arm into equal parts.",
             manoeuvre="A random manoeuvre of all joints of 120 s. No rule of the flight is applied: only times count.",
             sensors="Rate and accelerometer at 2 Hz, 10⁻⁵ rad/s and 10⁻⁵ m/s²; encoders exact, or with noise.",
             known="Arm and orbit. MuJoCo's joints are driven by the exact torques at mid-step, its best case; it "
             "simulates without the gravity gradient.",
-            unknown=f"Base and initial rate; three recordings and {first.sampling.chains.z.shape[-1]} unknowns where "
+            unknown=f"Base and initial rate; three recordings and {runs[0].sampling.chains.z.shape[-1]} unknowns where "
             "samples are drawn.",
             replicates=f"{len(runs)} runs of all of it, one after the other; within a run the shortest of several "
             "times counts, after one that is not counted.",
         ),
+        sections=[_simulations, _samples],
+        tables=[CsvTable("runs", ["run", "figure of merit", "value"], rows)],
+        beside="",
     )
-    _simulations(document, runs)
-    _samples(document, runs)
-    rows = [(number, name, value) for name, values, _, _ in figures for number, value in enumerate(values, start=1)]
-    write_table(output, "runs", ["run", "figure of merit", "value"], rows)
-    write_study(document, summary, output, origin)
 
 
-def _simulations(document: Document, runs: Sequence[Benchmark]) -> None:
+def _simulations(document: Document, result: Result) -> None:
+    runs = result.runs
     document.section("Simulations")
     rows = [
         [
@@ -174,13 +169,14 @@ def _simulations(document: Document, runs: Sequence[Benchmark]) -> None:
         ["simulator or case", "time [µs]", "ratio"],
         rows,
         f"Median of {len(runs)} runs (smallest to largest). Ratios: of other simulators to one evaluation of the log "
-        f"likelihood, that of ETS-VII with {EVALUATED}; of cases to the first with the same unit. Other "
-        "simulators take steps short enough for an error below 0.01 σ, where they reach it.",
+        f"likelihood, that of ETS-VII with {EVALUATED}; of cases to the first with the same unit. Other simulators "
+        "take steps short enough for an error below 0.01 σ, where they reach it.",
         columns("lrr"),
     )
 
 
-def _samples(document: Document, runs: Sequence[Benchmark]) -> None:
+def _samples(document: Document, result: Result) -> None:
+    runs = result.runs
     document.section("Effective samples")
     rows = []
     for number, item in enumerate(runs, start=1):
@@ -223,16 +219,10 @@ def merit_figure(figures: Figures) -> Figure:
     return figure
 
 
-COMMAND = Command(
+STUDY = Study(
     "benchmark",
     f"Measure the cost of simulations and of effective samples in {RUNS} runs.",
+    run=run,
+    report=_report,
     full="longer chains, more repeats",
 )
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the benchmark and write its report."""
-    options = COMMAND.parse(arguments)
-    keep_compiled()
-    runs = run(full=options.full, progress=print)
-    write_report(runs, options.output, full=options.full, origin=study_origin(COMMAND.name, options))

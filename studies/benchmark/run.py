@@ -18,6 +18,7 @@ from bayesid.inference import Chains, LogCholeskyParameterisation, identify
 from bayesid.inference.predicted_readings import integration_error_at
 from studies.benchmark.cases import DURATION, SIGMA, chain, excitation, posterior_of
 from studies.common.ets7 import INTERVAL, RADIUS, ets7
+from studies.common.study import show
 from studies.truth import stepwise
 from studies.truth.mujoco import TruthModel, rollout
 
@@ -236,7 +237,14 @@ class Benchmark:
         return {rival.name: rival.seconds / self.evaluation for rival in self.rivals}
 
 
-def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = lambda text: None) -> list[Benchmark]:
+class Result(NamedTuple):
+    """All runs, and whether they took longer chains and more repeats."""
+
+    runs: list[Benchmark]
+    full: bool
+
+
+def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = show) -> Result:
     """Measure everything in each of `RUNS` runs.
 
     Parameters
@@ -252,7 +260,7 @@ def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = 
     for number in range(RUNS):
         progress(f"run {number + 1} of {RUNS}")
         results.append(_measured(full=full, seed=seed + number))
-    return results
+    return Result(results, full)
 
 
 def _measured(*, full: bool, seed: int) -> Benchmark:

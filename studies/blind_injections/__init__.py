@@ -5,7 +5,9 @@ study to the file contract, and runs the diagnosis on the files alone. A store k
 that was interrupted continues where it stopped.
 """
 
-from studies.blind_injections.report import main, write_report
+from studies.blind_injections.report import STUDY, Campaign
 from studies.blind_injections.trials import Trial, plan, run
 
-__all__ = ["Trial", "main", "plan", "run", "write_report"]
+__all__ = ["STUDY", "Campaign", "Trial", "main", "plan", "run"]
+
+main = STUDY.main

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -38,90 +38,47 @@ from studies.blind_injections.rows import (
     scores,
     snap_limit,
 )
-from studies.blind_injections.trials import Trial, plan, read, run
-from studies.common.provenance import study_origin
+from studies.blind_injections.trials import Trial, plan, read
+from studies.blind_injections.trials import run as make_trials
+from studies.common.monte_carlo import Workers
 from studies.common.report_parts import add_number_table
-from studies.common.study import WORKERS, Command, Verdict
-from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
+from studies.common.study import MADE, WORKERS, CsvTable, Picture, Report, Setup, Study, Verdict, show
 
 SCORES = ["stated of", "statements", "Brier score", "log score", "mean stated", "share true"]
 SHOWN = 2  # trials of a case that were not answered rightly, from which the report lists its answers
 SNAPS = 20  # draws of what could be reached of each snap
 TICKS = (3, 5, 7, 10, 20, 50, 100)  # ticks of the signal-to-noise ratio in the figure
 
-COMMAND = Command(
-    "blind_injections",
-    "How often a hidden cause is named rightly or wrongly, and how often nothing raises alarm.",
-    full="hundreds of injections and a thousand nulls (many hours)",
-    extra={
-        "--trials": {"type": Path, "default": Path("out/blind_injections.jsonl"), "help": "kept between runs"},
-        "--made": {"action": "store_true", "help": "report the trials made so far, make no more"},
-        "--record": {"type": Path, "help": "file for the counts that the package ships"},
-        **WORKERS,
-    },
-)
+
+class Campaign(NamedTuple):
+    """Trials that were made, one at least, and the number of trials of the whole campaign."""
+
+    trials: Sequence[Trial]
+    planned: int
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the campaign and write its report."""
-    options = COMMAND.parse(arguments)
-
-    def show(text: str) -> None:
-        print(text, file=sys.stderr)
-
-    plans = plan(options.full)
-    trials = read(options.trials) if options.made else run(plans, options.trials, show, options.workers)
-    if not trials:
-        raise ValueError(f"{options.trials} holds no trials; leave out --made to make some")
-    origin = study_origin(COMMAND.name, options, [options.trials])
-    write_report(trials, options.output, planned=len(plans), origin=origin)
-    if options.record is not None:
-        write_json(options.record, record_of(trials))
-    print(f"Wrote {options.output}.")
-
-
-def write_report(trials: Sequence[Trial], file: Path, planned: int | None = None, origin: str | None = None) -> None:
-    """Write the report as PDF, and beside it its summary and its further tables.
-
-    Parameters
-    ----------
-    trials : sequence of Trial
-        One at least.
-    file : Path
-    planned : int, optional
-        Number of trials of the whole campaign, by default those that were made.
-    origin : str, optional
-        Where the report comes from.
-    """
-    planned = len(trials) if planned is None else planned
-    document = Document("Blind injections", "What the diagnosis says of hidden causes")
-    summary = _summary(trials, planned)
-    add_first_page(
-        document,
-        summary,
-        _figure([trial for trial in trials if trial.kind == "effect"]),
-        "Trials with a cause of the catalogue hidden, by its signal-to-noise ratio: what was said. Faults that only "
-        "change the noise have no such ratio and are not shown.",
-    )
-    document.paragraph(
-        "Brackets hold exact 95 % intervals: of shares those of Clopper and Pearson, of medians those of order "
-        "statistics. NOT DECIDED: the interval has values on both sides of the goal, because too few trials were made. "
-        "Sigma of a cause: the root of the noncentrality of its signal after the model's unknowns have taken their "
-        "share. Sigma left: the same of what the most probable set of known causes leaves of an outside effect; it is "
-        "the size of what could still tell that the named causes are not the true ones."
-    )
-    add_setup(document, _setup(trials, planned))
-    document.section("What went wrong")
-    document.items(_failures(trials))
-    _evidence(document, trials)
-    _calibration(document, trials)
-    _answers(document, trials)
-    _files(document, trials, file)
-    write_study(document, summary, file, origin)
+def run(
+    *,
+    trials: Path,
+    full: bool = False,
+    made: bool = False,
+    record: Path | None = None,
+    workers: Workers = 1,
+    progress: Callable[[str], None] = show,
+) -> Campaign:
+    """Make the trials that the store does not hold yet, or only read those ``made`` so far; keep their ``record``."""
+    plans = plan(full)
+    done = read(trials) if made else make_trials(plans, trials, progress, workers)
+    if not done:
+        raise ValueError(f"{trials} holds no trials; leave out --made to make some")
+    if record is not None:
+        write_json(record, record_of(done))
+    return Campaign(done, len(plans))
 
 
-def _summary(trials: Sequence[Trial], planned: int) -> Summary:
-    goals = tuple(goals_of(trials))
+def _report(campaign: Campaign) -> Report[Campaign]:
+    trials, planned = campaign
+    goals = goals_of(trials)
     nulls = [trial for trial in trials if trial.kind == "adequate"]
     sure = [trial for trial in trials if (trial.probability or 0.0) >= SURE]
     verdicts = [goal.verdict for goal in goals]
@@ -137,7 +94,10 @@ def _summary(trials: Sequence[Trial], planned: int) -> Summary:
             f"; {len(trials):,} of {planned:,} planned trials leave {verdicts.count(Verdict.OPEN)} of {len(goals)} "
             "goals undecided"
         )
-    return Summary(
+    seconds = np.median([trial.seconds["total"] for trial in trials])
+    return Report(
+        title="Blind injections",
+        subtitle="What the diagnosis says of hidden causes",
         question="How often does the diagnosis name a hidden cause, rightly or wrongly, and how often does it raise an "
         "alarm where nothing is hidden?",
         answer=f"{answer}.",
@@ -145,6 +105,22 @@ def _summary(trials: Sequence[Trial], planned: int) -> Summary:
         valid="a base carries an arm of three to five joints whose links are exact or known to 2 %, and noise is white "
         "and as declared where its fault is not what is hidden.",
         full=len(trials) >= planned,
+        figure=Picture(
+            _figure([trial for trial in trials if trial.kind == "effect"]),
+            "Trials with a cause of the catalogue hidden, by its signal-to-noise ratio: what was said. Faults that "
+            "only change the noise have no such ratio and are not shown.",
+        ),
+        note="Brackets hold exact 95 % intervals: of shares those of Clopper and Pearson, of medians those of order "
+        "statistics. NOT DECIDED: the interval has values on both sides of the goal, because too few trials were made. "
+        "Sigma of a cause: the root of the noncentrality of its signal after the model's unknowns have taken their "
+        "share. Sigma left: the same of what the most probable set of known causes leaves of an outside effect; it is "
+        "the size of what could still tell that the named causes are not the true ones.",
+        setup=_setup(trials, planned),
+        sections=[_failures, _evidence, _calibration, _answers],
+        tables=_tables(trials),
+        beside="Beside this report: every trial with its seed and strength ({0}), the answers by case in words ({1}) "
+        f"and as a matrix of counts ({{2}}), and Brier and logarithmic scores ({{3}}). A trial took {seconds:.0f} s in "
+        "the median.",
     )
 
 
@@ -160,8 +136,8 @@ def _setup(trials: Sequence[Trial], planned: int) -> Setup:
         f"m/s², encoders {format_number(1e-6)} rad.",
         known="Robot, orbit, sensors and attitude at the start, as the files state them; links exactly or to 2 %.",
         unknown="The base's ten parameters, the initial rates, and what is hidden. The diagnosis gets the files alone.",
-        replicates=f"{len(trials):,} of {planned:,} planned trials, in random order: {counts[0]} with causes of "
-        f"the catalogue hidden, {counts[1]} with something outside it, {counts[2]} with nothing. Seeds {min(seeds)} to "
+        replicates=f"{len(trials):,} of {planned:,} planned trials, in random order: {counts[0]} with causes of the "
+        f"catalogue hidden, {counts[1]} with something outside it, {counts[2]} with nothing. Seeds {min(seeds)} to "
         f"{max(seeds)}, other than those of tests. Trials of the full plan were made over several versions of the "
         "package as the campaign went on: defects that it found were mended meanwhile, and the trials made before were "
         "kept. Which version made a trial is not kept with it.",
@@ -203,8 +179,10 @@ def _failure(alike: Sequence[Trial]) -> str:
     return f"{first.case.replace(', ', ' + ')}{where} was called {said}: {'; '.join(each)}."
 
 
-def _failures(trials: Sequence[Trial]) -> list[str]:
-    """Return sentences on every wrong answer, and on what is missed though it is large."""
+def _failures(document: Document, campaign: Campaign) -> None:
+    """Add sentences on every wrong answer, and on what is missed though it is large."""
+    document.section("What went wrong")
+    trials = campaign.trials
     wrong = [trial for trial in trials if trial.misnamed or (trial.kind == "adequate" and trial.alarmed)]
     alike: dict[tuple[str, str], list[Trial]] = {}
     for trial in wrong:
@@ -223,7 +201,8 @@ def _failures(trials: Sequence[Trial]) -> list[str]:
         texts.append(f"No alarm was raised by {named}; the largest of them has {largest:.1f} σ.")
     framed = [t for t in trials if t.kind == "unknown" and t.true_frame is not None and t.status == "unknown"]
     if framed:
-        right, wrongly = (sum(test(t) for t in framed) for test in (_framed, _misframed))
+        right = sum(t.frame == t.true_frame for t in framed)
+        wrongly = sum(t.frame not in (None, t.true_frame) for t in framed)
         median = np.median([trial.correlation or 0.0 for trial in framed])
         texts.append(
             f"Axes in which an outside torque is fixed: {share_text(right, len(framed))} named rightly, {wrongly} "
@@ -236,7 +215,7 @@ def _failures(trials: Sequence[Trial]) -> list[str]:
         texts.append(
             f"Every outside effect that was misnamed left less than {LEFT:g} σ beside the causes it was taken for."
         )
-    return texts
+    document.items(texts)
 
 
 def _snaps(trials: Sequence[Trial]) -> list[str]:
@@ -265,14 +244,6 @@ def _snaps(trials: Sequence[Trial]) -> list[str]:
     ]
 
 
-def _framed(trial: Trial) -> bool:
-    return trial.frame == trial.true_frame
-
-
-def _misframed(trial: Trial) -> bool:
-    return trial.frame not in (None, trial.true_frame)
-
-
 def _hidden(trial: Trial) -> str:
     outside = " (outside the catalogue)" if trial.kind == "unknown" else ""
     return trial.case.replace(", ", " + ") + outside
@@ -282,12 +253,12 @@ def _said(trial: Trial) -> str:
     return " + ".join(trial.causes) or trial.status
 
 
-def _evidence(document: Document, trials: Sequence[Trial]) -> None:
+def _evidence(document: Document, campaign: Campaign) -> None:
     document.section("What was said, by the size of what was hidden")
     add_number_table(
         document,
         ["signal-to-noise", "trials", "alarm", "limit", "in the set", "named alone", "limit", "misnamed"],
-        rates(trials),
+        rates(campaign.trials),
         "Trials with a cause of the catalogue hidden, by its signal-to-noise ratio: the root of its noncentrality "
         "after the model's unknowns have taken their share. The limits are the numbers expected of a test that knows "
         "which effect to look for (family-wise 1 %), and of the Bayes decision between all sets of causes on data of "
@@ -296,7 +267,8 @@ def _evidence(document: Document, trials: Sequence[Trial]) -> None:
     )
 
 
-def _calibration(document: Document, trials: Sequence[Trial]) -> None:
+def _calibration(document: Document, campaign: Campaign) -> None:
+    trials = campaign.trials
     document.section("Whether stated probabilities and intervals hold")
     stated = reliability(trials)
     if stated:
@@ -324,8 +296,9 @@ def _calibration(document: Document, trials: Sequence[Trial]) -> None:
     )
 
 
-def _answers(document: Document, trials: Sequence[Trial]) -> None:
+def _answers(document: Document, campaign: Campaign) -> None:
     """Add scores of the stated probabilities, and the answers of cases that were missed more than once."""
+    trials = campaign.trials
     add_number_table(
         document,
         SCORES,
@@ -357,27 +330,16 @@ def _answered(trial: Trial) -> bool:
     return trial.status == trial.kind
 
 
-def _files(document: Document, trials: Sequence[Trial], output: Path) -> None:
-    """Write the further tables and say where they are."""
+def _tables(trials: Sequence[Trial]) -> list[CsvTable]:
     fields = {name: None for trial in trials for name in asdict(trial)}
     kept = [name for name in fields if name not in ("probabilities", "amplitude_errors", "body_errors", "seconds")]
-    files = [
-        write_table(
-            output,
-            "trials",
-            [*kept, "seconds"],
-            ([*(_cell(getattr(trial, name)) for name in kept), f"{trial.seconds['total']:.1f}"] for trial in trials),
-        ),
-        write_table(output, "answers", ["hidden", "said"], confusion(trials)),
-        write_table(output, "confusion", *confusion_matrix(trials)),
-        write_table(output, "scores", SCORES, scores(trials)),
+    rows = [[*(_cell(getattr(trial, name)) for name in kept), f"{trial.seconds['total']:.1f}"] for trial in trials]
+    return [
+        CsvTable("trials", [*kept, "seconds"], rows),
+        CsvTable("answers", ["hidden", "said"], confusion(trials)),
+        CsvTable("confusion", *confusion_matrix(trials)),
+        CsvTable("scores", SCORES, scores(trials)),
     ]
-    seconds = np.array([trial.seconds["total"] for trial in trials])
-    document.paragraph(
-        f"Beside this report: every trial with its seed and strength ({files[0]}), the answers by case in words "
-        f"({files[1]}) and as a matrix of counts ({files[2]}), and Brier and logarithmic scores ({files[3]}). "
-        f"A trial took {np.median(seconds):.0f} s in the median."
-    )
 
 
 def _cell(value: object) -> object:
@@ -423,3 +385,19 @@ def _outcome(trial: Trial) -> str:
     if trial.in_set:
         return "in the set"
     return "alarm, nothing named" if trial.alarmed else "no alarm"
+
+
+STUDY = Study(
+    "blind_injections",
+    "How often a hidden cause is named rightly or wrongly, and how often nothing raises alarm.",
+    run=run,
+    report=_report,
+    full="hundreds of injections and a thousand nulls (many hours)",
+    extra={
+        "--trials": {"type": Path, "default": Path("out/blind_injections.jsonl"), "help": "kept between runs"},
+        **MADE,
+        "--record": {"type": Path, "help": "file for the counts that the package ships"},
+        **WORKERS,
+    },
+    inputs=lambda options: [options.trials],
+)

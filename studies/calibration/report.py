@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,16 +25,19 @@ from studies.calibration.outcomes import (
     holm,
     interval_coverage,
     pooled_coverage,
+    read,
     uniform_p_value,
 )
-from studies.calibration.replicate import ARMS, LOG_LIKELIHOOD, Method
+from studies.calibration.replicate import ARMS, LOG_LIKELIHOOD, Method, make, plan
 from studies.common.ets7 import START, ets7
 from studies.common.figures import robot_outline
+from studies.common.monte_carlo import Workers, run_trials
 from studies.common.report_parts import add_number_table
-from studies.common.study import Goal, Verdict
-from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
+from studies.common.study import MADE, TRIALS, CsvTable, Goal, Picture, Report, Setup, Study, Verdict, show
 
 FAMILYWISE = 0.01  # probability that any rank of any case is called not uniform where all are
+SEED = 1  # of all replicates
+HEADER = ["case and method", "made", *(format_percent(level) for level in LEVELS), "k-hat ≥ 0.7"]
 SHORT = 2.0  # standard errors below the stated share from which a coverage is named among what went wrong
 
 
@@ -101,62 +104,53 @@ def corrected_p_values(cases: Sequence[Replicates]) -> dict[tuple[Case, str], fl
     return holm({(item.case, name): p for item in cases for name, p in item.p_values.items()})
 
 
-def write_report(cases: Sequence[Replicates], file: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, with its summary beside it."""
+def run(
+    *,
+    full: bool = False,
+    trials: Path,
+    workers: Workers = 1,
+    made: bool = False,
+    progress: Callable[[str], None] = show,
+) -> list[Replicates]:
+    """Make the replicates that the store does not hold yet, unless those ``made`` so far are enough, and read all."""
+    if not made:
+        run_trials(make, plan(full), trials, seed=SEED, workers=workers, progress=progress)
+    return read(trials)
+
+
+def _report(cases: Sequence[Replicates]) -> Report[Sequence[Replicates]]:
     corrected = corrected_p_values(cases)
-    document = Document("Calibration", "Whether the truth lies where the posterior says")
-    summary = _summary(cases)
-    add_first_page(
-        document,
-        summary,
-        ecdf_figure(cases, len(corrected)),
-        "Empirical distribution of the ranks less the uniform one, by importance sampling: every unknown (grey), the "
-        "log likelihood (colour), and the band that all curves of all cases leave with a probability of at most "
-        f"{format_percent(FAMILYWISE, 1)}.",
-    )
-    document.paragraph(
-        f"P-values of ranks are exact and simultaneous over {len(POINTS)} points of their distribution, and corrected "
-        f"by Holm's method over all {len(corrected)} ranks of all cases. P-values of coverage are by the standard "
-        "error over replicates, whose numbers depend on one another, and corrected by Holm's method over all cases, "
-        f"all together and {len(LEVELS)} levels. A goal fails at {format_percent(FAMILYWISE, 1)} family-wise, and is "
-        "not decided until all its replicates are made."
-    )
-    add_setup(document, _setup(cases), outline=robot_outline(ets7(), START))
-    document.section("What went wrong")
-    document.items(_failures(cases))
-    document.section("What the ranks and intervals say")
-    document.items(_findings(cases, corrected))
-    header = ["case and method", "made", *(format_percent(level) for level in LEVELS), "k-hat ≥ 0.7"]
-    pooled = _pooled_rows(cases)
-    every = [row for item in cases for row in _coverage_rows(item)] + pooled
-    table = write_table(file, "coverage", header, every)
-    weighed = [row for row in every if row in pooled or row[0].endswith(f": {Method.IMPORTANCE}")]
-    add_number_table(
-        document,
-        header,
-        weighed,
-        "Percentage of the true mass, centre of mass and inertia of all identified bodies within the stated central "
-        "intervals, with the standard error over replicates. Emcee samples one replicate of twenty, and none of the "
-        f"whole system. Laplace and emcee of each case are in {table}.",
-    )
-    _add_chi_square(document, cases)
-    write_study(document, summary, file, origin)
-
-
-def _summary(cases: Sequence[Replicates]) -> Summary:
     made, planned = sum(len(item.results) for item in cases), sum(REPLICATES.values())
     share, error = pooled_coverage([item.bodies() for item in cases if item.results], LEVELS[-1])
-    wrong = [p for p in corrected_p_values(cases).values() if p <= FAMILYWISE]
+    wrong = [p for p in corrected.values() if p <= FAMILYWISE]
     said = f"{len(wrong)} ranks contradict uniformity" if wrong else "no rank contradicts uniformity"
-    return Summary(
+    return Report(
+        title="Calibration",
+        subtitle="Whether the truth lies where the posterior says",
         question="Does the truth lie within the stated intervals as often as they say, through the whole chain?",
-        answer=f"Of the bodies' true values {100.0 * share:.1f} ± {100.0 * error:.1f} % lie within their "
-        f"{format_percent(LEVELS[-1])} intervals and {said}, over {made:,} replicates"
+        answer=f"Of the bodies' true values {_percent(share, error)} % lie within their {format_percent(LEVELS[-1])} "
+        f"intervals and {said}, over {made:,} replicates"
         + (f" of the {planned:,} that would decide." if made < planned else "."),
-        goals=tuple(goals_of(cases)),
+        goals=goals_of(cases),
         valid="noise is white and as declared, joints move smoothly, nothing acts that the model lacks, and the prior "
         "is the one from which truths are drawn.",
         full=made >= planned,
+        figure=Picture(
+            ecdf_figure(cases, len(corrected)),
+            "Empirical distribution of the ranks less the uniform one, by importance sampling: every unknown (grey), "
+            "the log likelihood (colour), and the band that all curves of all cases leave with a probability of at "
+            f"most {format_percent(FAMILYWISE, 1)}.",
+        ),
+        note=f"P-values of ranks are exact and simultaneous over {len(POINTS)} points of their distribution, and "
+        f"corrected by Holm's method over all {len(corrected)} ranks of all cases. P-values of coverage are by the "
+        "standard error over replicates, whose numbers depend on one another, and corrected by Holm's method over all "
+        f"cases, all together and {len(LEVELS)} levels. A goal fails at {format_percent(FAMILYWISE, 1)} family-wise, "
+        "and is not decided until all its replicates are made.",
+        setup=_setup(cases),
+        outline=robot_outline(ets7(), START),
+        sections=[_failures, _findings, _chi_square],
+        tables=[CsvTable("coverage", HEADER, _coverage_rows(cases))],
+        beside="",
     )
 
 
@@ -165,8 +159,8 @@ def _setup(cases: Sequence[Replicates]) -> Setup:
     return Setup(
         robot="ETS-VII, alone or with a load, and a planar robot on a table.",
         manoeuvre="Random motion of all joints for 120 s, from a random attitude and initial rate (10⁻³ rad/s).",
-        sensors="Every 0.5 s rates with 10⁻⁵ rad/s, accelerations with 10⁻⁵ m/s² and an unknown constant error of "
-        "10⁻⁴ m/s², joint positions with 10⁻⁶ rad.",
+        sensors="Every 0.5 s rates with 10⁻⁵ rad/s, accelerations with 10⁻⁵ m/s² and an unknown constant error of 10⁻⁴ "
+        "m/s², joint positions with 10⁻⁶ rad.",
         known="The orbit with its gravity gradient, the attitude at the start, the sensors' noise.",
         unknown=f"Log-Cholesky coordinates of width {BASE_SPREAD:g} for base and load (mass uncertain by a factor of "
         f"1.8), {ARM_SPREAD:g} for an arm known to 5 %, {DRAWINGS_SPREAD:g} for links where the whole system is "
@@ -179,7 +173,7 @@ def _setup(cases: Sequence[Replicates]) -> Setup:
     )
 
 
-def _add_chi_square(document: Document, cases: Sequence[Replicates]) -> None:
+def _chi_square(document: Document, cases: Sequence[Replicates]) -> None:
     document.section("Chi-square per sample")
     smoothed = smoothed_errors()
     sharp = np.sqrt([row.near[2] for row in smoothed])
@@ -193,10 +187,9 @@ def _add_chi_square(document: Document, cases: Sequence[Replicates]) -> None:
         "have, whatever the sampling and the encoder, as long as the encoder's noise and not the interval limits the "
         f"smoothing. Ratios of {', '.join(f'{smooth_share(order):.1f}' for order in range(3))} follow, and a sensor "
         "whose errors are mostly carried accelerations shows a chi-square down to one half. Within a second of the "
-        "ends of quintic ramps, where the jerk jumps, the actual error of the acceleration is "
-        f"{sharp.min():.1f} to {sharp.max():.1f} times what is stated: jumps that the samples show are unknowns of "
-        "the process, but one joint alone, as here, does not show all. A sensor with as much noise of its own shows "
-        "little of either."
+        f"ends of quintic ramps, where the jerk jumps, the actual error of the acceleration is {sharp.min():.1f} to "
+        f"{sharp.max():.1f} times what is stated: jumps that the samples show are unknowns of the process, but one "
+        "joint alone, as here, does not show all. A sensor with as much noise of its own shows little of either."
     )
     add_number_table(
         document,
@@ -210,12 +203,14 @@ def _add_chi_square(document: Document, cases: Sequence[Replicates]) -> None:
         document,
         ["sampling, encoder", *parts],
         [_smoothed_row(row) for row in smoothed],
-        "Mean square of the errors of smoothed joints over the stated variance, one where all is right: "
-        f"near the ends of ramps (within {NEAR:g} s) and between.",
+        "Mean square of the errors of smoothed joints over the stated variance, one where all is right: near the ends "
+        f"of ramps (within {NEAR:g} s) and between.",
     )
 
 
-def _findings(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], float]) -> list[str]:
+def _findings(document: Document, cases: Sequence[Replicates]) -> None:
+    document.section("What the ranks and intervals say")
+    corrected = corrected_p_values(cases)
     wrong = [f"{name} ({case}; p {format_p_value(p)})" for (case, name), p in corrected.items() if p <= FAMILYWISE]
     sentences = [
         f"Not uniform at {100.0 * FAMILYWISE:g} % family-wise: " + "; ".join(wrong) + "."
@@ -227,15 +222,15 @@ def _findings(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], flo
         ranks = [item.bodies() for item in cases if (item.case in INDEPENDENT) is chosen and len(item.results)]
         if ranks:
             shares = [pooled_coverage(ranks, level) for level in LEVELS]
-            words = ", ".join(f"{100.0 * s:.1f} ± {100.0 * e:.1f}" for s, e in shares)
+            words = ", ".join(_percent(*share) for share in shares)
             sentences.append(
                 f"On {title}, {words} % (with standard errors) of the bodies' true values lie within the "
                 f"{', '.join(f'{100.0 * level:g}' for level in LEVELS)} % intervals."
             )
     pooled = np.concatenate([item.ranks()[LOG_LIKELIHOOD] for item in cases if item.results])
     sentences.append(
-        f"The log likelihood of all {len(pooled)} replicates together: "
-        f"p = {format_p_value(uniform_p_value(pooled))} of its ranks being uniform."
+        f"The log likelihood of all {len(pooled)} replicates together: p = {format_p_value(uniform_p_value(pooled))} "
+        "of its ranks being uniform."
     )
     chi2 = [np.concatenate([item.chi2(sensor) for item in cases if item.results]) for sensor in ("rate", "accel")]
     sentences.append(
@@ -244,10 +239,19 @@ def _findings(cases: Sequence[Replicates], corrected: dict[tuple[Case, str], flo
         "understated where their jerk jumps too little to be seen, which shows where it outweighs the sensors' own "
         "(section 4)."
     )
-    return sentences
+    document.items(sentences)
+    add_number_table(
+        document,
+        HEADER,
+        [row for row in _coverage_rows(cases) if row[0].endswith(f": {Method.IMPORTANCE}") or row[0].startswith(ALL)],
+        "Percentage of the true mass, centre of mass and inertia of all identified bodies within the stated central "
+        "intervals, with the standard error over replicates. Emcee samples one replicate of twenty, and none of the "
+        "whole system. Laplace and emcee of each case are in calibration-coverage.csv.",
+    )
 
 
-def _failures(cases: Sequence[Replicates]) -> list[str]:
+def _failures(document: Document, cases: Sequence[Replicates]) -> None:
+    document.section("What went wrong")
     errors = [f"{item.case}: {message}" for item in cases for message in item.failures]
     modes = sum(item.count("converged", False) for item in cases)
     chains = sum(item.count("emcee_converged", False) for item in cases)
@@ -278,32 +282,30 @@ def _failures(cases: Sequence[Replicates]) -> list[str]:
             f"Root mean square of the difference in stated standard deviations: {shifts}. Ranks and coverage here are "
             "of the rate as the posterior means it; the bodies are the same in both readings."
         )
-    return sentences
+    document.items(sentences)
 
 
-def _coverage_rows(item: Replicates) -> list[list[str]]:
+def _coverage_rows(cases: Sequence[Replicates]) -> list[list[str]]:
+    """Return the coverage of each case and of all together, by method."""
     rows = []
+    for item in cases:
+        bad = str(sum(result["pareto_k"] >= TRUSTED for result in item.results))
+        for method in Method:
+            ranks = item.bodies(method)
+            if len(ranks) > 1:
+                cells = [_percent(*coverage(ranks, level)) for level in LEVELS]
+                doubt = bad if method is Method.IMPORTANCE else "-"
+                rows.append([f"{item.case}: {method}", str(len(ranks)), *cells, doubt])
     for method in Method:
-        ranks = item.bodies(method)
-        if len(ranks) < 2:
-            continue
-        cells = [f"{100.0 * share:.1f} ± {100.0 * error:.1f}" for share, error in (coverage(ranks, v) for v in LEVELS)]
-        bad = sum(result["pareto_k"] >= TRUSTED for result in item.results)
-        rows.append(
-            [f"{item.case}: {method}", str(len(ranks)), *cells, str(bad) if method is Method.IMPORTANCE else "-"]
-        )
+        every = [made for item in cases if len(made := item.bodies(method))]
+        if every:
+            cells = [_percent(*pooled_coverage(every, level)) for level in LEVELS]
+            rows.append([f"{ALL}: {method}", str(sum(map(len, every))), *cells, "-"])
     return rows
 
 
-def _pooled_rows(cases: Sequence[Replicates]) -> list[list[str]]:
-    rows = []
-    for method in Method:
-        ranks = [made for item in cases if len(made := item.bodies(method))]
-        if ranks:
-            found = [pooled_coverage(ranks, level) for level in LEVELS]
-            cells = [f"{100.0 * share:.1f} ± {100.0 * error:.1f}" for share, error in found]
-            rows.append([f"all cases: {method}", str(sum(map(len, ranks))), *cells, "-"])
-    return rows
+def _percent(share: float, error: float) -> str:
+    return f"{100.0 * share:.1f} ± {100.0 * error:.1f}"
 
 
 def _smoothed_row(row: Smoothed) -> list[str]:
@@ -343,3 +345,13 @@ def ecdf_figure(cases: Sequence[Replicates], family: int) -> Figure:
     for axes in panels[-1]:
         axes.set_xlabel("rank")
     return figure
+
+
+STUDY = Study(
+    "calibration",
+    "Whether the truth lies as often within the stated intervals as they say.",
+    run=run,
+    report=_report,
+    full="all replicates of all cases (hours)",
+    extra={**TRIALS, "--trials": {**TRIALS["--trials"], "default": Path("out/calibration.jsonl")}, **MADE},
+)

@@ -142,6 +142,7 @@ class Report(Generic[R]):
     goals: Sequence[Goal]
     full: bool  # whether the study was run in full
     figure: Picture | None = None  # figure that decides, on the first page
+    note: str = ""  # paragraph below the goals, as on how they are judged
     setup: Setup | None = None
     outline: Figure | None = None  # drawing of the robot inside the box of the setup
     picture: Picture | None = None  # figure below the setup, as of the motion
@@ -163,6 +164,8 @@ class Report(Generic[R]):
             document.figure(*self.figure)
         rows = [[goal.text, goal.reached, goal.verdict.value] for goal in self.goals]
         document.table(["goal", "reached", "verdict"], rows, "Goals.", ["left"] * 3)
+        if self.note:
+            document.paragraph(self.note)
         if self.setup is not None:
             document.section("Setup")
             conditions = [(name.capitalize(), text) for name, text in asdict(self.setup).items()]
@@ -213,6 +216,8 @@ class Command:
         options = parser.parse_args(arguments)
         if options.output.is_dir() or not options.output.suffix:
             options.output /= report.name
+        if getattr(options, "made", False) and options.trials is None:
+            parser.error("--made reports trials that were kept: give their file with --trials")
         summary = options.output.with_suffix(".json")  # written beside the report
         for name, value in vars(options).items():
             if isinstance(value, Path) and value == summary:

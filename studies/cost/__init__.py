@@ -1,5 +1,7 @@
 """Cost: what commands take from files to answers, by phase, cold and with compiled code kept, and how that grows."""
 
-from studies.cost.report import main, write_report
+from studies.cost.report import STUDY
 
-__all__ = ["main", "write_report"]
+__all__ = ["STUDY", "main"]
+
+main = STUDY.main

@@ -10,15 +10,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid._io.words import joined
-from bayesid.app.compilation_cache import keep_compiled
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, BEFORE, styled, wide_figure
 from bayesid.report.numbers import format_number
 from studies.benchmark.run import EVALUATED
-from studies.common.provenance import MODELS, processor, study_origin
+from studies.common.provenance import MODELS, processor
 from studies.common.report_parts import columns
-from studies.common.study import Command, Goal, Verdict
-from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
+from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Study, Verdict
 from studies.cost.run import AFTER_VERDICT, COMMANDS, DIAGNOSES, Cost, middle, run
 from studies.cost.search_times import SearchTimes
 
@@ -40,34 +38,22 @@ def goals_of(cost: Cost) -> list[Goal]:
                 goals.append(_times(cost, names, kind, limit))
     memory = {name: max(item.memory for item in runs) for name, runs in cost.diagnoses.items()}
     worst = max(memory, key=lambda name: memory[name])
-    goals.append(
-        Goal(
-            f"Memory of a diagnosis: at most {MEMORY:g} GB",
-            f"{format_number(memory[worst], 3)} GB ({worst})",
-            Verdict.of(memory[worst] <= MEMORY),
-        )
-    )
-    longest = max((item.phases["sample"] for item in cost.sampled.values()), default=None)
+    reached = f"{format_number(memory[worst], 3)} GB ({worst})"
+    goals.append(Goal(f"Memory of a diagnosis: at most {MEMORY:g} GB", reached, Verdict.of(memory[worst] <= MEMORY)))
+    sampled = {name: item.phases["sample"] for name, item in cost.sampled.items()}
     goals.append(
         Goal(
             f"4,000 effective samples of the extended model of a single cause within {SAMPLES:g} s more",
-            "not sampled"
-            if longest is None
-            else ", ".join(f"{name} {item.phases['sample']:.1f} s" for name, item in cost.sampled.items()),
-            Verdict.of(None if longest is None else longest <= SAMPLES),
+            ", ".join(f"{name} {seconds:.1f} s" for name, seconds in sampled.items()) or "not sampled",
+            Verdict.of(max(sampled.values()) <= SAMPLES if sampled else None),
         )
     )
     goals.append(_nested(cost))
     for name, (_, limit) in COMMANDS.items():
         if limit is not None and name in cost.commands:
             walls = [item.wall for item in cost.commands[name][1:]]
-            goals.append(
-                Goal(
-                    f"{name}, files to report, with compiled code kept: at most {limit:g} s",
-                    _spread(walls),
-                    _verdict(walls, limit),
-                )
-            )
+            text = f"{name}, files to report, with compiled code kept: at most {limit:g} s"
+            goals.append(Goal(text, _spread(walls), _verdict(walls, limit)))
     return goals + _search_goals(cost.search)
 
 
@@ -78,16 +64,14 @@ def _search_goals(search: SearchTimes | None) -> list[Goal]:
     if search is None:
         return [Goal(text, "not measured", Verdict.NOT_TESTED) for text in (step, begin)]
     low, middle_of, high = (1e3 * value for value in np.percentile(search.criterion, [5.0, 50.0, 95.0]))
+    criterion = (
+        f"{middle_of:.1f} ms ({low:.1f} to {high:.1f}, 90 % of {len(search.criterion)} manoeuvres of {search.unknowns} "
+        "free numbers)"
+    )
+    start = f"{search.cold:.1f} s, {search.warm:.1f} s with compiled code kept"
     return [
-        Goal(
-            step,
-            f"{middle_of:.1f} ms ({low:.1f} to {high:.1f}, 90 % of {len(search.criterion)} manoeuvres of "
-            f"{search.unknowns} free numbers)",
-            Verdict.of(middle_of <= 1e3 * STEP),
-        ),
-        Goal(
-            begin, f"{search.cold:.1f} s, {search.warm:.1f} s with compiled code kept", Verdict.of(search.cold <= BEGIN)
-        ),
+        Goal(step, criterion, Verdict.of(middle_of <= 1e3 * STEP)),
+        Goal(begin, start, Verdict.of(search.cold <= BEGIN)),
     ]
 
 
@@ -110,8 +94,9 @@ def _nested(cost: Cost) -> Goal:
     ratio = cost.nested.seconds * count / seconds
     bound = "" if cost.nested.done else "more than "
     said = (
-        f"{bound}{format_number(ratio, 2)}: {count} candidates, {'' if cost.nested.done else 'not ended after '}"
-        f"{cost.nested.seconds:.0f} s of processor time with {cost.nested.unknowns} unknowns"
+        f"{bound}{format_number(ratio, 2)}: {count} candidates, "
+        f"{'' if cost.nested.done else 'not ended after '}{cost.nested.seconds:.0f} s of processor time with "
+        f"{cost.nested.unknowns} unknowns"
     )
     return Goal(text, said, Verdict.PASS if ratio >= CHEAPER else Verdict.FAIL if cost.nested.done else Verdict.OPEN)
 
@@ -129,44 +114,28 @@ def _spread(values: Sequence[float]) -> str:
     return f"{np.median(values):.1f} s ({min(values):.1f} to {max(values):.1f})"
 
 
-def write_report(
-    cost: Cost, output: Path, *, full: bool, before: Path | None = None, origin: str | None = None
-) -> None:
-    """Write the report as PDF, and beside it its summary and all times.
-
-    Parameters
-    ----------
-    cost : Cost
-    output : Path
-    full : bool
-    before : Path, optional
-        Times that an earlier run wrote, with which these are compared.
-    origin : str, optional
-        Where the report comes from.
-    """
-    document = Document("Cost", "What commands take from files to answers")
+def _report(cost: Cost) -> Report[Cost]:
     warm = {name: middle(runs, lambda item: item.to_verdict) for name, runs in cost.diagnoses.items()}
     quickest, slowest = min(warm, key=lambda name: warm[name]), max(warm, key=lambda name: warm[name])
-    goals = tuple(goals_of(cost))
-    summary = Summary(
-        "How long do commands take from files to answers, with compiled code kept and without, how much memory, and "
-        "how does that grow with the problem?",
-        f"A diagnosis of three recordings comes to its verdict in {warm[quickest]:.1f} s ({quickest}) to "
+    goals = goals_of(cost)
+    return Report(
+        title="Cost",
+        subtitle="What commands take from files to answers",
+        question="How long do commands take from files to answers, with compiled code kept and without, how much "
+        "memory, and how does that grow with the problem?",
+        answer=f"A diagnosis of three recordings comes to its verdict in {warm[quickest]:.1f} s ({quickest}) to "
         f"{warm[slowest]:.1f} s ({slowest}) with compiled code kept, with the whole catalogue{_wanted(warm)}; "
         f"{sum(goal.verdict is Verdict.FAIL for goal in goals)} of {len(goals)} goals are missed.",
-        goals,
-        f"run on {processor()}, two cores, with nothing beside it. The machine's speed varies by a third from day to "
-        "day.",
-        full,
-    )
-    caption = (
-        "Time from files to report of each diagnosis, without compiled code (left bar) and with it (right bar): orange "
-        "until the verdict, blue after it. Samples are not drawn."
-    )
-    add_first_page(document, summary, phases_figure(cost), caption)
-    add_setup(
-        document,
-        Setup(
+        goals=goals,
+        valid=f"run on {processor()}, two cores, with nothing beside it. The machine's speed varies by a third from "
+        "day to day.",
+        full=cost.full,
+        figure=Picture(
+            phases_figure(cost),
+            "Time from files to report of each diagnosis, without compiled code (left bar) and with it (right bar): "
+            "orange until the verdict, blue after it. Samples are not drawn.",
+        ),
+        setup=Setup(
             robot="A servicer with three joints where files are timed; ETS-VII and chains of links for evaluations.",
             manoeuvre="Three random manoeuvres of 140 to 160 s, far faster than the flight's rule: only times count.",
             sensors="Rate and accelerometer at 4 Hz and encoders, written to files by MuJoCo.",
@@ -174,11 +143,13 @@ def write_report(
             unknown="Base and initial rates, and what is hidden.",
             replicates="One run without compiled code and three with it; medians, with the smallest and the largest.",
         ),
+        sections=[_phases, _compared, _growth],
+        tables=[_runs(cost)],
+        beside="",
     )
-    _phases(document, cost)
-    if before is not None:
-        _compared(document, cost, before)
-    _growth(document, cost)
+
+
+def _runs(cost: Cost) -> CsvTable:
     names = ["start", "load", "compile", "fit", "verdict", *AFTER_VERDICT]
     rows = [
         [kind, name, number, "cold" if number == 0 else "warm", item.wall, item.processor, item.memory]
@@ -187,8 +158,7 @@ def write_report(
         for name, runs in group.items()
         for number, item in enumerate(runs)
     ]
-    write_table(output, "runs", ["kind", "what", "run", "code", "wall", "processor", "memory", *names], rows)
-    write_study(document, summary, output, origin)
+    return CsvTable("runs", ["kind", "what", "run", "code", "wall", "processor", "memory", *names], rows)
 
 
 def _wanted(warm: Mapping[str, float]) -> str:
@@ -216,8 +186,8 @@ def _phases(document: Document, cost: Cost) -> None:
         ["diagnosis of", *phases, "memory [GB]"],
         rows,
         "Time by phase [s], without compiled code / with it; medians. Start: import of the package, reading of the "
-        "files, smoothing of the joints' motion. Compile: what the simulation needs; further functions are "
-        "compiled or read within the phases that use them.",
+        "files, smoothing of the joints' motion. Compile: what the simulation needs; further functions are compiled or "
+        "read within the phases that use them.",
         columns("l" + "r" * (len(phases) + 1)),
     )
     rows = [
@@ -242,9 +212,11 @@ def _phases(document: Document, cost: Cost) -> None:
         )
 
 
-def _compared(document: Document, cost: Cost, before: Path) -> None:
-    """Tabulate the times of an earlier run beside those of this one."""
-    with before.open(encoding="utf-8", newline="") as stream:
+def _compared(document: Document, cost: Cost) -> None:
+    """Tabulate the times of an earlier run beside those of this one, where one was given."""
+    if cost.before is None:
+        return
+    with cost.before.open(encoding="utf-8", newline="") as stream:
         lines = [line for line in csv.DictReader(stream) if line["code"] == "warm"]
     rows = []
     for kind, group in (("diagnose", cost.diagnoses), ("command", cost.commands)):
@@ -256,7 +228,7 @@ def _compared(document: Document, cost: Cost, before: Path) -> None:
             if abs(now / was - 1.0) > CHANGED:
                 change = f"{100.0 * (now / was - 1.0):+.0f}".replace("-", "−")
                 rows.append([f"diagnose ({name})" if kind == "diagnose" else name, f"{was:.1f}", f"{now:.1f}", change])
-    within = f"within {100.0 * CHANGED:.0f} % of the run that wrote {before.name}"
+    within = f"within {100.0 * CHANGED:.0f} % of the run that wrote {cost.before.name}"
     if not rows:
         document.paragraph(f"All times to the report with compiled code kept lie {within}.")
         return
@@ -270,28 +242,14 @@ def _compared(document: Document, cost: Cost, before: Path) -> None:
 
 def _growth(document: Document, cost: Cost) -> None:
     document.section("Growth, and the floor")
-    rows = []
-    for name, times in cost.growth.items():
-        first = next(iter(times.values()))
-        sizes = ", ".join(f"{key}" for key in times)
-        rows.append(
-            [
-                name,
-                sizes,
-                f"{1e6 * first:.0f} µs",
-                ", ".join(format_number(value / first, 3) for value in times.values()),
-            ]
-        )
+    grown = [(name, "{:.0f} µs", 1e6, times) for name, times in cost.growth.items()]
     if len(cost.candidates) > 1:
-        first = next(iter(cost.candidates.values()))
-        rows.append(
-            [
-                "candidates (verdict)",
-                ", ".join(map(str, cost.candidates)),
-                f"{first:.2f} s",
-                ", ".join(format_number(value / first, 3) for value in cost.candidates.values()),
-            ]
-        )
+        grown.append(("candidates (verdict)", "{:.2f} s", 1.0, cost.candidates))
+    rows = []
+    for name, form, unit, times in grown:
+        first = next(iter(times.values()))
+        ratios = ", ".join(format_number(value / first, 3) for value in times.values())
+        rows.append([name, ", ".join(map(str, times)), form.format(unit * first), ratios])
     document.table(
         ["what grows", "sizes", "time of the first", "ratios to the first"],
         rows,
@@ -300,14 +258,14 @@ def _growth(document: Document, cost: Cost) -> None:
     )
     floor = cost.floor
     document.paragraph(
-        f"One evaluation, of ETS-VII with {EVALUATED}, has "
-        f"{format_number(floor.operations / 1e6, 3)} million floating-point operations and, by the compiler's "
-        f"count, reads and writes {format_number(floor.traffic / 1e6, 3)} MB, most of it in caches. "
-        f"One core multiplies matrices at {format_number(floor.speed / 1e9, 3)} GFLOP/s and streams "
-        f"{format_number(floor.bandwidth / 1e9, 3)} GB/s from memory. At that speed the operations alone would take "
-        f"{format_number(1e6 * floor.least, 2)} µs, of the {format_number(1e6 * floor.seconds, 3)} µs measured here: "
-        f"one evaluation is {format_number(floor.seconds / floor.least, 2)} times above that floor, as small matrices "
-        "and short loops are."
+        f"One evaluation, of ETS-VII with {EVALUATED}, has {format_number(floor.operations / 1e6, 3)} million "
+        "floating-point operations and, by the compiler's count, reads and writes "
+        f"{format_number(floor.traffic / 1e6, 3)} MB, most of it in caches. One core multiplies matrices at "
+        f"{format_number(floor.speed / 1e9, 3)} GFLOP/s and streams {format_number(floor.bandwidth / 1e9, 3)} GB/s "
+        f"from memory. At that speed the operations alone would take {format_number(1e6 * floor.least, 2)} µs, of the "
+        f"{format_number(1e6 * floor.seconds, 3)} µs measured here: one evaluation is "
+        f"{format_number(floor.seconds / floor.least, 2)} times above that floor, as small matrices and short loops "
+        "are."
     )
 
 
@@ -328,21 +286,13 @@ def phases_figure(cost: Cost) -> Figure:
     return figure
 
 
-COMMAND = Command(
+STUDY = Study(
     "cost",
     "Measure what commands take from files to answers, and how that grows.",
+    run=run,
+    report=_report,
     full="every run repeated, samples drawn, and a nested sampler for up to ten minutes",
     seed=0,
     extra={"--before": {"type": Path, "help": "CSV file of the times of an earlier run to compare with"}},
+    inputs=lambda options: [MODELS / "ets7.urdf", *([] if options.before is None else [options.before])],
 )
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the study and write its report."""
-    options = COMMAND.parse(arguments)
-    keep_compiled()
-    cost = run(full=options.full, seed=options.seed, progress=print)
-    inputs = [MODELS / "ets7.urdf", *([] if options.before is None else [options.before])]
-    origin = study_origin(COMMAND.name, options, inputs)
-    write_report(cost, options.output, full=options.full, before=options.before, origin=origin)
-    print(f"Wrote {options.output}.")

@@ -325,6 +325,10 @@ class Cost:
         One candidate by nested sampling.
     search : SearchTimes or None
         A search for manoeuvres.
+    full : bool
+        Whether runs were repeated.
+    before : Path or None
+        Times that an earlier run wrote, with which these are compared.
     """
 
     diagnoses: dict[str, list[Run]]
@@ -335,6 +339,8 @@ class Cost:
     floor: Floor
     nested: Nested | None
     search: SearchTimes | None
+    full: bool = False
+    before: Path | None = None
 
 
 def run(
@@ -343,6 +349,7 @@ def run(
     seed: int = 0,
     titles: tuple[str, ...] = TITLES,
     commands: tuple[str, ...] = tuple(COMMANDS),
+    before: Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Cost:
     """Measure everything.
@@ -355,6 +362,8 @@ def run(
         Seed of the nested sampler.
     titles, commands : tuple of str
         Diagnoses and other commands to time.
+    before : Path, optional
+        Times that an earlier run wrote, to compare with.
     progress : callable, optional
         Receives a line before each part.
     """
@@ -394,7 +403,8 @@ def run(
         one = nested(found, LIMIT if full else 10.0, seed) if found.verdict.causes else None
     progress("growth of one evaluation")
     grown = growth(20) if full else growth(2, sizes=1)
-    return Cost(diagnoses, sampled, others, by_candidates, grown, floor_of(20 if full else 2), one, search)
+    floor = floor_of(20 if full else 2)
+    return Cost(diagnoses, sampled, others, by_candidates, grown, floor, one, search, full, before)
 
 
 def middle(runs: list[Run], value: Callable[[Run], float]) -> float:
