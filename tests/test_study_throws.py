@@ -10,7 +10,7 @@ from studies.common.study import Verdict
 from studies.throws import run
 from studies.throws.analysis import BodyResult
 from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, Timing, read_throws
-from studies.throws.report import _quick_fit, goals_of, held_in_all, write_report
+from studies.throws.report import STUDY, _quick_fit, goals_of, held_in_all
 from tests.report_rules import broken_rules
 
 PRESENT = (DEFAULT_FOLDER / "truth.json").is_file()
@@ -70,7 +70,7 @@ def test_goals_without_a_diagnosis_are_not_tested(result):
 
 @pytest.mark.slow
 def test_the_report_is_written(result, tmp_path):
-    write_report(result, tmp_path / "throws.pdf")
+    STUDY.write(result, tmp_path / "throws.pdf")
     assert broken_rules(tmp_path / "throws.pdf", full=False) == []
 
 

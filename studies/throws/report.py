@@ -1,14 +1,16 @@
-"""Report of the study."""
+"""The study of thrown bodies, its goals and its report."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from time import perf_counter
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis import Diagnosis
 from bayesid.diagnosis.evidence.verdict import NAMED
 from bayesid.report import Document, format_quantity
@@ -16,76 +18,119 @@ from bayesid.report.figures.figure_style import styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_probability, format_signed
 from bayesid.report.verdict_record import Share
 from studies.common.report_parts import columns
-from studies.common.study import Goal, Verdict
-from studies.common.template import Setup, Summary, add_first_page, add_setup, write_study, write_table
-from studies.throws.analysis import BLOCK_SD, PLATE_SD, Analysis, BodyResult
-from studies.throws.data import EXCLUDED, INTERVAL
-from studies.throws.diagnosis import SPREAD
+from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Study, Verdict
+from studies.throws.analysis import BLOCK_SD, PLATE_SD, Analysis, BodyResult, analyse, prepare
+from studies.throws.data import CALIBRATION, DEFAULT_FOLDER, EXCLUDED, INTERVAL, Timing, read_throws, read_truth
+from studies.throws.diagnosis import SPREAD, Lacking, geometry_errors, lacking, without_wheel
 from studies.throws.joint import LARGEST
-from studies.throws.left_over import CHANNELS, ORDERS, PHASES, LeftOver, following, shaken_axis, shaking_words
+from studies.throws.left_over import (
+    CHANNELS,
+    ORDERS,
+    PHASES,
+    LeftOver,
+    following,
+    pole_pairs,
+    shaken_axis,
+    shaking_words,
+)
+from studies.throws.model import is_fitted, is_rigid
 
-if TYPE_CHECKING:
-    from studies.throws import Result
-
-
-@styled
-def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
-    """Draw the errors of single throws, a row per body, a column per model."""
-    figure = wide_figure(1.6 * len(extended.bodies))
-    panels = figure.subplots(len(extended.bodies), 2, sharey="row", squeeze=False)
-    for row, body in zip(panels, extended.bodies, strict=True):
-        for axes, analysis in zip(row, (plain, extended), strict=True):
-            result = analysis.bodies[body]
-            band = float(100.0 * (result.truth_sd / result.truth).max())
-            axes.axhspan(-band, band, color="#eeeeee")
-            axes.axhline(0.0, color="#888888", linewidth=0.8)
-            places = np.arange(len(result.throws))
-            for index, name in enumerate(("smallest", "middle", "largest")):
-                sd = 100.0 * result.formal[:, index] / result.truth[index]
-                place = places + 0.2 * (index - 1)
-                axes.errorbar(
-                    place, result.errors[:, index], sd, fmt="os^"[index], markersize=3, linewidth=1, label=name
-                )
-            axes.set_xticks(places, [name[-3:] for name in result.throws])
-            axes.set_title(f"{body}, {analysis.label} model")
-        row[0].set_ylabel("error [%]")
-    for axes in panels[-1]:
-        axes.set_xlabel("number of the throw")
-    handles, labels = panels[0][1].get_legend_handles_labels()
-    figure.legend(handles, [f"{label} moment" for label in labels], loc="outside upper center", ncols=3)
-    return figure
-
-
-@styled
-def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
-    """Draw the spectrum of what is left on the accelerometer, and the raw accelerometer against the wheel's orders."""
-    figure = wide_figure(0.6 + 0.72 * len(left))
-    panels = figure.subplots(len(left), 2, sharex="col", squeeze=False)
-    for row, (body, own) in zip(panels, left.items(), strict=True):
-        spectrum = np.array([own.spectrum[:, c] for c in range(3, 6)])
-        for edge in (own.wheel[0], own.wheel[2]):
-            row[0].axvspan(edge - 2.0, edge + 2.0, color="#eeeeee")
-        for c in range(3, 6):
-            row[0].plot(own.frequencies[1:], 1e3 * spectrum[c - 3, 1:], linewidth=1, label=CHANNELS[c][-1])
-            row[1].semilogy(
-                ORDERS, np.sqrt((own.orders[:, :, c] ** 2).mean(axis=0)), linewidth=1, label=CHANNELS[c][-1]
-            )
-        row[1].axvline(own.turn[0], color="#888888", linewidth=0.8)
-        row[0].set_title(body, loc="left")
-        row[0].set_ylabel("[mm/s²]")
-        row[1].set_ylabel("[m/s²]")
-    panels[0][0].set_title("residual of samples")
-    panels[0][1].set_title("raw readings, wheel at speed")
-    panels[-1][0].set_xlabel("frequency [Hz]")
-    panels[-1][1].set_xlabel("frequency / that of the recorded wheel")
-    handles, labels = panels[0][1].get_legend_handles_labels()
-    figure.legend(handles, [f"accelerometer {label}" for label in labels], loc="outside upper center", ncols=3)
-    return figure
-
-
+QUICK = 4  # throws of each body that a quick run identifies
+TRAINING = 1  # throws of each body that are diagnosed
 QUICK_FIT = {"Empty": 1.9, "A": 1.0}  # mean errors of a quick least-squares fit by those who prepared the data [%]
 LOW, HIGH = 0.90, 0.98  # share of 95 % intervals that should hold the truth
 SECONDS = 600.0  # longest time of a full run [s]
+SETS = 10  # number of sets of causes that are listed of each body
+AXES = tuple(f"{sensor} {axis}" for sensor in ("gyro", "accelerometer") for axis in "xyz")
+
+Row = tuple[object, ...]
+
+
+@dataclass(frozen=True)
+class Result:
+    """Numbers of the study.
+
+    Attributes
+    ----------
+    plain, extended : Analysis
+        Rigid body with wheel and nothing else; the same with what the device and the air add.
+    studies : tuple of Lacking
+        What each body's diagnosis said; empty where it was left out.
+    errors : mapping of str to mapping of str to (3,) array
+        Of the diagnosed models against the geometry [%].
+    wheels : mapping of str to Diagnosis
+        With the recorded wheel dropped, by body; empty where that was left out.
+    masses : mapping of str to float
+        Of the bodies with the device on them [kg].
+    pairs : int
+        Pole pairs of the wheel's motor, from the calibration throws' loudest line.
+    seconds, reverse_seconds : float
+        Time of the run without the reverse, and of the reverse.
+    """
+
+    plain: Analysis
+    extended: Analysis
+    studies: tuple[Lacking, ...]
+    errors: Mapping[str, Mapping[str, np.ndarray]]
+    wheels: Mapping[str, Diagnosis]
+    masses: Mapping[str, float]
+    pairs: int
+    seconds: float
+    reverse_seconds: float
+
+
+def run(
+    data: Path | None = None,
+    *,
+    full: bool = False,
+    reverse: bool = False,
+    seed: int = 1,
+    throws: int | None = None,
+    progress: Progress = silent,
+) -> Result:
+    """Run the study.
+
+    Parameters
+    ----------
+    data : path, optional
+        Of the measurements; beside the checkout where left out.
+    full : bool
+        All throws, and the diagnosis of every body.
+    reverse : bool
+        Whether to drop the recorded wheel from a throw of every body and to have it sought, which takes minutes more.
+    throws : int, optional
+        Throws of each body; all in a full run and `QUICK` in a quick one where left out.
+
+    Raises
+    ------
+    InputError
+        If the measurements are not there.
+    """
+    began = perf_counter()
+    folder = DEFAULT_FOLDER if data is None else Path(data)
+    truth, count = read_truth(folder), throws if full or throws else QUICK
+    rng = np.random.default_rng(seed)
+    masses = {body: truth.thrown_mass(body) for body in truth.bodies}
+    prepared = prepare(folder, truth, count)
+    plain = analyse("rigid", prepared, is_rigid, truth, rng, folder, smooth=False)
+    extended = analyse("extended", prepared, is_fitted, truth, rng, folder)
+    pairs = pole_pairs([extended.left[body] for body in CALIBRATION])
+    studies: tuple[Lacking, ...] = ()
+    errors: Mapping[str, Mapping[str, np.ndarray]] = {}
+    wheels: dict[str, Diagnosis] = {}
+    if full:
+        recordings = {body: read_throws(folder, body, Timing()) for body in truth.bodies}
+        studies = tuple(
+            lacking(body, recordings[body], masses[body], TRAINING, seed, progress, pairs=pairs)
+            for body in truth.bodies
+        )
+        errors = geometry_errors(studies, truth)
+    seconds = perf_counter() - began
+    if reverse:
+        for body in truth.bodies:
+            thrown = read_throws(folder, body, Timing())
+            wheels[body] = without_wheel(thrown, masses[body], TRAINING, seed, progress)
+    return Result(plain, extended, studies, errors, wheels, masses, pairs, seconds, perf_counter() - began - seconds)
 
 
 def held_in_all(result: Result, *, with_truth: bool = False) -> tuple[int, int]:
@@ -176,44 +221,23 @@ def wheel_probability(found: Diagnosis) -> float:
     return found.probabilities.of_any(["wheel-history:z"])
 
 
-SETS = 10  # number of sets of causes that are listed of each body
-AXES = tuple(f"{sensor} {axis}" for sensor in ("gyro", "accelerometer") for axis in "xyz")
-
-Row = tuple[object, ...]
-
-
-def write_tables(output: Path, result: Result) -> list[str]:
-    """Write the tables beside a report and return the names of their files."""
-    files = [
-        write_table(
-            output,
-            "moments",
-            ["model", "throw", "moment", "stated [kg m2]", "found [kg m2]", "formal sd [kg m2]"],
-            _moment_rows(result),
-        ),
-        write_table(
-            output,
-            "bodies",
-            [
-                *("body", "throws", "torque sd [N m]", "rms / sd of the torque", "force sd [m/s2]"),
-                *(f"noise in flight / at rest, {axis}" for axis in AXES),
-                *("wheel [Hz]", "loudest order", "throws with it", "axis", "amplitude [m/s2]", "beside it [m/s2]"),
-                "force [N]",
-            ],
-            _body_rows(result),
-        ),
-        write_table(
-            output,
-            "residuals",
-            ["body", "channel", "rms", "rms at rest", "loudest [Hz]", *PHASES, *(f"imbalance, {p}" for p in PHASES)],
-            _residual_rows(result),
-        ),
-        write_table(output, "device", ["error", "mean", "formal sd"], _device_rows(result)),
+def _tables(result: Result) -> list[CsvTable]:
+    moments = ["model", "throw", "moment", "stated [kg m2]", "found [kg m2]", "formal sd [kg m2]"]
+    bodies = [
+        *("body", "throws", "torque sd [N m]", "rms / sd of the torque", "force sd [m/s2]"),
+        *(f"noise in flight / at rest, {axis}" for axis in AXES),
+        *("wheel [Hz]", "loudest order", "throws with it", "axis", "amplitude [m/s2]", "beside it [m/s2]", "force [N]"),
     ]
-    if result.studies:
-        header = ["diagnosis", "body", "probability", "log evidence", "causes"]
-        files.append(write_table(output, "causes", header, _cause_rows(result)))
-    return files
+    left = ["body", "channel", "rms", "rms at rest", "loudest [Hz]", *PHASES, *(f"imbalance, {p}" for p in PHASES)]
+    device = [(name, _digits(mean), _digits(sd)) for name, (mean, sd) in result.extended.calibration.items()]
+    tables = [
+        CsvTable("moments", moments, _moment_rows(result)),
+        CsvTable("bodies", bodies, _body_rows(result)),
+        CsvTable("residuals", left, _residual_rows(result)),
+        CsvTable("device", ["error", "mean", "formal sd"], device),
+    ]
+    causes = ["diagnosis", "body", "probability", "log evidence", "causes"]
+    return [*tables, *([CsvTable("causes", causes, _cause_rows(result))] if result.studies else [])]
 
 
 def _moment_rows(result: Result) -> Iterator[Row]:
@@ -245,11 +269,6 @@ def _residual_rows(result: Result) -> Iterator[Row]:
             yield name, channel, *map(_digits, numbers)
 
 
-def _device_rows(result: Result) -> Iterator[Row]:
-    for name, (mean, sd) in result.extended.calibration.items():
-        yield name, _digits(mean), _digits(sd)
-
-
 def _cause_rows(result: Result) -> Iterator[Row]:
     found = [("as recorded", study.body, study.diagnosis) for study in result.studies]
     found += [("wheel dropped", body, diagnosis) for body, diagnosis in result.wheels.items()]
@@ -263,31 +282,7 @@ def _digits(value: float | np.floating) -> str:
     return f"{float(value):.6g}"
 
 
-def write_report(result: Result, output: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, and beside it its summary and its further tables."""
-    document = Document("Thrown bodies", "Real measurements of a small free-flying device with one reaction wheel")
-    summary = _summary(result)
-    add_first_page(
-        document,
-        summary,
-        throws_figure(result.plain, result.extended),
-        "Errors of the principal moments in single throws, with formal standard deviations: a rigid body with its "
-        "wheel and nothing else (left), and with what the device and the air add (right). The grey band is the "
-        "uncertainty of the stated moments.",
-    )
-    add_setup(document, _setup(result))
-    document.section("What failed, and what cannot be told")
-    document.items(_failures(result))
-    _bodies(document, result)
-    _diagnosis(document, result)
-    _left_over(document, result)
-    files = write_tables(output, result)
-    document.paragraph(f"Beside this report, in SI units: {', '.join(files)}.")
-    credit = "Data: Blaha, Kuijper, Pop and Smeur, arXiv:2503.13137; no measurement is reproduced here."
-    write_study(document, summary, output, None if origin is None else f"{origin}. {credit}")
-
-
-def _summary(result: Result) -> Summary:
+def _report(result: Result) -> Report[Result]:
     count, total = held_in_all(result)
     errors = " and ".join(
         f"{body.mean_error:.2f} % ({body.name}, stated to {_uncertain(body)} %; rigid body: "
@@ -296,15 +291,28 @@ def _summary(result: Result) -> Summary:
     )
     named = sum(bool(study.diagnosis.verdict.causes) for study in result.studies)
     said = f", and a cause is named on {named} of {len(result.studies)} bodies" if result.studies else ""
-    return Summary(
+    return Report(
+        title="Thrown bodies",
+        subtitle="Real measurements of a small free-flying device with one reaction wheel",
         question="How well does half a second of real flight tell the principal moments of inertia, do the intervals "
         "hold, and does the diagnosis say what a rigid body with its wheel lacks?",
-        answer=f"Principal moments of single throws differ from the stated moments, which are uncertain themselves, by "
+        answer="Principal moments of single throws differ from the stated moments, which are uncertain themselves, by "
         f"{errors} in the mean, {count} of {total} of their 95 % intervals hold the stated moments{said}.",
-        goals=tuple(goals_of(result)),
+        goals=goals_of(result),
         valid="the wheel's momentum is recorded and one throw series on a box of known inertia gives its scale. Four "
         "choices were made while looking at these throws, so that this is no blind test.",
         full=bool(result.studies and result.wheels),
+        figure=Picture(
+            throws_figure(result.plain, result.extended),
+            "Errors of the principal moments in single throws, with formal standard deviations: a rigid body with its "
+            "wheel and nothing else (left), and with what the device and the air add (right). The grey band is the "
+            "uncertainty of the stated moments.",
+        ),
+        setup=_setup(result),
+        sections=[_failures, _bodies, _diagnosis, _left_over],
+        tables=_tables(result),
+        beside="Beside this report, in SI units: {all}.",
+        credit="Data: Blaha, Kuijper, Pop and Smeur, arXiv:2503.13137; no measurement is reproduced here.",
     )
 
 
@@ -324,8 +332,8 @@ def _setup(result: Result) -> Setup:
         manoeuvre="Thrown by hand and caught; the wheel spins up and down in flight. There is no rule of speed.",
         sensors=f"Gyro, accelerometer and wheel speed, raw at 4 kHz. Samples every {1e3 * INTERVAL:g} ms are local "
         "parabolas with Gaussian weights, whose neighbours are uncorrelated; their noise is measured on quiet "
-        "stretches, by body and axis. Samples next to the largest accelerations of the wheel (12000 rad/s² within "
-        "4 ms) and the last 20 ms are left out.",
+        "stretches, by body and axis. Samples next to the largest accelerations of the wheel (12000 rad/s² within 4 "
+        "ms) and the last 20 ms are left out.",
         known=f"Mass, and the stated moments, which are taken as uncertain by {100 * PLATE_SD:.0f} % for the plate "
         f"(CAD) and by {100 * BLOCK_SD:.1f} % for what blocks add (our numbers). Inertias are relative to the wheel's, "
         "which the box gives; the device is taken off with the parallel-axis theorem.",
@@ -338,7 +346,8 @@ def _setup(result: Result) -> Setup:
     )
 
 
-def _failures(result: Result) -> list[str]:
+def _failures(document: Document, result: Result) -> None:
+    document.section("What failed, and what cannot be told")
     plain = result.plain.bodies.values()
     both, total = held_in_all(result, with_truth=True)
     factors = [factor.max() for factor in result.extended.noise.values()]
@@ -367,15 +376,14 @@ def _failures(result: Result) -> list[str]:
         "the first two are constants of the reader.",
         "Every throw of a body shares the error of its stated geometry and of the wheel's inertia. Intervals that "
         f"count both hold {both} of {total}.",
-        "In flight the samples vary about the smooth model by up to "
-        f"{format_fixed(min(factors), 1)} to {format_fixed(max(factors), 1)} times as much as quiet stretches do, by "
-        "body.",
+        f"In flight the samples vary about the smooth model by up to {format_fixed(min(factors), 1)} to "
+        f"{format_fixed(max(factors), 1)} times as much as quiet stretches do, by body.",
         "The gyro's scale cannot be told from the wheel's inertia; a shift of the wheel's place is not a candidate.",
     ]
     for body, widths in result.extended.widths.items():
         if widths["smooth-torque"].doubtful:
             texts.append(f"{body}: the unexplained torque is {widths['smooth-torque'].ratio:.2f} times its prior sd.")
-    return texts
+    document.items(texts)
 
 
 def _bodies(document: Document, result: Result) -> None:
@@ -438,11 +446,10 @@ def _diagnosis(document: Document, result: Result) -> None:
         held = sum(found.held for found in result.wheels.values())
         chi2 = [found.gain.before.chi2_per_sample for found in result.wheels.values()]
         document.paragraph(
-            "Without the recorded wheel a rigid body leaves chi-square per sample of "
-            f"{format_number(min(chi2), 2)} to {format_number(max(chi2), 2)}, and its fit diverges; on {held} of "
-            f"{len(result.wheels)} bodies the body is held at its prior and causes are weighed along the motion that "
-            f"the data show. This took {minutes} minutes. The verdict is unknown wherever the named causes leave more "
-            "than noise."
+            f"Without the recorded wheel a rigid body leaves chi-square per sample of {format_number(min(chi2), 2)} to "
+            f"{format_number(max(chi2), 2)}, and its fit diverges; on {held} of {len(result.wheels)} bodies the body "
+            f"is held at its prior and causes are weighed along the motion that the data show. This took {minutes} "
+            "minutes. The verdict is unknown wherever the named causes leave more than noise."
         )
 
 
@@ -467,3 +474,73 @@ def _left_over(document: Document, result: Result) -> None:
         "wheel's frequency where it idles. Right: amplitude of the raw accelerometer at multiples of the recorded "
         "wheel's frequency while it coasts at speed; the line is the loudest.",
     )
+
+
+@styled
+def throws_figure(plain: Analysis, extended: Analysis) -> Figure:
+    """Draw the errors of single throws, a row per body, a column per model."""
+    figure = wide_figure(1.6 * len(extended.bodies))
+    panels = figure.subplots(len(extended.bodies), 2, sharey="row", squeeze=False)
+    for row, body in zip(panels, extended.bodies, strict=True):
+        for axes, analysis in zip(row, (plain, extended), strict=True):
+            result = analysis.bodies[body]
+            band = float(100.0 * (result.truth_sd / result.truth).max())
+            axes.axhspan(-band, band, color="#eeeeee")
+            axes.axhline(0.0, color="#888888", linewidth=0.8)
+            places = np.arange(len(result.throws))
+            for index, name in enumerate(("smallest", "middle", "largest")):
+                sd = 100.0 * result.formal[:, index] / result.truth[index]
+                place = places + 0.2 * (index - 1)
+                axes.errorbar(
+                    place, result.errors[:, index], sd, fmt="os^"[index], markersize=3, linewidth=1, label=name
+                )
+            axes.set_xticks(places, [name[-3:] for name in result.throws])
+            axes.set_title(f"{body}, {analysis.label} model")
+        row[0].set_ylabel("error [%]")
+    for axes in panels[-1]:
+        axes.set_xlabel("number of the throw")
+    handles, labels = panels[0][1].get_legend_handles_labels()
+    figure.legend(handles, [f"{label} moment" for label in labels], loc="outside upper center", ncols=3)
+    return figure
+
+
+@styled
+def left_over_figure(left: Mapping[str, LeftOver]) -> Figure:
+    """Draw the spectrum of what is left on the accelerometer, and the raw accelerometer against the wheel's orders."""
+    figure = wide_figure(0.6 + 0.72 * len(left))
+    panels = figure.subplots(len(left), 2, sharex="col", squeeze=False)
+    for row, (body, own) in zip(panels, left.items(), strict=True):
+        spectrum = np.array([own.spectrum[:, c] for c in range(3, 6)])
+        for edge in (own.wheel[0], own.wheel[2]):
+            row[0].axvspan(edge - 2.0, edge + 2.0, color="#eeeeee")
+        for c in range(3, 6):
+            row[0].plot(own.frequencies[1:], 1e3 * spectrum[c - 3, 1:], linewidth=1, label=CHANNELS[c][-1])
+            row[1].semilogy(
+                ORDERS, np.sqrt((own.orders[:, :, c] ** 2).mean(axis=0)), linewidth=1, label=CHANNELS[c][-1]
+            )
+        row[1].axvline(own.turn[0], color="#888888", linewidth=0.8)
+        row[0].set_title(body, loc="left")
+        row[0].set_ylabel("[mm/s²]")
+        row[1].set_ylabel("[m/s²]")
+    panels[0][0].set_title("residual of samples")
+    panels[0][1].set_title("raw readings, wheel at speed")
+    panels[-1][0].set_xlabel("frequency [Hz]")
+    panels[-1][1].set_xlabel("frequency / that of the recorded wheel")
+    handles, labels = panels[0][1].get_legend_handles_labels()
+    figure.legend(handles, [f"accelerometer {label}" for label in labels], loc="outside upper center", ncols=3)
+    return figure
+
+
+STUDY = Study(
+    "throws",
+    "Identify and diagnose thrown rigid bodies from real measurements.",
+    run=run,
+    report=_report,
+    full="all throws, and the diagnosis of every body",
+    seed=1,
+    extra={
+        "--data": {"type": Path, "help": "folder of the measurements"},
+        "--reverse": {"action": "store_true", "help": "drop the recorded wheel from a throw of every body and seek it"},
+    },
+    inputs=lambda options: [(options.data or DEFAULT_FOLDER) / name for name in ("truth.json", "index.csv")],
+)
