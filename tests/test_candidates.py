@@ -11,8 +11,8 @@ import pytest
 from bayesid._io.errors import InputError
 from bayesid.diagnosis import Diagnosis, candidates, diagnose
 from bayesid.inference.posterior import Posterior
-from bayesid.report.sentences.next_experiment import advice
-from bayesid.report.tables.diagnosis_tables import candidate_rows
+from bayesid.report.diagnosis.appendix import candidate_rows
+from bayesid.report.diagnosis.diagnosis_sentences import advice
 from bayesid.simulation.effects import (
     Effect,
     FlexibleAppendage,

@@ -23,7 +23,7 @@ from bayesid.inference.posterior_file import write_draws
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.report import loop_report
-from bayesid.report.sentences.loop_sentences import (
+from bayesid.report.loop_report import (
     ending_sentence,
     goal_words,
     loop_sentences,

@@ -16,7 +16,7 @@ from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
-from bayesid.report.sentences.next_steps import action_sentence
+from bayesid.report.diagnosis.diagnosis_sentences import action_sentence
 from bayesid.robot.composite_tables import composite_rows
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.joint_state import JointState

@@ -22,8 +22,10 @@ from bayesid.recording.joint_motion import Excitation, sample_joints
 from bayesid.recording.recording import Recording
 from bayesid.report import Document, figures, format_quantity, identification_report
 from bayesid.report.document import literal
+from bayesid.report.figures.posterior_figures import widths
 from bayesid.report.figures.robot_figures import equivalent_box
-from bayesid.report.figures.uncertainty_figures import widths
+from bayesid.report.identification_report import agreement_sentences, misfit_rows, parameter_rows, start_rows, verdict
+from bayesid.report.model_assumptions import joint_rows, model_sentences
 from bayesid.report.numbers import (
     format_fixed,
     format_number,
@@ -34,9 +36,6 @@ from bayesid.report.numbers import (
     format_unit,
     format_vector,
 )
-from bayesid.report.sentences.identification_sentences import agreement_sentences, verdict
-from bayesid.report.sentences.model_assumptions import model_sentences
-from bayesid.report.tables import identification_tables
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import GravityGradient, SensorBias
@@ -344,16 +343,16 @@ def test_the_report_tables_every_parameter_with_its_uncertainty(result, printed)
     body = result.bodies["base_link"]
     for index, (key, unit) in enumerate(BODY_QUANTITIES.items()):
         mean, sd = body.mean[index], body.sd[index]
-        row = identification_tables.parameter_rows(result)[index]
+        row = parameter_rows(result)[index]
         assert row[:2] == [f"base_link.{key}", format_unit(unit)]
         assert row[3] == format_quantity(mean, sd)
         assert printed.row(*row)
-    rows = identification_tables.misfit_rows(result.posterior, sensor_fits(result.posterior, result.optimum.z))
+    rows = misfit_rows(result.posterior, sensor_fits(result.posterior, result.optimum.z))
     assert [row[:3] for row in rows] == [["planar", "rate", "243"], ["planar", "accel", "243"]]
     assert sum(float(row[3].split()[0]) * int(row[2]) for row in rows) == pytest.approx(
         result.optimum.chi2, abs=0.0011 * 243
     )
-    for row in (*rows, *identification_tables.start_rows(result), *identification_tables.joint_rows(result.posterior)):
+    for row in (*rows, *start_rows(result), *joint_rows(result.posterior)):
         assert printed.row(*row)
 
 

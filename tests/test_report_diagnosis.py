@@ -37,22 +37,19 @@ from bayesid.inference.residual_view import ResidualView
 from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.recording import Recording
 from bayesid.report import diagnosis_report, figures
-from bayesid.report.cause_marks import cause_marks
-from bayesid.report.diagnosis_pages.decision_page import decision_entries
-from bayesid.report.figures.cause_picture import moved_axis
+from bayesid.report.diagnosis import diagnosis_sentences as sentences
+from bayesid.report.diagnosis.appendix import GLOSSARY, bound_rows, candidate_rows, sensitivity_rows
+from bayesid.report.diagnosis.cause_words import amplitude_text, size_text, vector_text
+from bayesid.report.diagnosis.causes_page import cause_rows, set_rows
+from bayesid.report.diagnosis.consequences_page import change_rows, correlation_rows, error_rows, most_moved
+from bayesid.report.diagnosis.decision_page import conditions_text, decision_entries, probability_rows
+from bayesid.report.diagnosis.diagnosis_sentences import ANYTHING, action_sentence, advice, advice_sentences
+from bayesid.report.diagnosis.evidence_page import gain_rows
+from bayesid.report.diagnosis.limits_page import computation_sentence, method_sentences, pair_rows, unseen_rows
+from bayesid.report.figures.diagnosis_figures import cause_marks, moved_axis
 from bayesid.report.figures.residual_figures import NOISE_BAND
+from bayesid.report.model_assumptions import joint_rows, model_sentences
 from bayesid.report.numbers import format_number, format_probability, format_quantity, format_text
-from bayesid.report.sentences import diagnosis_sentences as sentences
-from bayesid.report.sentences.amplitude_words import amplitude_text
-from bayesid.report.sentences.conditions import conditions_text
-from bayesid.report.sentences.diagnosis_method import GLOSSARY, computation_sentence, method_sentences
-from bayesid.report.sentences.model_assumptions import model_sentences
-from bayesid.report.sentences.next_experiment import ANYTHING, advice
-from bayesid.report.sentences.next_steps import action_sentence, advice_sentences
-from bayesid.report.sentences.size_words import size_text, vector_text
-from bayesid.report.tables import change_tables, probability_tables
-from bayesid.report.tables import diagnosis_tables as tables
-from bayesid.report.tables.identification_tables import joint_rows
 from bayesid.robot.kinematics import kinematics
 from bayesid.simulation.effects import known_effects
 from bayesid.simulation.effects.effect_parameters import Quantity
@@ -203,7 +200,7 @@ def test_an_alternative_holds_what_accompanies_it_and_a_cause_its_equivalents(bi
     assert result.probability_of(("accel-bias", "rate-bias")) == pytest.approx(pair)
     either = pair + p["accel-bias",] + p["thruster-leak",]
     assert result.cause_probability("thruster-leak") == pytest.approx(either)
-    assert probability_tables.probability_rows(result, 1) == [
+    assert probability_rows(result, 1) == [
         ["accel-bias or thruster-leak", format_probability(either)],
         ["something unknown", "< 0.001"],
         ["nothing", format_probability(p[()])],
@@ -292,7 +289,7 @@ def test_the_cone_and_the_interval_of_a_vector_hold_95_percent():
 
 
 def test_a_candidate_that_is_not_seen_has_a_limit():
-    seen, faint, noise = tables.candidate_rows(
+    seen, faint, noise = candidate_rows(
         [
             candidate(),
             candidate(p_value_adjusted=0.4, probability=0.01, log_bayes_factor=-2.0),
@@ -319,7 +316,7 @@ def test_candidates_out_of_reach_are_those_of_low_power(biased):
     rows = [candidate(power=0.9), candidate(name="b", power=0.3), candidate(name="c", power=0.1), candidate(power=None)]
     unseen = replace(biased, candidates=rows).unseen_candidates
     assert [row.name for row in unseen] == ["c", "b"]
-    assert tables.unseen_rows(unseen[:1]) == [["c", "0.10", "x < 1.2 × 10⁻⁵, y < 2 × 10⁻⁶, z < 2 × 10⁻⁶ m/s²"]]
+    assert unseen_rows(unseen[:1]) == [["c", "0.10", "x < 1.2 × 10⁻⁵, y < 2 × 10⁻⁶, z < 2 × 10⁻⁶ m/s²"]]
 
 
 SHIPPED = sorted(name for name, effect in known_effects().items() if effect.__module__.startswith("bayesid."))
@@ -379,7 +376,7 @@ def test_a_cause_imitates_itself_and_others_less(biased):
 
 def test_equivalents_stand_first_among_the_pairs(biased):
     result = replace(biased, classes=(("accel-bias", "wheel-momentum"),))
-    first, second, *_ = probability_tables.pair_rows(result.inseparable_pairs[:20])
+    first, second, *_ = pair_rows(result.inseparable_pairs[:20])
     assert [first[1], first[4], second[4]] == ["wheel-momentum", "equivalent", ""]
 
 
@@ -391,7 +388,7 @@ def test_the_disturbance_moves_with_what_drives_it(biased, disturbance):
     sizes = [abs(item.correlation) for item in correlations]
     assert sizes == sorted(sizes, reverse=True)
     assert {item.component for item in correlations} == {"torque x"}  # the others are zero
-    assert tables.correlation_rows(correlations)[0] == ["torque x", name, "+1.00"]
+    assert correlation_rows(correlations)[0] == ["torque x", name, "+1.00"]
 
 
 def test_the_spectrum_of_a_wave_is_its_amplitude():
@@ -498,7 +495,7 @@ def test_a_force_that_nothing_sees_is_not_drawn(disturbance):
 
 def test_the_table_of_the_gain_compares_before_and_after(biased):
     before, after = biased.gain.before, biased.gain.after
-    rows = {row[0]: row[1:] for row in tables.gain_rows(biased)}
+    rows = {row[0]: row[1:] for row in gain_rows(biased)}
     assert list(rows) == [
         "chi-square per sample",
         "share of residuals within 1 σ",
@@ -523,7 +520,7 @@ def test_held_out_scores_are_tabled_by_recording(biased):
         after=replace(biased.gain.after, held_out=np.array([56.78])),
     )
     result = replace(biased, gain=gain)
-    assert tables.gain_rows(result)[-2:] == [
+    assert gain_rows(result)[-2:] == [
         [f"held-out log score of {names[0]}", "−12.3", "56.8", "higher is better"],
         ["held-out log score, sum", "−12.3", "56.8", "higher is better"],
     ]
@@ -541,18 +538,18 @@ def test_the_parameters_are_those_given_and_of_both_fits(biased):
     # the logarithm of the mass is normal with twice the spread
     spread = biased.before.fit.posterior.model.bodies[0].spread
     assert changes[0].prior_sd == pytest.approx(given.mass * np.sinh(2.0 * spread), rel=0.1)
-    rows = change_tables.change_rows(changes)
+    rows = change_rows(changes)
     for k, (row, item) in enumerate(zip(rows, changes, strict=True)):
         assert row[2:4] == [format_number(item.given, 4), format_number(item.prior_sd, 2)]
         assert row[4] == format_quantity(before.mean[k], before.sd[k])
         assert row[5] == format_quantity(after.mean[k], after.sd[k])
         assert float(row[6].replace("−", "-")) == pytest.approx(biased.gain.shift[k], abs=0.051)
-    assert [row[:5] for row in rows] == change_tables.change_rows(changes, named=False)
+    assert [row[:5] for row in rows] == change_rows(changes, named=False)
 
 
 def test_those_that_move_most_stand_in_their_usual_order(biased):
     changes = biased.parameter_changes
-    moved = change_tables.most_moved(changes, 3)
+    moved = most_moved(changes, 3)
     assert moved == [item for item in changes if item in moved]
     least = min(abs(item.shift) for item in moved)
     assert all(abs(item.shift) <= least for item in changes if item not in moved)
@@ -566,7 +563,7 @@ def test_the_errors_are_in_the_units_of_the_sensors(biased):
         rms = [biased.gain.before.rms[f"{item.kind.value}.{axis}"] for axis in "xyz"]
         assert item.before == pytest.approx(SIGMA * np.linalg.norm(rms))
     assert accel.before > 1.5 * accel.after
-    assert change_tables.error_rows([accel])[0][:2] == ["accel", "m/s²"]
+    assert error_rows([accel])[0][:2] == ["accel", "m/s²"]
 
 
 def test_the_strongest_recording_is_the_one_that_gains_most(biased):
@@ -579,7 +576,7 @@ def test_the_strongest_recording_is_the_one_that_gains_most(biased):
 
 
 def test_the_table_of_causes_has_value_distance_and_bound(biased):
-    rows = tables.cause_rows(biased)
+    rows = cause_rows(biased)
     amplitudes = amplitudes_of(biased.after, "accel-bias")
     assert [row[0] for row in rows] == [f"accel-bias.{axis}" for axis in "xyz"]
     for row, item in zip(rows, amplitudes, strict=True):
@@ -595,7 +592,7 @@ def test_the_most_probable_sets_have_sizes_beside_their_bounds(biased):
     (bound,) = biased.bounds["accel-bias"]
     assert (size.unit, size.largest) == ("m/s2", bound.largest)
     assert size.share == pytest.approx(size.size / bound.largest)
-    rows = probability_tables.set_rows(biased, 4)
+    rows = set_rows(biased, 4)
     assert rows[0][:3] == ["accel-bias", format_probability(best.probability), f"{best.log_evidence:+.1f}"]
     assert rows[0][4] == "0.049 m/s²"
     firsts = [row for row in rows if row[1]]
@@ -617,7 +614,7 @@ def test_a_size_beyond_its_bound_is_called_so_and_nothing_has_none(biased):
     states = (replace(state, point=replace(state.point, evidence=evidence)),)
     result = weighed(biased, (("accel-bias",), None, 9.0))
     result = replace(result, bounds=small, weighed=replace(result.weighed, states=states))
-    named, nothing = probability_tables.set_rows(result, 2)
+    named, nothing = set_rows(result, 2)
     assert named[4] == "10⁻⁶ m/s²" or named[4] == "1 × 10⁻⁶ m/s²"
     assert named[5].endswith(", beyond it")
     assert nothing == ["nothing", nothing[1], "0", "", "", ""]
@@ -627,7 +624,7 @@ def test_the_sensitivity_says_under_which_choices_the_verdict_is_another(biased)
     first = next(iter(biased.sensitivity.others))
     other = ProbableVerdict(Status.AMBIGUOUS, ("accel-bias",), {}, ((),))
     changed = replace(biased.sensitivity, others={**biased.sensitivity.others, first: other})
-    rows = {row[0]: row[1:] for row in probability_tables.sensitivity_rows(replace(biased, sensitivity=changed))}
+    rows = {row[0]: row[1:] for row in sensitivity_rows(replace(biased, sensitivity=changed))}
     assert rows["as chosen"] == ["explained: accel-bias", ""]
     assert rows.pop(first) == ["ambiguous: accel-bias or nothing", "yes"]
     del rows["as chosen"]
@@ -636,7 +633,7 @@ def test_the_sensitivity_says_under_which_choices_the_verdict_is_another(biased)
 
 
 def test_the_bounds_have_their_reasons(biased):
-    rows = probability_tables.bound_rows(dict(biased.bounds))
+    rows = bound_rows(dict(biased.bounds))
     assert ["accel-bias", "0.049 m/s²", biased.bounds["accel-bias"][0].reason] in rows
     assert len(rows) == sum(map(len, biased.bounds.values()))
     assert [row[0] for row in rows if row[0]] == sorted(HIDDEN)
@@ -737,7 +734,7 @@ RECORD, ADVICE, ORIGIN = "Right in 97 of 100 cases.", "Fly next.csv, 60 s.", "st
 @pytest.fixture(scope="module")
 def printed(biased, clean, disturbance, readings, tmp_path_factory):
     """Return a function that prints the report of a verdict, once, and reads it."""
-    limits, appendix = (import_module(f"bayesid.report.diagnosis_pages.{name}") for name in ("limits_page", "appendix"))
+    limits, appendix = (import_module(f"bayesid.report.diagnosis.{name}") for name in ("limits_page", "appendix"))
     file = tmp_path_factory.mktemp("printed") / "report.pdf"
 
     @cache
@@ -804,22 +801,22 @@ def test_the_report_of_every_verdict_holds_its_sentences_and_tables(printed, sta
         *(meaning for _, meaning in GLOSSARY),
     ):
         assert sentence in text
-    for row in change_tables.error_rows(result.simulation_errors, named):
+    for row in error_rows(result.simulation_errors, named):
         assert text.row(*row)
-    for row in tables.gain_rows(result):
+    for row in gain_rows(result):
         assert text.row(*row) if named else text.row(row[0], row[1], row[3])
-    for row in change_tables.change_rows(result.parameter_changes, named):
+    for row in change_rows(result.parameter_changes, named):
         assert text.row(*row)
-    for row in tables.candidate_rows(result.candidates, 0.01):
+    for row in candidate_rows(result.candidates, 0.01):
         assert text.row(*row)
-    for row in tables.cause_rows(result) if named else ():
+    for row in cause_rows(result) if named else ():
         assert text.row(*row)
     for rows in (
-        probability_tables.set_rows(result, 6),
-        probability_tables.sensitivity_rows(result),
-        probability_tables.bound_rows(dict(result.bounds)),
-        probability_tables.pair_rows(result.inseparable_pairs[:10]),
-        tables.unseen_rows(result.unseen_candidates),
+        set_rows(result, 6),
+        sensitivity_rows(result),
+        bound_rows(dict(result.bounds)),
+        pair_rows(result.inseparable_pairs[:10]),
+        unseen_rows(result.unseen_candidates),
         joint_rows(result.posterior),
     ):
         for row in rows:
@@ -835,7 +832,7 @@ def test_the_decision_stands_on_the_first_page(printed, status):
     entries = decision_entries(result, result.parameter_changes, result.simulation_errors, RECORD)
     for name, said in entries:
         assert f"{name}{said}" in first
-    for row in probability_tables.probability_rows(result, 4):
+    for row in probability_rows(result, 4):
         assert first.row(*row)
     assert ORIGIN in first
     assert "1 Evidence" not in first
@@ -861,14 +858,14 @@ def test_an_unknown_cause_is_shown_as_a_torque_with_its_correlations(printed):
     assert "signal-to-noise ratio of 12.0. It keeps its direction in base axes: its source is on board." in text
     for frame in ("base", "orbit (zenith, along-track, normal)", "inertial"):
         assert f"Reconstructed torque and force, {frame} axes." in text
-    for row in tables.correlation_rows(torque_correlations(result.unexplained, result.before)):
+    for row in correlation_rows(torque_correlations(result.unexplained, result.before)):
         assert text.row(*row)
     assert "Repeat a manoeuvre unchanged but later" in text
 
 
 def test_the_identification_follows_the_diagnosis(biased, tmp_path, monkeypatch):
     added = []
-    module = import_module("bayesid.report.diagnosis_report")
+    module = import_module("bayesid.report.diagnosis.diagnosis_report")
     monkeypatch.setattr(module, "add_identification", lambda _, result, said: added.append(result))
     sampled = SimpleNamespace()
     diagnosis_report(biased, sampled, "Study", tmp_path / "report.pdf")

@@ -49,7 +49,7 @@ def run(
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
     from bayesid.design import THOROUGH, Search, Store, best_design, design
     from bayesid.report import design_report
-    from bayesid.report.sentences.design_sentences import design_sentences
+    from bayesid.report.design_report import design_sentences
 
     if separate is not None:
         study = separating(study, separate)

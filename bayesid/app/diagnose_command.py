@@ -107,8 +107,8 @@ def _written(
     from bayesid.diagnosis import diagnose, identify_extended
     from bayesid.inference.posterior_file import write_netcdf
     from bayesid.report import diagnosis_report
-    from bayesid.report.sentences.design_sentences import separation_sentence
-    from bayesid.report.sentences.diagnosis_sentences import diagnosis_sentences
+    from bayesid.report.design_report import separation_sentence
+    from bayesid.report.diagnosis.diagnosis_sentences import diagnosis_sentences
     from bayesid.report.verdict_record import record_sentence
 
     knows = all(section.argument_of_latitude is not None for section in study.recordings)

@@ -36,7 +36,7 @@ def run(
     from bayesid.identifiability import base_parameters
     from bayesid.identifiability.practical_identifiability import practical
     from bayesid.report import identifiability_report
-    from bayesid.report.sentences.identifiability_sentences import (
+    from bayesid.report.identifiability_report import (
         advice_sentences,
         practical_sentences,
         structure_sentence,

@@ -59,7 +59,7 @@ def run(
     from bayesid.app.wanted import goals_of
     from bayesid.design import Loop, Sampled
     from bayesid.report import loop_report
-    from bayesid.report.sentences.loop_sentences import loop_sentences
+    from bayesid.report.loop_report import loop_sentences
 
     problem = load_loop_problem(study)
     model, tip_frame = problem.plan.model, None if study.design is None else study.design.tip_frame

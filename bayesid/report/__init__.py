@@ -2,7 +2,7 @@
 
 from bayesid.report.check_report import check_report
 from bayesid.report.design_report import design_report
-from bayesid.report.diagnosis_report import diagnosis_report
+from bayesid.report.diagnosis.diagnosis_report import diagnosis_report
 from bayesid.report.document import Document
 from bayesid.report.identifiability_report import identifiability_report
 from bayesid.report.identification_report import identification_report

@@ -1,19 +1,21 @@
-"""The report of designed manoeuvres."""
+"""The report of designed manoeuvres, and its sentences for the terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from bayesid.design import Design
+from bayesid._io.words import counted, joined, ordinal
+from bayesid.design import Design, Separation, expected_probability, noncentrality_for
+from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report import figures
-from bayesid.report.document import Document
-from bayesid.report.sentences.design_sentences import MEANING, assumption_sentences, reference_design, summary
-from bayesid.report.tables import design_tables as tables
+from bayesid.report.document import Document, Rows
+from bayesid.report.model_assumptions import planning_sentences
+from bayesid.report.numbers import format_fixed, format_number, format_percent, format_range, format_unit
 
-__all__ = ["design_report"]
+__all__ = ["design_report", "design_sentences", "separation_sentence"]
 
 POSES = 5
 """Number of instants at which the robot is drawn."""
@@ -27,6 +29,30 @@ PAIRS = (
     ("inertia.xy", "inertia.xz"),
 )
 """Pairs of a body's quantities whose ellipses are drawn."""
+
+SURE = 0.95
+"""Probability of the right one of two rivals at which they count as told apart."""
+
+REFERENCE = "paper-26"
+"""Name of the design that the others are compared with."""
+
+MEANING: Mapping[str, str] = {
+    "paper-26": "The paper's (26) as printed, of the largest excursions y1, y2, y3 of the base's position and of its "
+    "attitude. The signed differences cancel most of it: of each triple −y1² + y2² + 3 y3² remains to be maximised, "
+    "which rewards the third state, penalises the first and says nothing of balance. Metres are added to radians.",
+    "paper-26-intended": "What (26) appears to intend: the squares of the excursions less the sizes of their "
+    "differences, so that an uneven motion counts against itself whatever the sign.",
+    "condition-number": "The smallest condition number of the regressor of the base's force balance, columns per unit "
+    "of the prior's width, torques over the radius of gyration.",
+    "d-optimal": "The smallest volume of the posterior: the determinant of its covariance.",
+    "a-optimal": "The smallest mean variance of the log-Cholesky coordinates of the bodies.",
+    "e-optimal": "The smallest standard deviation along the direction that is known worst.",
+    "information-gain": "The largest expected gain of information on the bodies, averaged over draws of their prior "
+    "instead of taken at its centre.",
+    "separation": "The largest expected log Bayes factor between the rival effects, each in the direction of its "
+    "amplitudes that shows least, with everything else unknown. Directions that no manoeuvre shows are left out.",
+}
+"""Meaning of each criterion, by its name."""
 
 
 def design_report(designs: Sequence[Design], best: Design, title: str, file: Path, *, origin: str = "") -> None:
@@ -64,7 +90,7 @@ def _add_result(document: Document, designs: Sequence[Design], best: Design) -> 
     document.paragraph(summary(designs, best))
     document.table(
         ["manoeuvre", "log-determinant", f"sd relative to {reference.name}", "worst direction", "evaluations", "go"],
-        tables.design_rows(designs),
+        design_rows(designs),
         "Manoeuvres, named after the criterion each was designed by. Logarithm of the determinant of the predicted "
         "posterior covariance of all parameters in SI units; geometric mean of their standard deviations (sd) relative "
         f"to {reference.name}; sd of the log-Cholesky coordinates along the worst direction (relative: a mass is known "
@@ -73,7 +99,7 @@ def _add_result(document: Document, designs: Sequence[Design], best: Design) -> 
     )
     document.table(
         ["quantity", "unit", "prior centre", *(design.name for design in designs)],
-        tables.sd_rows(designs),
+        sd_rows(designs),
         "Predicted posterior standard deviation of every parameter, in the unit of its row, by manoeuvre.",
         ["left", "left", *["right"] * (1 + len(designs))],
     )
@@ -83,13 +109,13 @@ def _add_limits(document: Document, designs: Sequence[Design], best: Design) -> 
     document.section("Limits")
     document.table(
         ["quantity", "unit", "limit", "largest", "used", "state"],
-        tables.limit_rows(best),
+        limit_rows(best),
         f"Limits of {best.name} and the largest value along it, at the prior's centre. A joint's range is counted from "
         "its middle; rest is the joints' speed at both ends; the value of a quiet band is the share of the power of "
         "the base's motion within it.",
         ["left", "left", "right", "right", "right", "left"],
     )
-    if rows := tables.risk_rows(designs):
+    if rows := risk_rows(designs):
         document.table(
             ["manoeuvre", "quantity", "unit", "limit", "99 % below", "go"],
             rows,
@@ -130,7 +156,181 @@ def _add_uncertainty(document: Document, designs: Sequence[Design]) -> None:
     for body in designs[0].problem.plan.model.bodies:
         pairs = [(f"{body.name}.{first}", f"{body.name}.{second}") for first, second in PAIRS]
         document.figure(
-            figures.covariance_ellipses(designs, pairs, tables.parameter_units(designs[0])),
+            figures.covariance_ellipses(designs, pairs, parameter_units(designs[0])),
             f"Predicted 95 % ellipses of pairs of parameters of {body.name}, about the prior's centre. A much wider "
             "ellipse may extend beyond its panel.",
         )
+
+
+def reference_design(designs: Sequence[Design]) -> Design:
+    """Return the design that the others are compared with: the one by (26), or the first where there is none."""
+    return next((design for design in designs if design.name == REFERENCE), designs[0])
+
+
+def summary(designs: Sequence[Design], best: Design) -> str:
+    """Return which manoeuvre is best and by how much it narrows the posterior."""
+    reference, family = reference_design(designs), best.problem.plan.family
+    names = joined(body.name for body in best.problem.plan.model.bodies)
+    text = (
+        f"{counted(len(designs), 'manoeuvre')} of {family.duration:g} s for the robot "
+        f"{best.problem.plan.model.robot.name}, of the family {family.name} with {family.size} parameters, "
+        f"{'was' if len(designs) == 1 else 'were'} designed to identify {names}. "
+        f"The smallest posterior is that of {best.name}"
+    )
+    if best is reference:
+        return f"{text}. {_verdict(best)}"
+    ratio = best.predicted.geometric_mean / reference.predicted.geometric_mean
+    worst = best.predicted.worst / reference.predicted.worst
+    return (
+        f"{text}: in the geometric mean its standard deviations are {ratio:.3g} times those of {reference.name}, and "
+        f"{worst:.3g} times along the worst direction. {_verdict(best)}"
+    )
+
+
+def design_sentences(designs: Sequence[Design], best: Design) -> list[str]:
+    """Return one sentence on each design and one on the best, for the terminal."""
+    reference = reference_design(designs)
+    scale = reference.predicted.geometric_mean
+    lines = []
+    for design in designs:
+        ratio = design.predicted.geometric_mean / scale
+        size = "" if design is reference else f"standard deviations {ratio:.3g} times those of {reference.name}, and "
+        kept = "every limit is kept" if design.go else "some limit is not kept"
+        lines.append(f"{design.name}: {size}{kept} with 99 % probability under the present uncertainty of the robot.")
+    return [*lines, *map(separation_sentence, filter(_separates, designs)), f"Best: {best.name}."]
+
+
+def _separates(design: Design) -> bool:
+    return isinstance(_separation(design), Separation)
+
+
+def _separation(design: Design) -> Separation | None:
+    criteria = (item for item in design.problem.criteria if item.name == design.criterion)
+    return next((item for item in criteria if isinstance(item, Separation)), None)
+
+
+def separation_sentence(design: Design) -> str:
+    """Return how well a manoeuvre that was designed to tell effects apart does so, and down to which size."""
+    criterion = _separation(design)
+    if criterion is None:
+        raise ValueError(f"{design.name} was not designed to tell effects apart")
+    noncentrality = float(np.exp(-2.0 * design.costs[criterion.name]))
+    share = float(np.sqrt(noncentrality_for(SURE) / noncentrality))
+    unseen = [f"{count} of {label}" for label, count in criterion.left_out.items()]
+    rest = f" Directions of the amplitudes that no manoeuvre shows are left out: {joined(unseen)}." if unseen else ""
+    return (
+        f"{design.name} tells {joined(criterion.rivals)} apart: of the size of their priors, the least distinct has a "
+        f"signal-to-noise ratio of {format_number(float(np.sqrt(noncentrality)))} that no other can imitate. Of two "
+        f"causes that are equally probable before, the right one is expected to have a probability of "
+        f"{format_number(SURE)} afterwards if its size is {format_percent(share, 2)} of its prior's, and "
+        f"{format_number(expected_probability(0.25 * noncentrality_for(SURE)))} if half of that.{rest}"
+    )
+
+
+def assumption_sentences(best: Design) -> list[str]:
+    """Return what the design assumes."""
+    problem = best.problem
+    plan = problem.plan
+    sensors = [
+        f"Sensor {sensor.kind.value}: white noise of {format_range(sensor.noise.sigma(plan.interval))} "
+        f"{format_unit(sensor.kind.unit)} per sample and axis."
+        for sensor in plan.model.sensors
+    ]
+    return [
+        "The search compares manoeuvres by the white noise of the sensors and the noise of the encoders at the "
+        "start; the predicted standard deviations and covariances below take the encoders along the manoeuvre and "
+        "include the filters, and every other unknown is marginalised.",
+        "Predictions hold to first order about the prior's centre (Laplace), and include the prior.",
+        f"Sampling every {plan.interval:g} s; the search integrates with steps of {format_number(plan.step)} s and "
+        f"simulates every {f'{ordinal(plan.thinning)} ' if plan.thinning > 1 else ''}sample. Limits are evaluated "
+        "every half step in the search, and eight times more finely at its end.",
+        f"Tip speed and tip rate are those of {plan.tip.name}, each the larger of the one relative to the base and the "
+        "one relative to inertial space.",
+        "The risk is evaluated over draws from the prior of the bodies with the base starting at rest: the initial "
+        "rate, which the manoeuvre does not cause, is left out.",
+        *sensors,
+        *planning_sentences(plan),
+    ]
+
+
+def _verdict(best: Design) -> str:
+    if best.go:
+        return "It keeps every limit, with 99 % probability also under the present uncertainty of the robot."
+    broken = ", ".join(
+        f"{risk.name} ({format_number(risk.quantile)} {format_unit(risk.unit)})" for risk in best.risks if not risk.go
+    )
+    return (
+        "It keeps every limit for the robot as given, but under the present uncertainty not with 99 % probability: "
+        f"{broken}. It is a no go until the robot is known better or the limits leave more room."
+    )
+
+
+def design_rows(designs: Sequence[Design]) -> Rows:
+    """Return name, log-determinant, geometric mean over the reference's, worst direction, evaluations, go or no go."""
+    reference = reference_design(designs).predicted
+    return [
+        [
+            design.name,
+            format_fixed(design.predicted.log_det, 2),
+            format_fixed(design.predicted.geometric_mean / reference.geometric_mean, 3),
+            format_number(design.predicted.worst),
+            str(design.found.evaluations),
+            _go(design.go),
+        ]
+        for design in designs
+    ]
+
+
+def sd_rows(designs: Sequence[Design]) -> Rows:
+    """Return quantity, unit, prior centre, and the standard deviation that each design predicts."""
+    units = parameter_units(designs[0])
+    return [
+        [
+            name,
+            format_unit(units[name]),
+            format_number(float(designs[0].predicted.mean[row]), 4),
+            *(format_number(float(design.predicted.sd[row])) for design in designs),
+        ]
+        for row, name in enumerate(designs[0].predicted.names)
+    ]
+
+
+def limit_rows(design: Design) -> Rows:
+    """Return limited quantity, unit, limit, largest value, its share of the limit, and whether the limit is active."""
+    return [
+        [
+            item.name,
+            format_unit(item.unit),
+            format_number(item.limit, 4),
+            format_number(item.largest, 4),
+            f"{format_fixed(100.0 * item.largest / item.limit, 0)} %",
+            "active" if item.active else "",
+        ]
+        for item in design.reached
+    ]
+
+
+def risk_rows(designs: Sequence[Design]) -> Rows:
+    """Return design, limited quantity, unit, limit, 99 % quantile, and go or no go."""
+    return [
+        [
+            design.name,
+            risk.name,
+            format_unit(risk.unit),
+            format_number(risk.limit, 4),
+            format_number(risk.quantile, 4),
+            _go(risk.go),
+        ]
+        for design in designs
+        for risk in design.risks
+    ]
+
+
+def parameter_units(design: Design) -> dict[str, str]:
+    """Return the unit of every predicted quantity."""
+    bodies = design.problem.plan.model.bodies
+    return {f"{body.name}.{key}": unit for body in bodies for key, unit in BODY_QUANTITIES.items()}
+
+
+def _go(go: bool) -> str:
+    return "go" if go else "no go"

@@ -7,18 +7,31 @@ from pathlib import Path
 
 import numpy as np
 
+from bayesid._io.words import counted, joined
+from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
+from bayesid.inference.body_quantities import BODY_QUANTITIES, reported_effect
+from bayesid.inference.contraction import Contraction, ContractionVerdict
 from bayesid.inference.identification import Identification
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_view import ResidualView
-from bayesid.inference.sensor_fit import sensor_fits, torque_fits
+from bayesid.inference.sensor_fit import SensorFit, TorqueFit, sensor_fits, torque_fits
 from bayesid.report import figures
-from bayesid.report.document import Document
+from bayesid.report.document import Document, Rows
 from bayesid.report.figures.figure_style import WIDTH
-from bayesid.report.sentences import identification_sentences as sentences
-from bayesid.report.sentences.model_assumptions import model_sentences
-from bayesid.report.tables import identification_tables as tables
+from bayesid.report.model_assumptions import add_joints, model_sentences
+from bayesid.report.numbers import (
+    format_fixed,
+    format_number,
+    format_percent,
+    format_quantity,
+    format_signed,
+    format_unit,
+)
+from bayesid.robot.inertial_parameters import mass_com_inertia
+from bayesid.simulation.effects import Effect
 
-__all__ = ["add_identification", "add_joints", "identification_report"]
+__all__ = ["add_identification", "agreement_sentences", "identification_report", "verdict"]
 
 POSES = 4
 """Number of instants at which the robot is drawn."""
@@ -28,6 +41,9 @@ CURVE_POINTS = 600
 
 LARGEST_CORRELATIONS = 30
 """Largest number of quantities in the figure of correlations."""
+
+LIMIT = 3.0
+"""Deviation of chi-square, in standard deviations of chi-square, that noise alone rarely reaches."""
 
 
 def identification_report(
@@ -72,9 +88,9 @@ def add_identification(document: Document, result: Identification, assumptions: 
 
 def _add_result(document: Document, result: Identification) -> None:
     document.section("Result")
-    document.paragraph(sentences.summary(result))
-    document.paragraph(sentences.verdict(result))
-    if rows := tables.parameter_rows(result):
+    document.paragraph(summary(result))
+    document.paragraph(verdict(result))
+    if rows := parameter_rows(result):
         document.table(
             ["quantity", "unit", "prior centre", "posterior mean ± sd", "sd / |mean|", "learnt"],
             rows,
@@ -82,11 +98,11 @@ def _add_result(document: Document, result: Identification) -> None:
             "share by which the data narrowed the prior (half the central 68 %); prior only stands for less than 10 %.",
             ["left", "left", "right", "right", "right", "right"],
         )
-    if rows := tables.effect_rows(result):
+    if rows := effect_rows(result):
         header = ["parameter", "unit", "prior, central 68 %", "posterior mean ± sd", "|mean| / sd"]
         caption = "Parameters of the effects in the model."
         document.table(header, rows, caption, ["left", "left", "right", "right", "right"])
-    if rows := tables.start_rows(result):
+    if rows := start_rows(result):
         header = ["recording", "unknown", "unit", "prior", "x", "y", "z"]
         caption = "State of the base at the start of each recording, base axes."
         document.table(header, rows, caption, ["left"] * 3 + ["right"] * 4)
@@ -124,7 +140,7 @@ def _add_fit(document: Document, result: Identification) -> None:
     )
     document.table(
         ["recording", "sensor", "samples", "chi-square per sample", "largest residual"],
-        tables.misfit_rows(posterior, fits),
+        misfit_rows(posterior, fits),
         "Misfit by recording and sensor. Noise alone gives one, in two cases of three within the ± stated.",
         ["left", "left", "right", "right", "right"],
     )
@@ -148,7 +164,7 @@ def _add_torques(document: Document, result: Identification) -> None:
     fits = torque_fits(posterior, result.optimum.z)
     document.table(
         ["recording", "joint", "noise per sample", "samples used", "chi-square per sample", "largest residual"],
-        tables.torque_rows(posterior, fits),
+        torque_rows(posterior, fits),
         "Joint torques. The torque of a joint with dry friction that stands nearly still carries no information and is "
         "left out.",
         ["left", "left", "right", "right", "right", "right"],
@@ -184,7 +200,7 @@ def _add_uncertainty(document: Document, result: Identification) -> None:
 
 def _add_computation(document: Document, result: Identification) -> None:
     document.section("Computation")
-    document.items(sentences.agreement_sentences(result))
+    document.items(agreement_sentences(result))
     document.figure(
         figures.convergence(result),
         "The coordinates in which the ensembles agree least. Left: mean of the draws so far, about the mean of all, "
@@ -200,13 +216,196 @@ def _add_assumptions(document: Document, result: Identification, assumptions: Se
     add_joints(document, result.posterior)
 
 
-def add_joints(document: Document, posterior: Posterior) -> None:
-    """Add the table of the joints' smoothing; nothing where their motion is prescribed."""
-    if rows := tables.joint_rows(posterior):
-        document.table(
-            ["joint", "noise per sample", "order", "chi-square per sample"],
-            rows,
-            "Smoothing of the joints: noise of the samples, order of the derivative of the position that is modelled "
-            "as white noise, and misfit of the samples to the spline, which is below one as far as the spline follows "
-            "their noise. Orders and misfits are those of each recording in turn.",
+def summary(result: Identification) -> str:
+    """Return which bodies were identified, from how many samples, and their masses."""
+    posterior = result.posterior
+    names = joined(body.name for body in posterior.model.bodies) or "no body"
+    masses = [
+        f"{name} {format_quantity(float(body.mean[0]), float(body.sd[0]))} kg" for name, body in result.bodies.items()
+    ]
+    return (
+        f"Mass, centre of mass and inertia of {names} of the robot {posterior.model.robot.name} were identified from "
+        f"{counted(len(posterior.manoeuvres), 'recording')} with {posterior.samples} scalar sensor samples. "
+        f"Identified mass: {', '.join(masses) or 'none'}. Every ± is one standard deviation of the posterior."
+    )
+
+
+def verdict(result: Identification) -> str:
+    """Return whether the model explains the data, judged by chi-square at the mode."""
+    posterior, chi2 = result.posterior, result.optimum.chi2
+    expected, spread = posterior.samples - posterior.size, float(np.sqrt(2.0 * posterior.samples))
+    deviation = (chi2 - expected) / spread
+    numbers = (
+        f"Chi-square, the sum of squares of the residuals in units of their noise, is {chi2:.0f}, that is "
+        f"{chi2 / posterior.samples:.3f} per sample. With {posterior.samples} samples and {posterior.size} unknowns, "
+        f"noise alone gives {expected} ± {spread:.0f}; the difference is {format_signed(deviation)} standard "
+        "deviations. "
+    )
+    if deviation > LIMIT:
+        return numbers + (
+            "The model does not explain the data: they hold more than the declared noise. The uncertainties below "
+            "assume that the model is right, so they are too small, and the values may be shifted by more than "
+            "they say. A diagnosis looks for the cause."
         )
+    if deviation < -LIMIT:
+        return numbers + (
+            "The residuals are smaller than the declared noise: the sensors are better than declared, so the "
+            "uncertainties below are too large."
+        )
+    return numbers + "The declared noise is enough: by this measure the model explains the data."
+
+
+def agreement_sentences(result: Identification) -> list[str]:
+    """Return how the posterior was computed, and whether the three methods agree."""
+    chains, evidence, optimum = result.chains, result.evidence, result.optimum
+    mode = (
+        f"Mode: Levenberg-Marquardt with exact derivatives, {optimum.evaluations} evaluations, "
+        f"{_converged(optimum.converged)}."
+    )
+    sampler = (
+        f"Samples: emcee, {len(chains.z)} independent ensembles of {chains.walkers} walkers, {chains.steps} steps "
+        f"each, {chains.evaluations} evaluations in {result.seconds:.0f} s. {chains.effective_samples:.0f} effective "
+        f"samples, largest R-hat {chains.r_hat:.4f}, longest autocorrelation time "
+        f"{format_number(chains.autocorrelation)} steps, {100.0 * chains.acceptance:.0f} % of the proposals accepted; "
+        f"{_converged(chains.converged)}."
+    )
+    weights = (
+        f"Importance sampling: {evidence.evaluations} draws worth {evidence.effective_samples:.0f}, Pareto k-hat "
+        f"{evidence.pareto_k:.2f} ({'trusted' if evidence.trusted else 'not trusted'}; the limit is 0.7). "
+        f"Log evidence {format_quantity(evidence.value, evidence.error)}; the Laplace approximation gives "
+        f"{format_number(optimum.log_evidence(result.posterior), 8)}."
+    )
+    agreement = "Laplace approximation, importance sampling and ensembles agree on means and widths."
+    return [mode, sampler, weights, *(result.disagreements or (agreement,))]
+
+
+def _converged(flag: bool) -> str:
+    return "converged" if flag else "not converged"
+
+
+def parameter_rows(result: Identification) -> Rows:
+    """Return quantity, unit, prior centre, posterior, relative sd and shrinkage for every identified body."""
+    rows = []
+    for prior in result.posterior.model.bodies:
+        body, centre = result.bodies[prior.name], mass_com_inertia(prior.centre.vector)
+        for index, (key, unit) in enumerate(BODY_QUANTITIES.items()):
+            mean, sd = float(body.mean[index]), float(body.sd[index])
+            rows.append(
+                [
+                    f"{prior.name}.{key}",
+                    format_unit(unit),
+                    format_number(centre[index], 4),
+                    format_quantity(mean, sd),
+                    _relative(mean, sd),
+                    _shrinkage(result.contraction[f"{prior.name}.{key}"]),
+                ]
+            )
+    return rows
+
+
+def effect_rows(result: Identification) -> Rows:
+    """Return quantity, unit, central 68 % of the prior, posterior and distance from zero of effects with parameters."""
+    rows = []
+    for effect in result.posterior.model.effects:
+        if not effect.parameters:
+            continue
+        draws = result.effects[effect.label]
+        copies = [(effect.label, draws)]
+        if effect.per_recording:
+            names = [manoeuvre.recording.name for manoeuvre in result.posterior.manoeuvres]
+            copies = [(f"{effect.label}[{name}]", draws[:, index]) for index, name in enumerate(names)]
+        prior = prior_range(effect)
+        for label, values in copies:
+            for index, (key, unit) in enumerate(effect.quantities):
+                mean, sd = float(values[:, index].mean()), float(values[:, index].std(ddof=1))
+                rows.append(
+                    [
+                        f"{label}.{key}",
+                        format_unit(unit),
+                        f"{format_number(prior[0][index])} to {format_number(prior[1][index])}",
+                        format_quantity(mean, sd),
+                        f"{format_fixed(abs(mean) / sd, 1)} sd" if sd > 0.0 else "",
+                    ]
+                )
+    return rows
+
+
+def prior_range(effect: Effect) -> tuple[Floats, Floats]:
+    """Return the ends of the central 68 % of the prior of an effect's quantities."""
+    z = on_device(np.random.default_rng(0).normal(size=(2001, len(effect.parameters))))
+    values = np.stack([np.asarray(p.value(z[:, k])) for k, p in enumerate(effect.parameters)], axis=-1)
+    low, high = np.percentile(reported_effect(effect, values), [16.0, 84.0], axis=0)
+    return low, high
+
+
+def start_rows(result: Identification) -> Rows:
+    """Return recording, unknown, unit, prior, and posterior per axis for unknown initial rates and attitudes."""
+    posterior = result.posterior
+    values = posterior.unknowns.values_of(result.chains.flat)
+    rows = []
+    for index, manoeuvre in enumerate(posterior.manoeuvres):
+        unknown = [("initial rate", "rad/s", values.rate, posterior.unknowns.rate_sigma)]
+        unknown.append(("initial rotation", "rad", values.tilt, posterior.unknowns.tilt_sigma[index]))
+        for label, unit, draws, sigma in unknown:
+            if sigma > 0.0:
+                drawn = np.asarray(draws)[:, index]
+                texts = [
+                    format_quantity(float(mean), float(sd))
+                    for mean, sd in zip(drawn.mean(axis=0), drawn.std(axis=0, ddof=1), strict=True)
+                ]
+                rows.append([manoeuvre.recording.name, label, unit, f"0 ± {format_number(sigma)}", *texts])
+    return rows
+
+
+def misfit_rows(posterior: Posterior, fits: list[list[SensorFit]]) -> Rows:
+    """Return recording, sensor, number of scalar samples, chi-square per sample and largest residual."""
+    return [
+        [
+            manoeuvre.recording.name,
+            fit.kind.value,
+            str(fit.samples),
+            _chi2_per_sample(fit.chi2, max(fit.samples, 1)),
+            _largest(fit.residual),
+        ]
+        for manoeuvre, sensors in zip(posterior.manoeuvres, fits, strict=True)
+        for fit in sensors
+    ]
+
+
+def torque_rows(posterior: Posterior, fits: list[list[TorqueFit]]) -> Rows:
+    """Return recording, joint, noise, number of samples used, chi-square per sample and largest residual."""
+    sigmas = () if posterior.model.torque is None else posterior.model.torque.sigma
+    return [
+        [
+            manoeuvre.recording.name,
+            fit.joint,
+            f"{format_number(sigma, 2)} {fit.unit}",
+            f"{len(fit.residual)} of {len(fit.time)}",
+            _chi2_per_sample(float(fit.residual @ fit.residual), len(fit.residual)) if len(fit.residual) else "none",
+            _largest(fit.residual),
+        ]
+        for manoeuvre, joints in zip(posterior.manoeuvres, fits, strict=True)
+        for fit, sigma in zip(joints, sigmas, strict=True)
+    ]
+
+
+def _chi2_per_sample(chi2: float, samples: int) -> str:
+    """Return chi-square per sample ± the standard deviation that noise alone gives it."""
+    return f"{format_fixed(chi2 / samples, 3)} ± {format_fixed(float(np.sqrt(2.0 / samples)), 3)}"
+
+
+def _largest(residual: Floats) -> str:
+    return f"{format_fixed(float(np.nanmax(np.abs(residual), initial=0.0)), 1)} σ"
+
+
+def _shrinkage(contraction: Contraction) -> str:
+    if contraction.verdict is ContractionVerdict.NOT:
+        return "prior only"
+    text = format_percent(contraction.shrinkage, 3)
+    return text if contraction.verdict is ContractionVerdict.CONTRACTED else f"{text} (weakly)"
+
+
+def _relative(mean: float, sd: float) -> str:
+    if mean == 0.0 or sd > abs(mean):
+        return "> 100 %"
+    return format_percent(sd / abs(mean), 2)

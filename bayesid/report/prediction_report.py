@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from bayesid.design.base_prediction import ATTITUDE, Prediction
+from bayesid.design.pose_region import Region
+from bayesid.design.pose_trajectory import PoseTrajectory
 from bayesid.inference.posterior import Posterior
 from bayesid.report import figures
-from bayesid.report.document import Document
-from bayesid.report.numbers import format_number, format_vector
-from bayesid.report.sentences.model_assumptions import planning_sentences
-from bayesid.report.tables.prediction_tables import pose_rows, predicted_trajectories, region_rows
+from bayesid.report.document import Document, Rows
+from bayesid.report.model_assumptions import planning_sentences
+from bayesid.report.numbers import format_fixed, format_number, format_quantity, format_vector
 from bayesid.simulation.model import Manoeuvre
 
 __all__ = ["prediction_report"]
@@ -107,3 +108,36 @@ def _rate_sentence(prediction: Prediction) -> str:
         return f"{prediction.name}: the base starts at rest; its recording holds no initial rate."
     rate = format_vector(prediction.rate)
     return f"{prediction.name}: the base starts with the first measured rate, {rate} rad/s, taken as exact."
+
+
+def pose_rows(prediction: Prediction) -> Rows:
+    """Return manoeuvre, body, quantity, and mean ± sd along each axis."""
+    return [
+        [*place, *(format_quantity(float(mean), float(sd)) for mean, sd in zip(region.mean, region.sd, strict=True))]
+        for place, region in _final_regions(prediction)
+    ]
+
+
+def region_rows(prediction: Prediction) -> Rows:
+    """Return manoeuvre, body, quantity, semi-axes from the longest, and direction of the longest."""
+    return [
+        [
+            *place,
+            *(format_number(float(value)) for value in region.semi_axes),
+            f"({', '.join(format_fixed(float(value), 2) for value in region.directions[0])})",
+        ]
+        for place, region in _final_regions(prediction)
+    ]
+
+
+def predicted_trajectories(prediction: Prediction) -> list[tuple[str, PoseTrajectory]]:
+    """Return the trajectories of base and end-effector with what they are called."""
+    return [("base", prediction.base), (f"end-effector {prediction.tip_frame}", prediction.tip)]
+
+
+def _final_regions(prediction: Prediction) -> Iterator[tuple[list[str], Region]]:
+    """Yield manoeuvre, body and quantity with the region of the final pose."""
+    for name, trajectory in predicted_trajectories(prediction):
+        final = trajectory.pose()
+        yield [prediction.name, name, "position [mm]"], final.millimetres
+        yield [prediction.name, name, "rotation [deg]"], final.degrees

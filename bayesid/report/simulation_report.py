@@ -15,8 +15,8 @@ from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.recording import Recording
 from bayesid.report import figures
 from bayesid.report.document import Document
+from bayesid.report.model_assumptions import model_sentences
 from bayesid.report.numbers import format_number, format_unit
-from bayesid.report.sentences.model_assumptions import model_sentences
 
 __all__ = ["simulation_report"]
 

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid.report import Document, figures, format_quantity
+from bayesid.report.diagnosis.cause_words import set_text
 from bayesid.report.figures.figure_style import AFTER, BAND, BEFORE, TRUTH, shared_legend, styled, wide_figure
 from bayesid.report.numbers import (
     format_number,
@@ -19,7 +20,6 @@ from bayesid.report.numbers import (
     format_unit,
     format_vector,
 )
-from bayesid.report.sentences.set_words import set_text
 from studies.common.ets7 import RADIUS, RAMPS, TIP_SPEED, ets7, tip_speed
 from studies.common.quantities import HEADINGS
 from studies.common.report_parts import columns

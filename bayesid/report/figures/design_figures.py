@@ -1,8 +1,9 @@
-"""Designed manoeuvres: joints within their limits, motion of tip and base, and the covariances they predict."""
+"""Figures of planned manoeuvres: limits, motion of tip and base, predicted covariances and poses, and a loop."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,30 @@ from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
 from bayesid.design import Design
-from bayesid.report.figures.figure_style import curve_style, decimal_scale, ellipse_outline, styled, wide_figure
+from bayesid.design.pose_region import Pose, Region
+from bayesid.design.pose_trajectory import PoseTrajectory
+from bayesid.report.figures.figure_style import (
+    COLOURS,
+    TRUTH,
+    WIDTH,
+    curve_style,
+    decimal_scale,
+    ellipse_outline,
+    styled,
+    wide_figure,
+)
 from bayesid.report.numbers import format_number, format_unit
 from bayesid.robot.robot import Joint
 
-__all__ = ["base_motion", "covariance_ellipses", "joints_within_limits", "tip_motion"]
+__all__ = [
+    "base_motion",
+    "covariance_ellipses",
+    "final_positions",
+    "joints_within_limits",
+    "loop_progress",
+    "tip_motion",
+    "trajectory_bands",
+]
 
 LIMIT: Any = {"color": "#B00020", "linewidth": 0.9, "linestyle": (0, (4, 2))}
 """Look of limits."""
@@ -25,6 +45,15 @@ ELLIPSE = 2.4477
 
 WIDEST = 6.0
 """Largest half-width of a panel, in half-widths of the middle ellipse of all designs."""
+
+PLANES = ((0, 1), (0, 2), (1, 2))
+"""Axes along and up of each panel."""
+
+SHOWN = ("mass", "inertia.xx", "inertia.yy", "inertia.zz")
+"""Quantities whose relative standard deviations are drawn."""
+
+MARKS = ("o", "s", "^", "D")
+"""Marks of the quantities, in their order."""
 
 
 @styled
@@ -159,3 +188,112 @@ def _draw_limits(axes: Axes, values: Floats, bounds: set[float], unit: str) -> N
     if beyond:
         names = ", ".join(format_number(bound) for bound in beyond)
         axes.set_title(f"limits beyond the panel: {names} {unit}", color="#B00020", loc="right")
+
+
+@styled
+def trajectory_bands(trajectory: PoseTrajectory) -> Figure:
+    """Draw the mean trajectory of one body with a band of ± 2 sd, and twice the standard deviation beside it."""
+    poses = [trajectory.pose(index) for index in range(len(trajectory.time))]
+    figure = wide_figure(3.2)
+    panels = figure.subplots(2, 2, sharex=True)
+    rows = (("position", "mm", [pose.millimetres for pose in poses]), ("rotation", "deg", [p.degrees for p in poses]))
+    for row, (name, unit, regions) in enumerate(rows):
+        mean, sd = np.stack([region.mean for region in regions]), np.stack([region.sd for region in regions])
+        for axis in range(3):
+            style = curve_style(axis)
+            panels[row, 0].plot(trajectory.time, mean[:, axis], label="xyz"[axis] if row == 0 else None, **style)
+            panels[row, 0].fill_between(
+                trajectory.time,
+                mean[:, axis] - 2.0 * sd[:, axis],
+                mean[:, axis] + 2.0 * sd[:, axis],
+                color=style["color"],
+                alpha=0.25,
+                linewidth=0.0,
+            )
+            panels[row, 1].plot(trajectory.time, 2.0 * sd[:, axis], **style)
+        panels[row, 0].set_ylabel(f"{name} [{unit}]")
+        panels[row, 1].set_ylabel(f"2 sd of {name} [{unit}]")
+        panels[row, 1].set_ylim(bottom=0.0)
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    figure.legend(loc="outside upper center", ncols=3)
+    return figure
+
+
+@styled
+def final_positions(poses: Mapping[str, Pose], truth: Floats | None = None, colours: Sequence[str] = COLOURS) -> Figure:
+    """Draw samples of the final position in three planes, with the projection of the 95 % ellipsoid.
+
+    Parameters
+    ----------
+    poses : mapping of str to Pose
+        Poses by their names in the legend.
+    truth : (3,) array, optional
+        True position [m], from which offsets are counted; where it is left out, they are counted from the first
+        pose's mean.
+    colours : sequence of str
+        Colours of the poses.
+    """
+    figure = wide_figure(2.4)
+    panels = figure.subplots(1, 3)
+    origin = next(iter(poses.values())).millimetres.mean if truth is None else 1e3 * truth
+    for colour, (name, pose) in zip(colours, poses.items(), strict=False):
+        draws, region = 1e3 * pose.position - origin, pose.millimetres
+        moved = replace(region, mean=region.mean - origin)
+        for axes, plane in zip(panels, PLANES, strict=True):
+            _shadow(axes, draws[:, plane], moved, plane, name if plane == PLANES[0] else None, colour)
+    for axes, (first, second) in zip(panels, PLANES, strict=True):
+        if truth is not None:
+            label = "truth" if (first, second) == PLANES[0] else None
+            axes.plot(0.0, 0.0, "+", color=TRUTH, markersize=9, markeredgewidth=1.6, label=label, zorder=5)
+        axes.set_xlabel(f"{'xyz'[first]} [mm]")
+        axes.set_ylabel(f"{'xyz'[second]} [mm]")
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.locator_params(nbins=5)
+    if len(poses) > 1 or truth is not None:
+        figure.legend(loc="outside upper center", ncols=len(poses) + 1)
+    return figure
+
+
+def _shadow(axes: Axes, draws: Floats, region: Region, plane: tuple[int, int], name: str | None, colour: str) -> None:
+    """Draw the samples and the projection of the ellipsoid onto a plane."""
+    covariance = region.covariance[np.ix_(plane, plane)]
+    outline = ellipse_outline(covariance, region.reach) + region.mean[list(plane)][:, None]
+    axes.plot(draws[:, 0], draws[:, 1], ".", color=colour, markersize=1.5, alpha=0.35, markeredgewidth=0.0)
+    axes.plot(outline[0], outline[1], label=name, color=colour)
+
+
+@styled
+def loop_progress(steps: Sequence[dict[str, Any]]) -> Figure:
+    """Draw relative standard deviations after each step, and the 99 % quantile of each limited quantity over its limit.
+
+    Parameters
+    ----------
+    steps : sequence of dict
+        Steps of a loop that were identified.
+    """
+    figure = Figure(figsize=(WIDTH, 2.6), layout="constrained")
+    known, limits = figure.subplots(1, 2)
+    numbers = [step["step"] for step in steps]
+    bodies = steps[0]["identification"]["bodies"]
+    for colour, name in zip(COLOURS, bodies, strict=False):
+        for mark, key in zip(MARKS, SHOWN, strict=True):
+            items = [step["identification"]["bodies"][name][key] for step in steps]
+            ratio = [100.0 * item["sd"] / abs(item["mean"]) for item in items]
+            known.plot(numbers, ratio, marker=mark, markersize=3.5, color=colour, label=f"{name} {key}", alpha=0.8)
+    known.set(yscale="log", xlabel="step", ylabel="standard deviation / mean [%]", title="What is known")
+    names = list(dict.fromkeys(key for step in steps for key in step["plan"]["attempts"][-1]["limits"]))
+    for colour, name in zip(COLOURS, names, strict=False):
+        entries = [step["plan"]["attempts"][-1]["limits"].get(name) for step in steps]
+        used = [np.nan if item is None else 100.0 * item["quantile_99"] / item["limit"] for item in entries]
+        limits.plot(numbers, used, marker="o", markersize=3.5, color=colour, label=name.replace("_", " "))
+    limits.axhline(100.0, color="black", linewidth=0.8, linestyle="--")
+    limits.set(xlabel="step", ylabel="99 % quantile / limit [%]", title="Limits that depend on what is known")
+    limits.set_ylim(0.0, 110.0)
+    for axes in (known, limits):
+        axes.set_xticks(numbers)
+        axes.set_xlim(numbers[0] - 0.5, numbers[-1] + 0.5)
+    known.legend()
+    if names:
+        limits.legend(loc="lower right")
+    return figure

@@ -7,12 +7,12 @@ from pathlib import Path
 from bayesid._io.errors import InputError
 from bayesid.diagnosis import Diagnosis
 from bayesid.inference import Identification
-from bayesid.report.diagnosis_pages.appendix import add_appendix, add_measured
-from bayesid.report.diagnosis_pages.causes_page import add_causes
-from bayesid.report.diagnosis_pages.consequences_page import add_consequences
-from bayesid.report.diagnosis_pages.decision_page import add_decision
-from bayesid.report.diagnosis_pages.evidence_page import add_evidence
-from bayesid.report.diagnosis_pages.limits_page import add_assumptions, add_limits
+from bayesid.report.diagnosis.appendix import add_appendix, add_measured
+from bayesid.report.diagnosis.causes_page import add_causes
+from bayesid.report.diagnosis.consequences_page import add_consequences
+from bayesid.report.diagnosis.decision_page import add_decision
+from bayesid.report.diagnosis.evidence_page import add_evidence
+from bayesid.report.diagnosis.limits_page import add_assumptions, add_limits
 from bayesid.report.document import Document
 from bayesid.report.identification_report import add_identification
 

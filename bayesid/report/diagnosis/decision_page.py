@@ -4,20 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayesid.diagnosis import Diagnosis, Status
+from bayesid.diagnosis import Diagnosis, Hypothesis, Status
 from bayesid.diagnosis.outcome.model_change import ParameterChange, SimulationError
 from bayesid.report import figures
-from bayesid.report.document import Document
-from bayesid.report.numbers import format_number, format_probability, format_quantity, format_unit
-from bayesid.report.sentences.conditions import conditions_text
-from bayesid.report.sentences.diagnosis_sentences import cause_summary, verdict_sentence, wrench_sentence
-from bayesid.report.sentences.next_steps import action_sentence
-from bayesid.report.sentences.set_words import set_text, verdict_text
-from bayesid.report.sentences.size_words import size_text
-from bayesid.report.sentences.torque_sentences import torque_sentence
-from bayesid.report.tables import change_tables, probability_tables
+from bayesid.report.diagnosis.cause_words import NOTHING, SOMETHING, set_text, size_text, verdict_text
+from bayesid.report.diagnosis.consequences_page import change_rows, most_moved
+from bayesid.report.diagnosis.diagnosis_sentences import (
+    action_sentence,
+    cause_summary,
+    torque_sentence,
+    verdict_sentence,
+    wrench_sentence,
+)
+from bayesid.report.document import Document, Rows
+from bayesid.report.numbers import (
+    format_number,
+    format_percent,
+    format_probability,
+    format_quantity,
+    format_range,
+    format_unit,
+)
+from bayesid.simulation.sensors import Coloured
 
-__all__ = ["add_decision", "decision_entries"]
+__all__ = ["add_decision", "conditions_text", "decision_entries", "probability_rows"]
 
 MOVED = 4
 """Inertial parameters in the table of the first page."""
@@ -54,7 +64,7 @@ def add_decision(
     _add_changes(document, result, changes)
     document.table(
         ["at work", "probability"],
-        probability_tables.probability_rows(result, CLASSES),
+        probability_rows(result, CLASSES),
         "Probability of being at work, whatever accompanies it; causes that these data cannot tell apart share a row.",
         ["left", "right"],
     )
@@ -101,7 +111,7 @@ def _change_text(result: Diagnosis, changes: Sequence[ParameterChange], errors: 
     if not result.verdict.causes:
         return "No inertial parameter: nothing is added to the model. " + _errors_text(errors, named=False)
     text = ""
-    if moved := change_tables.most_moved(changes, 1):
+    if moved := most_moved(changes, 1):
         item = moved[0]
         text = (
             f"{item.name}: given {format_number(item.given, 4)}, fitted without "
@@ -134,7 +144,7 @@ def _add_changes(document: Document, result: Diagnosis, changes: Sequence[Parame
         return
     document.table(
         ["parameter", "unit", "given", "prior sd", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
-        change_tables.change_rows(change_tables.most_moved(changes, MOVED), named),
+        change_rows(most_moved(changes, MOVED), named),
         "The inertial parameters that move most: given, fitted without the named causes, fitted with them, ± sd."
         if named
         else "Inertial parameters: given, and fitted with the present model, ± sd. All are on a later page.",
@@ -144,3 +154,40 @@ def _add_changes(document: Document, result: Diagnosis, changes: Sequence[Parame
 
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
+
+
+def conditions_text(hypothesis: Hypothesis) -> str:
+    """Return what a hypothesis takes for granted of links, noise and attitude."""
+    posterior = hypothesis.fit.posterior
+    nuisance = [prior for prior in posterior.model.priors if prior.nuisance]
+    links = "links exact"
+    if nuisance:
+        widths = [prior.spread for prior in nuisance]
+        width = format_percent(widths[0]) if len(set(widths)) == 1 else f"{format_range(widths)} of their values"
+        links = f"links uncertain by {width}"
+    coloured = [sensor.kind.value for sensor in posterior.model.sensors if isinstance(sensor.noise, Coloured)]
+    noise = f"noise of {', '.join(coloured)} coloured as named" if coloured else "noise white"
+    if hypothesis.faults:
+        noise += f", with {', '.join(fault.label for fault in hypothesis.faults)}"
+    known = "geometry exact"
+    return f"{links}, {known}, {noise}; bodies rigid but for the causes considered.".capitalize()
+
+
+def probability_rows(result: Diagnosis, most: int) -> Rows:
+    """Return name and probability of nothing, of something unknown, and of the most probable classes of causes.
+
+    Parameters
+    ----------
+    result : Diagnosis
+    most : int
+        Number of classes.
+    """
+    probabilities = result.probabilities
+    classes = dict.fromkeys(result.class_of(cause) for cause in probabilities.causes)
+    ranked = sorted(classes, key=lambda members: (-probabilities.of_any(members), members))[:most]
+    rows = [[" or ".join(members), format_probability(probabilities.of_any(members))] for members in ranked]
+    return [
+        *rows,
+        [SOMETHING, format_probability(probabilities.unknown)],
+        [NOTHING, format_probability(probabilities.nothing)],
+    ]

@@ -1,4 +1,4 @@
-"""Sentences on what a model assumes of priors, links, sensors, effects, orbit, joint motion and integration."""
+"""What a model assumes: priors, links, sensors, effects, orbit, joint motion and its smoothing, integration."""
 
 from __future__ import annotations
 
@@ -8,12 +8,24 @@ from bayesid._io.words import counted
 from bayesid.design import Plan
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
-from bayesid.report.numbers import format_number, format_percent, format_range, format_unit, format_vector
+from bayesid.recording.smoothing import SmoothedJoint
+from bayesid.report.document import Document, Rows
+from bayesid.report.numbers import (
+    format_fixed,
+    format_number,
+    format_percent,
+    format_range,
+    format_unit,
+    format_vector,
+)
 from bayesid.robot.inertial_parameters import PARAMETERS
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Filter, Sensor, SensorKind
 
-__all__ = ["model_sentences", "planning_sentences"]
+__all__ = ["add_joints", "model_sentences", "planning_sentences"]
+
+FAMILIES = {"position": "", "velocity": "/s", "acceleration": "/s²"}
+"""Families of joint channels, with what follows the unit of the joint's position."""
 
 
 def model_sentences(posterior: Posterior, integration_error: float) -> list[str]:
@@ -166,3 +178,46 @@ def _motion_sentence(posterior: Posterior) -> str:
         f"The motion of the joints is a smoothing spline{free} through the samples of the encoders (last table); its "
         f"uncertainty is carried into the noise of the sensors, {reach}."
     )
+
+
+def joint_rows(posterior: Posterior) -> Rows:
+    """Return joint, noise of its channels, order of its smoothing and misfit, the last two for each recording in turn.
+
+    The rows are empty where the motion of the joints is prescribed.
+    """
+    rows = []
+    for index, joint in enumerate(posterior.model.robot.joints):
+        fits: list[SmoothedJoint] = []
+        noise: dict[str, list[float]] = {}
+        for manoeuvre in posterior.manoeuvres:
+            if isinstance(manoeuvre.motion, MeasuredMotion):
+                fit = manoeuvre.motion.joints[index]
+                present = [family for family in FAMILIES if f"{family}.{joint.name}" in manoeuvre.recording.channels]
+                for family, sigma in zip(present, fit.sigmas, strict=False):
+                    noise.setdefault(family, []).append(sigma)
+                fits.append(fit)
+        if fits:
+            rows.append(
+                [
+                    joint.name,
+                    "; ".join(
+                        f"{family} {format_range(values, 2)} {joint.unit}{FAMILIES[family]}"
+                        for family, values in noise.items()
+                    ),
+                    ", ".join(str(fit.order) for fit in fits),
+                    ", ".join(format_fixed(fit.chi2 / max(fit.samples, 1), 2) for fit in fits),
+                ]
+            )
+    return rows
+
+
+def add_joints(document: Document, posterior: Posterior) -> None:
+    """Add the table of the joints' smoothing; nothing where their motion is prescribed."""
+    if rows := joint_rows(posterior):
+        document.table(
+            ["joint", "noise per sample", "order", "chi-square per sample"],
+            rows,
+            "Smoothing of the joints: noise of the samples, order of the derivative of the position that is modelled "
+            "as white noise, and misfit of the samples to the spline, which is below one as far as the spline follows "
+            "their noise. Orders and misfits are those of each recording in turn.",
+        )

@@ -1,36 +1,43 @@
-"""Sentences of a diagnosis: the verdict, its causes and alternatives, what the causes gain, and what is left."""
+"""Sentences of a diagnosis: verdict, causes, alternatives, gain, what is left, joint torques, and what to do next."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from bayesid._io.words import joined
-from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Hypothesis, Status
+from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Hypothesis, Status, TorqueReading, TorquesNotRead
+from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.candidates.jump_instants import jump_instants
 from bayesid.diagnosis.evidence.verdict import COVERED, NAMED, UNKNOWN
 from bayesid.diagnosis.noise.noise_faults import SUMMARIES
 from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
+from bayesid.report.diagnosis.cause_words import NOTHING, amplitude_text, probability_text, set_text
 from bayesid.report.numbers import (
     format_fixed,
     format_number,
     format_p_value,
     format_percent,
     format_probability,
+    format_quantity,
     format_signed,
+    format_unit,
     relation,
 )
-from bayesid.report.sentences.amplitude_words import amplitude_text
-from bayesid.report.sentences.set_words import NOTHING, probability_text, set_text
-from bayesid.report.sentences.torque_sentences import torque_sentence
+from bayesid.simulation.effects import known_effects
 from bayesid.simulation.effects.mass_shift import MassShift
 
 __all__ = [
+    "action_sentence",
+    "advice",
+    "advice_sentences",
     "alarm_sentence",
     "alternative_sentences",
     "cause_sentences",
     "cause_summary",
     "diagnosis_sentences",
     "gain_sentence",
+    "torque_sentence",
+    "torque_size",
     "verdict_sentence",
     "wrench_sentence",
 ]
@@ -54,6 +61,24 @@ FIXED = {
     Frame.INERTIAL: "It keeps its direction in inertial space: its source lies outside the orbit, as the Sun does.",
 }
 """Where the source of a disturbance is, by the axes in which it keeps its direction."""
+
+SEPARATE_UNKNOWN = (
+    "Repeat a manoeuvre unchanged but later: what depends on the clock then comes back at another instant of the "
+    "motion, what depends on the motion at the same. Then repeat it with the base turned to another attitude, and "
+    "record with the arm at rest."
+)
+"""Advice where no cause of the catalogue is at work."""
+
+ADVICE = {
+    "initial-rate": "It is there before the arm moves: record a rest before the motion.",
+    "noise": "It is present at rest: record the sensor with the arm at rest.",
+    "outliers": "They are single samples: look at the readings themselves, and record at rest.",
+    "quantisation": "The readings lie on a lattice: record at rest, and compare with the resolution in the data sheet.",
+}
+"""Manoeuvre that would bring a cause out that is no effect, by its name or a part of it."""
+
+ANYTHING = "Repeat with other amplitudes, other speeds and the base in another attitude."
+"""Advice on a cause of which nothing is known."""
 
 
 def diagnosis_sentences(result: Diagnosis) -> Iterator[str]:
@@ -209,3 +234,89 @@ def wrench_sentence(wrench: DisturbingWrench) -> str:
     where = FIXED[wrench.fixed_in] if wrench.fixed_in else "In which axes it keeps its direction is not decided."
     strength = format_fixed(wrench.signal_to_noise, 1)
     return f"As a free torque and force on the base it has a signal-to-noise ratio of {strength}. {where}"
+
+
+def torque_sentence(found: TorqueReading | TorquesNotRead) -> str:
+    """Return what the joint torques say beside the verdict on the motion, or why they were not read."""
+    if isinstance(found, TorquesNotRead):
+        return f"The joint torques were not evaluated. {found.reason}"
+    before, after = (format_fixed(value, 2) for value in found.chi2_per_sample)
+    match found.verdict.status:
+        case Status.ADEQUATE:
+            return (
+                "The joint torques leave nothing but the declared noise "
+                f"(p {relation(format_p_value(found.p_value))}, chi-square per sample {before})."
+            )
+        case Status.EXPLAINED:
+            rows = [row for row in found.causes if row.name in found.verdict.causes]
+            sizes = joined([f"{row.name} ({torque_size(found, row.name)}, ± sd)" for row in rows])
+            return (
+                f"The joint torques are explained by {sizes}; chi-square per sample goes from {before} to {after}. "
+                "It changes no motion, since that of the joints is measured."
+            )
+        case Status.AMBIGUOUS:
+            others = [found.verdict.causes, *found.verdict.ambiguous_with]
+            return f"The joint torques are ambiguous: {'; or '.join(map(set_text, others))}."
+        case Status.UNRESOLVED:
+            return "The joint torques leave more than noise, and the recordings do not say what."
+    return (
+        "The joint torques leave something that is neither friction nor a constant error of a sensor "
+        f"({probability_text(found.probabilities.unknown)}); chi-square per sample is {before}."
+    )
+
+
+def torque_size(found: TorqueReading, name: str) -> str:
+    """Return the amplitudes of one candidate, ± sd."""
+    row = next(row for row in found.causes if row.name == name)
+    return ", ".join(
+        f"{item.name} {format_quantity(mean, sd)} {format_unit(item.unit)}"
+        for item, mean, sd in zip(row.quantities, row.mean.tolist(), row.sd.tolist(), strict=True)
+    )
+
+
+def action_sentence(result: Diagnosis) -> str:
+    """Return what to do now, in one or two sentences."""
+    match result.verdict.status:
+        case Status.ADEQUATE:
+            return "Use the model as it is."
+        case Status.EXPLAINED:
+            return _addition(result)
+        case Status.AMBIGUOUS:
+            first = next(advice_sentences(result), "")
+            return f"Do not rely on one of the alternatives; fly the manoeuvre that separates them. {first}".rstrip()
+        case Status.UNRESOLVED:
+            return "Record longer, or repeat the manoeuvres: the signal grows with the root of their number."
+    return f"Do not use the present model's values. {SEPARATE_UNKNOWN}"
+
+
+def _addition(result: Diagnosis) -> str:
+    """Return how to put the named causes into the model: effects, faults of the noise, and a base that turned."""
+    causes = result.verdict.causes
+    faults = [fault.label for fault in result.after.faults]
+    steps = []
+    if effects := [effect.entry for effect in result.after.fit.effects if effect.candidate in causes]:
+        steps.append(f"add {joined(effects)} to the model's effects")
+    if INITIAL_RATE in causes:
+        steps.append("let the initial rates be unknown")
+    if named := [name for name in causes if name in faults]:
+        keys = [f"sensors.{name.partition(':')[2] or name.removesuffix('-noise')}.sigma" for name in named]
+        steps.append(f"state {joined(keys)} as large as the noise with {joined(named)}")
+    steps.append(f"use the values fitted with {'it' if len(causes) == 1 else 'them'}")
+    text = f"{joined(steps)}."
+    return text[0].upper() + text[1:]
+
+
+def advice_sentences(result: Diagnosis) -> Iterator[str]:
+    """Return the manoeuvre that would bring out each cause in which the alternatives differ."""
+    for name in result.differing_causes:
+        yield f"{name}: {advice(name)}"
+    if pair := result.rivals:
+        yield f"A manoeuvre that tells them apart is designed by: bayesid design STUDY.toml --separate {' '.join(pair)}"
+
+
+def advice(name: str) -> str:
+    """Return the manoeuvre that would bring a cause out, as a sentence; of an effect its class states it."""
+    bare = name.partition(":")[0]
+    effect = known_effects().get(bare)
+    said = effect.separated_by if effect else next((text for key, text in ADVICE.items() if key in bare), "")
+    return said or ANYTHING

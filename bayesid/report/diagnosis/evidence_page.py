@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 from bayesid.diagnosis import Diagnosis, Hypothesis
 from bayesid.inference.residual_view import ResidualView
 from bayesid.report import figures
-from bayesid.report.document import Document
-from bayesid.report.sentences.diagnosis_sentences import alarm_sentence, gain_sentence
-from bayesid.report.tables import diagnosis_tables as tables
+from bayesid.report.diagnosis.diagnosis_sentences import alarm_sentence, gain_sentence
+from bayesid.report.document import Document, Rows
+from bayesid.report.numbers import (
+    format_fixed,
+)
 
-__all__ = ["add_evidence", "add_other_residuals"]
+__all__ = ["add_evidence", "add_other_residuals", "gain_rows"]
 
 RECORDINGS = 6
 """Largest number of further recordings whose residuals are drawn over time."""
@@ -57,7 +61,7 @@ def add_other_residuals(document: Document, result: Diagnosis) -> None:
 
 def _add_gain(document: Document, result: Diagnosis) -> None:
     named = bool(result.verdict.causes)
-    rows, header = tables.gain_rows(result), ["measure", "before", "after", "expected"]
+    rows, header = gain_rows(result), ["measure", "before", "after", "expected"]
     if not named:
         rows, header = [[name, value, expected] for name, value, _, expected in rows], ["measure", "value", "expected"]
     document.table(
@@ -86,3 +90,28 @@ def _residuals(hypothesis: Hypothesis) -> ResidualView:
 
 def _names(result: Diagnosis) -> list[str]:
     return [manoeuvre.recording.name for manoeuvre in result.before.fit.posterior.manoeuvres]
+
+
+def gain_rows(result: Diagnosis) -> Rows:
+    """Return each measure of fit and prediction with its value before and after, and what noise alone would give."""
+    before, after = result.gain.before, result.gain.after
+    rows = [
+        _measure("chi-square per sample", before.chi2_per_sample, after.chi2_per_sample, 3),
+        _measure("share of residuals within 1 σ", before.inside, after.inside, 3),
+        *(_measure(f"rms residual of {name} [σ]", value, after.rms.get(name), 3) for name, value in before.rms.items()),
+    ]
+    spread = math.sqrt(2.0 / result.before.fit.posterior.samples)
+    expected = [f"1 ± {format_fixed(spread, 3)}", "0.683", *["1"] * len(before.rms)]
+    if before.held_out is not None and after.held_out is not None:
+        names = [manoeuvre.recording.name for manoeuvre in result.before.fit.posterior.manoeuvres]
+        rows += [
+            _measure(f"held-out log score of {name}", float(one), float(two), 1)
+            for name, one, two in zip(names, before.held_out, after.held_out, strict=True)
+        ]
+        rows.append(_measure("held-out log score, sum", float(before.held_out.sum()), float(after.held_out.sum()), 1))
+    expected += ["higher is better"] * (len(rows) - len(expected))
+    return [[*row, text] for row, text in zip(rows, expected, strict=True)]
+
+
+def _measure(name: str, before: float, after: float | None, decimals: int) -> list[str]:
+    return [name, format_fixed(before, decimals), "" if after is None else format_fixed(after, decimals)]

@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Status
-from bayesid.diagnosis.outcome.model_change import ParameterChange
+from bayesid.diagnosis.outcome.disturbance import TorqueCorrelation
+from bayesid.diagnosis.outcome.model_change import ParameterChange, SimulationError
 from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes
 from bayesid.report import figures
-from bayesid.report.document import Document
-from bayesid.report.sentences.diagnosis_sentences import wrench_sentence
-from bayesid.report.tables import change_tables
-from bayesid.report.tables.diagnosis_tables import correlation_rows
+from bayesid.report.diagnosis.diagnosis_sentences import wrench_sentence
+from bayesid.report.document import Document, Rows
+from bayesid.report.numbers import (
+    format_number,
+    format_quantity,
+    format_signed,
+    format_unit,
+)
 
-__all__ = ["add_consequences"]
+__all__ = ["add_consequences", "change_rows", "correlation_rows", "error_rows", "most_moved"]
 
 AXES = {Frame.BASE: "base", Frame.ORBIT: "orbit (zenith, along-track, normal)", Frame.INERTIAL: "inertial"}
 """Names of the axes in which a disturbance is drawn."""
@@ -26,7 +31,7 @@ def add_consequences(document: Document, result: Diagnosis, changes: Sequence[Pa
     if changes:
         document.table(
             ["parameter", "unit", "given", "prior sd", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
-            change_tables.change_rows(changes, named),
+            change_rows(changes, named),
             "Inertial parameters, ± sd: given with the prior's width, fitted without the named causes, fitted with "
             "them. A shift of many standard deviations of the fit without is the error that would have been believed."
             if named
@@ -42,7 +47,7 @@ def add_consequences(document: Document, result: Diagnosis, changes: Sequence[Pa
         )
     document.table(
         ["sensor", "unit", *(["before", "after"] if named else ["error"]), "noise alone"],
-        change_tables.error_rows(result.simulation_errors, named),
+        error_rows(result.simulation_errors, named),
         "Root mean square error of the simulation, length of all axes, freed of its correlation.",
         ["left", "left", *["right"] * (3 if named else 2)],
     )
@@ -104,3 +109,40 @@ def _add_wrench(document: Document, result: Diagnosis, wrench: DisturbingWrench,
             "smooth, so that a correlation of one half can be chance.",
             ["left", "left", "right"],
         )
+
+
+def change_rows(changes: Sequence[ParameterChange], named: bool = True) -> Rows:
+    """Return parameter, unit, given, prior sd, without, with, and shift in sd; only the fit where nothing is named."""
+    rows = []
+    for item in changes:
+        given = [format_number(item.given, 4), format_number(item.prior_sd, 2)]  # wide priors would round it away
+        start = [item.name, format_unit(item.unit), *given]
+        without = format_quantity(item.without, item.without_sd)
+        fitted = [format_quantity(item.fitted, item.fitted_sd), format_signed(item.shift)] if named else []
+        rows.append([*start, without, *fitted])
+    return rows
+
+
+def error_rows(errors: Sequence[SimulationError], named: bool = True) -> Rows:
+    """Return sensor, unit, error before and after, and what noise alone makes; only before where nothing is named."""
+    return [
+        [
+            item.kind.value,
+            format_unit(item.kind.unit),
+            format_number(item.before),
+            *([format_number(item.after)] if named else []),
+            format_number(item.noise),
+        ]
+        for item in errors
+    ]
+
+
+def most_moved(changes: Sequence[ParameterChange], most: int) -> list[ParameterChange]:
+    """Return the parameters that move most in standard deviations, in their usual order."""
+    chosen = sorted(changes, key=lambda item: -abs(item.shift))[:most]
+    return [item for item in changes if item in chosen]
+
+
+def correlation_rows(correlations: Sequence[TorqueCorrelation]) -> Rows:
+    """Return torque component, series and correlation."""
+    return [[item.component, item.series, format_signed(item.correlation, 2)] for item in correlations]

@@ -1,0 +1,1 @@
+"""The report of a diagnosis, page by page, and its sentences for the terminal."""

@@ -1,0 +1,131 @@
+"""Third page of a diagnosis report: why these causes, with what else could be at work and whether it is plausible."""
+
+from __future__ import annotations
+
+from bayesid.diagnosis import Diagnosis
+from bayesid.diagnosis.candidates.jump_instants import jump_instants
+from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
+from bayesid.diagnosis.outcome.cause_sizes import GroupSize
+from bayesid.report import figures
+from bayesid.report.diagnosis.cause_words import NOTHING
+from bayesid.report.document import Document, Rows
+from bayesid.report.numbers import (
+    format_fixed,
+    format_number,
+    format_percent,
+    format_probability,
+    format_quantity,
+    format_signed,
+    format_unit,
+)
+from bayesid.simulation.effects.mass_shift import MassShift
+
+__all__ = ["add_causes", "cause_rows", "set_rows"]
+
+SETS = 6
+"""Sets in the table of the most probable."""
+
+BARS = 20
+"""Largest number of bars of the figure of candidates."""
+
+
+def add_causes(document: Document, result: Diagnosis) -> None:
+    """Add the most probable sets, the sizes of the named causes, and the strengths of the candidates."""
+    named = bool(result.verdict.causes)
+    document.section(
+        "Why this cause"
+        if len(result.verdict.causes) == 1
+        else "Why these causes"
+        if named
+        else "What could be at work"
+    )
+    document.table(
+        ["causes", "probability", "log evidence", "size", "bound", "share of the bound"],
+        set_rows(result, SETS),
+        f"The {min(SETS, len(result.probabilities.sets))} most probable sets of causes, of "
+        f"{len(result.probabilities.sets)} considered. The log evidence is relative to that of nothing. Sizes are root "
+        "mean squares of the amplitudes that share a unit, by the linear model at the most probable scale; a size "
+        "beyond its bound is not plausible. Of a body that is missing or sloshes the mass stands for all its moments.",
+        ["left", "right", "right", "left", "right", "right"],
+    )
+    if named:
+        _add_sizes(document, result)
+    drawn = sorted(result.candidates, key=lambda row: (-row.signal_to_noise, row.name))[:BARS]
+    document.figure(
+        figures.candidate_strengths(drawn, result.verdict.causes, result.alarm.level),
+        f"Signal-to-noise ratio of the {len(drawn)} strongest of {len(result.candidates)} candidates, each alone "
+        "beside the present model. Several can stand out for one cause, since they explain parts of the same residual.",
+        floating=True,
+    )
+
+
+def _add_sizes(document: Document, result: Diagnosis) -> None:
+    if rows := cause_rows(result):
+        document.table(
+            ["quantity", "unit", "value ± sd", "from zero", "bound"],
+            rows,
+            "Size of the named causes, fitted together with all unknowns. Changes of a link are in the link's axes, "
+            "with its inertia about its centre of mass; all other vectors are in base or sensor axes.",
+            ["left", "left", "right", "right", "right"],
+        )
+    else:
+        document.paragraph("The named causes have no free parameter: physics fixes their size.")
+
+
+def cause_rows(result: Diagnosis) -> Rows:
+    """Return quantity, unit, value, distance from zero and bound for every quantity of every named cause.
+
+    The instants of a jump come last, without a distance.
+    """
+    best = result.after
+    sizes = [
+        [
+            f"{label}.{item.quantity.name}",
+            format_unit(item.quantity.unit),
+            format_quantity(item.mean, item.sd),
+            f"{format_fixed(item.distance, 1)} sd" if item.sd > 0.0 else "",
+            _bound_text(result, label, item.quantity.unit),
+        ]
+        for label in best.labels
+        for item in amplitudes_of(best, label)
+    ]
+    instants = [
+        [f"{MassShift.name}.{quantity.name}", format_unit(quantity.unit), format_quantity(mean, sd), "", ""]
+        for quantity, mean, sd in jump_instants(best)
+    ]
+    return sizes + instants
+
+
+def _bound_text(result: Diagnosis, label: str, unit: str) -> str:
+    found = [bound.largest for bound in result.bounds.get(label, ()) if bound.unit == unit]
+    return format_number(found[0]) if found else ""
+
+
+def set_rows(result: Diagnosis, most: int) -> Rows:
+    """Return cause, probability and log evidence of the set, size, bound and share of it, of the most probable sets.
+
+    A set of several causes, or of causes in several units, has several rows, of which only the first has numbers of the
+    whole set; a plus sign stands before each further cause.
+    """
+    rows = []
+    for item in result.probabilities.sets[:most]:
+        whole = [format_probability(item.probability), format_signed(item.log_evidence) if item.names else "0"]
+        before = None
+        for size in result.sizes_of(item) or [GroupSize(NOTHING)]:
+            name = size.cause if before is None else f"+ {size.cause}" if size.cause != before else ""
+            rows.append([name, *(whole if before is None else ["", ""]), *_size_cells(size)])
+            before = size.cause
+    return rows
+
+
+def _size_cells(size: GroupSize) -> list[str]:
+    if size.cause == NOTHING:
+        return ["", "", ""]
+    if size.size is None:
+        return ["fixed by physics", "", ""]
+    share = "" if size.share is None else f"{format_percent(size.share)}{'' if size.plausible else ', beyond it'}"
+    if size.unit is None:
+        return ["", "", share]
+    unit = format_unit(size.unit)
+    bound = "" if size.largest is None else f"{format_number(size.largest, 2)} {unit}".rstrip()
+    return [f"{format_number(size.size, 2)} {unit}".rstrip(), bound, share]

@@ -1,0 +1,144 @@
+"""Fifth page of a diagnosis report: what to fly next, what could not be seen, the method, and the assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from bayesid.diagnosis import Candidate, Diagnosis, Status
+from bayesid.diagnosis.evidence.verdict import COVERED, MOST_ALTERNATIVES, NAMED
+from bayesid.diagnosis.outcome.inseparable_causes import CausePair
+from bayesid.inference.predicted_readings import integration_error_at
+from bayesid.report.diagnosis.cause_words import limit_text
+from bayesid.report.diagnosis.diagnosis_sentences import action_sentence, advice_sentences
+from bayesid.report.document import Document, Rows
+from bayesid.report.model_assumptions import add_joints, model_sentences
+from bayesid.report.numbers import (
+    format_fixed,
+    format_number,
+)
+
+__all__ = [
+    "NEXT",
+    "add_assumptions",
+    "add_limits",
+    "computation_sentence",
+    "method_sentences",
+    "pair_rows",
+    "unseen_rows",
+]
+
+NEXT = "Next experiment and limits"
+"""Title of the section that says what to fly next."""
+
+PAIRS = 10
+"""Largest number of pairs in the table of causes that imitate each other."""
+
+LIMITS = 6
+"""Largest number of limits in a cell of the table of candidates out of reach."""
+
+
+def add_limits(document: Document, result: Diagnosis, advice: str | None = None) -> None:
+    """Add the manoeuvres to fly, the candidates out of reach, the pairs that imitate each other, and the method."""
+    document.section(NEXT)
+    document.paragraph(action_sentence(result))
+    document.items([*advice_sentences(result), *([advice] if advice else [])])
+    _add_unseen(document, result)
+    if pairs := result.inseparable_pairs[:PAIRS]:
+        document.table(
+            ["cause", "other", "largest cosine", "smallest cosine", ""],
+            pair_rows(pairs),
+            ("Named causes" if result.verdict.causes else "The most probable causes")
+            + " and those that imitate them best, apart from what the model's unknowns explain. Where the largest "
+            "cosine is near one, some change by the one can be taken for some change by the other; where the smallest "
+            "is, too, these manoeuvres cannot tell them apart at all.",
+            ["left", "left", "right", "right", "left"],
+        )
+    document.paragraph("How the verdict was reached:")
+    document.items([*method_sentences(result), computation_sentence(result)])
+
+
+def _add_unseen(document: Document, result: Diagnosis) -> None:
+    if hidden := result.unseen_candidates:
+        document.paragraph(
+            "The following candidates could not have been seen: drawn from their priors, these manoeuvres would have "
+            "raised no alarm in more than half of all cases. Their absence from the verdict says little about them."
+        )
+        document.table(
+            ["candidate", "power", "95 % limits on its magnitude"],
+            unseen_rows(hidden),
+            "Candidates out of reach of these manoeuvres.",
+            ["left", "right", "left"],
+        )
+    elif result.verdict.status in (Status.ADEQUATE, Status.EXPLAINED):
+        document.paragraph(
+            "Every candidate whose power is known, drawn from its prior, would have raised the alarm in at least half "
+            "of all cases: these manoeuvres are enough."
+        )
+
+
+def add_assumptions(document: Document, result: Diagnosis) -> None:
+    """Add what the model with the named causes assumes."""
+    posterior = result.posterior
+    document.section("Assumptions")
+    document.items(list(model_sentences(posterior, integration_error_at(posterior, result.start))))
+    add_joints(document, posterior)
+
+
+def method_sentences(result: Diagnosis) -> Iterator[str]:
+    """Return how the verdict was reached."""
+    prior, probabilities = result.probabilities.prior, result.probabilities
+    yield (
+        f"An alarm is raised where the loudest of {result.alarm.tests} tests together is as loud as noise alone "
+        f"makes it in less than {100.0 * result.alarm.level:g} % of cases, all dependence between the tests included."
+    )
+    yield (
+        f"{len(probabilities.causes)} causes of the catalogue are possible here: {', '.join(probabilities.causes)}. "
+        f"Beside them {len(probabilities.generics)} candidates stand for what is in no catalogue: "
+        f"{', '.join(probabilities.generics)}."
+    )
+    yield (
+        "The probability of a set of causes is its evidence times its prior. The prior has two numbers: one more cause "
+        f"is at work with a probability of {format_number(prior.one_more)}, however many there are, and something "
+        f"outside the catalogue with {format_number(prior.generic)}. All sets of one size are equally probable "
+        "beforehand."
+    )
+    yield (
+        "The scale of the amplitudes of a cause that share a unit is itself unknown: every power of ten between what "
+        "the data cannot resolve and the physical bound is equally probable."
+    )
+    yield (
+        f"Causes are named where the class of each has a probability of {NAMED:g} or more. Otherwise the verdict is "
+        f"ambiguous if two to {MOST_ALTERNATIVES} alternatives hold {format_number(100.0 * COVERED)} %, and unresolved "
+        "if more are needed. It is unknown if candidates that name nothing hold the majority."
+    )
+    if result.held:
+        yield (
+            "Every fit of the present model drove its bodies to where their prior all but excludes them. They are held "
+            "at the prior's centre, and what each candidate changes is computed along the motion that the data show."
+        )
+    yield f"Seed of all random numbers: {result.seed}."
+
+
+def computation_sentence(result: Diagnosis) -> str:
+    """Return how long each phase of the diagnosis took."""
+    phases = ", ".join(f"{name} {seconds:.1f} s" for name, seconds in result.seconds.items())
+    return f"Time by phase: {phases}; {sum(result.seconds.values()):.1f} s in all."
+
+
+def unseen_rows(rows: Sequence[Candidate]) -> Rows:
+    """Return name, power and 95 % limits of candidates that could hardly have been seen."""
+    return [[row.name, f"{row.power:.2f}", limit_text(row, LIMITS) or "no limit"] for row in rows]
+
+
+def pair_rows(pairs: Sequence[CausePair]) -> Rows:
+    """Return two causes, their largest and smallest cosine, and what that means."""
+    return [
+        [
+            pair.first,
+            pair.second,
+            format_fixed(pair.largest, 3),
+            format_fixed(pair.smallest, 3),
+            "equivalent" if pair.equivalent else "",
+        ]
+        for pair in pairs
+    ]

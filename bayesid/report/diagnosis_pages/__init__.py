@@ -1,1 +1,0 @@
-"""Pages of a diagnosis report, one file each."""

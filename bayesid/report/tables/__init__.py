@@ -1,1 +1,0 @@
-"""Rows of the reports' tables, one module per report."""
