@@ -12,7 +12,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from bayesid.report import Document
-from bayesid.report.figures.figure_height import fitted_height
+from bayesid.report.document import fitted_height
 from bayesid.report.figures.figure_style import styled, wide_figure
 from studies.common.provenance import study_origin
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict, show

@@ -17,8 +17,7 @@ from bayesid.report.numbers import format_fixed, format_number, format_unit
 
 __all__ = ["check_report"]
 
-CURVE_POINTS = 600
-"""Number of points of a curve over time."""
+CURVE_POINTS = 600  # number of points of a curve over time
 
 
 def check_report(

@@ -17,8 +17,7 @@ from bayesid.report.numbers import format_fixed, format_number, format_percent, 
 
 __all__ = ["design_report", "design_sentences", "separation_sentence"]
 
-POSES = 5
-"""Number of instants at which the robot is drawn."""
+POSES = 5  # number of instants at which the robot is drawn
 
 PAIRS = (
     ("mass", "com.x"),
@@ -30,11 +29,8 @@ PAIRS = (
 )
 """Pairs of a body's quantities whose ellipses are drawn."""
 
-SURE = 0.95
-"""Probability of the right one of two rivals at which they count as told apart."""
-
-REFERENCE = "paper-26"
-"""Name of the design that the others are compared with."""
+SURE = 0.95  # probability of the right one of two rivals at which they count as told apart
+REFERENCE = "paper-26"  # name of the design that the others are compared with
 
 MEANING: Mapping[str, str] = {
     "paper-26": "The paper's (26) as printed, of the largest excursions y1, y2, y3 of the base's position and of its "

@@ -11,6 +11,7 @@ import math
 import re
 import tempfile
 from collections.abc import Sequence
+from importlib.resources import files
 from pathlib import Path
 
 import matplotlib as mpl
@@ -23,7 +24,6 @@ from matplotlib.lines import Line2D
 
 from bayesid._io.errors import InputError
 from bayesid._io.files import complete_file
-from bayesid.report.figures.figure_height import fitted_height
 from bayesid.report.figures.figure_style import with_plain_labels
 
 __all__ = ["Document", "Rows"]
@@ -31,74 +31,22 @@ __all__ = ["Document", "Rows"]
 Rows = list[list[str]]
 """Cells of a table, row by row."""
 
-MANY_POINTS = 4000
-"""Number of points above which a line or a scatter plot is drawn as pixels inside the vector figure."""
-
-RESOLUTION = 250
-"""Resolution of what is drawn as pixels [dots per inch]."""
-
-LONG_WORD = 14
-"""Number of characters from which on a word in a table may break at its punctuation."""
+MANY_POINTS = 4000  # number of points above which a line or a scatter plot is drawn as pixels inside the vector figure
+RESOLUTION = 250  # resolution of what is drawn as pixels [dots per inch]
+LONG_WORD = 14  # number of characters from which on a word in a table may break at its punctuation
 
 WHOLE = 24
 """Number of lines of a table above which it may break between two pages; the caption stays with the first of them."""
 
-LINE = 60
-"""Number of characters of a table's cell that fill about one line."""
+ROOM = 1.15  # least distance of named ticks along a vertical axis, in heights of their letters
+LINE = 60  # number of characters of a table's cell that fill about one line
 
 HEIGHTS = (1.0, 0.95, 1.05, 0.9, 1.1, 0.85, 1.15, 0.8, 1.2, 0.75, 1.25, 0.7, 1.3)
 """Factors on the heights of figures and on the space in tables, tried in this order until the last page is filled."""
 
-LOWEST = 0.55
-"""Fraction of its text's height to which the last page is then filled at least."""
+LOWEST = 0.55  # fraction of its text's height to which the last page is then filled at least
 
-_TEMPLATE = """\
-#set page(paper: "a4", margin: (x: 20mm, top: 20mm, bottom: 22mm), numbering: "1 / 1", footer-descent: 18%)
-#set text(font: "Libertinus Serif", size: 10.5pt, lang: "en")
-#set par(justify: true, leading: 0.62em, spacing: 0.95em)
-#set heading(numbering: "1")
-#show heading: set block(above: 1.5em, below: 0.8em, sticky: true)
-#set list(indent: 0.4em, spacing: 0.65em)
-#set figure(gap: 0.7em)
-#show figure: set block(above: 1.3em, below: 1.3em)
-#show figure.where(kind: table): set block(breakable: false)
-#show figure.where(kind: table): set figure.caption(position: top)
-#show figure.caption: it => block(width: 100%, sticky: true, { set text(size: 9pt)
-  set par(justify: true); set align(left)
-  strong(it.supplement + " " + context it.counter.display(it.numbering) + ". ") + it.body })
-#set table(stroke: none, inset: (x: 5pt, y: 2.9pt * float(sys.inputs.at("height", default: "1"))))
-#show table: set text(size: 8.5pt)
-#show table: set par(justify: false, leading: 0.5em)
-#show table.cell.where(y: 0): strong
-#let decision(title, picture, ..cells) = block(width: 100%, stroke: 1pt, radius: 3pt, inset: 9pt, breakable: false, {
-  set text(size: 10pt)
-  set par(justify: false, leading: 0.55em, spacing: 0.5em)
-  par(leading: 0.5em, text(size: 12.5pt, weight: "bold", title))
-  v(0.35em)
-  let entries = grid(columns: (auto, 1fr), column-gutter: 1em, row-gutter: 0.65em,
-    ..cells.pos().chunks(2).map(pair => (text(fill: luma(35%), pair.at(0)), pair.at(1))).flatten())
-  if picture == none { entries }
-  else { grid(columns: (1fr, auto), column-gutter: 1em, align: (left, horizon), entries, picture) }
-})
-#let small(body) = {
-  set par(justify: false, leading: 0.5em)
-  line(length: 100%, stroke: 0.4pt) + v(-0.5em) + text(size: 7.5pt, body) + v(-0.3em)
-}
-#let foot(first, last) = context {
-  let number = counter(page).get().first()
-  for (said, there) in ((first, number == 1), (last, number == counter(page).final().first())) {
-    if there and said != "" { small(said) }
-  }
-  align(center, counter(page).display("1 / 1", both: true))
-}
-#let title(main, sub, date) = align(left, {
-  text(size: 18pt, weight: "bold", main)
-  if sub != "" { linebreak() + text(size: 12pt, fill: luma(35%), sub) }
-  if date != "" { linebreak() + text(size: 10pt, fill: luma(35%), date) }
-  v(-0.4em) + line(length: 100%, stroke: 0.6pt) + v(0.2em)
-})
-"""
-
+LOOK = "document.typ"  # file beside this one that holds the look of every report
 
 _END = """
 #context {
@@ -121,7 +69,7 @@ class Document:
 
     def __init__(self, title: str, subtitle: str = "", date: str | None = None) -> None:
         self._parts = [
-            _TEMPLATE,
+            (files("bayesid.report") / LOOK).read_text(encoding="utf-8"),
             f"#set document(title: {literal(title)}, date: none)\n",
             f"#title({literal(title)}, {literal(subtitle)}, {literal(date or '')})\n",
         ]
@@ -285,6 +233,24 @@ def _check_table(header: Sequence[str], rows: Sequence[Sequence[str]], align: Se
 def _write_all(folder: Path, figures: Sequence[bytes]) -> None:
     for number, content in enumerate(figures, start=1):
         (folder / f"figure-{number}.svg").write_bytes(content)
+
+
+def fitted_height(figure: Figure, factor: float) -> float:
+    """Return a figure's height multiplied by a factor, or as much of its height as its named ticks need [inch].
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure that is laid out already.
+    factor : float
+    """
+    height = float(figure.get_size_inches()[1])
+    lowest = 0.0
+    for axes in figure.axes:
+        named = [label for label in axes.get_yticklabels() if label.get_text()]
+        needed = ROOM * sum(float(label.get_fontsize()) for label in named) / 72.0
+        lowest = max(lowest, height + needed - axes.get_position().height * height if named else 0.0)
+    return max(factor * height, min(lowest, height))
 
 
 def _blank(fig: Figure, factor: float) -> bytes:

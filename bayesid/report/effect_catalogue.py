@@ -23,11 +23,8 @@ from bayesid.simulation.sensors import Sensor, SensorKind, White
 
 __all__ = ["CatalogueEntry", "catalogue", "entry_of", "example_model"]
 
-WIDTH = 100
-"""Width of the text in characters."""
-
-EXAMPLE = "ets7"
-"""Robot of the package for which sizes are given where there is no study."""
+WIDTH = 100  # width of the text in characters
+EXAMPLE = "ets7"  # robot of the package for which sizes are given where there is no study
 
 FAULT_OF_NOISE = "It is sought in the residual, from which its size follows too; no study file can put it into a model"
 

@@ -34,11 +34,8 @@ __all__ = [
     "structure_sentence",
 ]
 
-SHOWN = 20
-"""Largest number of directions in the table, from the worst known."""
-
-NEGLIGIBLE = 1e-9
-"""Size of a regrouping's coefficient below which it is rounding."""
+SHOWN = 20  # largest number of directions in the table, from the worst known
+NEGLIGIBLE = 1e-9  # size of a regrouping's coefficient below which it is rounding
 
 
 def identifiability_report(

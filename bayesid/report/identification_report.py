@@ -33,17 +33,10 @@ from bayesid.simulation.effects import Effect
 
 __all__ = ["add_identification", "agreement_sentences", "identification_report", "verdict"]
 
-POSES = 4
-"""Number of instants at which the robot is drawn."""
-
-CURVE_POINTS = 600
-"""Number of points of a curve over time."""
-
-LARGEST_CORRELATIONS = 30
-"""Largest number of quantities in the figure of correlations."""
-
-LIMIT = 3.0
-"""Deviation of chi-square, in standard deviations of chi-square, that noise alone rarely reaches."""
+POSES = 4  # number of instants at which the robot is drawn
+CURVE_POINTS = 600  # number of points of a curve over time
+LARGEST_CORRELATIONS = 30  # largest number of quantities in the figure of correlations
+LIMIT = 3.0  # deviation of chi-square, in standard deviations of chi-square, that noise alone rarely reaches
 
 
 def identification_report(

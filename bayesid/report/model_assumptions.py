@@ -10,14 +10,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.smoothing import SmoothedJoint
 from bayesid.report.document import Document, Rows
-from bayesid.report.numbers import (
-    format_fixed,
-    format_number,
-    format_percent,
-    format_range,
-    format_unit,
-    format_vector,
-)
+from bayesid.report.numbers import format_fixed, format_number, format_percent, format_range, format_unit, format_vector
 from bayesid.robot.inertial_parameters import PARAMETERS
 from bayesid.simulation.model import Model
 from bayesid.simulation.sensors import Filter, Sensor, SensorKind

@@ -23,17 +23,10 @@ __all__ = [
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
-LARGEST, SMALLEST = 6, -3
-"""Exponents from which on, and down to which, a number is written with its power of ten."""
-
-SMALLEST_P = 1e-12
-"""P-value below which only the bound is printed."""
-
-LEAST_PROBABILITY = 0.001
-"""Probability below which only the bound is printed, and the same from one."""
-
-NEARLY_ALL = 0.995
-"""Ratio from which on a percentage has three digits, because two would round it to 100 %."""
+LARGEST, SMALLEST = 6, -3  # exponents from which on, and down to which, a number is written with its power of ten
+SMALLEST_P = 1e-12  # p-value below which only the bound is printed
+LEAST_PROBABILITY = 0.001  # probability below which only the bound is printed, and the same from one
+NEARLY_ALL = 0.995  # ratio from which on a percentage has three digits, because two would round it to 100 %
 
 
 def format_quantity(mean: float, sd: float) -> str:

@@ -19,11 +19,8 @@ from bayesid.simulation.model import Manoeuvre
 
 __all__ = ["prediction_report"]
 
-CURVE_POINTS = 400
-"""Number of points of a curve over time."""
-
-ALIGN = ["left", "left", "left", "right", "right", "right"]
-"""Alignment of three columns of names and three of numbers."""
+CURVE_POINTS = 400  # number of points of a curve over time
+ALIGN = ["left", "left", "left", "right", "right", "right"]  # alignment of three columns of names and three of numbers
 
 
 def prediction_report(

@@ -20,8 +20,7 @@ from bayesid.report.numbers import format_number, format_unit
 
 __all__ = ["simulation_report"]
 
-CURVE_POINTS = 600
-"""Number of points of a curve over time."""
+CURVE_POINTS = 600  # number of points of a curve over time
 
 
 def simulation_report(

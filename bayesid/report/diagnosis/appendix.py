@@ -52,8 +52,7 @@ GLOSSARY = (
 )
 """Terms of the report and their meanings."""
 
-SEEN = 2.0
-"""Distance from zero, in standard deviations, above which an amplitude is given and below which a limit."""
+SEEN = 2.0  # distance from zero, in standard deviations, above which an amplitude is given and below which a limit
 
 
 def add_appendix(document: Document, result: Diagnosis) -> None:

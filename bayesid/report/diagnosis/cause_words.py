@@ -34,8 +34,7 @@ __all__ = [
 NOTHING, SOMETHING = "nothing", "something unknown"
 """Names of the empty set, and of any generic candidate among the alternatives."""
 
-SHOWN = 3
-"""Largest number of quantities of one cause by default."""
+SHOWN = 3  # largest number of quantities of one cause by default
 
 NOT_OF_SIZE = ("frequency", "damping")
 """Quantities of a vibration that say nothing of its size, so that a limit on them would mislead."""

@@ -22,11 +22,8 @@ from bayesid.simulation.effects.mass_shift import MassShift
 
 __all__ = ["add_causes", "cause_rows", "set_rows"]
 
-SETS = 6
-"""Sets in the table of the most probable."""
-
-BARS = 20
-"""Largest number of bars of the figure of candidates."""
+SETS = 6  # sets in the table of the most probable
+BARS = 20  # largest number of bars of the figure of candidates
 
 
 def add_causes(document: Document, result: Diagnosis) -> None:

@@ -11,12 +11,7 @@ from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes
 from bayesid.report import figures
 from bayesid.report.diagnosis.diagnosis_sentences import wrench_sentence
 from bayesid.report.document import Document, Rows
-from bayesid.report.numbers import (
-    format_number,
-    format_quantity,
-    format_signed,
-    format_unit,
-)
+from bayesid.report.numbers import format_number, format_quantity, format_signed, format_unit
 
 __all__ = ["add_consequences", "change_rows", "correlation_rows", "error_rows", "most_moved"]
 

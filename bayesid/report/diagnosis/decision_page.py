@@ -29,11 +29,8 @@ from bayesid.simulation.sensors import Coloured
 
 __all__ = ["add_decision", "conditions_text", "decision_entries", "probability_rows"]
 
-MOVED = 4
-"""Inertial parameters in the table of the first page."""
-
-CLASSES = 4
-"""Classes of causes in the table of probabilities."""
+MOVED = 4  # inertial parameters in the table of the first page
+CLASSES = 4  # classes of causes in the table of probabilities
 
 
 def add_decision(
@@ -79,10 +76,7 @@ def decision_entries(
     verdict = result.verdict
     entries = [("Verdict", verdict_sentence(result))]
     for cause in verdict.causes:
-        entries += [
-            ("Cause", _cause_text(result, cause)),
-            ("Size, ± 95 %", size_text(result.after, cause)),
-        ]
+        entries += [("Cause", _cause_text(result, cause)), ("Size, ± 95 %", size_text(result.after, cause))]
     entries += [
         ("Alternative", f"{set_text(names)}, probability {format_probability(result.probability_of(names))}")
         for names in verdict.ambiguous_with

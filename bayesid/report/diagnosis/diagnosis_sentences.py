@@ -42,14 +42,9 @@ __all__ = [
     "wrench_sentence",
 ]
 
-AT_MOST = 6
-"""Largest number of quantities of one cause in a sentence."""
-
-WORTH_SAYING = 0.1
-"""Probability of something without a name from which it is said beside causes that are named."""
-
-SHOWN_SETS = 3
-"""Sets named in the sentence of a verdict that names none."""
+AT_MOST = 6  # largest number of quantities of one cause in a sentence
+WORTH_SAYING = 0.1  # probability of something without a name from which it is said beside causes that are named
+SHOWN_SETS = 3  # sets named in the sentence of a verdict that names none
 
 RELEASED = "The base was already turning when the recordings began, although the study takes it to be at rest."
 """Summary of the cause that the initial rate is not zero."""

@@ -9,14 +9,11 @@ from bayesid.inference.residual_view import ResidualView
 from bayesid.report import figures
 from bayesid.report.diagnosis.diagnosis_sentences import alarm_sentence, gain_sentence
 from bayesid.report.document import Document, Rows
-from bayesid.report.numbers import (
-    format_fixed,
-)
+from bayesid.report.numbers import format_fixed
 
 __all__ = ["add_evidence", "add_other_residuals", "gain_rows"]
 
-RECORDINGS = 6
-"""Largest number of further recordings whose residuals are drawn over time."""
+RECORDINGS = 6  # largest number of further recordings whose residuals are drawn over time
 
 
 def add_evidence(document: Document, result: Diagnosis) -> None:

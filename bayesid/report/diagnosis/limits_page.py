@@ -12,10 +12,7 @@ from bayesid.report.diagnosis.cause_words import limit_text
 from bayesid.report.diagnosis.diagnosis_sentences import action_sentence, advice_sentences
 from bayesid.report.document import Document, Rows
 from bayesid.report.model_assumptions import add_joints, model_sentences
-from bayesid.report.numbers import (
-    format_fixed,
-    format_number,
-)
+from bayesid.report.numbers import format_fixed, format_number
 
 __all__ = [
     "NEXT",
@@ -27,14 +24,9 @@ __all__ = [
     "unseen_rows",
 ]
 
-NEXT = "Next experiment and limits"
-"""Title of the section that says what to fly next."""
-
-PAIRS = 10
-"""Largest number of pairs in the table of causes that imitate each other."""
-
-LIMITS = 6
-"""Largest number of limits in a cell of the table of candidates out of reach."""
+NEXT = "Next experiment and limits"  # title of the section that says what to fly next
+PAIRS = 10  # largest number of pairs in the table of causes that imitate each other
+LIMITS = 6  # largest number of limits in a cell of the table of candidates out of reach
 
 
 def add_limits(document: Document, result: Diagnosis, advice: str | None = None) -> None:

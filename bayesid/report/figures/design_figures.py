@@ -40,20 +40,11 @@ __all__ = [
 LIMIT: Any = {"color": "#B00020", "linewidth": 0.9, "linestyle": (0, (4, 2))}
 """Look of limits."""
 
-ELLIPSE = 2.4477
-"""Half-width, in standard deviations, of an ellipse that holds 95 %."""
-
-WIDEST = 6.0
-"""Largest half-width of a panel, in half-widths of the middle ellipse of all designs."""
-
-PLANES = ((0, 1), (0, 2), (1, 2))
-"""Axes along and up of each panel."""
-
-SHOWN = ("mass", "inertia.xx", "inertia.yy", "inertia.zz")
-"""Quantities whose relative standard deviations are drawn."""
-
-MARKS = ("o", "s", "^", "D")
-"""Marks of the quantities, in their order."""
+ELLIPSE = 2.4477  # half-width, in standard deviations, of an ellipse that holds 95 %
+WIDEST = 6.0  # largest half-width of a panel, in half-widths of the middle ellipse of all designs
+PLANES = ((0, 1), (0, 2), (1, 2))  # axes along and up of each panel
+SHOWN = ("mass", "inertia.xx", "inertia.yy", "inertia.zz")  # quantities whose relative standard deviations are drawn
+MARKS = ("o", "s", "^", "D")  # marks of the quantities, in their order
 
 
 @styled

@@ -48,14 +48,9 @@ __all__ = [
 ROBOT = "#888888"
 """Colour of the robot's sticks."""
 
-ARROW = 0.45
-"""Length of the arrow of a vector, relative to the width of the picture."""
-
-PLACES = ("cp", "position")
-"""Names of the quantities of an effect that are a point of the base."""
-
-FEW = 7
-"""Largest number of recordings in one figure."""
+ARROW = 0.45  # length of the arrow of a vector, relative to the width of the picture
+PLACES = ("cp", "position")  # names of the quantities of an effect that are a point of the base
+FEW = 7  # largest number of recordings in one figure
 
 GIVEN = "#999999"
 """Colour of the values given and their prior."""

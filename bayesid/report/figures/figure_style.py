@@ -39,8 +39,7 @@ __all__ = [
     "with_plain_labels",
 ]
 
-WIDTH = 6.7
-"""Width of the text on an A4 page [in]; figures are printed in their true size."""
+WIDTH = 6.7  # width of the text on an A4 page [in]; figures are printed in their true size
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Colours of curves, by Okabe and Ito, Color Universal Design (2008)."""
@@ -48,8 +47,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 BEFORE, AFTER, TRUTH = COLOURS[1], COLOURS[0], "#808080"
 """Orange of what was before (a model without its causes, the paper), blue of what is after, and grey of the truth."""
 
-DASHES = ("-", "--", ":", "-.")
-"""Dashes of curves, one after the other when the colours are used up."""
+DASHES = ("-", "--", ":", "-.")  # dashes of curves, one after the other when the colours are used up
 
 FILL = "#9fcbe6"
 """Colour of histograms and marginal densities."""
@@ -57,8 +55,7 @@ FILL = "#9fcbe6"
 BAND: Any = {"color": "#e8e8e8", "linewidth": 0.0}
 """Look of the grey band in which noise alone would stay."""
 
-LEAST_REACH = 4.5
-"""Smallest half-height of a panel of residuals [σ]."""
+LEAST_REACH = 4.5  # smallest half-height of a panel of residuals [σ]
 
 _TITLES = {SensorKind.RATE: "angular rate", SensorKind.ACCEL: "acceleration", SensorKind.ATTITUDE: "rotation"}
 """Quantity that a sensor measures, where figures call it otherwise than files do."""

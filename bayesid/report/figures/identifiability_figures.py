@@ -15,11 +15,8 @@ from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 
 __all__ = ["direction_widths", "displacements"]
 
-WORST, MOST_ROWS = 12, 44
-"""Largest numbers of directions and of parameters in the map of displacements."""
-
-VISIBLE = 0.1
-"""Displacement over the largest of its direction from which on a parameter counts as moved."""
+WORST, MOST_ROWS = 12, 44  # largest numbers of directions and of parameters in the map of displacements
+VISIBLE = 0.1  # displacement over the largest of its direction from which on a parameter counts as moved
 
 LOOK = {
     ContractionVerdict.CONTRACTED: COLOURS[2],

@@ -28,23 +28,15 @@ from bayesid.report.numbers import format_fixed, format_number, format_quantity,
 
 __all__ = ["convergence", "corner", "correlations", "prior_to_posterior", "widths"]
 
-REACH = 3.5
-"""Half-width of a corner plot's axes in posterior standard deviations."""
-
-CELLS = 35
-"""Number of cells of a corner plot's histograms along one axis."""
+REACH = 3.5  # half-width of a corner plot's axes in posterior standard deviations
+CELLS = 35  # number of cells of a corner plot's histograms along one axis
 
 LABELS, VALUES = 36, 16
 """Largest numbers of parameters of which a matrix of correlations has room for every name, and for every value."""
 
-PRIOR_DRAWS = 4000
-"""Number of draws from the prior."""
-
-SHOWN = 3
-"""Number of coordinates drawn, those in which the ensembles agree least."""
-
-RANK_BINS = 20
-"""Number of bins of the histograms of ranks."""
+PRIOR_DRAWS = 4000  # number of draws from the prior
+SHOWN = 3  # number of coordinates drawn, those in which the ensembles agree least
+RANK_BINS = 20  # number of bins of the histograms of ranks
 
 
 @styled

@@ -40,11 +40,8 @@ __all__ = [
     "torques_over_time",
 ]
 
-COLUMNS = 3
-"""Number of sensor axes or joints in a row."""
-
-PARTS = 40
-"""Number of windows that a recording is cut into for the running mean."""
+COLUMNS = 3  # number of sensor axes or joints in a row
+PARTS = 40  # number of windows that a recording is cut into for the running mean
 
 SIDES = (("before", COLOURS[1]), ("after", COLOURS[0]))
 """Names and colours of the residuals of the present model and of the extended one."""
