@@ -13,10 +13,8 @@ from bayesid.robot.body_prior import coordinates_of
 from studies.common import mission
 from studies.common.study import Verdict
 from studies.planning import run
-from studies.planning.planner import Planner, miss_of
-from studies.planning.report import _verdict, goals, write_report
-from studies.planning.ships import fitted
-from studies.planning.world import Swing, fly, planners_model, true_ship
+from studies.planning.analysis import Planner, Swing, fitted, fly, miss_of, planners_model, true_ship
+from studies.planning.report import STUDY, _verdict, goals
 from tests.report_rules import broken_rules
 
 
@@ -63,7 +61,7 @@ def test_the_whole_study_small(tmp_path):
     result = run(parameters, seed=2, ships=4)
     for own in result.rows.values():
         assert np.all(own.miss[:, 1, 0] < own.miss[:, 0, 0])
-    write_report(result, tmp_path / "report.pdf")
+    STUDY.write(result, tmp_path / "report.pdf")
     assert broken_rules(tmp_path / "report.pdf", full=False) == []
     assert {goal.verdict for goal in goals(result)[:4]} == {Verdict.OPEN}  # four ships decide nothing
     (row, own), *_ = result.rows.items()

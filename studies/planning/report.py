@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,25 +17,15 @@ from bayesid.report.verdict_record import Share
 from studies.common import mission
 from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, TIP_RATE, TIP_SPEED, ets7
 from studies.common.figures import robot_outline
+from studies.common.provenance import MODELS
 from studies.common.report_parts import add_number_table
-from studies.common.study import Goal, Verdict
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
-)
-from studies.planning import Result
-from studies.planning.ships import BODIES, DRAWS, KINDS, STAGES, Row
-from studies.planning.world import EXCURSION, SPREAD
+from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.ets7_limits.analysis import designed_motion
+from studies.planning.analysis import BODIES, DRAWS, EXCURSION, KINDS, SHIPS, SPREAD, STAGES, Result, Row, run
 
-__all__ = ["goals", "write_report"]
+__all__ = ["STUDY", "Result", "goals", "run"]
 
+MANOEUVRES = "excitation-manoeuvres.csv"  # table of the study of excitation
 HEADLINE = next(iter(mission.ROWS))  # what is known of the arm in the headline
 
 # regions that are counted, by indices of body and kind; base and end-effector turn alike
@@ -77,55 +68,47 @@ def _median(row: Row, stage: int, kind: int) -> str:
     return format_number(float(np.median(row.miss[:, stage, kind])), 2)
 
 
-def write_report(result: Result, output: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, and its tables beside it."""
-    document = Document("What a planner gains by identification", "ETS-VII in MuJoCo; section 1.1.1 of the paper")
-    own = result.rows[HEADLINE]
-    held = [own.share(stage, 1, 0) for stage in range(len(STAGES))]
-    summary = Summary(
+def _report(result: Result) -> Report[Result]:
+    row = result.rows[HEADLINE]
+    before, after = (row.share(stage, 1, 0) for stage in range(len(STAGES)))
+    counts = ", ".join(f"{len(drawn.miss)} with the {known}" for known, drawn in result.rows.items())
+    return Report(
+        title="What a planner gains by identification",
+        subtitle="ETS-VII in MuJoCo; section 1.1.1 of the paper",
         question="How far from its target does a path planned in joint space end, before and after identification?",
-        answer=f"With the {HEADLINE} the end-effector misses its target by {_median(own, 0, 0)} mm and "
-        f"{_median(own, 0, 1)} degrees in the median before identification and by {_median(own, 1, 0)} mm and "
-        f"{_median(own, 1, 1)} degrees after one manoeuvre; the predicted 95 % region of its position holds it in "
-        f"{held[0]} and {held[1]} of the flights.",
+        answer=f"With the {HEADLINE} the end-effector misses its target by {_median(row, 0, 0)} mm and "
+        f"{_median(row, 0, 1)} degrees in the median before identification and by {_median(row, 1, 0)} mm and "
+        f"{_median(row, 1, 1)} degrees after one manoeuvre; the predicted 95 % region of its position holds it in "
+        f"{before} and {after} of the flights.",
         goals=goals(result),
         valid="the joints follow the plan exactly, nothing but the gravity gradient acts, and every path starts at "
         "rest.",
         full=result.full,
-    )
-    add_first_page(
-        document,
-        summary,
-        _miss_figure(result),
-        "Miss of the end-effector, distance from its target and angle, over the drawn ships: share of the ships below "
-        "a value. Solid: arm known to 5 %; dashed: arm known exactly.",
-    )
-    add_setup(document, _setup(result), outline=robot_outline(ets7(), START))
-    _failures(document, result)
-    _evidence(document, result)
-    add_statements(document, _statements(result))
-    tables = _write_tables(result, output)
-    document.paragraph(f"Tables beside this report: {', '.join(tables)}.")
-    write_study(document, summary, output, origin)
-
-
-def _setup(result: Result) -> Setup:
-    counts = ", ".join(f"{len(own.miss)} with the {row}" for row, own in result.rows.items())
-    return Setup(
-        robot=f"ETS-VII, its base drawn within {format_percent(2.0 * SPREAD)} of its mass and its links within 5 %; "
-        f"joints within ±{mission.REACH:g} rad, wrist extended at the start.",
-        manoeuvre=f"Identifying: the d-optimal manoeuvre of the study of excitation, {mission.DURATION:g} s within 50 "
-        "mm/s and 5 degrees per second. Planned: quintics from rest to rest in the same time, with joint excursions of "
-        f"{format_vector(EXCURSION, 2)} rad at first, at {format_number(1e3 * result.course.largest('tip_speed'))} "
-        "mm/s at most.",
-        sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
-        f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant bias "
-        "of the accelerometer.",
-        known="The orbit and its gravity gradient, the attitude at the start, and the ship as it was published.",
-        unknown="The base and the links within these widths, the rate at the start, the bias within "
-        f"{format_number(BIAS)} m/s².",
-        replicates=f"Drawn ships: {counts}, each with noise and bias of its own. Each prediction has {DRAWS} draws; "
-        "posteriors are normal in log-Cholesky coordinates about the mode.",
+        figure=Picture(
+            _miss_figure(result),
+            "Miss of the end-effector, distance from its target and angle, over the drawn ships: share of the ships "
+            "below a value. Solid: arm known to 5 %; dashed: arm known exactly.",
+        ),
+        setup=Setup(
+            robot=f"ETS-VII, its base drawn within {format_percent(2.0 * SPREAD)} of its mass and its links within 5 "
+            f"%; joints within ±{mission.REACH:g} rad, wrist extended at the start.",
+            manoeuvre=f"Identifying: the d-optimal manoeuvre of the study of excitation, {mission.DURATION:g} s within "
+            "50 mm/s and 5 degrees per second. Planned: quintics from rest to rest in the same time, with joint "
+            f"excursions of {format_vector(EXCURSION, 2)} rad at first, at "
+            f"{format_number(1e3 * result.course.largest('tip_speed'))} mm/s at most.",
+            sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
+            f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant "
+            "bias of the accelerometer.",
+            known="The orbit and its gravity gradient, the attitude at the start, and the ship as it was published.",
+            unknown="The base and the links within these widths, the rate at the start, the bias within "
+            f"{format_number(BIAS)} m/s².",
+            replicates=f"Drawn ships: {counts}, each with noise and bias of its own. Each prediction has {DRAWS} "
+            "draws; posteriors are normal in log-Cholesky coordinates about the mode.",
+        ),
+        outline=robot_outline(ets7(), START),
+        sections=[_failures, _evidence],
+        statements=_statements(result),
+        tables=[_table(result)],
     )
 
 
@@ -209,7 +192,7 @@ def _statements(result: Result) -> list[Statement]:
     ]
 
 
-def _write_tables(result: Result, output: Path) -> list[str]:
+def _table(result: Result) -> CsvTable:
     header = ["arm", "ship", "planned with", "miss [mm]", "miss [degrees]"]
     header += [f"{body} {kind} held" for body in BODIES for kind in KINDS]
     lines = [
@@ -218,7 +201,7 @@ def _write_tables(result: Result, output: Path) -> list[str]:
         for ship in range(len(own.miss))
         for stage, title in enumerate(STAGES)
     ]
-    return [write_table(output, "ships", header, lines)]
+    return CsvTable("ships", header, lines)
 
 
 @styled
@@ -236,3 +219,24 @@ def _miss_figure(result: Result) -> Figure:
     panels[0].set_ylabel("share of ships")
     shared_legend(figure, panels[0], len(STAGES))
     return figure
+
+
+def _run(tables: Path, **options: Any) -> Result:
+    """Run the study with the manoeuvre in a table of the study of excitation."""
+    return run(np.asarray(designed_motion(tables / MANOEUVRES).parameters), **options)
+
+
+STUDY = Study(
+    "planning",
+    "Say what a planner gains by identification.",
+    run=_run,
+    report=_report,
+    full=f"{SHIPS} drawn ships for each knowledge of the arm",
+    seed=1,
+    extra={
+        "--tables": {"type": Path, "default": Path("reports"), "help": "folder with the tables of excitation"},
+        "--ships": {"type": int, "help": "number of drawn ships for each knowledge of the arm"},
+        **TRIALS,
+    },
+    inputs=lambda options: [MODELS / "ets7.urdf", options.tables / MANOEUVRES],
+)
