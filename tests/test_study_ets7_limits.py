@@ -9,9 +9,8 @@ from bayesid._io.errors import InputError
 from bayesid.identifiability.local_knowledge import Knowledge
 from studies.common import mission
 from studies.common.ets7 import EXCURSION, RAMPS, START, FlightManoeuvre
-from studies.common.template import write_table
-from studies.ets7_limits.analysis import Answer, designed_motion
-from studies.ets7_limits.information import Repeated
+from studies.common.study import CsvTable
+from studies.ets7_limits.analysis import Answer, Repeated, designed_motion
 from studies.ets7_limits.report import time_needed
 
 TRUTH = np.ones(10)
@@ -90,5 +89,5 @@ def test_the_manoeuvre_is_read_from_the_table_of_the_other_study(tmp_path):
         designed_motion(file)
     names = mission.splines(2).names
     values = 0.01 * np.arange(len(names))
-    write_table(tmp_path / "excitation.pdf", "manoeuvres", ["manoeuvre", *names], [["d-optimal", *values]])
+    CsvTable("manoeuvres", ["manoeuvre", *names], [["d-optimal", *values]]).write(tmp_path / "excitation.pdf")
     np.testing.assert_allclose(designed_motion(file).parameters, values)

@@ -214,11 +214,7 @@ def _statements(result: BaseBody) -> list[Statement]:
     well, poor = result.noise_free["well"].worst, result.noise_free["poor"].worst
     loss = result.noise_free["poor"].uncertainty[MOMENTS] / result.noise_free["well"].uncertainty[MOMENTS]
     return [
-        Statement(
-            "To include the gravity gradient is very important (4.1).",
-            Finding.CONFIRMED,
-            _gradient(result),
-        ),
+        Statement("To include the gravity gradient is very important (4.1).", Finding.CONFIRMED, _gradient(result)),
         Statement(
             f"Well exciting, the errors are up to {_worst(paper.RESULT_WELL)}; poorly exciting, up to "
             f"{_worst(paper.RESULT_POOR)} (4.1).",

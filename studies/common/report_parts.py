@@ -44,11 +44,7 @@ def columns(letters: str) -> list[str]:
 
 
 def add_number_table(
-    document: Document,
-    header: Sequence[str],
-    rows: Sequence[Sequence[str]],
-    caption: str | None = None,
-    words: int = 1,
+    document: Document, header: Sequence[str], rows: Sequence[Sequence[str]], caption: str | None = None, words: int = 1
 ) -> None:
     """Add a table with words in its leading columns, aligned to the left, and numbers in the others, to the right.
 

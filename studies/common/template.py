@@ -45,12 +45,7 @@ def add_first_page(document: Document, summary: Summary, figure: Figure | None =
 
 
 def add_setup(
-    document: Document,
-    setup: Setup,
-    picture: Figure | None = None,
-    caption: str = "",
-    *,
-    outline: Figure | None = None,
+    document: Document, setup: Setup, picture: Figure | None = None, caption: str = "", *, outline: Figure | None = None
 ) -> None:
     """Add the conditions in a box, with an outline of the robot in it or a picture of its motion below."""
     document.section("Setup")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import astuple, fields
-from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -23,21 +22,10 @@ from bayesid.report.numbers import (
 from studies.common.ets7 import RADIUS, RAMPS, TIP_SPEED, ets7, tip_speed
 from studies.common.quantities import HEADINGS
 from studies.common.report_parts import columns
-from studies.common.study import Goal, Verdict
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
-)
-from studies.ets7_drift.analysis import CAUSES, Amplitude, Attitude, Case, Step
-from studies.ets7_drift.world import (
+from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.ets7_drift.analysis import (
     ATTITUDE_SIGMA,
+    CAUSES,
     DURATION,
     ENCODER_SIGMA,
     INTERVAL,
@@ -46,9 +34,14 @@ from studies.ets7_drift.world import (
     MOTION,
     RATE,
     RATE_SIGMA,
+    Amplitude,
+    Attitude,
+    Case,
+    Step,
+    run,
 )
 
-__all__ = ["attitude_figure", "goals_of", "write_report"]
+__all__ = ["STUDY", "attitude_figure", "goals_of"]
 
 # factor by which the predicted attitude should be nearer to the measured one than the present simulation
 BETTER = 100.0
@@ -58,44 +51,60 @@ REACH = 1.96  # half-width of a 95 % band [standard deviations]
 NOISE = float(np.degrees(np.sqrt(3.0) * ATTITUDE_SIGMA))  # expected size of the attitude's noise [degrees]
 
 
-def write_report(cases: Mapping[str, Case], output: Path, *, full: bool, origin: str | None = None) -> None:
-    """Write the report as PDF, and beside it its summary and its further tables."""
-    document = Document("Drift of ETS-VII", "Section 2.1 and figure 2 of Lampariello and Hirzinger (IDETC 2005)")
+Cases = Mapping[str, Case]  # cases by what is known of the base
+
+
+def _report(cases: Cases) -> Report[Cases]:
     known, shown = _shown(cases)
-    summary = Summary(
-        "With attitude control off, the attitude of ETS-VII drifted away from its simulation (the paper's figure 2). "
-        "Can the causes be named from rates and joints alone, with the base known to 5 %, and does the simulation with "
-        "them predict the measured attitude, which was not used?",
-        " ".join(_answer(name, case) for name, case in cases.items()),
-        tuple(goal for name in KNOWN for goal in goals_of(name, cases.get(name))),
-        "the links are known exactly, where the paper knows them to 5 %, the wheels' momentum is constant and the "
-        "noise is white. Recordings are simulated; no flight telemetry of ETS-VII is public.",
-        full,
-    )
-    add_first_page(
-        document,
-        summary,
-        attitude_figure(shown.attitudes[0]),
-        f"Base known to {known}, the first of {len(shown.attitudes)} recordings. Above: the paper's figure 2 with its "
-        "remedy, Euler angles of the base since the start; the bump between 60 and 145 s is the motion of the arm. "
-        "Below: error of the predicted attitude, with the 95 % band predicted from what the rates leave unknown and "
-        "the attitude's noise.",
-    )
+    ramps = " and ".join(f"{start:g} to {stop:g} s" for start, stop in RAMPS)
+    fastest, _ = tip_speed(MOTION, DURATION)
     rests = np.array([0.0, 100.0])
-    add_setup(
-        document,
-        _setup(shown),
-        figures.robot_pose(ets7(), MOTION, rests),
-        f"ETS-VII with the joints at rest, before the manoeuvre and between its two turns ({rests[1]:g} s).",
+    quantities = [[name, *astuple(amplitude)] for name, case in cases.items() for amplitude in _quantities(case)]
+    return Report(
+        title="Drift of ETS-VII",
+        subtitle="Section 2.1 and figure 2 of Lampariello and Hirzinger (IDETC 2005)",
+        question="With attitude control off, the attitude of ETS-VII drifted away from its simulation (the paper's "
+        "figure 2). Can the causes be named from rates and joints alone, with the base known to 5 %, and does the "
+        "simulation with them predict the measured attitude, which was not used?",
+        answer=" ".join(_answer(name, case) for name, case in cases.items()),
+        valid="the links are known exactly, where the paper knows them to 5 %, the wheels' momentum is constant and "
+        "the noise is white. Recordings are simulated; no flight telemetry of ETS-VII is public.",
+        goals=[goal for name in KNOWN for goal in goals_of(name, cases.get(name))],
+        full=set(cases) == set(KNOWN),
+        figure=Picture(
+            attitude_figure(shown.attitudes[0]),
+            f"Base known to {known}, the first of {len(shown.attitudes)} recordings. Above: the paper's figure 2 with "
+            "its remedy, Euler angles of the base since the start; the bump between 60 and 145 s is the motion of the "
+            "arm. Below: error of the predicted attitude, with the 95 % band predicted from what the rates leave "
+            "unknown and the attitude's noise.",
+        ),
+        setup=Setup(
+            robot=f"ETS-VII as shipped with this package, on a circular orbit of {RADIUS / 1e3:g} km, without attitude "
+            "control. An independent simulator (MuJoCo) makes the recordings.",
+            manoeuvre=f"Joints 2 to 4 move by 0.264, −0.321 and 0.057 rad out and back, as in flight, over {ramps}; "
+            f"its linear ramps are replaced by quintic ones. The tip moves with up to {1e3 * fastest:.0f} mm/s, where "
+            f"the flight's rule is {1e3 * TIP_SPEED:.0f} mm/s.",
+            sensors=f"Every {INTERVAL:g} s, noise per sample: rates {format_number(RATE_SIGMA)} rad/s (the paper's "
+            f"star sensor: 2 arcsec), joints {format_number(ENCODER_SIGMA)} rad. The attitude, "
+            f"{format_number(ATTITUDE_SIGMA)} rad, is kept for comparison alone, but for the exact one at the start.",
+            known="Orbit, links and joint motion. The present simulation starts at rest and has no effect.",
+            unknown=f"Base body, with a mass known to {' or '.join(KNOWN)}, of which the true base is a draw; hidden: "
+            f"gravity gradient, momentum {format_vector(MOMENTUM)} N m s left in the wheels, and initial rates of "
+            f"{format_number(RATE)} rad/s per axis (assumed, as no values are public).",
+            replicates=f"{len(shown.world.manoeuvres)} recordings of {DURATION:g} s, attitudes and places on orbit "
+            "drawn at random, one base. A single world: rates of right verdicts are in the report on blind injections.",
+        ),
+        picture=Picture(
+            figures.robot_pose(ets7(), MOTION, rests),
+            f"ETS-VII with the joints at rest, before the manoeuvre and between its two turns ({rests[1]:g} s).",
+        ),
+        sections=[_negatives, _evidence],
+        statements=_statements(cases),
+        tables=[CsvTable("quantities", ["base known to", *(field.name for field in fields(Amplitude))], quantities)],
     )
-    document.section("What fails, and how sure the answer is")
-    document.items([text for name, case in cases.items() for text in _negatives(name, case)])
-    _evidence(document, cases, output)
-    add_statements(document, _statements(cases))
-    write_study(document, summary, output, origin)
 
 
-def _shown(cases: Mapping[str, Case]) -> tuple[str, Case]:
+def _shown(cases: Cases) -> tuple[str, Case]:
     """Return the first case whose causes are named rightly, or else the first."""
     right = [(name, case) for name, case in cases.items() if case.right]
     return (right or list(cases.items()))[0]
@@ -154,28 +163,12 @@ def _true(case: Case) -> float:
     return sum(item.probability for item in sets if item.generic is None and set(item.causes) == set(CAUSES))
 
 
-def _setup(case: Case) -> Setup:
-    ramps = " and ".join(f"{start:g} to {stop:g} s" for start, stop in RAMPS)
-    fastest, _ = tip_speed(MOTION, DURATION)
-    return Setup(
-        robot=f"ETS-VII as shipped with this package, on a circular orbit of {RADIUS / 1e3:g} km, without attitude "
-        "control. An independent simulator (MuJoCo) makes the recordings.",
-        manoeuvre=f"Joints 2 to 4 move by 0.264, −0.321 and 0.057 rad out and back, as in flight, over {ramps}; its "
-        f"linear ramps are replaced by quintic ones. The tip moves with up to {1e3 * fastest:.0f} mm/s, where the "
-        f"flight's rule is {1e3 * TIP_SPEED:.0f} mm/s.",
-        sensors=f"Every {INTERVAL:g} s, noise per sample: rates {format_number(RATE_SIGMA)} rad/s (the paper's star "
-        f"sensor: 2 arcsec), joints {format_number(ENCODER_SIGMA)} rad. The attitude, {format_number(ATTITUDE_SIGMA)} "
-        "rad, is kept for comparison alone, but for the exact one at the start.",
-        known="Orbit, links and joint motion. The present simulation starts at rest and has no effect.",
-        unknown=f"Base body, with a mass known to {' or '.join(KNOWN)}, of which the true base is a draw; hidden: "
-        f"gravity gradient, momentum {format_vector(MOMENTUM)} N m s left in the wheels, and initial rates of "
-        f"{format_number(RATE)} rad/s per axis (assumed, as no values are public).",
-        replicates=f"{len(case.world.manoeuvres)} recordings of {DURATION:g} s, attitudes and places on orbit drawn at "
-        "random, one base. A single world: rates of right verdicts are in the report on blind injections.",
-    )
+def _negatives(document: Document, cases: Cases) -> None:
+    document.section("What fails, and how sure the answer is")
+    document.items([text for name, case in cases.items() for text in _failures(name, case)])
 
 
-def _negatives(known: str, case: Case) -> list[str]:
+def _failures(known: str, case: Case) -> list[str]:
     """Return what fails with the base known to so much."""
     verdict, gain = case.diagnosis.verdict, case.diagnosis.gain
     off = (gain.before.bodies.mean[0] / case.world.base[0] - 1.0) * 100.0
@@ -210,7 +203,7 @@ def _negatives(known: str, case: Case) -> list[str]:
     return texts
 
 
-def _evidence(document: Document, cases: Mapping[str, Case], output: Path) -> None:
+def _evidence(document: Document, cases: Cases) -> None:
     document.section("Evidence")
     document.table(
         ["base known to", "causes", "probability", "log evidence", "chi-square per sample"],
@@ -220,8 +213,6 @@ def _evidence(document: Document, cases: Mapping[str, Case], output: Path) -> No
         columns("llrrr"),
     )
     quantities = [(known, item) for known, case in cases.items() for item in _quantities(case)]
-    header = ["base known to", *(field.name for field in fields(Amplitude))]
-    file = write_table(output, "quantities", header, ((known, *astuple(item)) for known, item in quantities))
     document.table(
         ["base known to", "quantity", "unit", "truth", "estimate ± sd", "error [sd]"],
         [
@@ -237,7 +228,7 @@ def _evidence(document: Document, cases: Mapping[str, Case], output: Path) -> No
             if not item.name.startswith(("initial rate", "com", "inertia"))
         ],
         "Mass of the base and momentum of the wheels, fitted together with the other named causes. All ten parameters "
-        f"and the initial rates, one vector for each recording, are in {file}.",
+        "and the initial rates, one vector for each recording, are in the table beside this report.",
         columns("lllrrr"),
     )
     document.items([f"Base known to {known}: {_fit_sentence(case)}" for known, case in cases.items()])
@@ -280,7 +271,7 @@ def _step_row(step: Step) -> list[str]:
     ]
 
 
-def _statements(cases: Mapping[str, Case]) -> list[Statement]:
+def _statements(cases: Cases) -> list[Statement]:
     right = [name for name, case in cases.items() if case.right]
     last = max(
         float(np.abs(item.plain[-1] - item.measured[-1]).max()) for case in cases.values() for item in case.attitudes
@@ -327,3 +318,13 @@ def attitude_figure(attitude: Attitude) -> Figure:
     panels[1, 0].legend()
     shared_legend(figure, panels[0, 0], 3)
     return figure
+
+
+STUDY = Study(
+    "ets7_drift",
+    "Name what makes the attitude of ETS-VII drift.",
+    run=run,
+    report=_report,
+    full="three recordings, and a base known to 5 %%",
+    seed=1,
+)

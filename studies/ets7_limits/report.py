@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from bayesid.report import Document
+from bayesid.report.figures.figure_style import COLOURS, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_number, format_percent, format_vector
 from studies.common import mission
 from studies.common.ets7 import (
@@ -23,26 +26,13 @@ from studies.common.ets7 import (
     ets7,
 )
 from studies.common.figures import manoeuvre_figure, robot_outline
+from studies.common.provenance import MODELS
 from studies.common.quantities import HEADINGS
 from studies.common.report_parts import add_number_table
-from studies.common.study import Goal, Verdict
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
-)
-from studies.ets7_limits import Result
-from studies.ets7_limits.analysis import Answer
-from studies.ets7_limits.figures import repetition_figure
-from studies.ets7_limits.information import LONGEST
+from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.ets7_limits.analysis import LONGEST, Answer, Result, run
 
-__all__ = ["goals", "time_needed", "write_report"]
+__all__ = ["STUDY", "goals", "time_needed"]
 
 YEAR = 3.156e7  # length of a year [s]
 
@@ -99,10 +89,11 @@ def goals(result: Result) -> tuple[Goal, ...]:
     return tuple(rows)
 
 
-def write_report(result: Result, output: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, and its tables beside it."""
-    document = Document("What ETS-VII could have identified", "Within 50 mm/s and 5 degrees per second at the tip")
-    summary = Summary(
+def _report(result: Result) -> Report[Result]:
+    (begin, end), (again, _) = RAMPS
+    return Report(
+        title="What ETS-VII could have identified",
+        subtitle="Within 50 mm/s and 5 degrees per second at the tip",
         question="How long must the arm move within the flight's rule until mass and moments of inertia of the base "
         "are known to 1 %, and with which sensors?",
         answer="With the arm known to 5 % of each link's mass no time and no rate sensor or accelerometer is enough: "
@@ -114,48 +105,39 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
         valid="wheels, fuel, paddles and thrusters do not act, attitude control is off, the initial attitude is known "
         "and noise white. Every repetition starts at a new unknown rate; bias and arm stay the same.",
         full=True,
+        figure=Picture(
+            _repetition_figure(result.repetitions, result.curves),
+            "Largest of the relative standard deviations of mass and moments of inertia against the time spent moving, "
+            "with 10⁻⁵ rad/s, 10⁻⁵ m/s² and an unknown bias. The grey line is 1 %.",
+        ),
+        setup=Setup(
+            robot="ETS-VII with the published base and nominal links. The accelerometer is at "
+            f"{format_vector(ACCELEROMETER)} m, which is not published.",
+            manoeuvre=f"Two of {mission.DURATION:g} s from the posture with the wrist extended: the d-optimal one of "
+            "the report on excitation, at the speed that the rule allows, and the flight's own, which turns joints 2 "
+            f"to 4 by {', '.join(format_number(turn) for turn in EXCURSION[1:4])} rad out and back within "
+            f"{end - begin:g} s each, {again - end:g} s apart, with corners rounded over {CORNER:g} s.",
+            sensors=f"Every {INTERVAL:g} s rates and accelerations with the noise in the table, encoders with "
+            f"{format_number(ENCODER)} rad. The mission's are {format_number(RATE)} rad/s and {format_number(ACCEL)} "
+            "m/s². The star sensor's 2 seconds of arc are differenced and taken as white.",
+            known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link, or exactly.",
+            unknown=f"The base, the rate at the start, and the accelerometer's bias within {format_number(BIAS)} m/s².",
+            replicates="Standard deviations to first order; those above some 30 % are rough.",
+        ),
+        outline=robot_outline(ets7(), START),
+        picture=Picture(
+            manoeuvre_figure({"d-optimal manoeuvre": result.motion, "the flight's own": mission.flight_manoeuvre()}),
+            "The two manoeuvres in MuJoCo: joints, speed of the tip with the rule dotted, and rotation of the base.",
+        ),
+        sections=[_failures, _evidence],
+        statements=_statements(result),
+        tables=_tables(result),
     )
-    add_first_page(
-        document,
-        summary,
-        repetition_figure(result.repetitions, result.curves),
-        "Largest of the relative standard deviations of mass and moments of inertia against the time spent moving, "
-        "with 10⁻⁵ rad/s, 10⁻⁵ m/s² and an unknown bias. The grey line is 1 %.",
-    )
-    add_setup(document, _setup(), outline=robot_outline(ets7(), START))
-    document.figure(
-        manoeuvre_figure({"d-optimal manoeuvre": result.motion, "the flight's own": mission.flight_manoeuvre()}),
-        "The two manoeuvres in MuJoCo: joints, speed of the tip with the rule dotted, and rotation of the base.",
-    )
-    _failures(document, result)
-    _evidence(document, result)
-    add_statements(document, _statements(result))
-    tables = _write_tables(result, output)
-    document.paragraph(f"Tables beside this report: {', '.join(tables)}.")
-    write_study(document, summary, output, origin)
 
 
 def _least(result: Result) -> float:
     """Return the smallest of all lower limits with the arm known to 5 %."""
     return min(answer.floor for row in result.answers.values() for (known, _), answer in row.items() if not known)
-
-
-def _setup() -> Setup:
-    (begin, end), (again, _) = RAMPS
-    return Setup(
-        robot="ETS-VII with the published base and nominal links. The accelerometer is at "
-        f"{format_vector(ACCELEROMETER)} m, which is not published.",
-        manoeuvre=f"Two of {mission.DURATION:g} s from the posture with the wrist extended: the d-optimal one of the "
-        "report on excitation, at the speed that the rule allows, and the flight's own, which turns joints 2 to 4 by "
-        f"{', '.join(format_number(turn) for turn in EXCURSION[1:4])} rad out and back within {end - begin:g} s each, "
-        f"{again - end:g} s apart, with corners rounded over {CORNER:g} s.",
-        sensors=f"Every {INTERVAL:g} s rates and accelerations with the noise in the table, encoders with "
-        f"{format_number(ENCODER)} rad. The mission's are {format_number(RATE)} rad/s and {format_number(ACCEL)} m/s². "
-        "The star sensor's 2 seconds of arc are differenced and taken as white.",
-        known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link, or exactly.",
-        unknown=f"The base, the rate at the start, and the accelerometer's bias within {format_number(BIAS)} m/s².",
-        replicates="Standard deviations to first order; those above some 30 % are rough.",
-    )
 
 
 def _failures(document: Document, result: Result) -> None:
@@ -181,10 +163,7 @@ def _evidence(document: Document, result: Result) -> None:
         cells = [
             cell
             for known in (False, True)
-            for cell in (
-                format_percent(row[known, False].once, 2),
-                time_needed(row[known, False], mission.DURATION),
-            )
+            for cell in (format_percent(row[known, False].once, 2), time_needed(row[known, False], mission.DURATION))
         ]
         rows.append([rate, accel, *cells])
     add_number_table(
@@ -234,7 +213,7 @@ def _statements(result: Result) -> list[Statement]:
     ]
 
 
-def _write_tables(result: Result, output: Path) -> list[str]:
+def _tables(result: Result) -> list[CsvTable]:
     times = [
         [
             *labels,
@@ -254,6 +233,38 @@ def _write_tables(result: Result, output: Path) -> list[str]:
         for arm, values in zip(mission.ROWS, (item.uncertain, item.exact), strict=True)
     ]
     return [
-        write_table(output, "times", header, times),
-        write_table(output, "predicted", ["manoeuvre", "arm", *(f"sd {text}" for text in HEADINGS)], sds),
+        CsvTable("times", header, times),
+        CsvTable("predicted", ["manoeuvre", "arm", *(f"sd {text}" for text in HEADINGS)], sds),
     ]
+
+
+@styled
+def _repetition_figure(repetitions: Sequence[float], curves: Mapping[tuple[str, bool], Sequence[float]]) -> Figure:
+    """Draw the worst relative standard deviation against the time spent moving."""
+    figure = wide_figure(2.7)
+    axes = figure.subplots()
+    hours = np.array(repetitions) * mission.DURATION / 3600.0
+    for index, ((name, known), values) in enumerate(curves.items()):
+        label = f"{name} manoeuvre, arm {'exact' if known else '5 %'}"
+        line = "--" if known else "-"
+        axes.plot(hours, 100.0 * np.array(values), color=COLOURS[index // 2], linestyle=line, label=label)
+    axes.axhline(1.0, color="#888888", linewidth=0.8)
+    axes.set(xscale="log", yscale="log", xlabel="time spent moving [h]", ylabel="largest relative sd [%]")
+    axes.set_yticks(*_ticks(axes.get_ylim()))
+    shared_legend(figure, axes, 2, place="outside lower center")
+    return figure
+
+
+def _ticks(limits: tuple[float, float]) -> tuple[list[float], list[str]]:
+    values = [value for value in (0.001, 0.01, 0.1, 1.0, 10.0, 100.0) if limits[0] <= value <= limits[1]]
+    return values, [f"{value:g}" for value in values]
+
+
+STUDY = Study(
+    "ets7_limits",
+    "Say what ETS-VII could have identified within its rules.",
+    run=run,
+    report=_report,
+    extra={"--tables": {"type": Path, "default": Path("reports"), "help": "folder with the tables of excitation"}},
+    inputs=lambda options: [MODELS / "ets7.urdf", options.tables / "excitation-manoeuvres.csv"],
+)

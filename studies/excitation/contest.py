@@ -83,12 +83,7 @@ def contest_problem(full: bool, points: int) -> Problem:
 
 
 def compete(
-    problem: Problem,
-    seed: int,
-    search: Search,
-    first: Sequence[Floats],
-    store: Store,
-    progress: Callable[[str], None],
+    problem: Problem, seed: int, search: Search, first: Sequence[Floats], store: Store, progress: Callable[[str], None]
 ) -> Contest:
     """Design by every criterion of the problem; ``first`` are manoeuvres from which every search begins, too."""
     found = design(problem, seed, mission.ENCODERS, search, first=first, store=store, progress=sparse(progress))

@@ -91,9 +91,7 @@ def _report(result: Result) -> Report[Result]:
         tables=[
             CsvTable("estimates", ["treated", "noise", "treatment", "quantity", *SPREAD], estimate_rows(result)),
             CsvTable(
-                "linear",
-                ["noise", "treatment", "quantity", "bias", "bias error", "closed form"],
-                linear_rows(result),
+                "linear", ["noise", "treatment", "quantity", "bias", "bias error", "closed form"], linear_rows(result)
             ),
             CsvTable(
                 "fits",

@@ -98,11 +98,7 @@ def treatment_rows(result: Result, level: str) -> list[list[str]]:
 
 def estimate_rows(result: Result) -> Iterator[tuple[object, ...]]:
     """Yield what is treated, noise, treatment, quantity; bias, sd, rms with Monte-Carlo errors; stated sd, honesty."""
-    for what, levels in (
-        ("joints", result.joints),
-        ("rates", result.rates),
-        ("accelerometer", result.accelerometers),
-    ):
+    for what, levels in (("joints", result.joints), ("rates", result.rates), ("accelerometer", result.accelerometers)):
         for level, spreads in levels.items():
             for name, spread in spreads.items():
                 stated = np.sqrt((spread.stated**2).mean(axis=0))

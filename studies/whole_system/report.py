@@ -95,11 +95,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
 
 
 # manoeuvres and sensors of the first page
-CHIEF = (
-    ("six joints", Sensors.MOTION),
-    ("six joints", Sensors.TORQUES),
-    ("six joints, known thrust", Sensors.MOTION),
-)
+CHIEF = (("six joints", Sensors.MOTION), ("six joints", Sensors.TORQUES), ("six joints, known thrust", Sensors.MOTION))
 
 
 def _haste(result: Result) -> str:
@@ -146,11 +142,7 @@ def goals_of(result: Result) -> list[Goal]:
     tail = f"{coverage.far} and {coverage.near} of {len(coverage.distances)}, p = {coverage.tail_p_value:.2f}"
     return [
         *goals,
-        Goal(
-            texts[0],
-            sampled,
-            Verdict.of(len(agreed) == len(cases) and _well_sized(cases)),
-        ),
+        Goal(texts[0], sampled, Verdict.of(len(agreed) == len(cases) and _well_sized(cases))),
         Goal(texts[1], f"p = {coverage.p_value:.2f}", Verdict.of(coverage.p_value >= LEVEL)),
         Goal(texts[2], tail, Verdict.of(coverage.tail_p_value >= LEVEL)),
     ]

@@ -24,10 +24,7 @@ CENTRE = np.array([0.2, -0.8, 1.2, -0.5, 0.6, 0.3])  # joint positions before an
 def flights(duration: float) -> dict[str, dict[str, Any]]:
     """Return the manoeuvres compared, by name: arguments of `fly`."""
     first, second = round(0.25 * duration), round(0.6 * duration)
-    pulses = (
-        Thrust(first, first + 2.0, force=(20.0, 0.0, 0.0)),
-        Thrust(second, second + 2.0, force=(0.0, 20.0, 0.0)),
-    )
+    pulses = (Thrust(first, first + 2.0, force=(20.0, 0.0, 0.0)), Thrust(second, second + 2.0, force=(0.0, 20.0, 0.0)))
     return {
         "three joints": {"joints": (0, 1, 2)},
         "six joints": {"joints": tuple(range(6))},
