@@ -14,12 +14,9 @@ from studies.base_body import paper
 from studies.common import mission
 from studies.common.repeated_fits import Realised, Reference
 from studies.common.study import Verdict
-from studies.excitation import run
-from studies.excitation.cloud import Cloud
-from studies.excitation.contest import paper_problem, shrunk
-from studies.excitation.report import goals, write_report
-from studies.excitation.rivals import Rivals, other_problem, other_robots
-from studies.excitation.saturation import Crowd, Searches
+from studies.excitation import STUDY, run
+from studies.excitation.report import goals
+from studies.excitation.search import Cloud, Crowd, Rivals, Searches, other_problem, other_robots, paper_problem, shrunk
 from tests.report_rules import broken_rules
 
 
@@ -84,7 +81,7 @@ def test_the_whole_study_small(tmp_path):
     assert 0.3 < own.ratio < 2.0
     assert own.last_step.max() < 0.5
     assert np.all(result.cloud.intended <= result.cloud.motion + 1e-12)  # differences only take away
-    write_report(result, tmp_path / "report.pdf")
+    STUDY.write(result, tmp_path / "report.pdf")
     assert broken_rules(tmp_path / "report.pdf", full=False) == []
     for errors, verdict in ((3.0 * own.errors, Verdict.FAIL), (own.errors / own.rms, Verdict.OPEN)):
         realised = {"d-optimal": replace(own, errors=errors)}
@@ -117,7 +114,7 @@ def test_the_whole_study_small(tmp_path):
 
 @pytest.mark.usefixtures("slow")
 def test_other_robots_are_searched_by_many_descents_and_by_a_search_and_kept(monkeypatch, tmp_path):
-    monkeypatch.setattr("studies.excitation.rivals.ROBOTS", {"a table": lambda: Robot.shipped("planar")})
+    monkeypatch.setattr("studies.excitation.search.ROBOTS", {"a table": lambda: Robot.shipped("planar")})
     store, efforts = Store.open(tmp_path / "store.json", "small"), (Search(3, 10), Search(1, 10, exchanges=1))
     told: list[str] = []
     found = other_robots(1, *efforts, store, told.append)

@@ -11,10 +11,8 @@ from bayesid.report.verdict_record import Share
 from bayesid.robot.joint_state import JointState
 from studies.common import mission
 from studies.common.study import Verdict
-from studies.separating.analysis import expectations, flown, realise, references
-from studies.separating.linear_evidence import Expected, Linearised
+from studies.separating.analysis import TRUTHS, Expected, Linearised, expectations, flown, realise, references
 from studies.separating.report import LAST, RIVALRY, _decided, _shown
-from studies.separating.setting import TRUTHS
 
 DURATION = 40.0
 

@@ -9,14 +9,10 @@ import pytest
 
 from bayesid.robot.inertial_parameters import InertialParameters
 from studies.common.ets7 import BASE
-from studies.whole_system import run, write_report
-from studies.whole_system.coverage import Coverage
-from studies.whole_system.information import Information, Sensors
-from studies.whole_system.linear import linear_prior, regress
+from studies.whole_system import STUDY, run
+from studies.whole_system.identification import Coverage, Sampled, linear_prior, regress
 from studies.whole_system.report import _well_sized
-from studies.whole_system.sampled import Sampled
-from studies.whole_system.setting import LOAD, bodies, drawn, spreads, true_robot
-from studies.whole_system.world import fly, record
+from studies.whole_system.system import LOAD, Information, Sensors, bodies, drawn, fly, record, spreads, true_robot
 from tests.report_rules import broken_rules
 
 
@@ -111,7 +107,7 @@ def test_torques_and_thrust_bring_the_scale_and_the_report_is_written(tmp_path: 
     thrust = result.known["six joints, known thrust"].knowledge(Sensors.MOTION).mass(*bodies(result.truth))[1]
     assert total[Sensors.TORQUES] < 0.2 * total[Sensors.MOTION]
     assert thrust < 0.2 * total[Sensors.MOTION]
-    write_report(result, tmp_path / "report.pdf")
+    STUDY.write(result, tmp_path / "report.pdf")
     assert broken_rules(tmp_path / "report.pdf", full=False) == []
 
 

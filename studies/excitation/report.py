@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
-from bayesid.design import THOROUGH, Search
+from bayesid.design import THOROUGH, Search, Store
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent
@@ -17,23 +20,10 @@ from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, ets
 from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.quantities import HEADINGS, LABELS
 from studies.common.report_parts import add_number_table
-from studies.common.study import Goal, Verdict
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
-)
-from studies.excitation import Result
-from studies.excitation.contest import Contest
-from studies.excitation.saturation import Crowd
+from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.excitation.search import FULL, QUICK, Contest, Crowd, Result, run
 
-__all__ = ["goals", "write_report"]
+__all__ = ["STUDY", "goals"]
 
 # titles of the manoeuvres
 TITLES = {
@@ -167,52 +157,44 @@ def _near_goal(text: str, result: Result, crowd: Crowd) -> Goal:
     return Goal(text, reached, Verdict.of(worse.mean() <= ALIKE) if len(crowd.costs) >= STARTS else Verdict.OPEN)
 
 
-def write_report(result: Result, output: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, and its tables beside it."""
-    contest, reached = result.contest, goals(result)
-    document = Document("Which manoeuvre tells most about the base", "ETS-VII; sections 3.2, 3.3 and 4.1 of the paper")
+def _report(result: Result) -> Report[Result]:
+    contest = result.contest
     factors = {row: contest.factor("d-optimal", "condition-number", row) for row in mission.ROWS}
-    summary = Summary(
+    shrink = contest.shrink
+    return Report(
+        title="Which manoeuvre tells most about the base",
+        subtitle="ETS-VII; sections 3.2, 3.3 and 4.1 of the paper",
         question="Which manoeuvre of ETS-VII, within the rule of its flight, tells most about its base?",
         answer="The manoeuvre with the smallest posterior volume (d-optimal) leaves standard deviations that are "
         f"{factors[HEADLINE]:.2f} times smaller in the geometric mean than the best condition number's with the "
         f"{HEADLINE}, and {factors[IDEAL]:.2f} times with the {IDEAL}; {_starts(result)}.",
-        goals=reached,
         valid=f"all manoeuvres last {mission.DURATION:g} s, begin and end at rest with the wrist extended, and keep 50 "
         "mm/s and 5 degrees per second at the tip; the base rests at first and only the gravity gradient acts.",
+        goals=goals(result),
         full=result.full,
-    )
-    add_first_page(
-        document,
-        summary,
-        _factor_figure(contest),
-        "Geometric mean of the ten standard deviations of each manoeuvre over that of the d-optimal one: how many "
-        "times less it tells. Filled: arm known to 5 % of each link's mass; open: arm known exactly.",
-    )
-    add_setup(document, _setup(result), outline=robot_outline(ets7(), START))
-    _evidence(document, result)
-    _calibration(document, result)
-    add_statements(document, _statements(result))
-    tables = _write_tables(result, output)
-    document.paragraph(f"Tables beside this report: {', '.join(tables)}.")
-    write_study(document, summary, output, origin)
-
-
-def _setup(result: Result) -> Setup:
-    shrink = result.contest.shrink
-    return Setup(
-        robot=f"ETS-VII with the published base, nominal links, joints within ±{mission.REACH:g} rad.",
-        manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight's rule "
-        f"allows. The paper's optimum had to be made smaller, to {format_percent(shrink['printed'], 2)} of its "
-        f"amplitudes, and its poor neighbour to {format_percent(shrink['poor'], 2)}.",
-        sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
-        f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; the encoders' "
-        "noise is part of every criterion.",
-        known="The gravity gradient, the attitude at the start, and the arm to 5 % of the mass of each link.",
-        unknown="The base (mass known to a factor of e²), the rate at the start, the accelerometer's bias within "
-        f"{format_number(BIAS)} m/s², and the links, which are marginalised.",
-        replicates=f"{result.search.starts} random starts and {result.search.exchanges} exchanges per "
-        f"criterion{_crowds(result)}; {_flights(result)}, each with an arm, a bias and noise of its own.",
+        figure=Picture(
+            _factor_figure(contest),
+            "Geometric mean of the ten standard deviations of each manoeuvre over that of the d-optimal one: how many "
+            "times less it tells. Filled: arm known to 5 % of each link's mass; open: arm known exactly.",
+        ),
+        setup=Setup(
+            robot=f"ETS-VII with the published base, nominal links, joints within ±{mission.REACH:g} rad.",
+            manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight's rule "
+            f"allows. The paper's optimum had to be made smaller, to {format_percent(shrink['printed'], 2)} of its "
+            f"amplitudes, and its poor neighbour to {format_percent(shrink['poor'], 2)}.",
+            sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
+            f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; the encoders' "
+            "noise is part of every criterion.",
+            known="The gravity gradient, the attitude at the start, and the arm to 5 % of the mass of each link.",
+            unknown="The base (mass known to a factor of e²), the rate at the start, the accelerometer's bias within "
+            f"{format_number(BIAS)} m/s², and the links, which are marginalised.",
+            replicates=f"{result.search.starts} random starts and {result.search.exchanges} exchanges per "
+            f"criterion{_crowds(result)}; {_flights(result)}, each with an arm, a bias and noise of its own.",
+        ),
+        outline=robot_outline(ets7(), START),
+        sections=[_evidence, _calibration],
+        statements=_statements(result),
+        tables=_tables(result),
     )
 
 
@@ -271,20 +253,23 @@ def _evidence(document: Document, result: Result) -> None:
         "Predicted posteriors, arm known to 5 % and exactly. Factor: geometric-mean sd of (26) as printed over that of "
         "the manoeuvre; worst: largest relative sd of mass and moments of inertia; and the sd of the base's mass.",
     )
-    _saturation(document, result)
-    _cloud(document, result)
-    drawn = {TITLES[name]: contest.motions[name] for name in DRAWN if name in contest.motions}
-    document.figure(
-        manoeuvre_figure(drawn), "Joint positions, speed of the tip (the rule dotted) and rotation of the base."
-    )
-
-
-def _cloud(document: Document, result: Result) -> None:
+    if result.crowds:
+        document.figure(
+            _crowd_figure(result),
+            "What more starts are worth: cost of every first descent, the best first, and mean of the best of n of "
+            "them with the middle 80 % (band). Left, (26) as printed over the best value; right, geometric-mean sd per "
+            f"parameter over the best by d-optimality. The dotted line is {format_percent(ALIKE)}; the square is the "
+            "best once it was followed to the end.",
+        )
     document.figure(
         _cloud_figure(result),
         "Information (minus half the log-determinant of the covariance of the base's coordinates, arm known to 5 %) of "
         f"{len(result.cloud.motion)} random manoeuvres, each a random part of the largest that keeps the rule, against "
         "(26) in both readings and against the plain sum of the squared largest excursions (m² and rad²).",
+    )
+    drawn = {TITLES[name]: contest.motions[name] for name in DRAWN if name in contest.motions}
+    document.figure(
+        manoeuvre_figure(drawn), "Joint positions, speed of the tip (the rule dotted) and rotation of the base."
     )
 
 
@@ -307,18 +292,6 @@ def _calibration(document: Document, result: Result) -> None:
     document.figure(
         _realised_figure(result),
         "Root mean square error of every parameter over its predicted sd, with standard errors. The band is ± 5 %.",
-    )
-
-
-def _saturation(document: Document, result: Result) -> None:
-    if not result.crowds:
-        return
-    document.figure(
-        _crowd_figure(result),
-        "What more starts are worth: cost of every first descent, the best first, and mean of the best of n of them "
-        "with the middle 80 % (band). Left, (26) as printed over the best value; right, geometric-mean sd per "
-        f"parameter over the best by d-optimality. The dotted line is {format_percent(ALIKE)}; the square is the best "
-        "once it was followed to the end.",
     )
 
 
@@ -351,25 +324,20 @@ def _statements(result: Result) -> list[Statement]:
     ]
 
 
-def _write_tables(result: Result, output: Path) -> list[str]:
+def _tables(result: Result) -> list[CsvTable]:
     contest = result.contest
     sds = [
         [name, row, *map(float, contest.predicted[row][name].sd)] for row in mission.ROWS for name in contest.motions
     ]
     designed = list(contest.designs.values())
-    names = designed[0].problem.plan.family.names
-    tables = [
-        write_table(output, "predicted", ["manoeuvre", "arm", *(f"sd {text}" for text in HEADINGS)], sds),
-        write_table(
-            output,
-            "manoeuvres",
-            ["manoeuvre", *names],
-            [[item.name, *map(float, item.parameters)] for item in designed],
-        ),
+    parameters = [[each.name, *map(float, each.parameters)] for each in designed]
+    realised = [[name, len(fits.errors), *map(float, fits.rms)] for name, fits in result.realised.items()]
+    ratios = [f"rms / predicted sd, {text}" for text in HEADINGS]
+    return [
+        CsvTable("predicted", ["manoeuvre", "arm", *(f"sd {text}" for text in HEADINGS)], sds),
+        CsvTable("manoeuvres", ["manoeuvre", *designed[0].problem.plan.family.names], parameters),
+        CsvTable("realised", ["manoeuvre", "flights", *ratios], realised),
     ]
-    realised = [[name, len(item.errors), *map(float, item.rms)] for name, item in result.realised.items()]
-    header = ["manoeuvre", "flights", *(f"rms / predicted sd, {text}" for text in HEADINGS)]
-    return [*tables, write_table(output, "realised", header, realised)]
 
 
 @styled
@@ -452,3 +420,27 @@ def _realised_figure(result: Result) -> Figure:
     axes.set_ylabel("realised / predicted")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     return figure
+
+
+def _run(full: bool, seed: int, store: Path | None, **options: Any) -> Result:
+    """Run the study with the searches in threads, their results kept in a file where one is given."""
+    kept = None if store is None else Store.open(store, f"excitation {seed} {FULL if full else QUICK}")
+    with ThreadPoolExecutor(os.cpu_count()) as executor:
+        return run(full=full, seed=seed, store=kept, executor=executor, **options)
+
+
+STUDY = Study(
+    "excitation",
+    "Compare manoeuvres by the posterior they lead to.",
+    run=_run,
+    report=_report,
+    full="all criteria, the thorough effort of each search, every design flown",
+    seed=1,
+    extra={
+        "--repeats": {"type": int, "help": "number of flights of each design that is flown"},
+        "--starts": {"type": int, "help": "number of further descents by (26) and d-optimality"},
+        "--searches": {"type": int, "help": "number of thorough searches by d-optimality that are compared"},
+        "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
+        **TRIALS,
+    },
+)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from bayesid.design import Store
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
@@ -16,23 +17,22 @@ from studies.common import mission
 from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, ets7
 from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.report_parts import columns
-from studies.common.study import Goal, Verdict
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
+from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.separating.analysis import (
+    DRIFT,
+    FLIGHTS,
+    FULL,
+    QUICK,
+    RIVALS,
+    SPREAD,
+    STAGES,
+    TRUTHS,
+    Realised,
+    Result,
+    run,
 )
-from studies.separating import FLIGHTS, Result
-from studies.separating.analysis import Realised
-from studies.separating.setting import DRIFT, RIVALS, SPREAD, STAGES, TRUTHS
 
-__all__ = ["factor_figure", "goals", "write_report"]
+__all__ = ["STUDY", "factor_figure", "goals"]
 
 RIVALRY = 2.2  # log Bayes factor above which a cause is preferred to its one rival with a probability of 0.9 or more
 SURE = 0.9  # share of flights, and of directions, in which the factor is to be exceeded
@@ -113,48 +113,53 @@ def goals(result: Result) -> tuple[Goal, ...]:
     return tuple(rows)
 
 
-def write_report(result: Result, output: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, and its tables beside it."""
-    document = Document("Telling two causes apart", "A manoeuvre designed to separate rivals, ETS-VII in MuJoCo")
+def _report(result: Result) -> Report[Result]:
     parts = [
-        f"a hidden {NAMES[item.truth]} is preferred to its rival with a probability of {SURE:g} or more in "
-        f"{_counts(_preferred(item, LAST))} flights ({_counts(_preferred(item, 'first alone'))} with the first "
-        f"manoeuvre alone, {_counts(_preferred(item, 'first, d-optimal'))} with a d-optimal second one)"
-        for item in result.realised
+        f"a hidden {NAMES[case.truth]} is preferred to its rival with a probability of {SURE:g} or more in "
+        f"{_counts(_preferred(case, LAST))} flights ({_counts(_preferred(case, 'first alone'))} with the first "
+        f"manoeuvre alone, {_counts(_preferred(case, 'first, d-optimal'))} with a d-optimal second one)"
+        for case in result.realised
     ]
-    summary = Summary(
+    titles = {"first": "first (the flight's)", "separation": "separating", "d-optimal": "d-optimal"}
+    return Report(
+        title="Telling two causes apart",
+        subtitle="A manoeuvre designed to separate rivals, ETS-VII in MuJoCo",
         question="Wheels with momentum left and a leaking valve push a slowly drifting base alike. Does a second "
         "manoeuvre that is designed to separate them decide which it is?",
         answer=f"With the separating manoeuvre {' and '.join(parts)}.",
-        goals=goals(result),
         valid="one of the two acts and nothing else, with the same size in both manoeuvres; the base is known to "
         f"{format_percent(2.0 * SPREAD)} of its mass and drifts by a degree in a minute. The design knows that rate.",
+        goals=goals(result),
         full=result.full,
-    )
-    add_first_page(
-        document,
-        summary,
-        factor_figure(result),
-        "Log Bayes factor of the truth against its rival, one point for each set of flights, and the mean expected by "
-        f"linear theory with its standard deviation (bars). The grey line is {RIVALRY}, a probability of 0.9. The "
-        "scale is linear between −1 and 1 and logarithmic beyond.",
-    )
-    add_setup(document, _setup(result), outline=robot_outline(ets7(), START))
-    document.figure(
-        manoeuvre_figure(
-            {
-                "first (the flight's)": result.motions["first"],
-                "separating": result.motions["separation"],
-                "d-optimal": result.motions["d-optimal"],
-            }
+        figure=Picture(
+            factor_figure(result),
+            "Log Bayes factor of the truth against its rival, one point for each set of flights, and the mean expected "
+            f"by linear theory with its standard deviation (bars). The grey line is {RIVALRY}, a probability of 0.9. "
+            "The scale is linear between −1 and 1 and logarithmic beyond.",
         ),
-        "The manoeuvres: joints, speed of the tip with the rule dotted, and rotation of the base from rest.",
-    )
-    _failures(document, result)
-    _evidence(document, result)
-    add_statements(
-        document,
-        [
+        setup=Setup(
+            robot=f"ETS-VII with the published base; joints within ±{mission.REACH:g} rad, wrist extended at the "
+            "start.",
+            manoeuvre=f"{mission.DURATION:g} s each: first the flight's own, then quintic splines of all joints, at "
+            f"the 50 mm/s and 5 degrees per second of the flight's rule.{_left_out(result)}",
+            sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
+            f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant "
+            "bias of the accelerometer.",
+            known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link.",
+            unknown=f"The base within {format_percent(2.0 * SPREAD)} of its mass, the rate {format_vector(DRIFT)} "
+            f"rad/s at the start, the bias within {format_number(BIAS)} m/s², the links; and the cause, within 1 N m s "
+            "of wheels, or 0.5 mN and 0.5 mN m of leak, per axis.",
+            replicates=f"{len(result.realised[0].detected)} sets of flights for each cause, each with an arm, a bias "
+            f"and noise of its own; {result.search.starts} starts for each design. Evidences are linearised about the "
+            "plan.",
+        ),
+        outline=robot_outline(ets7(), START),
+        picture=Picture(
+            manoeuvre_figure({title: result.motions[name] for name, title in titles.items()}),
+            "The manoeuvres: joints, speed of the tip with the rule dotted, and rotation of the base from rest.",
+        ),
+        sections=[_failures, _evidence],
+        statements=[
             Statement(
                 "The wheels' momentum and the initial rate are among the main causes of the drift (2.1).",
                 Finding.NOT_TESTABLE,
@@ -162,26 +167,7 @@ def write_report(result: Result, output: Path, origin: str | None = None) -> Non
                 "for an assumed size.",
             )
         ],
-    )
-    tables = _write_tables(result, output)
-    document.paragraph(f"Tables beside this report: {', '.join(tables)}.")
-    write_study(document, summary, output, origin)
-
-
-def _setup(result: Result) -> Setup:
-    return Setup(
-        robot=f"ETS-VII with the published base; joints within ±{mission.REACH:g} rad, wrist extended at the start.",
-        manoeuvre=f"{mission.DURATION:g} s each: first the flight's own, then quintic splines of all joints, at the 50 "
-        f"mm/s and 5 degrees per second of the flight's rule.{_left_out(result)}",
-        sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
-        f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant bias "
-        "of the accelerometer.",
-        known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link.",
-        unknown=f"The base within {format_percent(2.0 * SPREAD)} of its mass, the rate {format_vector(DRIFT)} rad/s at "
-        f"the start, the bias within {format_number(BIAS)} m/s², the links; and the cause, within 1 N m s of wheels, "
-        "or 0.5 mN and 0.5 mN m of leak, per axis.",
-        replicates=f"{len(result.realised[0].detected)} sets of flights for each cause, each with an arm, a bias and "
-        f"noise of its own; {result.search.starts} starts for each design. Evidences are linearised about the plan.",
+        tables=_tables(result),
     )
 
 
@@ -247,7 +233,7 @@ def _evidence(document: Document, result: Result) -> None:
     )
 
 
-def _write_tables(result: Result, output: Path) -> list[str]:
+def _tables(result: Result) -> list[CsvTable]:
     factors = [
         [item.truth, stage, number, float(value)]
         for item in result.realised
@@ -257,8 +243,8 @@ def _write_tables(result: Result, output: Path) -> list[str]:
     names = next(iter(result.designs.values())).motion.family.names
     parameters = [[name, *map(float, np.asarray(item.motion.parameters))] for name, item in result.designs.items()]
     return [
-        write_table(output, "factors", ["hidden", "manoeuvres", "flight", "log Bayes factor"], factors),
-        write_table(output, "manoeuvres", ["manoeuvre", *names], parameters),
+        CsvTable("factors", ["hidden", "manoeuvres", "flight", "log Bayes factor"], factors),
+        CsvTable("manoeuvres", ["manoeuvre", *names], parameters),
     ]
 
 
@@ -301,3 +287,24 @@ def _direction_figure(result: Result) -> Figure:
     figure.axes[0].set_ylabel("share of directions")
     shared_legend(figure, figure.axes[0], len(STAGES))
     return figure
+
+
+def _run(full: bool, seed: int, store: Path | None, **options: Any) -> Result:
+    """Run the study, the results of its searches kept in a file where one is given."""
+    kept = None if store is None else Store.open(store, f"separating {seed} {FULL if full else QUICK}")
+    return run(full=full, seed=seed, store=kept, **options)
+
+
+STUDY = Study(
+    "separating",
+    "Tell apart what a first manoeuvre confuses.",
+    run=_run,
+    report=_report,
+    full=f"the thorough effort of each search, {FLIGHTS} sets of flights for each cause",
+    seed=1,
+    extra={
+        "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},
+        "--flights": {"type": int, "help": "number of sets of flights for each cause"},
+        "--trials": TRIALS["--trials"],
+    },
+)

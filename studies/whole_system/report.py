@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 from scipy import stats
 
-from bayesid import Robot
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import AFTER, COLOURS, TRUTH, shared_legend, styled, wide_figure
@@ -19,25 +16,22 @@ from bayesid.robot.inertial_parameters import mass_com_inertia
 from studies.common.ets7 import ACCEL, ENCODER, RATE, START, TIP_SPEED, ets7
 from studies.common.figures import robot_outline
 from studies.common.report_parts import columns
-from studies.common.study import Goal, Verdict
-from studies.common.template import (
-    Finding,
-    Setup,
-    Statement,
-    Summary,
-    add_first_page,
-    add_setup,
-    add_statements,
-    write_study,
-    write_table,
+from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.whole_system.identification import SCORED, TAIL, Coverage, Method, Result, Sampled, run
+from studies.whole_system.system import (
+    BASE_SPREAD,
+    COULOMB,
+    LOAD_SPREAD,
+    TORQUE,
+    VISCOUS,
+    Information,
+    Known,
+    Sensors,
+    bodies,
+    groups,
 )
-from studies.whole_system.contest import Method
-from studies.whole_system.coverage import SCORED, TAIL, Coverage
-from studies.whole_system.information import Information, Known, Sensors
-from studies.whole_system.sampled import Sampled
-from studies.whole_system.setting import BASE_SPREAD, COULOMB, LOAD_SPREAD, TORQUE, VISCOUS, bodies, groups
 
-__all__ = ["Result", "goals_of", "write_report"]
+__all__ = ["STUDY"]
 
 GROUPS = ("base", "load", "arm", "whole system")  # titles of the columns for the masses of `groups`
 
@@ -50,57 +44,65 @@ FAR = 3.0  # mean error of a method in its own stated standard deviations from w
 CONTENT = float(stats.chi2.cdf(1.0, 1))  # probability within one standard deviation of a normal distribution
 
 
-@dataclass(frozen=True)
-class Result:
-    """Outcome of the study; samples and coverage are evaluated in a full run only."""
-
-    # the robot as it truly is, and as the drawings state it
-    truth: Robot
-    drawings: Robot
-    known: Mapping[str, Information]  # information of every manoeuvre by name
-    cases: tuple[Sampled, ...]  # identifications with emcee
-    coverage: Coverage | None  # errors over systems drawn from the prior
-    methods: tuple[Method, ...]  # errors of the linear and of the integral method
-    duration: float  # duration of each manoeuvre [s]
-    hand_speed: float  # largest speed of the end-effector relative to the base with six joints moving [m/s]
-
-
-def write_report(result: Result, output: Path, origin: str | None = None) -> None:
-    """Write the report as PDF, and beside it its summary and its further tables."""
-    document = Document("The whole system identified", "Problem 3 of Lampariello and Hirzinger (IDETC 2005)")
-    motion, torques, thrust = (_known(result, *case) for case in CHIEF)
-    summary = Summary(
-        "ETS-VII holds a load of 120 kg and the ten inertial parameters of no body are known exactly: what does one "
-        "manoeuvre teach, with which sensors, and what must be known?",
-        "Motion alone fixes ratios of masses and not their scale, which stays known as the drawings know it (whole "
-        f"system: {_percents(motion)[3]}); joint torques bring it to {_percents(torques)[3]} and a known thrust to "
-        f"{_percents(thrust)[3]}, with a manoeuvre that moves the tip {_haste(result)}.",
-        tuple(goals_of(result)),
-        f"the tip moves {_haste(result)}, joints follow their path, the load is rigid and noise is white; widths are "
-        "linearised about the truth unless they are said to be sampled.",
-        result.coverage is not None,
-    )
-    add_first_page(
-        document,
-        summary,
-        _mass_figure(result),
-        "Relative standard deviation of four masses after one manoeuvre with six joints: from the drawings, from "
-        "motion, with joint torques (friction unknown), and with a known thrust in place of torques.",
-    )
-    add_setup(document, _setup(result), outline=robot_outline(ets7(), START))
-    _negatives(document, result)
-    _evidence(document, result, output)
-    add_statements(document, _statements(result))
-    write_study(document, summary, output, origin)
-
-
 # manoeuvres and sensors of the first page
 CHIEF = (("six joints", Sensors.MOTION), ("six joints", Sensors.TORQUES), ("six joints, known thrust", Sensors.MOTION))
 
 
-def _haste(result: Result) -> str:
-    """Return the tip's speed beside the flight's rule; widths at the permitted speed are larger."""
-    return f"{format_fixed(result.hand_speed / TIP_SPEED, 1)} times as fast as the flight's rule permits"
+def _report(result: Result) -> Report[Result]:
+    motion, torques, thrust = (_percents(_known(result, *case))[3] for case in CHIEF)
+    # widths at the permitted speed are larger
+    haste = f"{format_fixed(result.hand_speed / TIP_SPEED, 1)} times as fast as the flight's rule permits"
+    drawn = ""
+    if result.coverage is not None:
+        drawn = f" {len(result.coverage.distances)} systems drawn from the prior, each on its own manoeuvre."
+    return Report(
+        title="The whole system identified",
+        subtitle="Problem 3 of Lampariello and Hirzinger (IDETC 2005)",
+        question="ETS-VII holds a load of 120 kg and the ten inertial parameters of no body are known exactly: what "
+        "does one manoeuvre teach, with which sensors, and what must be known?",
+        answer="Motion alone fixes ratios of masses and not their scale, which stays known as the drawings know it "
+        f"(whole system: {motion}); joint torques bring it to {torques} and a known thrust to {thrust}, with a "
+        f"manoeuvre that moves the tip {haste}.",
+        valid=f"the tip moves {haste}, joints follow their path, the load is rigid and noise is white; widths are "
+        "linearised about the truth unless they are said to be sampled.",
+        goals=_goals(result),
+        full=result.coverage is not None,
+        figure=Picture(
+            _mass_figure(result),
+            "Relative standard deviation of four masses after one manoeuvre with six joints: from the drawings, from "
+            "motion, with joint torques (friction unknown), and with a known thrust in place of torques.",
+        ),
+        setup=Setup(
+            robot="ETS-VII with a rigid load of 120 kg on link 6, flown by an independent simulator (MuJoCo) with "
+            "gravity gradient on every body.",
+            manoeuvre=f"{result.duration:g} s of three sines between 0.02 and 0.06 Hz in each joint. The end-effector "
+            f"moves with up to {1e3 * result.hand_speed:.0f} mm/s relative to the base, {haste}; no row has the "
+            "permitted speed. The known thrust has two pulses of 20 N over 2 s.",
+            sensors=f"At 2 Hz, noise per sample: rate {format_number(RATE)} rad/s, accelerometer "
+            f"{format_number(ACCEL)} m/s², encoders {format_number(ENCODER)} rad; joint torques, where measured, "
+            f"{format_number(TORQUE)} N m.",
+            known="Kinematics and orbit. Drawings state every link to 5 % of its mass.",
+            unknown=f"All 80 parameters: base to {200 * BASE_SPREAD:g} % of its mass, load to {200 * LOAD_SPREAD:g} %, "
+            f"initial rate; friction of every joint where torques are measured (truly {COULOMB:g} N m dry and "
+            f"{VISCOUS:g} N m s viscous).",
+            replicates=f"{len(result.methods[0].errors)} recordings of one flight for the comparison of "
+            f"methods.{drawn}",
+        ),
+        outline=robot_outline(ets7(), START),
+        sections=[_negatives, _evidence],
+        statements=_statements(result),
+        tables=[
+            CsvTable(
+                "known",
+                ["known exactly", "manoeuvre", "sensors", *(f"sd of {group}" for group in GROUPS)],
+                _known_rows(result),
+            ),
+            CsvTable("bodies", ["sensors", "body", "quantity", "truth", "drawings", "mean", "sd"], _body_rows(result)),
+        ],
+        beside="Beside this report: what one exactly known body gives where no drawings help ({0}), and every sampled "
+        "parameter ({1}). The linear method differentiates rates with local cubics and weights every equation by its "
+        "residuals; the integral method is the mode of the posterior, whose fits start at the truth.",
+    )
 
 
 def _known(result: Result, manoeuvre: str, sensors: Sensors) -> Known:
@@ -113,7 +115,7 @@ def _percents(knowledge: Known, *, before: bool = False) -> list[str]:
     return [format_percent(prior if before else after, 2) if prior else "known" for prior, after in pairs]
 
 
-def goals_of(result: Result) -> list[Goal]:
+def _goals(result: Result) -> list[Goal]:
     """Return the goals."""
     system = groups(result.truth)["whole system"]
     goals = []
@@ -151,26 +153,6 @@ def goals_of(result: Result) -> list[Goal]:
 def _well_sized(cases: Sequence[Sampled]) -> bool:
     """Return whether no posterior is too narrow or too wide, each tested with its part of `LEVEL`."""
     return min(case.p_value for case in cases) >= LEVEL / len(cases)
-
-
-def _setup(result: Result) -> Setup:
-    drawn = ""
-    if result.coverage is not None:
-        drawn = f" {len(result.coverage.distances)} systems drawn from the prior, each on its own manoeuvre."
-    return Setup(
-        robot="ETS-VII with a rigid load of 120 kg on link 6, flown by an independent simulator (MuJoCo) with gravity "
-        "gradient on every body.",
-        manoeuvre=f"{result.duration:g} s of three sines between 0.02 and 0.06 Hz in each joint. The end-effector "
-        f"moves with up to {1e3 * result.hand_speed:.0f} mm/s relative to the base, {_haste(result)}; no row has the "
-        "permitted speed. The known thrust has two pulses of 20 N over 2 s.",
-        sensors=f"At 2 Hz, noise per sample: rate {format_number(RATE)} rad/s, accelerometer {format_number(ACCEL)} "
-        f"m/s², encoders {format_number(ENCODER)} rad; joint torques, where measured, {format_number(TORQUE)} N m.",
-        known="Kinematics and orbit. Drawings state every link to 5 % of its mass.",
-        unknown=f"All 80 parameters: base to {200 * BASE_SPREAD:g} % of its mass, load to {200 * LOAD_SPREAD:g} %, "
-        f"initial rate; friction of every joint where torques are measured (truly {COULOMB:g} N m dry and {VISCOUS:g} "
-        "N m s viscous).",
-        replicates=f"{len(result.methods[0].errors)} recordings of one flight for the comparison of methods.{drawn}",
-    )
 
 
 def _negatives(document: Document, result: Result) -> None:
@@ -217,7 +199,7 @@ def _distances(result: Result) -> str:
     )
 
 
-def _evidence(document: Document, result: Result, output: Path) -> None:
+def _evidence(document: Document, result: Result) -> None:
     document.section("Evidence")
     document.table(
         ["manoeuvre", "sensors", "directions learnt", *GROUPS],
@@ -255,22 +237,6 @@ def _evidence(document: Document, result: Result, output: Path) -> None:
             _coverage_figure(result.coverage),
             "Squared distances of the truth in the drawn systems, sorted, against quantiles of chi-square.",
         )
-    files = [
-        write_table(
-            output,
-            "known",
-            ["known exactly", "manoeuvre", "sensors", *(f"sd of {group}" for group in GROUPS)],
-            _known_rows(result),
-        ),
-        write_table(
-            output, "bodies", ["sensors", "body", "quantity", "truth", "drawings", "mean", "sd"], _body_rows(result)
-        ),
-    ]
-    document.paragraph(
-        f"Beside this report: what one exactly known body gives where no drawings help ({files[0]}), and every sampled "
-        f"parameter ({files[1]}). The linear method differentiates rates with local cubics and weights every equation "
-        "by its residuals; the integral method is the mode of the posterior, whose fits start at the truth."
-    )
 
 
 def _method_row(method: Method, k: int, group: str, count: int) -> list[str]:
@@ -377,3 +343,13 @@ def _coverage_figure(coverage: Coverage) -> Figure:
     axes.plot(quantiles[[0, -1]], quantiles[[0, -1]], color=TRUTH, linewidth=0.6)
     axes.set(xlabel=f"quantile of chi-square, {coverage.unknowns} degrees of freedom", ylabel="squared distance")
     return figure
+
+
+STUDY = Study(
+    "whole_system",
+    "Identify every body of the robot.",
+    run=run,
+    report=_report,
+    full="also sample the posteriors and check the coverage",
+    seed=1,
+)
