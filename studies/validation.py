@@ -20,24 +20,16 @@ __all__ = ["BESIDE", "SUBJECTS", "judged", "write_validation"]
 
 @dataclass(frozen=True)
 class Subject:
-    """A question that a reader asks first, and the studies that answer it.
-
-    Attributes
-    ----------
-    question : str
-    studies : tuple of str
-        Names of the studies.
-    untested : tuple of Goal
-        Goals that belong to no study, since nothing tests them.
-    """
+    """A question that a reader asks first, and the studies that answer it."""
 
     question: str
-    studies: tuple[str, ...]
-    untested: tuple[Goal, ...] = ()
+    studies: tuple[str, ...]  # names of the studies
+    untested: tuple[Goal, ...] = ()  # goals that belong to no study, since nothing tests them
 
 
 GPU = Goal("Walkers and trials per second on a GPU against two cores", "no GPU was at hand", Verdict.NOT_TESTED)
 
+# subjects in the order in which they are reported
 SUBJECTS = (
     Subject("Is the identification honest, and sharp enough?", ("calibration", "base_body", "sensors", "whole_system")),
     Subject("Are causes named?", ("blind_injections", "ets7_drift", "separating", "throws")),
@@ -45,17 +37,16 @@ SUBJECTS = (
     Subject("Is it ahead of its peers, and fast?", ("peers", "base_parameters", "benchmark", "cost"), (GPU,)),
     Subject("Does it withstand faults?", ("faults",)),
 )
-"""Subjects in the order in which they are reported."""
 
 ORDER = (Verdict.FAIL, Verdict.OPEN, Verdict.NOT_TESTED, Verdict.PASS)  # verdicts, misses first
 
+# section of each verdict
 SECTIONS = {
     Verdict.FAIL: "Where it falls short",
     Verdict.OPEN: "What is not decided",
     Verdict.NOT_TESTED: "What is not tested",
     Verdict.PASS: "What is met",
 }
-"""Section of each verdict."""
 
 BESIDE = ("manual", "validation")  # files among the reports that are no studies
 

@@ -19,34 +19,22 @@ from bayesid.identifiability.stacked_regressor import GRAVITY
 
 STATES = 80  # number of random states, many more than the parameters need
 
+# statement in place of FIGAROH's version
 ABSENT = "is not evaluated, since it is not installed (the extra peers brings it)"
-"""Statement in place of FIGAROH's version."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Numbers of base parameters, and how far the two tools' spaces of them are apart.
+    """Numbers of base parameters, and how far the two tools' spaces of them are apart."""
 
-    Attributes
-    ----------
-    robot : str
-        Name of the robot.
-    gravity : tuple of float
-        Gravity on the fixed base, base axes [m/s2].
-    count, rank, peer : int
-        Number by this package, rank of Pinocchio's regressor, and number by FIGAROH.
-    tool : str
-        FIGAROH and its version, or why it was not run.
-    angle : float
-        Largest angle between the rows that take standard to base parameters, this package's and FIGAROH's [rad].
-    """
-
-    robot: str
-    gravity: tuple[float, float, float]
+    robot: str  # name of the robot
+    gravity: tuple[float, float, float]  # gravity on the fixed base, base axes [m/s2]
+    # number by this package, rank of Pinocchio's regressor, and number by FIGAROH
     count: int
     rank: int
     peer: int | None
-    tool: str
+    tool: str  # FIGAROH and its version, or why it was not run
+    # largest angle between the rows that take standard to base parameters, this package's and FIGAROH's [rad]
     angle: float | None
 
 

@@ -35,49 +35,30 @@ from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup
 
 COUNTS = (24, 52)  # numbers of base parameters by the paper's rules: 30 − 6 for two joints, 70 − 18 for six
 
+# largest relative error of a parameter, and largest angle between two spaces [rad], that count as rounding
 EXACT = 1e-9
-"""Largest relative error of a parameter, and largest angle between two spaces [rad], that count as rounding."""
 
+# explanation of the symbols of tables
 LETTERS = (
     "Body 0 is the base, body i the link behind joint i. m is a mass, h a first moment of mass and I an inertia about "
     "the origin of the body's frame, in its axes; m₂₋₄ stands for m₂ + m₃ + m₄."
 )
-"""Explanation of the symbols of tables."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """Content of the report.
+    """Content of the report."""
 
-    Attributes
-    ----------
-    planar, arm : Structure
-        Identifiable parameters of the robot with two joints and of ETS-VII.
-    equations : Equations
-        Equations of the robot with two joints in one state.
-    grounded : tuple of Structure
-        Identifiable parameters of both robots on a fixed base.
-    recovery : Recovery
-        Identification of ETS-VII from motion and joint torques.
-    scale : tuple of ScaleCase
-        Base parameters of ETS-VII that different data determine.
-    peers : tuple of Comparison
-        Comparison with other tools for both robots on a fixed base.
-    tilted : Comparison
-        The same for ETS-VII in tilted gravity.
-    seed : int
-        Seed of the random states.
-    """
-
+    # identifiable parameters of the robot with two joints and of ETS-VII
     planar: Structure
-    equations: Equations
+    equations: Equations  # equations of the robot with two joints in one state
     arm: Structure
-    grounded: tuple[Structure, Structure]
-    recovery: Recovery
-    scale: tuple[ScaleCase, ...]
-    peers: tuple[Comparison, ...]
-    tilted: Comparison
-    seed: int
+    grounded: tuple[Structure, Structure]  # identifiable parameters of both robots on a fixed base
+    recovery: Recovery  # identification of ETS-VII from motion and joint torques
+    scale: tuple[ScaleCase, ...]  # base parameters of ETS-VII that different data determine
+    peers: tuple[Comparison, ...]  # comparison with other tools for both robots on a fixed base
+    tilted: Comparison  # the same for ETS-VII in tilted gravity
+    seed: int  # seed of the random states
 
 
 @threadpool_limits.wrap(limits=1)  # threads would slow the many small factorisations down

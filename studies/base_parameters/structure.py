@@ -30,38 +30,20 @@ SEED = 1991  # seed of the random states in which singular values are computed
 
 @dataclass(frozen=True)
 class Structure:
-    """Identifiable part of a robot's parameters.
-
-    Attributes
-    ----------
-    robot : Robot
-    base : BaseParameters
-    singular : (n,) array
-        Singular values of the regressor with columns of unit length, relative to the largest.
-    parameters : (n,) array
-        Parameters of the robot, in the order of ``base.standard``.
-    """
+    """Identifiable part of a robot's parameters."""
 
     robot: Robot
     base: BaseParameters
-    singular: Floats
-    parameters: Floats
+    singular: Floats  # (n,): singular values of the regressor with columns of unit length, relative to the largest
+    parameters: Floats  # (n,): parameters of the robot, in the order of ``base.standard``
 
 
 @dataclass(frozen=True)
 class Equations:
-    """The paper's (23) in one state; base force and torque [N, N m], then the joint torques [N m].
+    """The paper's (23) in one state; base force and torque [N, N m], then the joint torques [N m]."""
 
-    Attributes
-    ----------
-    regressor : (6 + joints,) array
-        Product of this package's regressor with the parameters.
-    pinocchio : (6 + joints,) array
-        Result of Pinocchio's recursive Newton-Euler algorithm.
-    """
-
-    regressor: Floats
-    pinocchio: Floats
+    regressor: Floats  # (6 + joints,): product of this package's regressor with the parameters
+    pinocchio: Floats  # (6 + joints,): result of Pinocchio's recursive Newton-Euler algorithm
 
 
 def structure(robot: Robot, base: Base = Base.FREE) -> Structure:
@@ -100,26 +82,14 @@ WRONG = 1.05  # factor by which the wrong K_2 differs from the true one
 
 @dataclass(frozen=True)
 class Recovery:
-    """Result of a least-squares identification with exact data.
+    """Result of a least-squares identification with exact data."""
 
-    Attributes
-    ----------
-    base_error : float
-        Largest error of K_B relative to its largest entry of the same unit.
-    standard_error : float
-        Largest such error of all standard parameters, recovered with the true K_2.
-    shifted : tuple
-        Name, true value, and value recovered with K_2 wrong by 5 %, of the parameters of K_1 that change most.
-    untouched : int
-        Number of parameters of K_1 that do not change at all.
-    torque_error : float
-        Largest error of the torques that the wrong set predicts, by Pinocchio, relative to the largest torque.
-    """
-
-    base_error: float
-    standard_error: float
+    base_error: float  # largest error of K_B relative to its largest entry of the same unit
+    standard_error: float  # largest such error of all standard parameters, recovered with the true K_2
+    # name, true value, and value recovered with K_2 wrong by 5 %, of the parameters of K_1 that change most
     shifted: tuple[tuple[str, float, float], ...]
-    untouched: int
+    untouched: int  # number of parameters of K_1 that do not change at all
+    # largest error of the torques that the wrong set predicts, by Pinocchio, relative to the largest torque
     torque_error: float
 
 
@@ -178,21 +148,11 @@ ACTION = 1.0e3  # size of known forces, torques and momenta in the same units, a
 
 @dataclass(frozen=True)
 class ScaleCase:
-    """Base parameters that some data determine.
+    """Base parameters that some data determine."""
 
-    Attributes
-    ----------
-    data : str
-        Description of what is measured and known.
-    determined : Determined
-        Number of determined base parameters, and singular values on both sides of the rank.
-    open_scale : bool
-        Whether the data allow any common factor of all base parameters.
-    """
-
-    data: str
-    determined: Determined
-    open_scale: bool
+    data: str  # description of what is measured and known
+    determined: Determined  # number of determined base parameters, and singular values on both sides of the rank
+    open_scale: bool  # whether the data allow any common factor of all base parameters
 
 
 def scale_cases(robot: Robot, rng: np.random.Generator) -> tuple[ScaleCase, ...]:

@@ -25,13 +25,13 @@ from studies.common.ets7 import INTERVAL, RADIUS
 SIGMA = 1.0e-5  # noise per sample of rate [rad/s] and accelerometer [m/s2]
 DURATION = 120.0  # length of every manoeuvre [s]
 
+# link and joint of the chain in URDF
 LINK = """
   <link name="link{n}"><inertial><origin xyz="{half} 0 0.01"/><mass value="{mass}"/>
     <inertia ixx="{thin}" iyy="{thick}" izz="{thick}" ixy="0" ixz="0" iyz="0"/></inertial></link>
   <joint name="joint{n}" type="revolute"><parent link="{parent}"/><child link="link{n}"/>
     <origin xyz="{length} 0 0" rpy="{turn} 0 0"/><axis xyz="0 0 1"/>
     <limit lower="-6.3" upper="6.3" effort="1" velocity="10"/></joint>"""
-"""Link and joint of the chain in URDF."""
 
 
 def chain(links: int) -> Robot:

@@ -18,20 +18,20 @@ from studies.common.provenance import processor
 from studies.common.report_parts import columns
 from studies.common.study import CsvTable, Goal, Picture, Report, Setup, Study, Verdict
 
+# smallest wanted ratio of the time of each other simulator to that of an evaluation
 RIVALS = {"Pinocchio, step by step in Python": 2000.0, "MuJoCo rollouts in C": 100.0}
-"""Smallest wanted ratio of the time of each other simulator to that of an evaluation."""
 
 ERROR = 0.01  # largest wanted error of the integration [standard deviations of a sample]
 LINKS, WHITENING = 1.3, 1.5  # largest wanted ratios of the times with 60 and 6 links, and with noisy and exact joints
 
+# number of effective samples that are wanted, and the time of an identification with them, all compiled [s]
 SAMPLES, SECONDS = 4000.0, 8.0
-"""Number of effective samples that are wanted, and the time of an identification with them, all compiled [s]."""
 
 CHEAPER = 20.0  # smallest wanted ratio of the evaluations per effective sample, emcee's default move over the package's
 ENOUGH = 50.0  # number of autocorrelation times from which on the estimate of the autocorrelation is reliable
 
+# figures of merit: name, value in each run, goal, and whether more is better
 Figures = Sequence[tuple[str, Floats, float, bool]]
-"""Figures of merit: name, value in each run, goal, and whether more is better."""
 
 
 def figures_of_merit(runs: Sequence[Benchmark]) -> Figures:

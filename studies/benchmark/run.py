@@ -24,33 +24,22 @@ from studies.truth.mujoco import TruthModel, rollout
 
 BATCH = 64  # number of simulations that are evaluated per call
 
+# what is evaluated where no other case is named, in words
 EVALUATED = (
     f"one recording of {round(DURATION / INTERVAL) + 1} samples over {DURATION:g} s, joints known exactly, base and "
     f"initial rate unknown, in batches of {BATCH} points"
 )
-"""What is evaluated where no other case is named, in words."""
 
 STEPS = (0.1, 0.05, 0.02, 0.01, 0.005)  # steps tried for MuJoCo, longest first [s]
 
 
 class Rival(NamedTuple):
-    """Another simulator.
-
-    Attributes
-    ----------
-    name : str
-    seconds : float
-        Time per simulation [s].
-    step : float
-        Integration step that it needs [s].
-    error : float
-        Largest error of a rate, in standard deviations of a sample.
-    """
+    """Another simulator."""
 
     name: str
-    seconds: float
-    step: float
-    error: float
+    seconds: float  # time per simulation [s]
+    step: float  # integration step that it needs [s]
+    error: float  # largest error of a rate, in standard deviations of a sample
 
 
 def best_of(function: Callable[[], Any], repeats: int) -> float:
@@ -123,30 +112,14 @@ def _sigmas(difference: Any) -> float:
 
 
 class Sampling(NamedTuple):
-    """Cost of effective samples, burn-in included and compilation not.
+    """Cost of effective samples, burn-in included and compilation not."""
 
-    Attributes
-    ----------
-    chains : Chains
-        Samples by the package's moves.
-    seconds : float
-        Time of the whole identification: mode, coordinates, evidence and samples [s].
-    default_evaluations : int
-        Number of evaluations by emcee's default move, burn-in included.
-    default_effective : float
-        Number of effective samples that they gave.
-    default_seconds : float
-        Time that they took [s].
-    default_lengths : float
-        Number of autocorrelation times that the default move's chain covers.
-    """
-
-    chains: Chains
-    seconds: float
-    default_evaluations: int
-    default_effective: float
-    default_seconds: float
-    default_lengths: float
+    chains: Chains  # samples by the package's moves
+    seconds: float  # time of the whole identification: mode, coordinates, evidence and samples [s]
+    default_evaluations: int  # number of evaluations by emcee's default move, burn-in included
+    default_effective: float  # number of effective samples that they gave
+    default_seconds: float  # time that they took [s]
+    default_lengths: float  # number of autocorrelation times that the default move's chain covers
 
     @property
     def cost(self) -> float:
@@ -202,34 +175,18 @@ RUNS = 5  # number of runs, one after the other, whose spread is reported
 
 @dataclass(frozen=True)
 class Benchmark:
-    """Times measured in one run [s].
+    """Times measured in one run [s]."""
 
-    Attributes
-    ----------
-    evaluation : float
-        Time of one evaluation of the log density of ETS-VII.
-    error : float
-        Integration error of that evaluation, in standard deviations of a sample.
-    rivals : list of Rival
-        Other simulators of the same manoeuvre.
-    links, samples : dict of int to float
-        Time of one evaluation by number of links, and by number of samples.
-    whitening : dict of str to float
-        Time with white noise, with an encoder whose noise is negligible, and with one whose noise matters.
-    windows : dict of str to int
-        Number of earlier sample times that each of these whitenings conditions on.
-    sampling : Sampling
-        Cost of an effective sample.
-    """
-
-    evaluation: float
-    error: float
-    rivals: list[Rival]
+    evaluation: float  # time of one evaluation of the log density of ETS-VII
+    error: float  # integration error of that evaluation, in standard deviations of a sample
+    rivals: list[Rival]  # other simulators of the same manoeuvre
+    # time of one evaluation by number of links, and by number of samples
     links: dict[int, float]
     samples: dict[int, float]
+    # time with white noise, with an encoder whose noise is negligible, and with one whose noise matters
     whitening: dict[str, float]
-    windows: dict[str, int]
-    sampling: Sampling
+    windows: dict[str, int]  # number of earlier sample times that each of these whitenings conditions on
+    sampling: Sampling  # cost of an effective sample
 
     @property
     def speedups(self) -> dict[str, float]:

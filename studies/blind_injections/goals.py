@@ -18,14 +18,14 @@ CLEAR = 7.0  # signal-to-noise ratio from which the hidden causes should be name
 LEFT = 10.0  # signal-to-noise ratio left by the best known causes from which an outside effect should be called unknown
 SURE = 0.9  # stated probability from which a named cause should be right as often as 93 % say
 
+# outside torques -> least correlation of the reconstructed with the true one, and the cases that hide them
 TORQUES = {
     "swinging and growing torques": (0.9, ("swinging-torque", "growing-torque")),
     "snaps and pulses": (0.8, ("thermal-snap", "pulse-train")),
 }
-"""Outside torques -> least correlation of the reconstructed with the true one, and the cases that hide them."""
 
+# half-width of a 95 % interval in standard deviations, and the goal on how often such intervals hold the truth
 COVERED, COVERAGE = 1.96, (0.93, 0.97)
-"""Half-width of a 95 % interval in standard deviations, and the goal on how often such intervals hold the truth."""
 
 LEAST_NULLS = 1000  # trials without anything hidden below which a rate of 1 % is not decided
 
@@ -191,6 +191,7 @@ def _coverage(trials: Sequence[Sequence[float]]) -> Goal:
     return Goal(goal_text, reached, verdict)
 
 
+# when a verdict of each status counts as right
 RIGHT: dict[Status, Callable[[Trial], bool]] = {
     Status.EXPLAINED: lambda trial: trial.holds,
     Status.AMBIGUOUS: lambda trial: trial.in_set,
@@ -198,7 +199,6 @@ RIGHT: dict[Status, Callable[[Trial], bool]] = {
     Status.UNRESOLVED: lambda trial: trial.kind != "adequate",
     Status.ADEQUATE: lambda trial: trial.kind == "adequate",
 }
-"""When a verdict of each status counts as right."""
 
 
 def record_of(trials: Sequence[Trial]) -> dict[str, dict[str, int]]:

@@ -24,22 +24,15 @@ DRAWS = 8  # number of simulated data sets from each of which the decision is ta
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of theory for one hidden effect.
+    """Limits of theory for one hidden effect."""
 
-    Attributes
-    ----------
-    signal_to_noise : float or None
-        Root of the noncentrality, after the model's unknowns have taken their share; None where what is hidden does not
-        change the mean of the data.
-    detection : float or None
-        Probability of an alarm by the test of the hidden effect alone; None where none of the causes has a test.
-    naming : float or None
-        Share of simulated data in which the Bayes decision names the hidden causes alone; None where the model cannot
-        have one of them.
-    """
-
+    # root of the noncentrality, after the model's unknowns have taken their share; None where what is hidden does not
+    # change the mean of the data
     signal_to_noise: float | None
+    # probability of an alarm by the test of the hidden effect alone; None where none of the causes has a test
     detection: float | None
+    # share of simulated data in which the Bayes decision names the hidden causes alone; None where the model cannot
+    # have one of them
     naming: float | None
 
 

@@ -351,6 +351,7 @@ def _cell(value: object) -> object:
     return value
 
 
+# outcomes of a trial from the top of the figure down, each with its colour
 OUTCOMES = {
     "named alone": AFTER,
     "in the set": "#56B4E9",
@@ -358,7 +359,6 @@ OUTCOMES = {
     "no alarm": "#000000",
     "misnamed": BEFORE,
 }
-"""Outcomes of a trial from the top of the figure down, each with its colour."""
 
 
 @styled

@@ -185,8 +185,8 @@ TIME = np.arange(0.0, 150.5, 0.5)  # time stamps of each recording [s]
 DECAY, RECORDINGS = 4.0, 3  # time in which the torque falls to 1/e [s], and number of recordings
 ONSETS = (50.0, 80.0)  # instants between which the torque sets in [s]
 
+# standard deviations of the torque in the reader's prior, relative to the true one; all are equally probable
 SCALES = 10.0 ** np.linspace(-2.0, 1.0, 10)
-"""Standard deviations of the torque in the reader's prior, relative to the true one; all are equally probable."""
 
 
 @threadpool_limits.wrap(limits=1)  # threads only get in each other's way where another process keeps a core busy

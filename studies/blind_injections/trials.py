@@ -28,21 +28,21 @@ from studies.truth import hidden_causes
 from studies.truth.basilisk.cases import BASILISK_CASES, BasiliskCase
 from studies.truth.mujoco import Study as Written
 
+# fraction of the strength in the data with which a trial is compared to measure the size of a hidden effect
 WEAKER = 0.1
-"""Fraction of the strength in the data with which a trial is compared to measure the size of a hidden effect."""
 
 MATTERS = 0.01  # probability above which a cause is kept with its trial
 WEAK_TO_STRONG, OUTSIDE = (0.1, 1.5), (0.3, 2.0)  # least and largest strength of causes of the catalogue and of others
 
+# seed of the first trial of the small and of the full plan; those of tests and of development are others
 FIRST_SEED = {False: 200, True: 90_000}
-"""Seed of the first trial of the small and of the full plan; those of tests and of development are others."""
 
+# cases that were added when the first trials of the full plan had been made; from which trial on, and how many of the
+# others with a cause of the catalogue there are for each that they replace
 LATER, FROM, EVERY = ("mass-shift",), 700, 26
-"""Cases that were added when the first trials of the full plan had been made; from which trial on, and how many of the
-others with a cause of the catalogue there are for each that they replace."""
 
+# from which trial of the full plan on, and how often, Basilisk makes the data of a case with or without a cause
 IN_BASILISK, EVERY_EIGHTH = 937, 8
-"""From which trial of the full plan on, and how often, Basilisk makes the data of a case with or without a cause."""
 
 _ALL: tuple[hidden_causes.Case | BasiliskCase, ...] = (*hidden_causes.CASES, *BASILISK_CASES)
 
@@ -62,74 +62,44 @@ class Plan:
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial that was made.
+    """One trial that was made."""
 
-    Attributes
-    ----------
-    case, seed, strength
-        Values of the trial's plan.
-    kind : str
-        Kind of what is hidden: "effect", "adequate" (nothing) or "unknown" (outside the catalogue).
-    hidden : tuple of str
-        Hidden causes.
-    accept : tuple of str
-        Other names by which the hidden causes may be named; outside the catalogue, causes that come close.
-    status : str
-        Status of the verdict.
-    causes : tuple of str
-        Named causes.
-    sets : tuple of tuple of str
-        Named causes and all other explanations that the verdict gives, equivalents included; "unknown" among the names
-        stands for something outside the catalogue, and nothing is left out.
-    signal_to_noise : float or None
-        Root of the noncentrality of what is hidden, after the model's unknowns have taken their share; None for faults
-        of the noise, which do not change the mean. For outside effects, what the best set of causes leaves of it.
-    detection, naming : float or None
-        Limits of theory: probability of an alarm by the test of the hidden effect alone, and share of simulated data in
-        which the Bayes decision with all rivals names what is hidden alone.
-    p_value : float
-        Family-wise p-value of what the present model leaves.
-    probability : float or None
-        Stated probability that all named causes are at work, each with its equivalents, whatever accompanies them.
-    probabilities : dict of str to float
-        Probability of each cause to be at work, above one per cent.
-    unknown, nothing : float
-        Probabilities of something outside the catalogue, and of nothing.
-    amplitude_errors : tuple of float
-        Errors of the amplitudes of causes named rightly, in the stated standard deviations.
-    body_errors : tuple of float
-        Errors of the base's ten parameters after the extension, in the stated standard deviations.
-    frame, true_frame : str or None
-        Axes in which an outside wrench is fixed, as the diagnosis says and in truth.
-    correlation : float or None
-        Correlation of the reconstructed outside torque with the true one.
-    seconds : dict of str to float
-        Time of the diagnosis by phase, and "total" with the files read [s].
-    """
-
+    # values of the trial's plan
     case: str
     seed: int
     strength: float
-    kind: str
-    hidden: tuple[str, ...]
+    kind: str  # kind of what is hidden: "effect", "adequate" (nothing) or "unknown" (outside the catalogue)
+    hidden: tuple[str, ...]  # hidden causes
+    # other names by which the hidden causes may be named; outside the catalogue, causes that come close
     accept: tuple[str, ...]
-    status: str
-    causes: tuple[str, ...]
+    status: str  # status of the verdict
+    causes: tuple[str, ...]  # named causes
+    # named causes and all other explanations that the verdict gives, equivalents included; "unknown" among the names
+    # stands for something outside the catalogue, and nothing is left out
     sets: tuple[tuple[str, ...], ...]
+    # root of the noncentrality of what is hidden, after the model's unknowns have taken their share; None for faults of
+    # the noise, which do not change the mean. For outside effects, what the best set of causes leaves of it.
     signal_to_noise: float | None
+    # limits of theory: probability of an alarm by the test of the hidden effect alone, and share of simulated data in
+    # which the Bayes decision with all rivals names what is hidden alone
     detection: float | None
     naming: float | None
-    p_value: float
+    p_value: float  # family-wise p-value of what the present model leaves
+    # stated probability that all named causes are at work, each with its equivalents, whatever accompanies them
     probability: float | None
-    probabilities: dict[str, float]
+    probabilities: dict[str, float]  # probability of each cause to be at work, above one per cent
+    # probabilities of something outside the catalogue, and of nothing
     unknown: float
     nothing: float
+    # errors of the amplitudes of causes named rightly, in the stated standard deviations
     amplitude_errors: tuple[float, ...]
+    # errors of the base's ten parameters after the extension, in the stated standard deviations
     body_errors: tuple[float, ...]
+    # axes in which an outside wrench is fixed, as the diagnosis says and in truth
     frame: str | None
     true_frame: str | None
-    correlation: float | None
-    seconds: dict[str, float]
+    correlation: float | None  # correlation of the reconstructed outside torque with the true one
+    seconds: dict[str, float]  # time of the diagnosis by phase, and "total" with the files read [s]
 
     @property
     def alarmed(self) -> bool:

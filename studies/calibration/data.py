@@ -26,14 +26,14 @@ from studies.common.flight import prescribed, readings, smoothed, true_robot
 from studies.common.models import ARM_SPREAD, NOISE, base_model
 from studies.truth.mujoco import smooth_motion
 
+# relative widths of the priors of base and load (their masses are uncertain by a factor of 1.8) and, where the whole
+# system is unknown, of the links. The default width of 1 would draw bases of a tenth of the mass and of ten times it.
 BASE_SPREAD, LOAD_SPREAD, DRAWINGS_SPREAD = 0.3, 0.3, 0.05
-"""Relative widths of the priors of base and load (their masses are uncertain by a factor of 1.8) and, where the whole
-system is unknown, of the links. The default width of 1 would draw bases of a tenth of the mass and of ten times it."""
 
 START_RATE = 1e-3  # standard deviation of each axis of the initial rate [rad/s]
 
+# load in the hand where the whole system is unknown
 LOAD = Load("load", "link6", InertialParameters(120.0, [0.05, -0.1, 0.45], np.diag([14.0, 11.0, 9.0])))
-"""Load in the hand where the whole system is unknown."""
 
 
 class Case(StrEnum):
@@ -50,6 +50,7 @@ class Case(StrEnum):
     PLANAR_REST = "MuJoCo, planar robot from rest"
 
 
+# number of replicates of each case in the full study
 REPLICATES = {
     Case.BASE: 1000,
     Case.EXACT: 200,
@@ -61,10 +62,9 @@ REPLICATES = {
     Case.PLANAR: 100,
     Case.PLANAR_REST: 100,
 }
-"""Number of replicates of each case in the full study."""
 
+# cases whose data MuJoCo makes; the package itself makes those of the others
 INDEPENDENT = (Case.MUJOCO, Case.MUJOCO_REST, Case.PLANAR, Case.PLANAR_REST)
-"""Cases whose data MuJoCo makes; the package itself makes those of the others."""
 
 AT_REST = (Case.MUJOCO_REST, Case.PLANAR_REST)
 
@@ -98,25 +98,18 @@ DURATION = 120.0  # length of a recording [s]
 STEP = 0.1  # longest integration step of both simulators [s]
 AMPLITUDE = 0.5  # typical excursion of a joint [rad]
 
+# joint positions before and after the motion [rad]; the planar robot has the first two
 POSTURE = np.array([0.2, -0.8, 1.2, -0.5, 0.6, 0.3])
-"""Joint positions before and after the motion [rad]; the planar robot has the first two."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What is true in one replicate.
+    """What is true in one replicate."""
 
-    Attributes
-    ----------
-    bodies, bias : arrays
-        Coordinates of all unknown bodies, shape (10 B,), and of the accelerometer's constant error, shape (3,).
-    rates : (R, 3) array
-        Initial rate of every recording [rad/s], the base's own or that of `Recorded`.
-    """
-
+    # coordinates of all unknown bodies, shape (10 B,), and of the accelerometer's constant error, shape (3,)
     bodies: Floats
     bias: Floats
-    rates: Floats
+    rates: Floats  # (R, 3): initial rate of every recording [rad/s], the base's own or that of `Recorded`
 
 
 @dataclass(frozen=True)
@@ -153,17 +146,11 @@ def point(posterior: Posterior, truth: Truth) -> Floats:
 
 
 class Recorded(NamedTuple):
-    """Recording of one replicate.
-
-    Attributes
-    ----------
-    manoeuvre : Manoeuvre
-    rate : (3,) array
-        Initial rate that the model must take with the joints as they were smoothed [rad/s]. The momentum at time 0 is
-        the same: what the smoothed joints are too fast by, the base is too slow by.
-    """
+    """Recording of one replicate."""
 
     manoeuvre: Manoeuvre
+    # (3,): initial rate that the model must take with the joints as they were smoothed [rad/s]. The momentum at time 0
+    # is the same: what the smoothed joints are too fast by, the base is too slow by.
     rate: Floats
 
 

@@ -23,23 +23,17 @@ RAMP = 20.0  # length of the quintic ramps, at whose inner ends the jerk jumps [
 NEAR = 1.0  # distance from such an end within which a sample counts as near it [s]
 MOTIONS = 10  # number of random motions of each row
 
+# time between samples [s] and noise of the encoder [rad]
 SETTINGS = ((0.5, 1e-6), (0.5, 1e-5), (0.5, 1e-4), (2.0, 1e-6))
-"""Time between samples [s] and noise of the encoder [rad]."""
 
 
 class Smoothed(NamedTuple):
-    """Mean squares of the errors of joint position, speed and acceleration over their stated variances, each (3,).
+    """Mean squares of the errors of joint position, speed and acceleration over their stated variances, each (3,)."""
 
-    Attributes
-    ----------
-    interval, encoder : float
-        Time between samples [s] and noise of the encoder [rad].
-    between, near : (3,) arrays
-        Farther than `NEAR` from the inner ends of the ramps, and nearer.
-    """
-
+    # time between samples [s] and noise of the encoder [rad]
     interval: float
     encoder: float
+    # (3,): farther than `NEAR` from the inner ends of the ramps, and nearer
     between: Floats
     near: Floats
 

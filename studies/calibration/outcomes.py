@@ -18,8 +18,8 @@ from studies.common.monte_carlo import read_store
 
 K = TypeVar("K", bound=Hashable)
 
+# points at which the distribution function of the ranks is compared with that of the uniform one
 POINTS = np.arange(1, 20) / 20.0
-"""Points at which the distribution function of the ranks is compared with that of the uniform one."""
 
 
 def uniform_p_value(ranks: Floats) -> float:
@@ -68,20 +68,11 @@ def coverage(ranks: Floats, level: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Replicates:
-    """Replicates of one case that were made.
-
-    Attributes
-    ----------
-    case : Case
-    results : sequence of dict
-        Results of `studies.calibration.replicate.make`.
-    failures : sequence of str
-        Messages of the replicates that raised an error.
-    """
+    """Replicates of one case that were made."""
 
     case: Case
-    results: Sequence[Mapping[str, Any]]
-    failures: Sequence[str]
+    results: Sequence[Mapping[str, Any]]  # results of `studies.calibration.replicate.make`
+    failures: Sequence[str]  # messages of the replicates that raised an error
 
     def ranks(self, method: Method = Method.IMPORTANCE) -> dict[str, Floats]:
         """Ranks of every unknown and of the log likelihood, each (N,), of the N replicates that have the method."""

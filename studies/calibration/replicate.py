@@ -25,14 +25,14 @@ from studies.calibration.data import REPLICATES, Case, Truth, draw_truth, model_
 
 DRAWS = 499  # number of posterior draws among which the truth is ranked
 
+# number of draws of importance sampling; the package's default of 4,000 gives the same ranks at a higher price
 WEIGHTED = 1500
-"""Number of draws of importance sampling; the package's default of 4,000 gives the same ranks at a higher price."""
 
 EFFECTIVE = 1000.0  # effective samples of emcee
 
+# of so many replicates of a case, emcee samples the posterior of one; none of the whole system, where each would take
+# four minutes and more
 EVERY = 20
-"""Of so many replicates of a case, emcee samples the posterior of one; none of the whole system, where each would take
-four minutes and more."""
 
 ARMS = (Case.ARM, Case.WHOLE)  # cases with an unknown arm
 SMALL = (Case.EXACT, Case.MUJOCO)  # cases of the small plan

@@ -35,24 +35,16 @@ FIRST_SEED = 7100  # seed of the first case; those of tests and of the campaign 
 
 
 class Diagnosed(NamedTuple):
-    """A diagnosis that is timed.
+    """A diagnosis that is timed."""
 
-    Attributes
-    ----------
-    title : str
-        What is hidden.
-    case : str
-        Name of the case of `studies.truth.hidden_causes`.
-    warm, cold : float
-        Longest wanted times from files to verdict, with compiled code kept and without [s].
-    """
-
-    title: str
-    case: str
+    title: str  # what is hidden
+    case: str  # name of the case of `studies.truth.hidden_causes`
+    # longest wanted times from files to verdict, with compiled code kept and without [s]
     warm: float
     cold: float
 
 
+# single causes within 5 s, cold 20 s; pairs and what nobody listed within twice that
 DIAGNOSES = (
     Diagnosed("nothing", "null, three joints", 5.0, 20.0),
     Diagnosed("leak", "thruster-leak", 5.0, 20.0),
@@ -62,15 +54,14 @@ DIAGNOSES = (
     Diagnosed("growing torque", "growing-torque", 10.0, 40.0),
     Diagnosed("swinging torque", "swinging-torque", 10.0, 40.0),
 )
-"""Single causes within 5 s, cold 20 s; pairs and what nobody listed within twice that."""
 
+# other commands: words, and the longest wanted time with compiled code kept, from files to report [s]
 COMMANDS = {
     "check": (("check",), None),
     "identify": (("identify",), 20.0),
     "identifiability": (("identifiability",), 30.0),
     "design": (("design",), 120.0),
 }
-"""Other commands: words, and the longest wanted time with compiled code kept, from files to report [s]."""
 
 
 def write_case(name: str, folder: Path) -> Path:
@@ -86,21 +77,13 @@ STATING = ("diagnosis.json", "identification.json")  # files that state the time
 
 
 class Run(NamedTuple):
-    """One command.
+    """One command."""
 
-    Attributes
-    ----------
-    wall, processor : float
-        Time from its start to its end, and processor time of all its threads [s].
-    memory : float
-        Largest resident memory [GB].
-    phases : dict of str to float
-        Time by phase, where the command states it [s]; "start" is what comes before the first, import and files.
-    """
-
+    # time from its start to its end, and processor time of all its threads [s]
     wall: float
     processor: float
-    memory: float
+    memory: float  # largest resident memory [GB]
+    # time by phase, where the command states it [s]; "start" is what comes before the first, import and files
     phases: dict[str, float]
 
     @property
@@ -152,23 +135,15 @@ MATRIX, VECTOR = 1500, 30_000_000  # sizes of the matrix product and of the sum 
 
 
 class Floor(NamedTuple):
-    """What one evaluation of the log likelihood needs, and what one core of this machine gives.
+    """What one evaluation of the log likelihood needs, and what one core of this machine gives."""
 
-    Attributes
-    ----------
-    operations, traffic : float
-        Floating-point operations, and bytes read and written by all compiled operations, of one evaluation in a batch.
-    speed, bandwidth : float
-        Operations per second of a large matrix product, and bytes per second of a sum of large vectors.
-    seconds : float
-        Time of one evaluation, both cores [s].
-    """
-
+    # floating-point operations, and bytes read and written by all compiled operations, of one evaluation in a batch
     operations: float
     traffic: float
+    # operations per second of a large matrix product, and bytes per second of a sum of large vectors
     speed: float
     bandwidth: float
-    seconds: float
+    seconds: float  # time of one evaluation, both cores [s]
 
     @property
     def least(self) -> float:
@@ -258,21 +233,11 @@ def verdict_by_candidates(model: Model, manoeuvres: list[Manoeuvre], counts: tup
 
 
 class Nested(NamedTuple):
-    """What one run of dynesty took.
+    """What one run of dynesty took."""
 
-    Attributes
-    ----------
-    seconds : float
-        Processor time [s].
-    unknowns : int
-        Number of unknowns of the extended model.
-    done : bool
-        Whether it ended by itself, before its limit of time.
-    """
-
-    seconds: float
-    unknowns: int
-    done: bool
+    seconds: float  # processor time [s]
+    unknowns: int  # number of unknowns of the extended model
+    done: bool  # whether it ended by itself, before its limit of time
 
 
 def nested(diagnosis: Diagnosis, limit: float, seed: int) -> Nested | None:
@@ -306,41 +271,20 @@ LIMIT = 600.0  # time at which a nested sampler is stopped [s]
 
 @dataclass(frozen=True)
 class Cost:
-    """Times and memory.
+    """Times and memory."""
 
-    Attributes
-    ----------
-    diagnoses : dict of str to list of Run
-        Diagnoses without samples by what is hidden, the first of each without compiled code, the others with it.
-    sampled : dict of str to Run
-        Diagnoses with 4,000 effective samples of the extended model, compiled code kept.
-    commands : dict of str to list of Run
-        Other commands on the recordings with nothing hidden, the first run of each without compiled code.
-    candidates : dict of int to float
-        Time of a verdict by the number of candidates [s].
-    growth : dict of str to dict of int to float
-        Time of one evaluation by what grows [s].
-    floor : Floor
-    nested : Nested or None
-        One candidate by nested sampling.
-    search : SearchTimes or None
-        A search for manoeuvres.
-    full : bool
-        Whether runs were repeated.
-    before : Path or None
-        Times that an earlier run wrote, with which these are compared.
-    """
-
+    # diagnoses without samples by what is hidden, the first of each without compiled code, the others with it
     diagnoses: dict[str, list[Run]]
-    sampled: dict[str, Run]
+    sampled: dict[str, Run]  # diagnoses with 4,000 effective samples of the extended model, compiled code kept
+    # other commands on the recordings with nothing hidden, the first run of each without compiled code
     commands: dict[str, list[Run]]
-    candidates: dict[int, float]
-    growth: dict[str, dict[int, float]]
+    candidates: dict[int, float]  # time of a verdict by the number of candidates [s]
+    growth: dict[str, dict[int, float]]  # time of one evaluation by what grows [s]
     floor: Floor
-    nested: Nested | None
-    search: SearchTimes | None
-    full: bool = False
-    before: Path | None = None
+    nested: Nested | None  # one candidate by nested sampling
+    search: SearchTimes | None  # a search for manoeuvres
+    full: bool = False  # whether runs were repeated
+    before: Path | None = None  # times that an earlier run wrote, with which these are compared
 
 
 def run(

@@ -18,24 +18,15 @@ EVALUATIONS = 30  # number of manoeuvres at which the criterion is evaluated
 
 
 class SearchTimes(NamedTuple):
-    """Times of a search.
+    """Times of a search."""
 
-    Attributes
-    ----------
-    cold, warm : float
-        Time from the start of a process until all that a search needs is compiled, without compiled code and with it
-        [s].
-    criterion, limits : tuple of float
-        Times of one criterion with its gradient, and of all limits with their Jacobian, one core [s].
-    unknowns : int
-        Number of free numbers of a manoeuvre.
-    """
-
+    # time from the start of a process until all that a search needs is compiled, without compiled code and with it [s]
     cold: float
     warm: float
+    # times of one criterion with its gradient, and of all limits with their Jacobian, one core [s]
     criterion: tuple[float, ...]
     limits: tuple[float, ...]
-    unknowns: int
+    unknowns: int  # number of free numbers of a manoeuvre
 
 
 def search_times(cache: Path) -> SearchTimes:

@@ -22,36 +22,24 @@ from bayesid.app.command_line import app
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 
+# texts that take the place of a value
 JUNK = (
     *("nan", "inf", "-inf", "-1.0", "0", "0.0", "1e-300", "1e300", "1e400", "9" * 400, "-0.0", "1_000", "0x10", "1,5"),
     *("true", "''", '""', '"x"', "'..'", "'/'", '"\\u0000"', "[]", "[1.0]", "[nan, nan, nan]", "[[]]", "{}", "{x = 1}"),
     *("1979-05-27", "", " ", ",", '"', "'", "\x00", "\ufeff", "é", "\u202e", "<", ">", "&", "#", "=", "[", "]"),
 )
-"""Texts that take the place of a value."""
 
 ACCEPTED = "the files are accepted"  # message of what ends a command after it has read its files
 
 
 @dataclass(frozen=True)
 class Spoilt:
-    """One change of one file.
+    """One change of one file."""
 
-    Parameters
-    ----------
-    file : str
-        Ending of the name of the file.
-    kind : str
-        Name of the change, one of `KINDS`.
-    place : float
-        Where in the file, from 0 at its start to 1 at its end.
-    text : str
-        What is put there.
-    """
-
-    file: str
-    kind: str
-    place: float
-    text: str
+    file: str  # ending of the name of the file
+    kind: str  # name of the change, one of `KINDS`
+    place: float  # where in the file, from 0 at its start to 1 at its end
+    text: str  # what is put there
 
     def apply(self, folder: Path) -> None:
         """Change the file in a folder."""
@@ -96,23 +84,12 @@ def spoilt() -> st.SearchStrategy[Spoilt]:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command answers to a study.
+    """What a command answers to a study."""
 
-    Attributes
-    ----------
-    status : int
-        Exit status.
-    message : str
-        What it says.
-    accepted : bool
-        Whether it accepts the files.
-    fault : str
-        What is wrong with the answer: a traceback, another status than 2, no message or several; empty if nothing is.
-    """
-
-    status: int
-    message: str
-    accepted: bool
+    status: int  # exit status
+    message: str  # what it says
+    accepted: bool  # whether it accepts the files
+    # what is wrong with the answer: a traceback, another status than 2, no message or several; empty if nothing is
     fault: str
 
 
@@ -180,6 +157,7 @@ def _key(pattern: str, factor: float) -> Callable[[Path], None]:
     return change
 
 
+# changes of the folder of a study, by what they stand for
 SLIPS: Mapping[str, Callable[[Path], None]] = {
     "joint positions in degrees": _columns("position.", 180.0 / np.pi),
     "rate in degrees per second": _columns("rate.", 180.0 / np.pi),
@@ -192,7 +170,6 @@ SLIPS: Mapping[str, Callable[[Path], None]] = {
     "radius of the orbit in km": _key("radius", 1e-3),
     "place of the accelerometer in mm": _key("position", 1000.0),
 }
-"""Changes of the folder of a study, by what they stand for."""
 
 
 def refused(study: Path, slip: str, folder: Path) -> tuple[bool, str]:

@@ -18,9 +18,10 @@ import numpy as np
 import bayesid
 from bayesid.robot.robot import Robot
 
+# keys of what differs between two runs of one command: times, and keys of files that say when they were made
 DECIDED_BY_CLOCKS = ("seconds", "sha256")
-"""Keys of what differs between two runs of one command: times, and keys of files that say when they were made."""
 
+# study of which manoeuvres are designed and flown
 STUDY = """
 [robot]
 urdf = "planar.urdf"
@@ -40,7 +41,6 @@ criteria = ["d-optimal"]
 [design.limits]
 tip_speed = 0.15
 """
-"""Study of which manoeuvres are designed and flown."""
 
 SPACECRAFT = """
 from bayesid import SensorKind, Model, Robot, Sensor, White
@@ -51,6 +51,7 @@ execute = SimulatedSpacecraft(
 ).execute
 """
 
+# a trial of a campaign, which takes a while
 TRIAL = """
 import time
 
@@ -58,7 +59,6 @@ def draw(task, rng):
     time.sleep(0.15)
     return [task, *rng.random(3).tolist()]
 """
-"""A trial of a campaign, which takes a while."""
 
 CAMPAIGN = """
 import site
@@ -74,27 +74,13 @@ run_trials(draw, range(40), sys.argv[2] + "/trials.json", seed=5, workers=2)
 
 @dataclass(frozen=True)
 class Killed:
-    """What became of one command that was killed and called again.
+    """What became of one command that was killed and called again."""
 
-    Attributes
-    ----------
-    command : str
-        Name of the command.
-    kills : int
-        Number of kills that found it running.
-    half_written : tuple of str
-        Results that were there but not whole after a kill.
-    same : bool
-        Whether the results in the end, and the names of all files, are those of the command left alone.
-    message : str
-        Last line of what the last call said.
-    """
-
-    command: str
-    kills: int
-    half_written: tuple[str, ...]
-    same: bool
-    message: str
+    command: str  # name of the command
+    kills: int  # number of kills that found it running
+    half_written: tuple[str, ...]  # results that were there but not whole after a kill
+    same: bool  # whether the results in the end, and the names of all files, are those of the command left alone
+    message: str  # last line of what the last call said
 
 
 def _campaign(folder: Path, output: Path) -> list[str]:
@@ -111,6 +97,7 @@ def _bayesid(name: str, *options: str) -> Callable[[Path, Path], list[str]]:
     return arguments
 
 
+# functions of the folder of the studies and of the output that return what follows ``python``
 COMMANDS: Mapping[str, Callable[[Path, Path], list[str]]] = {
     "campaign": _campaign,
     "design": _bayesid("design", "--starts", "4", "--iterations", "10"),
@@ -118,7 +105,6 @@ COMMANDS: Mapping[str, Callable[[Path, Path], list[str]]] = {
     "identify": _bayesid("identify", "--samples", "300"),
     "diagnose": _bayesid("diagnose", "--no-sample"),
 }
-"""Functions of the folder of the studies and of the output that return what follows ``python``."""
 
 
 def kill_and_resume(command: str, folder: Path, rng: np.random.Generator, kills: int) -> Killed:
@@ -217,8 +203,8 @@ def _run_and_kill(arguments: Sequence[str], moment: float) -> bool:
 
 
 FILE = "simulation/effects/environment_effects.py"
+# what the other version computes differently: a torque of the gravity gradient a hundred times as large
 OWN, OTHER = "3.0 * instant.environment.gradient", "300.0 * instant.environment.gradient"
-"""What the other version computes differently: a torque of the gravity gradient a hundred times as large."""
 
 
 def answers_beside_another_version(study: Path, folder: Path) -> dict[str, bool]:

@@ -24,8 +24,8 @@ from studies.faults.kills import COMMANDS
 from studies.faults.surroundings import SURROUNDINGS
 from studies.faults.trials import attempt, tasks
 
+# titles of the outcomes by their keys
 OUTCOMES = {"refused": "refused with a clear message", "accepted": "accepted", "faulty": "unclear answer"}
-"""Titles of the outcomes by their keys."""
 
 Made = Mapping[str, Any]  # a task with its result
 NAMED = re.compile(r"\.(csv|toml|urdf): ")  # file in a message, with what follows on the place in it

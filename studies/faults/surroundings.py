@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 
 from bayesid.app.command_line import app
 
+# file of a user's effect, but for the method that fails
 PLUGIN = '''
 import jax.numpy as jnp
 from bayesid import Effect, Parameter, Wrench, register
@@ -31,8 +32,8 @@ class Mine(Effect):
 
     def {hook}
 '''
-"""File of a user's effect, but for the method that fails."""
 
+# failing methods of an effect, by what they stand for
 HOOKS = {
     "an effect that returns NaN": (
         "wrench(self, v, i, s):\n        return Wrench(jnp.zeros(3), jnp.sqrt(-v[0]) + jnp.ones(3))"
@@ -40,7 +41,6 @@ HOOKS = {
     "an effect of a wrong shape": "wrench(self, v, i, s):\n        return Wrench(jnp.zeros(3), v)",
     "an effect that raises": "wrench(self, v, i, s):\n        return Wrench(i.force, v)",
 }
-"""Failing methods of an effect, by what they stand for."""
 
 
 def with_plugin(study: Path, hook: str) -> None:
@@ -73,16 +73,16 @@ def _plugin(hook: str) -> Callable[[Path, Path], list[str]]:
 TWICE = "two runs into one folder"  # title of the case whose folder is claimed meanwhile
 FULL = "a full disk"  # title of the case whose folder for results lies on a file system of a few kilobytes
 
+# shell command that runs another one where a folder is such a file system, in a name space of its own
 FILL = 'mount -t tmpfs -o size=16k tmpfs "$0" && exec "$@"'
-"""Shell command that runs another one where a folder is such a file system, in a name space of its own."""
 
+# functions of a study and of a folder that prepare a fault and return the command, by what they stand for
 SURROUNDINGS: Mapping[str, Callable[[Path, Path], list[str]]] = {
     FULL: lambda study, folder: ["check", str(study), "--output", str(folder / "disk" / "out")],
     "a folder that cannot be written": _closed,
     TWICE: _check,
     **{title: _plugin(hook) for title, hook in HOOKS.items()},
 }
-"""Functions of a study and of a folder that prepare a fault and return the command, by what they stand for."""
 
 
 def answer_amid(study: Path, title: str, folder: Path) -> tuple[bool, str]:

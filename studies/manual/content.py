@@ -26,10 +26,10 @@ from bayesid.simulation.effects.register import known_effects
 
 __all__ = ["Pieces", "content"]
 
-Pieces = list[str]  # A text in pieces: plain, code, plain, and so on
+Pieces = list[str]  # a text in pieces: plain, code, plain, and so on
 
+# description of the package, which states its version and the order of its rooms
 PROJECT = Path(__file__).resolve().parents[2] / "pyproject.toml"
-"""Description of the package, which states its version and the order of its rooms."""
 
 VALUES = {int: "N", float: "X", str: "TEXT", Path: "PATH"}  # words for the value of an option that names none
 

@@ -32,8 +32,8 @@ from studies.peers.samplers import SAMPLERS, Budget, Sampler, reference
 from studies.truth.bodies import SERVICER3
 from studies.truth.mujoco import Hidden, Manoeuvres, write_study
 
+# hidden momentum of the wheels [N m s], a hundredth of what a small reaction wheel stores
 WHEEL = np.array([0.3, -0.2, 0.25])
-"""Hidden momentum of the wheels [N m s], a hundredth of what a small reaction wheel stores."""
 
 
 class Recipe(StrEnum):
@@ -93,8 +93,8 @@ def attempt_recipe(recipe: Recipe, hidden: bool, seed: int, *, count: int, durat
 
 EFFECTIVE = 4000.0  # number of effective samples that are wanted
 
+# limits of a peer's processor time by the number of unknowns [s]; more than five times what the package takes
 LIMITS = {10: 80.0, 19: 80.0, 39: 150.0, 79: 500.0}
-"""Limits of a peer's processor time by the number of unknowns [s]; more than five times what the package takes."""
 
 LONG = 15_000.0  # number of effective samples of a reference
 REFERENCE = "reference"  # name of the reference among the samplers

@@ -37,44 +37,28 @@ RECORDINGS = 3  # number of recordings of every case
 
 @dataclass(frozen=True)
 class Case:
-    """What is unknown.
+    """What is unknown."""
 
-    Attributes
-    ----------
-    links : int
-        Number of links of the arm that are known to 5 % only; all others are known exactly.
-    rates : bool
-        Whether the initial rates are unknown.
-    title : str
-    """
-
-    links: int
-    rates: bool
+    links: int  # number of links of the arm that are known to 5 % only; all others are known exactly
+    rates: bool  # whether the initial rates are unknown
     title: str
 
 
+# number of unknowns -> case; the first is the base body as the package's users have it
 CASES = {
     19: Case(0, True, "base and initial rates"),
     10: Case(0, False, "base, from rest"),
     39: Case(2, True, "the same and two links"),
     79: Case(6, True, "the same and the whole arm"),
 }
-"""Number of unknowns -> case; the first is the base body as the package's users have it."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A posterior over whitened coordinates x, with y = centre + factor x those of its parameterisation.
-
-    Attributes
-    ----------
-    parameterisation : Parameterisation
-    optimum : Optimum
-        Mode and Laplace approximation.
-    """
+    """A posterior over whitened coordinates x, with y = centre + factor x those of its parameterisation."""
 
     parameterisation: Parameterisation
-    optimum: Optimum
+    optimum: Optimum  # mode and Laplace approximation
 
     @property
     def posterior(self) -> Posterior:

@@ -27,23 +27,23 @@ from studies.peers.samplers import ADAPTATION, BROAD, CHAINS, LIVE, Sampler
 FASTER = 5.0  # smallest wanted ratio of the best peer's time to the package's
 EVIDENCE = 0.1  # largest wanted error of the log evidence
 
+# share of the wanted samples from which on the time to all of them is extrapolated; adaptation outweighs fewer
 LEAST = 0.25
-"""Share of the wanted samples from which on the time to all of them is extrapolated; adaptation outweighs fewer."""
 
 SIGMAS = 1.96  # half width of a 95 % interval in standard deviations
 
+# packages whose versions are stated
 PACKAGES = ("emcee", "numpyro", "dynesty", "nautilus-sampler", "jax", "scipy", "pin", "mujoco")
-"""Packages whose versions are stated."""
 
+# recipes in words
 TITLES = {
     Recipe.BAYESID: "bayesid: diagnose, identify",
     Recipe.SCIPY: "SciPy around Pinocchio",
     Recipe.SYSID: "mujoco.sysid",
 }
-"""Recipes in words."""
 
+# short titles of the recipes
 SHORT = {Recipe.BAYESID: "bayesid", Recipe.SCIPY: "SciPy, Pinocchio", Recipe.SYSID: "mujoco.sysid"}
-"""Short titles of the recipes."""
 
 TICKS = (5, 10, 20, 50, 100, 200, 500, 1000, 2000)  # ticks of times in the figure [s]
 Made = Sequence[Mapping[str, Any]]  # trials that were made: ``task`` and ``result``

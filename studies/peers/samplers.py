@@ -32,8 +32,8 @@ from bayesid.inference import importance_sample, sample
 from bayesid.inference.proposal import StudentT
 from studies.peers.density import Target
 
+# width of the normal prior that nested sampling starts from, in standard deviations of the Laplace approximation
 BROAD = 3.0
-"""Width of the normal prior that nested sampling starts from, in standard deviations of the Laplace approximation."""
 
 CHAINS = 8  # number of chains of NUTS, evaluated together: a point then costs less than half of what it costs alone
 ADAPTATION = 100  # number of steps in which NUTS finds its step size
@@ -57,49 +57,25 @@ class Sampler(StrEnum):
 
 @dataclass(frozen=True)
 class Budget:
-    """When a sampler may stop.
+    """When a sampler may stop."""
 
-    Attributes
-    ----------
-    effective_samples : float
-        Wanted number.
-    seconds : float
-        Limit of processor time [s].
-    """
-
-    effective_samples: float
-    seconds: float
+    effective_samples: float  # wanted number
+    seconds: float  # limit of processor time [s]
 
 
 @dataclass(frozen=True)
 class Reached:
-    """What a sampler reached.
+    """What a sampler reached."""
 
-    Attributes
-    ----------
-    seconds : float
-        Processor time for samples and evidence [s].
-    evaluations : int
-        Number of evaluations of the log density.
-    gradients : int
-        Number of them that gave the gradient too.
-    effective_samples : float
-        The smallest number of any coordinate.
-    finished : bool
-        Whether it stopped by its rule and not at the limit of time.
-    log_evidence, log_evidence_error : float or None
-        Where the sampler gives them.
-    mean : list of float
-        Mean of the whitened coordinates, to compare with the reference; empty where there are no samples.
-    """
-
-    seconds: float
-    evaluations: int
-    gradients: int
-    effective_samples: float
-    finished: bool
+    seconds: float  # processor time for samples and evidence [s]
+    evaluations: int  # number of evaluations of the log density
+    gradients: int  # number of them that gave the gradient too
+    effective_samples: float  # the smallest number of any coordinate
+    finished: bool  # whether it stopped by its rule and not at the limit of time
+    # where the sampler gives them
     log_evidence: float | None = None
     log_evidence_error: float | None = None
+    # mean of the whitened coordinates, to compare with the reference; empty where there are no samples
     mean: list[float] = field(default_factory=list)
 
 
@@ -309,6 +285,7 @@ def nautilus(target: Target, budget: Budget, rng: np.random.Generator) -> Reache
     )
 
 
+# samplers by name, the package's own first
 SAMPLERS: Mapping[Sampler, Callable[[Target, Budget, np.random.Generator], Reached]] = {
     Sampler.OURS: ours,
     Sampler.STRETCH: ensemble([(StretchMove(), 1.0)]),
@@ -317,7 +294,6 @@ SAMPLERS: Mapping[Sampler, Callable[[Target, Budget, np.random.Generator], Reach
     Sampler.DYNESTY: dynesty,
     Sampler.NAUTILUS: nautilus,
 }
-"""Samplers by name, the package's own first."""
 
 
 ITERATIONS = 100  # number of iterations of the bridge, many more than it needs

@@ -21,8 +21,8 @@ Floats = NDArray[np.floating]
 
 PLATE_SD = 0.03  # relative uncertainty of the plate's moments, which are from the authors' CAD: "a few percent"
 
+# relative uncertainty of what the blocks add: 0.1 to 0.2 mm in their place on levers of 63 mm, and their mass
 BLOCK_SD = 0.005
-"""Relative uncertainty of what the blocks add: 0.1 to 0.2 mm in their place on levers of 63 mm, and their mass."""
 
 
 @dataclass(frozen=True)
@@ -81,25 +81,19 @@ def truth_sd(truth: Truth, body: str) -> Floats:
 
 @dataclass(frozen=True)
 class BodyResult:
-    """Principal moments of one body without the device, ascending [kg m2].
-
-    Attributes
-    ----------
-    throws : tuple of str
-    moments, formal : (throws, 3) array
-        Of single throws, with the posterior's standard deviation of each; device, wheel and drag as found jointly.
-    joint, joint_formal, joint_jackknife : (3,) array
-        Of all throws together; the jackknife takes whole throws out, calibration throws included.
-    truth, truth_sd : (3,) array
-    """
+    """Principal moments of one body without the device, ascending [kg m2]."""
 
     name: str
     throws: tuple[str, ...]
+    # (throws, 3): of single throws, with the posterior's standard deviation of each; device, wheel and drag as found
+    # jointly
     moments: Floats
     formal: Floats
+    # (3,): of all throws together; the jackknife takes whole throws out, calibration throws included
     joint: Floats
     joint_formal: Floats
     joint_jackknife: Floats
+    # (3,)
     truth: Floats
     truth_sd: Floats
 
@@ -156,32 +150,20 @@ DRAWS = 1000
 
 @dataclass(frozen=True)
 class Analysis:
-    """All throws under one model.
-
-    Attributes
-    ----------
-    wheel, wheel_formal, wheel_jackknife : float
-        Inertia of the wheel [kg m2].
-    bodies : mapping of str to BodyResult
-    widths : mapping of str to mapping of str to SmoothWidth
-        Of the unexplained torque and force, by body; empty for a rigid model.
-    noise : mapping of str to (6,) array
-        Noise of gyro and accelerometer relative to that of quiet stretches.
-    calibration : mapping of str to (mean, sd)
-        Unknowns of the device, in standard deviations of their priors times those: physical units.
-    left : mapping of str to LeftOver
-        What the model leaves, by body; empty for a rigid model.
-    """
+    """All throws under one model."""
 
     label: str
+    # inertia of the wheel [kg m2]
     wheel: float
     wheel_formal: float
     wheel_jackknife: float
     bodies: Mapping[str, BodyResult]
+    # of the unexplained torque and force, by body; empty for a rigid model
     widths: Mapping[str, Mapping[str, SmoothWidth]]
-    noise: Mapping[str, Floats]
+    noise: Mapping[str, Floats]  # noise of gyro and accelerometer relative to that of quiet stretches
+    # unknowns of the device, in standard deviations of their priors times those: physical units
     calibration: Mapping[str, tuple[float, float]]
-    left: Mapping[str, LeftOver]
+    left: Mapping[str, LeftOver]  # what the model leaves, by body; empty for a rigid model
     converged: bool
 
 

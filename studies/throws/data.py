@@ -30,11 +30,11 @@ Floats = NDArray[np.floating]
 
 DEFAULT_FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "throws"  # beside the checkout
 
+# the device alone and the device on a box of known inertia, which every comparison needs
 CALIBRATION = ("cal_device", "cal_proof")
-"""The device alone and the device on a box of known inertia, which every comparison needs."""
 
+# throws that are not used, with the reason
 EXCLUDED = {"Empty_LOG00188": "its gyro is saturated; the folder of the measurements does not hold it"}
-"""Throws that are not used, with the reason."""
 
 SIGNS = np.array([-1.0, -1.0, 1.0])
 RATE_SCALE = np.pi / 180.0 / 16.384
@@ -42,36 +42,29 @@ ACCEL_SCALE = 9.81 / 2048.0
 POLE_PAIRS = 6  # of the wheel's motor, as the source of the data states; its inertia takes up an error of this number
 WHEEL_COUNT = 100.0 / POLE_PAIRS * 2.0 * np.pi / 60.0  # wheel speed of one count of its reading [rad/s]
 
+# nominal inertia of the wheel [kg m2]; every inertia scales with it, and the known box gives its true value
 WHEEL_INERTIA = 1.45e-6
-"""Nominal inertia of the wheel [kg m2]; every inertia scales with it, and the known box gives its true value."""
 
 INTERVAL = 0.005  # between samples [s]
 
+# width of the weights [s], at which the correlation of neighbouring samples is zero
 SMOOTH = INTERVAL / np.sqrt(14.0 - np.sqrt(88.0))
-"""Width of the weights [s], at which the correlation of neighbouring samples is zero."""
 
 WHEEL_STEPS = 4  # values of the wheel's momentum per sample
 
 
 @dataclass(frozen=True)
 class Timing:
-    """How a throw is cut; the delays were found on these data.
+    """How a throw is cut; the delays were found on these data."""
 
-    Parameters
-    ----------
-    start, end : float
-        Free flight after the wheel's start [s].
-    delay, delay_periods : float
-        A reported wheel speed is as old as this [s] plus this many electrical periods, over which it was averaged.
-    fast, margin : float
-        Wheel acceleration above which its delay is not known well enough [rad/s2]; gyro samples within ``margin``
-        seconds of it are left out.
-    """
-
+    # free flight after the wheel's start [s]
     start: float = 0.075
     end: float = 0.555
+    # a reported wheel speed is as old as this [s] plus this many electrical periods, over which it was averaged
     delay: float = -0.64e-3
     delay_periods: float = 0.40
+    # wheel acceleration above which its delay is not known well enough [rad/s2]; gyro samples within ``margin`` seconds
+    # of it are left out
     fast: float = 12000.0
     margin: float = 0.004
 
@@ -218,8 +211,8 @@ def quiet_noise(recordings: Sequence[Recording], sensor: str) -> Floats:
     return np.sqrt(np.mean(square, axis=0))
 
 
+# least principal moment of the second moments of mass relative to their trace, where noise gives what no body has
 SHARE = 0.05
-"""Least principal moment of the second moments of mass relative to their trace, where noise gives what no body has."""
 
 
 def regress(recordings: Sequence[Recording], mass: float) -> InertialParameters:

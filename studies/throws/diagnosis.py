@@ -36,6 +36,7 @@ SPREAD = 0.1  # relative width of the body's prior about a linear regression on 
 TESTING = 2  # throws at most that are predicted
 ITERATIONS = 20
 
+# effects of the catalogue that a stiff body with gyro, accelerometer and one wheel can show in half a second
 CATALOGUE = (
     "rotational-drag",
     "rate-scale",
@@ -48,7 +49,6 @@ CATALOGUE = (
     "wheel-history:y",
     "wheel-history:z",
 )
-"""Effects of the catalogue that a stiff body with gyro, accelerometer and one wheel can show in half a second."""
 
 
 def device_candidates(model: Model, *, records_wheels: bool, pairs: int = POLE_PAIRS) -> list[Effect]:
@@ -64,15 +64,10 @@ def device_candidates(model: Model, *, records_wheels: bool, pairs: int = POLE_P
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Log density of throws that took no part, given those that did, by the two models with the same noise.
-
-    Attributes
-    ----------
-    names : tuple of str
-    rigid, extended : (T,) array
-    """
+    """Log density of throws that took no part, given those that did, by the two models with the same noise."""
 
     names: tuple[str, ...]
+    # (T,)
     rigid: Floats
     extended: Floats
 
@@ -84,24 +79,15 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Lacking:
-    """The diagnosis of some throws of one body.
-
-    Attributes
-    ----------
-    training : tuple of str
-    taken : Hypothesis
-        The extended model; where nothing is named, the most probable set of known effects beside what is unknown.
-    held_out : HeldOut
-    body_found : dict of str to Tensor
-        Rigid and extended, the device included.
-    """
+    """The diagnosis of some throws of one body."""
 
     body: str
     training: tuple[str, ...]
     diagnosis: Diagnosis
+    # the extended model; where nothing is named, the most probable set of known effects beside what is unknown
     taken: Hypothesis
     held_out: HeldOut
-    body_found: Mapping[str, Tensor]
+    body_found: Mapping[str, Tensor]  # rigid and extended, the device included
 
 
 def lacking(

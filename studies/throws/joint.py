@@ -33,22 +33,13 @@ PRECISION = 1e-7  # relative fall of the cost at which the fit ends
 
 @dataclass(frozen=True)
 class Throw:
-    """One throw of a body: its posterior, and a point to start from or that was found.
-
-    Attributes
-    ----------
-    z : (size,) array
-    width : (size,) array
-        Factor on the prior standard deviation of each unknown of the throw's own.
-    noise : (6,) array
-        Factor on the noise of each axis of gyro and accelerometer.
-    """
+    """One throw of a body: its posterior, and a point to start from or that was found."""
 
     body: str
     posterior: Posterior
-    z: Floats
-    width: Floats
-    noise: Floats
+    z: Floats  # (size,)
+    width: Floats  # (size,): factor on the prior standard deviation of each unknown of the throw's own
+    noise: Floats  # (6,): factor on the noise of each axis of gyro and accelerometer
 
     def residuals(self, z: Floats) -> Floats:
         """Return the whitened residuals, shape (samples, 6)."""
@@ -72,37 +63,17 @@ class Throw:
 
 @dataclass(frozen=True)
 class Joint:
-    """Mode and Laplace approximation of a joint fit.
+    """Mode and Laplace approximation of a joint fit."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the free shared unknowns; those of a body are written ``body:name``.
-    covariance : (n, n) array
-        Of the shared unknowns, all others marginalised.
-    throws : tuple of Throw
-        With the unknowns found.
-    information : (throws, n, n) array
-    pull : (throws, n) array
-        Each throw's own part of the normal equations at the mode, its own unknowns eliminated.
-    own_variance : tuple of arrays
-        Of each throw's free own unknowns, in the order of its posterior.
-    fitted : (throws, 6) array
-        Number of samples of each axis that the throw's own unknowns absorb.
-    own : tuple of integer arrays
-        Which unknowns of each throw these are.
-    converged : bool
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the free shared unknowns; those of a body are written ``body:name``
     value: Floats
-    covariance: Floats
-    throws: tuple[Throw, ...]
-    information: Floats
-    pull: Floats
-    own_variance: tuple[Floats, ...]
-    fitted: Floats
-    own: tuple[NDArray[np.intp], ...]
+    covariance: Floats  # (n, n): of the shared unknowns, all others marginalised
+    throws: tuple[Throw, ...]  # with the unknowns found
+    information: Floats  # (throws, n, n)
+    pull: Floats  # (throws, n): each throw's own part of the normal equations at the mode, its own unknowns eliminated
+    own_variance: tuple[Floats, ...]  # of each throw's free own unknowns, in the order of its posterior
+    fitted: Floats  # (throws, 6): number of samples of each axis that the throw's own unknowns absorb
+    own: tuple[NDArray[np.intp], ...]  # which unknowns of each throw these are
     converged: bool
 
     def draw(self, count: int, rng: np.random.Generator) -> Floats:
@@ -264,21 +235,11 @@ LARGEST = 1.3  # root mean square of the values found over their prior width bey
 
 @dataclass(frozen=True)
 class SmoothWidth:
-    """Width of the unexplained torque or force of one body.
+    """Width of the unexplained torque or force of one body."""
 
-    Attributes
-    ----------
-    sd : float
-        Prior standard deviation of the values at the knots [N m or m/s2].
-    factor : float
-        By which one more step would change it.
-    ratio : float
-        Root mean square of the most probable values over ``sd``.
-    """
-
-    sd: float
-    factor: float
-    ratio: float
+    sd: float  # prior standard deviation of the values at the knots [N m or m/s2]
+    factor: float  # by which one more step would change it
+    ratio: float  # root mean square of the most probable values over ``sd``
 
     @property
     def doubtful(self) -> bool:

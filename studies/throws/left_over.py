@@ -31,45 +31,35 @@ CHANNELS = ("gyro x", "gyro y", "gyro z", "accel. x", "accel. y", "accel. z")
 ORDERS = np.arange(0.4, 3.601, 0.02)  # frequencies relative to the wheel's as it is recorded
 TURN = 1.5  # order below which the wheel's own turn is looked for
 
+# phases of a flight, by the wheel's speed and its slope
 PHASES = ("idle before", "running up", "fast", "running down", "idle after")
-"""Phases of a flight, by the wheel's speed and its slope."""
 
 FAST, IDLE = 0.8, 0.3  # share of a throw's highest wheel speed above which it is fast, and below which it idles
 
+# relative change of the wheel's speed in a second, up to which it coasts [1/s]: an eighth in the whole of it
 STEADY = 1.5
-"""Relative change of the wheel's speed in a second, up to which it coasts [1/s]: an eighth in the whole of it."""
 
 BINS = np.fft.rfftfreq(96, INTERVAL)
 
 
 @dataclass(frozen=True)
 class LeftOver:
-    """What is left of all throws of one body.
-
-    Attributes
-    ----------
-    names : tuple of str
-    spectrum : (frequencies, 6) array
-        Amplitude of the residual of the samples at `BINS`, root mean square over throws [rad/s, m/s2].
-    phase : (5, 6) array
-        Root mean square in the phases of `PHASES` [rad/s, m/s2]; NaN without a sample.
-    rms, quiet : (6,) array
-        Over the flight, and the noise of quiet stretches.
-    wheel : (3,) array
-        Frequency of the wheel where it idles before, at its highest, and where it idles after: means over throws [Hz].
-    orders : (throws, orders, 6) array
-        Amplitude of the raw readings at `ORDERS` times the wheel's frequency while it is fast [rad/s, m/s2].
-    shaken : (5, 6) array
-        Root mean square that an imbalance of this amplitude leaves in the samples, by phase [rad/s, m/s2].
-    """
+    """What is left of all throws of one body."""
 
     names: tuple[str, ...]
+    # (frequencies, 6): amplitude of the residual of the samples at `BINS`, root mean square over throws [rad/s, m/s2]
     spectrum: Floats
-    phase: Floats
+    phase: Floats  # (5, 6): root mean square in the phases of `PHASES` [rad/s, m/s2]; NaN without a sample
+    # (6,): over the flight, and the noise of quiet stretches
     rms: Floats
     quiet: Floats
+    # (3,): frequency of the wheel where it idles before, at its highest, and where it idles after: means over throws
+    # [Hz]
     wheel: Floats
+    # (throws, orders, 6): amplitude of the raw readings at `ORDERS` times the wheel's frequency while it is fast
+    # [rad/s, m/s2]
     orders: Floats
+    # (5, 6): root mean square that an imbalance of this amplitude leaves in the samples, by phase [rad/s, m/s2]
     shaken: Floats
 
     @property
@@ -200,9 +190,9 @@ def orders_of(recording: Recording, folder: Path) -> Floats:
     return np.abs(np.exp(-1j * ORDERS[:, None] * turn) * (2.0 * weight / weight.sum()) @ left)
 
 
+# distance from the expected order within which a throw's loudest line counts as the wheel's turn; the wheel coasts for
+# some 0.09 s, which tells orders 0.05 apart
 NEAR = 0.03
-"""Distance from the expected order within which a throw's loudest line counts as the wheel's turn; the wheel coasts for
-some 0.09 s, which tells orders 0.05 apart."""
 
 
 def shaken_axis(left: LeftOver) -> int:

@@ -233,8 +233,8 @@ TORQUE = 100.0 * WHEEL_INERTIA  # width of the unexplained torque that estimates
 DRAG = 20.0 * WHEEL_INERTIA  # prior standard deviation of the drag coefficients [N m s]
 BIAS = 0.1  # prior standard deviation of the accelerometer's constant error in a throw [m/s2]
 
+# least noise of the wheel's recorded speed, that of its counts [rad/s]: the gyro sees it through the inertia
 RESOLUTION = WHEEL_COUNT / np.sqrt(12.0)
-"""Least noise of the wheel's recorded speed, that of its counts [rad/s]: the gyro sees it through the inertia."""
 
 RATE = 150.0  # prior standard deviation of the initial rate [rad/s], wide enough for any throw
 

@@ -48,33 +48,17 @@ Row = tuple[object, ...]
 
 @dataclass(frozen=True)
 class Result:
-    """Numbers of the study.
+    """Numbers of the study."""
 
-    Attributes
-    ----------
-    plain, extended : Analysis
-        Rigid body with wheel and nothing else; the same with what the device and the air add.
-    studies : tuple of Lacking
-        What each body's diagnosis said; empty where it was left out.
-    errors : mapping of str to mapping of str to (3,) array
-        Of the diagnosed models against the geometry [%].
-    wheels : mapping of str to Diagnosis
-        With the recorded wheel dropped, by body; empty where that was left out.
-    masses : mapping of str to float
-        Of the bodies with the device on them [kg].
-    pairs : int
-        Pole pairs of the wheel's motor, from the calibration throws' loudest line.
-    seconds, reverse_seconds : float
-        Time of the run without the reverse, and of the reverse.
-    """
-
+    # rigid body with wheel and nothing else; the same with what the device and the air add
     plain: Analysis
     extended: Analysis
-    studies: tuple[Lacking, ...]
-    errors: Mapping[str, Mapping[str, np.ndarray]]
-    wheels: Mapping[str, Diagnosis]
-    masses: Mapping[str, float]
-    pairs: int
+    studies: tuple[Lacking, ...]  # what each body's diagnosis said; empty where it was left out
+    errors: Mapping[str, Mapping[str, np.ndarray]]  # of the diagnosed models against the geometry [%]
+    wheels: Mapping[str, Diagnosis]  # with the recorded wheel dropped, by body; empty where that was left out
+    masses: Mapping[str, float]  # of the bodies with the device on them [kg]
+    pairs: int  # pole pairs of the wheel's motor, from the calibration throws' loudest line
+    # time of the run without the reverse, and of the reverse
     seconds: float
     reverse_seconds: float
 

@@ -68,8 +68,8 @@ def _with_factor_changed(body: Body, change: Array) -> Body:
 ROBOTS = Path(__file__).resolve().parent / "robots"
 SERVICER3, SERVICER4, BRANCHED = (ROBOTS / f"{name}.urdf" for name in ("servicer3", "servicer4", "branched"))
 
+# names of the inertia's elements in a URDF, and where they stand in the matrix
 ELEMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-"""Names of the inertia's elements in a URDF, and where they stand in the matrix."""
 
 
 def part(element: ElementTree.Element, tag: str) -> ElementTree.Element:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from studies.truth.numerics import Array, quintic_step
 
+# time [s] -> positions, speeds, accelerations of the joints, each (joints,)
 Motion = Callable[[float], tuple[Array, Array, Array]]
-"""Time [s] -> positions, speeds, accelerations of the joints, each (joints,)."""
 
 
 def smooth_motion(

@@ -51,11 +51,11 @@ class Truth(NamedTuple):
 
 Table = dict[str, Array]  # columns of a recording by channel; NaN where a sensor takes no sample
 
+# changes the noise-free columns in place, given with the truth at their times
 Distortion = Callable[[Table, Truth], None]
-"""Changes the noise-free columns in place, given with the truth at their times."""
 
+# changes the noisy columns in place, given with their times
 Spoiling = Callable[[Table, Array, np.random.Generator], None]
-"""Changes the noisy columns in place, given with their times."""
 
 
 @dataclass(frozen=True)

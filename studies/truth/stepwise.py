@@ -27,8 +27,8 @@ from studies.truth.orbit import MU
 Zenith = Callable[[float], tuple[Array, float]]  # time [s] -> unit vector in orbit axes and mu / R^3 [1/s2]
 Wrench = Callable[[float], ArrayLike]  # time [s] -> force or torque at the base origin, base axes [N or N m]
 
+# time [s] -> momentum of the wheels relative to the base [N m s] and its derivative, base axes
 Wheel = Callable[[float], tuple[ArrayLike, ArrayLike]]
-"""Time [s] -> momentum of the wheels relative to the base [N m s] and its derivative, base axes."""
 
 
 class Response(NamedTuple):

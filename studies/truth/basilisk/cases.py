@@ -114,23 +114,13 @@ def write_basilisk_study(
 
 @dataclass(frozen=True)
 class BasiliskCase:
-    """A study that Basilisk flies, and the answer.
-
-    Parameters
-    ----------
-    name : str
-    causes : tuple of str
-        The contract's names for what is hidden; empty where nothing is.
-    urdf : path
-    accept : tuple of str
-        Names that are as right as one of the causes.
-    """
+    """A study that Basilisk flies, and the answer."""
 
     name: str
-    causes: tuple[str, ...]
+    causes: tuple[str, ...]  # the contract's names for what is hidden; empty where nothing is
     build: Build
     urdf: Path
-    accept: tuple[str, ...] = ()
+    accept: tuple[str, ...] = ()  # names that are as right as one of the causes
 
     @property
     def status(self) -> str:
@@ -190,6 +180,7 @@ def _all(*builds: Build) -> Build:
     return build
 
 
+# causes of the catalogue of which Basilisk has its own models, a pair of them, and nothing hidden on two robots
 BASILISK_CASES = (
     BasiliskCase("wheel-momentum in Basilisk", ("wheel-momentum",), _wheel, SERVICER3),
     BasiliskCase("null, three joints in Basilisk", (), _all(), SERVICER3),
@@ -204,4 +195,3 @@ BASILISK_CASES = (
         SERVICER4,
     ),
 )
-"""Causes of the catalogue of which Basilisk has its own models, a pair of them, and nothing hidden on two robots."""

@@ -40,33 +40,17 @@ from studies.truth.recordings import Truth
 
 @dataclass(frozen=True)
 class Panel:
-    """A rigid panel hinged on the base and held by a spring; at rest at time 0.
+    """A rigid panel hinged on the base and held by a spring; at rest at time 0."""
 
-    Parameters
-    ----------
-    mass : float
-        Mass [kg].
-    hinge : (3,) tuple
-        A point of the hinge line, base frame [m].
-    rpy : (3,) tuple
-        Roll, pitch, yaw of the panel's axes at rest relative to the base; y is the hinge line.
-    reach : float
-        Distance of the centre of mass from the hinge, along the panel's -x [m].
-    inertia : (3,) tuple
-        Moments about the centre of mass in the panel's axes [kg m2].
-    frequency : float
-        With the base held [Hz].
-    damping : float
-        Relative to critical.
-    """
-
-    mass: float = 3.0
-    hinge: tuple[float, float, float] = (-0.5, 0.1, 0.2)
+    mass: float = 3.0  # mass [kg]
+    hinge: tuple[float, float, float] = (-0.5, 0.1, 0.2)  # a point of the hinge line, base frame [m]
+    # roll, pitch, yaw of the panel's axes at rest relative to the base; y is the hinge line
     rpy: tuple[float, float, float] = (0.5, 0.3, -0.4)
-    reach: float = 0.7
+    reach: float = 0.7  # distance of the centre of mass from the hinge, along the panel's -x [m]
+    # moments about the centre of mass in the panel's axes [kg m2]
     inertia: tuple[float, float, float] = (0.31, 0.51, 0.8)
-    frequency: float = 0.25
-    damping: float = 0.01
+    frequency: float = 0.25  # with the base held [Hz]
+    damping: float = 0.01  # relative to critical
 
     @property
     def body(self) -> Body:
@@ -249,8 +233,8 @@ def wheel_effector(wheel: Wheel, craft: spacecraft.Spacecraft) -> reactionWheelS
     return effector
 
 
+# integration step [s] of the classical Runge-Kutta method; angular momentum then drifts by less than 1e-6 N m s
 STEP = 0.01
-"""Integration step [s] of the classical Runge-Kutta method; angular momentum then drifts by less than 1e-6 N m s."""
 
 LEAD = 5  # steps before time 0 and after the end, for central differences there
 

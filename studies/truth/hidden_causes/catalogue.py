@@ -29,35 +29,18 @@ Build = Callable[[Generator, float], Options]  # source of random numbers and st
 
 @dataclass(frozen=True)
 class Case:
-    """A study that can be written, and the answer.
-
-    Parameters
-    ----------
-    name : str
-    causes : tuple of str
-        The contract's names for what is hidden; empty for nulls and for outside effects.
-    status : str
-        "effect", "adequate" or "unknown" (outside the catalogue).
-    builds : tuple of callable
-        (draw, strength) -> keywords of `write_study`, one for each thing hidden.
-    urdf : path
-    fixed : dict
-        Further keywords.
-    accept : tuple of str
-        Names that are as right as one of the causes, since they change the model alike; outside the catalogue, causes
-        that come as close as unknown.
-    frame : str, optional
-        Axes in which an outside wrench is fixed; "orbit" are those of each recording's start.
-    """
+    """A study that can be written, and the answer."""
 
     name: str
-    causes: tuple[str, ...]
-    status: str
-    builds: tuple[Build, ...]
+    causes: tuple[str, ...]  # the contract's names for what is hidden; empty for nulls and for outside effects
+    status: str  # "effect", "adequate" or "unknown" (outside the catalogue)
+    builds: tuple[Build, ...]  # (draw, strength) -> keywords of `write_study`, one for each thing hidden
     urdf: Path
-    fixed: Options
+    fixed: Options  # further keywords
+    # names that are as right as one of the causes, since they change the model alike; outside the catalogue, causes
+    # that come as close as unknown
     accept: tuple[str, ...] = ()
-    frame: str | None = None
+    frame: str | None = None  # axes in which an outside wrench is fixed; "orbit" are those of each recording's start
 
     def write(self, folder: str | Path, seed: int, strength: float = 1.0) -> Study:
         """Write the study; circumstances, motions and noise follow from the seed and do not depend on the strength."""
@@ -142,6 +125,7 @@ STAR_SENSOR = {"rate_period": None, "attitude_period": 0.5}
 _payload3 = partial(hide.payload, "link3", SERVICER3, 0.08, [0.7, 0.05, 0.03])
 _payload4 = partial(hide.payload, "link4", SERVICER4, 0.06, [0.1, 0.05, 0.2])
 
+# at least one case for each name of the catalogue, then pairs, outside effects, nulls
 CASES: tuple[Case, ...] = (
     _hidden("gravity-gradient", hide.no_gradient),
     _hidden("initial-rate", hide.initial_rate, urdf=SERVICER4),
@@ -218,4 +202,3 @@ CASES: tuple[Case, ...] = (
     _null("null, one recording", urdf=SERVICER4, latitudes=[1.0], manoeuvres={"count": 1, "duration": 240.0}),
     _null("null, fast tumble", urdf=SERVICER4, manoeuvres={"rate_spread": 4e-3, "duration": 120.0}),
 )
-"""At least one case for each name of the catalogue, then pairs, outside effects, nulls."""

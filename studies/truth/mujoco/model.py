@@ -27,15 +27,15 @@ from studies.truth.numerics import Array, cross, runge_kutta_step, substeps
 from studies.truth.orbit import Orbit
 from studies.truth.recordings import Truth
 
+# inertia of a flexible joint's motor about its axis [kg m2]; the motor is driven, so that nothing else feels it
 ARMATURE = 1.0
-"""Inertia of a flexible joint's motor about its axis [kg m2]; the motor is driven, so that nothing else feels it."""
 
+# MuJoCo's joint for each moving joint of a URDF
 JOINT_TYPES = {
     "revolute": mujoco.mjtJoint.mjJNT_HINGE,
     "continuous": mujoco.mjtJoint.mjJNT_HINGE,
     "prismatic": mujoco.mjtJoint.mjJNT_SLIDE,
 }
-"""MuJoCo's joint for each moving joint of a URDF."""
 
 
 def _quaternion(rotation: Array) -> Array:

@@ -37,28 +37,15 @@ class Rotor:
 
 @dataclass(frozen=True)
 class Appendage:
-    """A body on the base with joints held by springs, which no recording shows: a solar panel, a tank of fuel.
+    """A body on the base with joints held by springs, which no recording shows: a solar panel, a tank of fuel."""
 
-    Parameters
-    ----------
-    body : Body
-        In base axes; the centre of mass relative to the base origin.
-    hinges, slides : sequence of (3,) array_like
-        Axes of its joints, base axes.
-    anchor : (3,) array_like
-        Point through which the hinges go, base frame [m].
-    frequency : float
-        Natural frequency of each joint with the base held and the other joints locked [Hz].
-    damping : float
-        Relative to critical.
-    """
-
-    body: Body
+    body: Body  # in base axes; the centre of mass relative to the base origin
+    # axes of its joints, base axes
     hinges: Sequence[ArrayLike] = ()
     slides: Sequence[ArrayLike] = ()
-    anchor: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    frequency: float = 0.2
-    damping: float = 0.01
+    anchor: tuple[float, float, float] = (0.0, 0.0, 0.0)  # (3,): point through which the hinges go, base frame [m]
+    frequency: float = 0.2  # natural frequency of each joint with the base held and the other joints locked [Hz]
+    damping: float = 0.01  # relative to critical
 
 
 @dataclass(frozen=True)
@@ -154,8 +141,8 @@ def panel(
     return Appendage(body, hinges=[across], anchor=tuple(root), frequency=frequency, damping=damping)
 
 
+# time, rotation matrix base -> orbit axes, rate in base axes -> force and torque at the base origin, base axes
 Field = Callable[[float, Array, Array], tuple[Array, Array]]
-"""Time, rotation matrix base -> orbit axes, rate in base axes -> force and torque at the base origin, base axes."""
 
 
 def _pushed(direction: Callable[[float], Array], force: float, cp: ArrayLike) -> Field:
