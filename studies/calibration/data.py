@@ -183,12 +183,7 @@ def _true_robot(model: Model, truth: Truth) -> Robot:
 
 
 def _simulated(
-    model: Model,
-    truth: Truth,
-    motion: SmoothMotion,
-    attitude: Floats,
-    time: Floats,
-    rng: np.random.Generator,
+    model: Model, truth: Truth, motion: SmoothMotion, attitude: Floats, time: Floats, rng: np.random.Generator
 ) -> dict[str, Floats]:
     """Return channels that the package's own simulator makes."""
     names = [f"position.{joint.name}" for joint in model.robot.joints]
@@ -200,12 +195,7 @@ def _simulated(
 
 
 def _flown(
-    model: Model,
-    truth: Truth,
-    motion: SmoothMotion,
-    attitude: Floats,
-    time: Floats,
-    rng: np.random.Generator,
+    model: Model, truth: Truth, motion: SmoothMotion, attitude: Floats, time: Floats, rng: np.random.Generator
 ) -> dict[str, Floats]:
     """Return channels that MuJoCo makes."""
     robot = _true_robot(model, truth)

@@ -261,12 +261,7 @@ def nautilus(target: Target, budget: Budget, rng: np.random.Generator) -> Reache
     likelihood = _log_likelihood(target.log_density, target.size)
     density = _Counted(likelihood, lambda: clock.seconds > budget.seconds)
     sampler = Nautilus(
-        nested_prior,
-        density,
-        n_dim=target.size,
-        vectorized=True,
-        pass_dict=False,
-        seed=int(rng.integers(2**31)),
+        nested_prior, density, n_dim=target.size, vectorized=True, pass_dict=False, seed=int(rng.integers(2**31))
     )
     try:
         sampler.run(n_eff=budget.effective_samples, discard_exploration=False)

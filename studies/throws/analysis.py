@@ -255,12 +255,7 @@ def _bodies(
 
 
 def _single(
-    throw: Throw,
-    free: Callable[[str], bool],
-    device: Tensor,
-    wheel: float,
-    truth: Truth,
-    rng: np.random.Generator,
+    throw: Throw, free: Callable[[str], bool], device: Tensor, wheel: float, truth: Truth, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """Principal moments of one throw and their formal standard deviations; device, wheel and drag as found jointly."""
     alone = maximise_jointly([throw], lambda name: free(name) and (is_own(name) or "base_link" in name))

@@ -237,12 +237,7 @@ def simulate(
     if gradient and zenith is None:
         raise ValueError("the gravity gradient needs zenith; give it, or gradient=False")
     reference = Reference(
-        urdf,
-        motion,
-        zenith=zenith if gradient else None,
-        wheel=wheel,
-        base_force=base_force,
-        base_torque=base_torque,
+        urdf, motion, zenith=zenith if gradient else None, wheel=wheel, base_force=base_force, base_torque=base_torque
     )
     quaternion = np.asarray(attitude0, dtype=float)
     rotation = pin.Quaternion(quaternion / np.linalg.norm(quaternion)).toRotationMatrix()

@@ -189,9 +189,6 @@ BASILISK_CASES = (
     BasiliskCase("fuel-slosh in Basilisk", ("fuel-slosh",), _slosh, SERVICER4),
     BasiliskCase("flexible-appendage in Basilisk", ("flexible-appendage",), _panel, SERVICER3),
     BasiliskCase(
-        "wheel-momentum, thruster-leak in Basilisk",
-        ("wheel-momentum", "thruster-leak"),
-        _all(_wheel, _leak),
-        SERVICER4,
+        "wheel-momentum, thruster-leak in Basilisk", ("wheel-momentum", "thruster-leak"), _all(_wheel, _leak), SERVICER4
     ),
 )
