@@ -17,7 +17,8 @@ from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects import GravityGradient
 from bayesid.simulation.instant import Environment, Instant
 from bayesid.simulation.orbit import EARTH, Orbit
-from studies.truth.stepwise import Reference, circular_zenith
+from studies.truth.orbit import Orbit as TrueOrbit
+from studies.truth.stepwise import Reference
 
 TIME = np.linspace(0.0, 6000.0, 41)
 
@@ -134,7 +135,7 @@ def reference_torque(radius: float, quaternion: np.ndarray, file) -> np.ndarray:
     reference = Reference(
         file,
         lambda _: (np.zeros(0), np.zeros(0), np.zeros(0)),
-        zenith=circular_zenith(radius),
+        zenith=TrueOrbit(radius).zenith,
         wheel=np.zeros(3),
         base_force=None,
         base_torque=None,

@@ -17,7 +17,8 @@ from scipy.interpolate import make_lsq_spline
 
 from studies.truth import mujoco as mj
 from studies.truth.bodies import moving_joints
-from studies.truth.stepwise import Response, circular_zenith, simulate
+from studies.truth.orbit import Orbit as TrueOrbit
+from studies.truth.stepwise import Response, simulate
 
 ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = ROOT.parent / "shared" / "examples"
@@ -76,7 +77,7 @@ def test_momentum_is_conserved_without_effects(robot, wheel):
 
 def test_gradient_turns_but_does_not_push():
     urdf = ROBOTS["servicer4"]
-    response = simulate(urdf, motion_of(urdf), TIMES[:16], 0.2, zenith=circular_zenith(6.878e6), attitude0=ATTITUDE)
+    response = simulate(urdf, motion_of(urdf), TIMES[:16], 0.2, zenith=TrueOrbit(6.878e6).zenith, attitude0=ATTITUDE)
     assert np.abs(response.com_velocity).max() < 5e-8
     assert np.abs(response.angular_momentum[-1] - response.angular_momentum[0]).max() > 1e-3
 
@@ -85,7 +86,7 @@ def test_integration_is_of_fourth_order():
     urdf = ROBOTS["servicer4"]
     motion = motion_of(urdf)
     end = [
-        simulate(urdf, motion, [20.0], step, zenith=circular_zenith(6.878e6), wheel=WHEEL, rate0=RATE).rate[0]
+        simulate(urdf, motion, [20.0], step, zenith=TrueOrbit(6.878e6).zenith, wheel=WHEEL, rate0=RATE).rate[0]
         for step in (0.25, 0.5, 1.0)
     ]
     ratio = np.linalg.norm(end[2] - end[0]) / np.linalg.norm(end[1] - end[0])
@@ -112,7 +113,7 @@ def test_agrees_with_mujoco(robot, tmp_path):
         rate0=RATE,
         attitude0=ATTITUDE,
         accel_position=SENSOR,
-        zenith=circular_zenith(orbit.radius),
+        zenith=TrueOrbit(orbit.radius).zenith,
     )
     rate, accel, attitude = differences(response, truth)
     assert rate < RATE_TOLERANCE
@@ -124,7 +125,7 @@ def test_engines_agree_to_rounding_at_equal_steps():
     urdf, orbit = ROBOTS["branched"], mj.Orbit()
     truth = mj.TruthModel(urdf, orbit=orbit, accel_position=SENSOR).run(motion_of(urdf), TIMES[:6], step=0.2)
     response = simulate(
-        urdf, motion_of(urdf), TIMES[:6], 0.2, accel_position=SENSOR, zenith=circular_zenith(orbit.radius)
+        urdf, motion_of(urdf), TIMES[:6], 0.2, accel_position=SENSOR, zenith=TrueOrbit(orbit.radius).zenith
     )
     rate, accel, _ = differences(response, truth)
     assert rate < 1e-14
@@ -290,7 +291,7 @@ def test_leaves_only_noise_in_the_shared_examples(name, tmp_path):
             rate0=rate0,
             attitude0=settings["recordings"][0]["attitude"],
             accel_position=hidden.get("position_true_m", settings["sensors"]["accel"]["position"]),
-            zenith=circular_zenith(settings["orbit"]["radius"]),
+            zenith=TrueOrbit(settings["orbit"]["radius"]).zenith,
         )
 
     # the rate is nearly linear in its initial value: one Newton step from the first sample

@@ -18,6 +18,7 @@ from studies.base_body.report import STUDY, goals_of
 from studies.common.ets7 import ACCELEROMETER, BASE, RADIUS, ets7, excitation, tip_speed
 from studies.common.study import Verdict
 from studies.truth import stepwise as reference
+from studies.truth.orbit import Orbit
 from tests.report_rules import broken_rules
 
 GOAL = 1e-6
@@ -56,7 +57,7 @@ def test_data_of_an_independent_simulator_give_the_same(tmp_path: Path):
         time,
         REFERENCE_STEP,
         accel_position=ACCELEROMETER,
-        zenith=reference.circular_zenith(RADIUS),
+        zenith=Orbit(RADIUS).zenith,
     )
     channels = {
         f"{kind}.{axis}": values[:, index]

@@ -84,12 +84,9 @@ def posterior_of(
     Parameters
     ----------
     robot : Robot
-    recordings : int
-        Number of recordings of different manoeuvres.
-    interval : float
-        Time between samples [s].
-    encoder_sigma : float
-        Noise of the joint positions [rad]; the joints' motion is known exactly where it is 0.
+    recordings : int; number of recordings of different manoeuvres
+    interval : float; time between samples [s]
+    encoder_sigma : float; noise of the joint positions [rad]; the joints' motion is known exactly where it is 0
     """
     model = model_of(robot)
     manoeuvres = []

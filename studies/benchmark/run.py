@@ -20,7 +20,7 @@ from studies.benchmark.cases import DURATION, SIGMA, chain, excitation, posterio
 from studies.common.ets7 import INTERVAL, RADIUS, ets7
 from studies.common.study import show
 from studies.truth import stepwise
-from studies.truth.mujoco import TruthModel, rollout
+from studies.truth.mujoco import Orbit, TruthModel, rollout
 
 BATCH = 64  # number of simulations that are evaluated per call
 
@@ -78,12 +78,10 @@ def _state_at(motion: Any) -> Callable[[float], tuple[Any, Any, Any]]:
 
 
 def _pinocchio(urdf: Path, motion: Any, samples: Any, repeats: int) -> Rival:
-    zenith = stepwise.circular_zenith(RADIUS)
 
     def simulate(step: float) -> Any:
-        return stepwise.simulate(
-            urdf, _state_at(motion), samples, step, rate0=np.zeros(3), accel_position=np.zeros(3), zenith=zenith
-        )
+        zenith = Orbit(RADIUS).zenith
+        return stepwise.simulate(urdf, _state_at(motion), samples, step, zenith=zenith)
 
     fine, coarse = simulate(0.25).rate, simulate(0.5).rate
     seconds = best_of(lambda: simulate(0.5), repeats)
@@ -138,12 +136,9 @@ def compare_moves(posterior: Posterior, *, wanted: float, default_steps: int, se
     Parameters
     ----------
     posterior : Posterior
-    wanted : float
-        Number of effective samples by the package's moves.
-    default_steps : int
-        Number of steps of the default move.
-    seed : int
-        Seed of the samplers.
+    wanted : float; number of effective samples by the package's moves
+    default_steps : int; number of steps of the default move
+    seed : int; seed of the samplers
     """
     identify(posterior, seed, effective_samples=1.0)  # compiles
     began = time.perf_counter()
@@ -206,12 +201,9 @@ def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = 
 
     Parameters
     ----------
-    full : bool
-        Whether to take longer chains of the default move and more repeats.
-    seed : int
-        Seed of the samplers in the first run.
-    progress : callable, optional
-        Receives a line before each run.
+    full : bool; whether to take longer chains of the default move and more repeats
+    seed : int; seed of the samplers in the first run
+    progress : callable, optional; receives a line before each run
     """
     results = []
     for number in range(RUNS):

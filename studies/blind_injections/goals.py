@@ -90,105 +90,89 @@ def _wrong(trials: Sequence[Trial]) -> int:
     return sum(t.misnamed or (t.kind == "adequate" and t.alarmed) for t in trials)
 
 
-def _verdict(low: float, high: float, goal: float) -> Verdict:
-    """Return the verdict on a share that is to be at least a goal."""
-    return Verdict.PASS if low >= goal else Verdict.FAIL if high < goal else Verdict.OPEN
-
-
 def _least(text: str, goal: float, count: int, total: int) -> Goal:
-    goal_text = f"{text}: at least {100.0 * goal:g} %"
-    return Goal(
-        goal_text,
-        share_text(count, total),
-        _verdict(*Share(count, total).interval, goal) if total else Verdict.NOT_TESTED,
-    )
+    verdict = Verdict.between(*Share(count, total).interval, least=goal) if total else Verdict.NOT_TESTED
+    return Goal(f"{text}: at least {100.0 * goal:g} %", share_text(count, total), verdict)
+
+
+def _most(text: str, goal: float, count: int, total: int) -> Goal:
+    verdict = Verdict.between(*Share(count, total).interval, most=goal) if total else Verdict.NOT_TESTED
+    return Goal(f"{text}: at most {100.0 * goal:g} %", share_text(count, total), verdict)
+
+
+def _rate(text: str, goal: float, count: int, total: int) -> Goal:
+    verdict = Verdict.NOT_TESTED
+    if total:
+        low, high = Share(count, total).interval
+        verdict = Verdict.FAIL if not low <= goal <= high else Verdict.PASS if total >= LEAST_NULLS else Verdict.OPEN
+    text = f"{text}: consistent with {100.0 * goal:g} % in {LEAST_NULLS} trials"
+    return Goal(text, share_text(count, total), verdict)
 
 
 def _relative(text: str, goal: float, trials: Sequence[Trial]) -> Goal:
     """Return the goal on how many are named alone, relative to how many the simulated decisions name."""
-    goal_text = f"{text}: at least {goal:g}"
+    text = f"{text}: at least {goal:g}"
     limit = sum((t.detection or 0.0) * (t.naming or 0.0) for t in trials)
     if not limit:
-        return Goal(goal_text, "none", Verdict.NOT_TESTED)
+        return Goal(text, "none", Verdict.NOT_TESTED)
     named = Share(sum(t.named_rightly for t in trials), len(trials))
     low, high = (end * len(trials) / limit for end in named.interval)
     reached = f"{named.count / limit:.2f} ({low:.2f} to {high:.2f}): {named.count} where the limit is {limit:.1f}"
-    return Goal(goal_text, f"{reached} of {len(trials)}", _verdict(low, high, goal))
-
-
-def _most(text: str, goal: float, count: int, total: int) -> Goal:
-    goal_text = f"{text}: at most {100.0 * goal:g} %"
-    if not total:
-        return Goal(goal_text, share_text(count, total), Verdict.NOT_TESTED)
-    low, high = Share(count, total).interval
-    return Goal(goal_text, share_text(count, total), _verdict(1.0 - high, 1.0 - low, 1.0 - goal))
-
-
-def _rate(text: str, goal: float, count: int, total: int) -> Goal:
-    goal_text = f"{text}: consistent with {100.0 * goal:g} % in {LEAST_NULLS} trials"
-    if not total:
-        return Goal(goal_text, share_text(count, total), Verdict.NOT_TESTED)
-    low, high = Share(count, total).interval
-    verdict = Verdict.FAIL if not low <= goal <= high else Verdict.PASS if total >= LEAST_NULLS else Verdict.OPEN
-    return Goal(goal_text, share_text(count, total), verdict)
+    return Goal(text, f"{reached} of {len(trials)}", Verdict.between(low, high, least=goal))
 
 
 def _scatter(text: str, errors: np.ndarray) -> Goal:
     """Return the goal on errors in stated standard deviations: their root mean square, within two standard errors."""
-    goal_text = f"errors of {text} in stated sd: rms 0.9 to 1.1"
+    text = f"errors of {text} in stated sd: rms 0.9 to 1.1"
     if len(errors) < 2:
-        return Goal(goal_text, "-", Verdict.NOT_TESTED)
+        return Goal(text, "-", Verdict.NOT_TESTED)
     rms = float(np.sqrt((errors**2).mean()))
     error = float((errors**2).std() / (2.0 * rms * np.sqrt(len(errors))))
-    low, high = rms - 2.0 * error, rms + 2.0 * error
-    verdict = Verdict.PASS if low >= 0.9 and high <= 1.1 else Verdict.FAIL if high < 0.9 or low > 1.1 else Verdict.OPEN
-    return Goal(goal_text, f"{rms:.2f} ± {error:.2f} ({len(errors)} numbers)", verdict)
+    verdict = Verdict.between(rms - 2.0 * error, rms + 2.0 * error, 0.9, 1.1)
+    return Goal(text, f"{rms:.2f} ± {error:.2f} ({len(errors)} numbers)", verdict)
 
 
 def _stated(text: str, trials: Sequence[Trial]) -> Goal:
     """Return the goal that wrong explanations are no more frequent than the explanations' mean stated error, 1 - p."""
-    goal_text = f"{text}: no more often than their stated probabilities of error say"
+    text = f"{text}: no more often than their stated probabilities of error say"
     if not trials:
-        return Goal(goal_text, "none", Verdict.NOT_TESTED)
+        return Goal(text, "none", Verdict.NOT_TESTED)
     share = Share(sum(map(wrongly_explained, trials)), len(trials))
     errors = [1.0 - t.probability for t in trials if t.status == "explained" and t.probability is not None]
     reached = share_text(share.count, share.total)
     if not errors:
-        return Goal(goal_text, f"{reached}, nothing stated", Verdict.OPEN)
-    stated, (low, high) = float(np.mean(errors)), share.interval
-    verdict = Verdict.FAIL if low > stated else Verdict.PASS if high <= stated else Verdict.OPEN
-    return Goal(goal_text, f"{reached}, mean stated error {100.0 * stated:.1f} %", verdict)
+        return Goal(text, f"{reached}, nothing stated", Verdict.OPEN)
+    stated = float(np.mean(errors))
+    verdict = Verdict.between(*share.interval, most=stated)
+    return Goal(text, f"{reached}, mean stated error {100.0 * stated:.1f} %", verdict)
 
 
 def _correlation(name: str, least: float, cases: Sequence[str], trials: Sequence[Trial]) -> Goal:
     """Return the goal on the median correlation of torques, with the exact 95 % interval that order statistics give."""
-    goal_text = f"correlation of reconstructed {name} with the true ones: median at least {least:g}"
+    text = f"correlation of reconstructed {name} with the true ones: median at least {least:g}"
     found = np.sort([t.correlation for t in trials if t.case in cases and t.correlation is not None])
     if not len(found):
-        return Goal(goal_text, "none", Verdict.NOT_TESTED)
+        return Goal(text, "none", Verdict.NOT_TESTED)
     median, rank = float(np.median(found)), int(stats.binom.ppf(0.025, len(found), 0.5))
     if not rank:  # too few for an interval
-        return Goal(goal_text, f"{median:.2f} ({len(found)} trials)", Verdict.OPEN)
+        return Goal(text, f"{median:.2f} ({len(found)} trials)", Verdict.OPEN)
     low, high = float(found[rank - 1]), float(found[-rank])
     reached = f"{median:.2f} ({low:.2f} to {high:.2f}, {len(found)} trials)"
-    return Goal(goal_text, reached, _verdict(low, high, least))
+    return Goal(text, reached, Verdict.between(low, high, least))
 
 
 def _coverage(trials: Sequence[Sequence[float]]) -> Goal:
     """Return the goal on 95 % intervals of amplitudes; errors of one trial are not taken as independent."""
     least, most = COVERAGE
-    goal_text = f"95 % intervals of amplitudes hold the truth: {100.0 * least:g} to {100.0 * most:g} %"
+    text = f"95 % intervals of amplitudes hold the truth: {100.0 * least:g} to {100.0 * most:g} %"
     if len(trials) < 2:
-        return Goal(goal_text, "-", Verdict.NOT_TESTED)
+        return Goal(text, "-", Verdict.NOT_TESTED)
     held = np.array([np.sum(np.abs(errors) <= COVERED) for errors in trials])
     counts = np.array([len(errors) for errors in trials])
     share = float(held.sum() / counts.sum())
     error = float(np.sqrt(((held - share * counts) ** 2).sum()) / counts.sum())
-    low, high = share - 2.0 * error, share + 2.0 * error
-    within, beside = least <= low and high <= most, high < least or low > most
-    verdict = Verdict.PASS if within else Verdict.FAIL if beside else Verdict.OPEN
     reached = f"{100.0 * share:.1f} ± {100.0 * error:.1f} % ({counts.sum()} numbers of {len(counts)} trials)"
-    return Goal(goal_text, reached, verdict)
+    return Goal(text, reached, Verdict.between(share - 2.0 * error, share + 2.0 * error, least, most))
 
 
 # when a verdict of each status counts as right

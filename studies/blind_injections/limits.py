@@ -48,12 +48,9 @@ def limits_of(
     Parameters
     ----------
     result : Diagnosis
-    causes : sequence of str
-        What is hidden.
-    change : (N,) array
-        What is hidden as a change of the whitened residual.
-    right : callable
-        Whether a verdict names what is hidden, and nothing else.
+    causes : sequence of str; what is hidden
+    change : (N,) array; what is hidden as a change of the whitened residual
+    right : callable; whether a verdict names what is hidden, and nothing else
     rng : Generator
     """
     noncentrality = float(result.before.fit.project(change[:, None])[0, 0])
@@ -127,15 +124,12 @@ def simulated_naming(
 
     Parameters
     ----------
-    evidence : SetEvidence
-        All candidates.
+    evidence : SetEvidence; all candidates
     prior : CausePrior
-    score : (m,) array
-        What the hidden causes add to the score of the Gram.
+    score : (m,) array; what the hidden causes add to the score of the Gram
     right : callable
     rng : Generator
-    draws : int
-        Number of simulated data sets.
+    draws : int; number of simulated data sets
     """
     count = 0
     for noise in evidence.gram.null_scores(rng, draws):

@@ -199,8 +199,7 @@ def snap_limit(signal_to_noise: float, rng: np.random.Generator) -> float:
 
     Parameters
     ----------
-    signal_to_noise : float
-        Root of the noncentrality of all recordings together, beside the initial rates.
+    signal_to_noise : float; root of the noncentrality of all recordings together, beside the initial rates
     rng : numpy.random.Generator
     """
     rates, torques = _responses()

@@ -184,14 +184,10 @@ def run(
 
     Parameters
     ----------
-    plans : sequence of Plan
-        Plans of the trials.
-    kept : path
-        Store of the trials, see `studies.common.monte_carlo`.
-    progress : callable, optional
-        Receives one line per finished trial.
-    workers : int or Executor
-        Number of processes.
+    plans : sequence of Plan; plans of the trials
+    kept : path; store of the trials, see `studies.common.monte_carlo`
+    progress : callable, optional; receives one line per finished trial
+    workers : int or Executor; number of processes
 
     Raises
     ------

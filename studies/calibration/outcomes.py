@@ -57,10 +57,8 @@ def coverage(ranks: Floats, level: float) -> tuple[float, float]:
 
     Parameters
     ----------
-    ranks : (N, n) array
-        Ranks of n unknowns in N replicates; those of one replicate may depend on one another.
-    level : float
-        Level of the intervals.
+    ranks : (N, n) array; ranks of n unknowns in N replicates; those of one replicate may depend on one another
+    level : float; level of the intervals
     """
     shares = (np.abs(2.0 * ranks - 1.0) < level).mean(axis=1)
     return float(shares.mean()), float(shares.std(ddof=1) / np.sqrt(len(shares)))

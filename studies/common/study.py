@@ -16,6 +16,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from bayesid._io.files import complete_file, write_json
@@ -65,6 +66,12 @@ class Verdict(StrEnum):
     def of(cls, passed: object) -> Verdict:
         """Return PASS or FAIL, or NOT TESTED where nothing was computed (None)."""
         return cls.NOT_TESTED if passed is None else cls.PASS if passed else cls.FAIL
+
+    @classmethod
+    def between(cls, low: float, high: float, least: float = -np.inf, most: float = np.inf) -> Verdict:
+        """Return PASS where an interval from low to high lies within the goal, FAIL where it lies beside it."""
+        within, beside = least <= low and high <= most, high < least or low > most
+        return cls.PASS if within else cls.FAIL if beside else cls.OPEN
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,7 @@ def goals_of(cost: Cost) -> list[Goal]:
         if limit is not None and name in cost.commands:
             walls = [item.wall for item in cost.commands[name][1:]]
             text = f"{name}, files to report, with compiled code kept: at most {limit:g} s"
-            goals.append(Goal(text, _spread(walls), _verdict(walls, limit)))
+            goals.append(Goal(text, _spread(walls), Verdict.between(min(walls), max(walls), most=limit)))
     return goals + _search_goals(cost.search)
 
 
@@ -80,7 +80,7 @@ def _times(cost: Cost, names: Sequence[str], kind: str, limit: float) -> Goal:
     part = slice(0, 1) if kind == "cold" else slice(1, None)
     each = {name: [item.to_verdict for item in cost.diagnoses[name][part]] for name in names}
     said = ", ".join(f"{name} {_spread(values)}" for name, values in each.items())
-    verdicts = [_verdict(values, limit) for values in each.values()]
+    verdicts = [Verdict.between(min(values), max(values), most=limit) for values in each.values()]
     worst = next((item for item in (Verdict.FAIL, Verdict.OPEN) if item in verdicts), Verdict.PASS)
     return Goal(f"Files to verdict, {kind}: at most {limit:g} s for {', '.join(names)}", said, worst)
 
@@ -99,12 +99,6 @@ def _nested(cost: Cost) -> Goal:
         f"{cost.nested.unknowns} unknowns"
     )
     return Goal(text, said, Verdict.PASS if ratio >= CHEAPER else Verdict.FAIL if cost.nested.done else Verdict.OPEN)
-
-
-def _verdict(values: Sequence[float], limit: float) -> Verdict:
-    if max(values) <= limit:
-        return Verdict.PASS
-    return Verdict.FAIL if min(values) > limit else Verdict.OPEN
 
 
 def _spread(values: Sequence[float]) -> str:

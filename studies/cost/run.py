@@ -97,14 +97,10 @@ def run_command(words: Sequence[str], study: Path, output: Path, cache: Path) ->
 
     Parameters
     ----------
-    words : sequence of str
-        Name of the command and its options.
-    study : Path
-        Study file.
-    output : Path
-        Folder of the results, which must not exist.
-    cache : Path
-        Folder of compiled code; an empty one makes the run a cold one.
+    words : sequence of str; name of the command and its options
+    study : Path; study file
+    output : Path; folder of the results, which must not exist
+    cache : Path; folder of compiled code; an empty one makes the run a cold one
 
     Raises
     ------
@@ -181,10 +177,8 @@ def growth(repeats: int, sizes: int | None = None) -> dict[str, dict[int, float]
 
     Parameters
     ----------
-    repeats : int
-        Repetitions, of which the fastest counts.
-    sizes : int, optional
-        How many sizes of each are measured, the smallest ones; by default all.
+    repeats : int; repetitions, of which the fastest counts
+    sizes : int, optional; how many sizes of each are measured, the smallest ones; by default all
     """
     robot = ets7()
     three = posterior_of(robot, recordings=3)
@@ -247,10 +241,8 @@ def nested(diagnosis: Diagnosis, limit: float, seed: int) -> Nested | None:
 
     Parameters
     ----------
-    diagnosis : Diagnosis
-        With a named cause.
-    limit : float
-        Time at which it is stopped [s].
+    diagnosis : Diagnosis; with a named cause
+    limit : float; time at which it is stopped [s]
     seed : int
     """
     if find_spec("dynesty") is None:
@@ -300,16 +292,11 @@ def run(
 
     Parameters
     ----------
-    full : bool
-        Whether to repeat, to sample, and to run the nested sampler up to ten minutes rather than ten seconds.
-    seed : int
-        Seed of the nested sampler.
-    titles, commands : tuple of str
-        Diagnoses and other commands to time.
-    before : Path, optional
-        Times that an earlier run wrote, to compare with.
-    progress : callable, optional
-        Receives a line before each part.
+    full : bool; whether to repeat, to sample, and to run the nested sampler up to ten minutes rather than ten seconds
+    seed : int; seed of the nested sampler
+    titles, commands : tuple of str; diagnoses and other commands to time
+    before : Path, optional; times that an earlier run wrote, to compare with
+    progress : callable, optional; receives a line before each part
     """
     repeats = REPEATS if full else 1
     with tempfile.TemporaryDirectory() as folder:

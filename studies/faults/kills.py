@@ -112,14 +112,10 @@ def kill_and_resume(command: str, folder: Path, rng: np.random.Generator, kills:
 
     Parameters
     ----------
-    command : str
-        One of `COMMANDS`.
-    folder : Path
-        Folder with the study ``study.toml``, in which both runs are made.
-    rng : numpy.random.Generator
-        Source of the moments, uniform over the time that the command takes alone.
-    kills : int
-        Number of calls that are killed before the last one, which runs to its end.
+    command : str; one of `COMMANDS`
+    folder : Path; folder with the study ``study.toml``, in which both runs are made
+    rng : numpy.random.Generator; source of the moments, uniform over the time that the command takes alone
+    kills : int; number of calls that are killed before the last one, which runs to its end
 
     Raises
     ------
@@ -212,10 +208,8 @@ def answers_beside_another_version(study: Path, folder: Path) -> dict[str, bool]
 
     Parameters
     ----------
-    study : Path
-        Study file whose model has the gravity gradient.
-    folder : Path
-        Folder for results, caches and the other version.
+    study : Path; study file whose model has the gravity gradient
+    folder : Path; folder for results, caches and the other version
 
     Returns
     -------

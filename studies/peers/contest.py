@@ -64,12 +64,9 @@ def attempt_recipe(recipe: Recipe, hidden: bool, seed: int, *, count: int, durat
     Parameters
     ----------
     recipe : Recipe
-    hidden : bool
-        Whether wheels are spinning.
-    seed : int
-        Seed of the study, the same for all recipes that are to be compared.
-    count, duration
-        Number and length of the recordings [s].
+    hidden : bool; whether wheels are spinning
+    seed : int; seed of the study, the same for all recipes that are to be compared
+    count, duration : number and length of the recordings [s]
 
     Returns
     -------

@@ -114,12 +114,9 @@ def target_of(unknowns: int, *, duration: float = DURATION, seed: int = 0) -> Ta
 
     Parameters
     ----------
-    unknowns : int
-        Number of unknowns.
-    duration : float
-        Length of each recording [s].
-    seed : int
-        Seed of the recordings' noise.
+    unknowns : int; number of unknowns
+    duration : float; length of each recording [s]
+    seed : int; seed of the recordings' noise
     """
     model = _model(CASES[unknowns])
     generators = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(RECORDINGS + 2)]

@@ -174,9 +174,8 @@ def _evidence_goal(made: Made, unknowns: int) -> Goal:
     text = f"log evidence within {EVIDENCE:g} of a long reference, {unknowns} unknowns"
     if error is None:
         return Goal(text, "not run", Verdict.NOT_TESTED)
-    low, high = abs(error[0]) - 2.0 * error[1], abs(error[0]) + 2.0 * error[1]
-    verdict = Verdict.PASS if high <= EVIDENCE else Verdict.FAIL if low > EVIDENCE else Verdict.OPEN
-    return Goal(text, f"{abs(error[0]):.3f} ± {error[1]:.3f}", verdict)
+    size, sd = abs(error[0]), error[1]
+    return Goal(text, f"{size:.3f} ± {sd:.3f}", Verdict.between(size - 2.0 * sd, size + 2.0 * sd, most=EVIDENCE))
 
 
 def _fastest(own: Mapping[str, Any], peers: Mapping[Sampler, Mapping[str, Any]]) -> str:

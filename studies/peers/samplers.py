@@ -336,12 +336,9 @@ def bridge(sampled: Floats, proposed: Floats, effective: float) -> tuple[float, 
 
     Parameters
     ----------
-    sampled : (n,) array
-        Log density over that of the proposal at draws of the posterior.
-    proposed : (m,) array
-        The same at draws of the proposal.
-    effective : float
-        Number of effective samples among the draws of the posterior.
+    sampled : (n,) array; log density over that of the proposal at draws of the posterior
+    proposed : (m,) array; the same at draws of the proposal
+    effective : float; number of effective samples among the draws of the posterior
     """
     shift = float(np.median(sampled))
     sampled, proposed = sampled - shift, proposed - shift

@@ -193,12 +193,9 @@ def analyse(
 
     Parameters
     ----------
-    free : callable
-        Which unknowns are fitted.
-    folder : path
-        Of the measurements.
-    smooth : bool
-        Whether these hold the unexplained torque and force, whose widths are then estimated.
+    free : callable; which unknowns are fitted
+    folder : path; of the measurements
+    smooth : bool; whether these hold the unexplained torque and force, whose widths are then estimated
     """
     started: list[Throw] = []
     for body in truth.bodies:  # each body alone first: from there the fit of all needs a few steps

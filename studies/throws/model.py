@@ -112,10 +112,8 @@ class WheelImbalance(Effect):
 
     Parameters
     ----------
-    share : float
-        Speed of the wheel relative to the recorded one.
-    static, dynamic : float
-        Standard deviations of the imbalance [kg m, kg m2].
+    share : float; speed of the wheel relative to the recorded one
+    static, dynamic : float; standard deviations of the imbalance [kg m, kg m2]
     """
 
     name = "wheel-imbalance"
@@ -244,10 +242,8 @@ def rigid(centre: InertialParameters, spread: float, recordings: Sequence[Record
 
     Parameters
     ----------
-    centre, spread
-        Of the body's prior.
-    recordings : sequence of Recording
-        Whose quiet stretches give the noise.
+    centre, spread : of the body's prior
+    recordings : sequence of Recording; whose quiet stretches give the noise
     """
     inertia = centre.inertia
     upper = inertia[np.triu_indices(3)]

@@ -76,14 +76,11 @@ def run(
 
     Parameters
     ----------
-    data : path, optional
-        Of the measurements; beside the checkout where left out.
-    full : bool
-        All throws, and the diagnosis of every body.
+    data : path, optional; of the measurements; beside the checkout where left out
+    full : bool; all throws, and the diagnosis of every body
     reverse : bool
         Whether to drop the recorded wheel from a throw of every body and to have it sought, which takes minutes more.
-    throws : int, optional
-        Throws of each body; all in a full run and `QUICK` in a quick one where left out.
+    throws : int, optional; throws of each body; all in a full run and `QUICK` in a quick one where left out
 
     Raises
     ------
@@ -161,8 +158,7 @@ def _quick_fit(body: BodyResult) -> Goal:
     """Return the goal on the mean size of the differences, which is uncertain by what throws differ."""
     goal, mean, error = QUICK_FIT[body.name], body.mean_error, body.mean_error_sd
     text = f"{body.name}: single throws differ from the stated moments by at most {goal:g} % in the mean, as a quick "
-    low, high = mean - 2.0 * error, mean + 2.0 * error
-    verdict = Verdict.PASS if high <= goal else Verdict.FAIL if low > goal else Verdict.OPEN
+    verdict = Verdict.between(mean - 2.0 * error, mean + 2.0 * error, most=goal)
     return Goal(f"{text}least-squares fit does", f"{mean:.2f} ± {error:.2f} %", verdict)
 
 
@@ -176,11 +172,9 @@ def _full(result: Result, reached: str, count: int) -> tuple[str, Verdict]:
 def _coverage(result: Result) -> Goal:
     count, total = held_in_all(result)
     low, high = Share(count, total).interval
-    inside = low >= LOW and high <= HIGH
-    outside = high < LOW or low > HIGH
     text = f"95 % intervals of single throws hold the truth in {100 * LOW:.0f} to {100 * HIGH:.0f} % of cases"
     reached = f"{100.0 * count / total:.0f} %: {count} of {total} ({100.0 * low:.0f} to {100.0 * high:.0f} %)"
-    return Goal(text, reached, Verdict.of(inside) if inside or outside else Verdict.OPEN)
+    return Goal(text, reached, Verdict.between(low, high, LOW, HIGH))
 
 
 def _reverse(result: Result) -> list[Goal]:

@@ -36,8 +36,7 @@ def runge_kutta_step(
     derivative : callable
         Time, state and the time at which actions are looked up -> derivative of the state. Actions are held between
         samples and jump at the end of a step: the last stage looks up those just before it.
-    time, step : float
-        Start and length of the step [s].
+    time, step : float; start and length of the step [s]
     state : (n,) array
     """
     middle = time + 0.5 * step

@@ -174,18 +174,14 @@ def study_toml(
 
     Parameters
     ----------
-    title, base : str
-        Title of the study, and name of the base link.
-    sensors : Sensors
-        Noise and mounting as the study states them.
-    attitudes : sequence of (4,) array
-        Initial quaternion of each recording, x, y, z, w.
+    title, base : str; title of the study, and name of the base link
+    sensors : Sensors; noise and mounting as the study states them
+    attitudes : sequence of (4,) array; initial quaternion of each recording, x, y, z, w
     orbits : sequence of Orbit or None, optional
         Orbit of each recording; they differ in the argument of latitude only.
     effects : sequence of str, optional
         Effects of the study's model; the study says nothing of its model where left out.
-    link_spread, initial_rate
-        Settings of the study of the same names.
+    link_spread, initial_rate : settings of the study of the same names
     """
     places = [None] * len(attitudes) if orbits is None else list(orbits)
     lines = [f'title = "{title}"', "[robot]", 'urdf = "robot.urdf"']

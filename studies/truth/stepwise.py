@@ -22,7 +22,6 @@ from numpy.typing import ArrayLike
 from studies.truth.bodies import moving_joints
 from studies.truth.motions import Motion
 from studies.truth.numerics import Array, runge_kutta_step, substeps
-from studies.truth.orbit import MU
 
 Zenith = Callable[[float], tuple[Array, float]]  # time [s] -> unit vector in orbit axes and mu / R^3 [1/s2]
 Wrench = Callable[[float], ArrayLike]  # time [s] -> force or torque at the base origin, base axes [N or N m]
@@ -56,17 +55,6 @@ class Response(NamedTuple):
     com: Array
     com_velocity: Array
     angular_momentum: Array
-
-
-def circular_zenith(radius: float) -> Zenith:
-    """Zenith in orbit axes and mu / R^3 [1/s2] as functions of time on a circular orbit of this radius [m]."""
-    gradient = MU / radius**3
-    mean_motion = np.sqrt(gradient)
-
-    def zenith(time: float) -> tuple[Array, float]:
-        return np.array([np.cos(mean_motion * time), np.sin(mean_motion * time), 0.0]), gradient
-
-    return zenith
 
 
 class Reference:
@@ -207,28 +195,19 @@ def simulate(
 
     Parameters
     ----------
-    urdf : path
-        The robot; its root link is the base.
-    motion : callable
-        Time -> positions, speeds, accelerations of the joints `moving_joints(urdf)`.
-    times_out : (n,) array_like
-        Increasing times of the output, the first not before 0 [s].
-    step : float
-        Largest integration step [s]; a whole number of equal steps leads from one output to the next.
-    gradient : bool
-        Whether the gravity gradient acts; it then needs `zenith`.
+    urdf : path; the robot; its root link is the base
+    motion : callable; Time -> positions, speeds, accelerations of the joints `moving_joints(urdf)`
+    times_out : (n,) array_like; increasing times of the output, the first not before 0 [s]
+    step : float; largest integration step [s]; a whole number of equal steps leads from one output to the next
+    gradient : bool; whether the gravity gradient acts; it then needs `zenith`
     wheel : (3,) array_like or callable
         Momentum of the wheels relative to the base, base axes [N m s]: constant, or time -> (momentum, its derivative).
-    rate0 : (3,) array_like
-        Angular velocity of the base at time 0, base axes [rad/s].
-    attitude0 : (4,) array_like
-        Quaternion x, y, z, w, base axes to orbit axes, at time 0.
-    accel_position : (3,) array_like
-        Mounting point of the accelerometer, base frame [m].
+    rate0 : (3,) array_like; angular velocity of the base at time 0, base axes [rad/s]
+    attitude0 : (4,) array_like; quaternion x, y, z, w, base axes to orbit axes, at time 0
+    accel_position : (3,) array_like; mounting point of the accelerometer, base frame [m]
     base_force, base_torque : callable, optional
         Time -> external action at the base origin, base axes [N, N m]; it may jump at output times.
-    zenith : callable, optional
-        Time -> (unit vector in orbit axes, mu / R^3), see `circular_zenith`.
+    zenith : callable, optional, Time -> (unit vector in orbit axes, mu / R^3), as `studies.truth.orbit.Orbit.zenith`
 
     Returns
     -------

@@ -66,20 +66,13 @@ def write_basilisk_study(
 
     Parameters
     ----------
-    folder : path
-        Folder of the study, made where it does not exist.
-    seed : int
-        Seed of motions, initial values, guess and noise.
-    hidden : BasiliskHidden
-        Parts and actions that the study's model lacks.
-    urdf : path
-        The robot as it truly is, a serial arm on a base; the study's copy has a wrong base and the true arm.
-    sensors : Sensors
-        Rate sensor, accelerometer and encoders with one common period.
-    manoeuvres : Manoeuvres
-        The joints' reference motions; the joints follow them badly.
-    guess_spread : float
-        The study's base is wrong by about twice this in mass and moments; 0 leaves it true.
+    folder : path; folder of the study, made where it does not exist
+    seed : int; seed of motions, initial values, guess and noise
+    hidden : BasiliskHidden; parts and actions that the study's model lacks
+    urdf : path; the robot as it truly is, a serial arm on a base; the study's copy has a wrong base and the true arm
+    sensors : Sensors; rate sensor, accelerometer and encoders with one common period
+    manoeuvres : Manoeuvres; the joints' reference motions; the joints follow them badly
+    guess_spread : float; the study's base is wrong by about twice this in mass and moments; 0 leaves it true
     title : str
 
     Returns

@@ -301,17 +301,14 @@ def simulate(
 
     Parameters
     ----------
-    motion : callable
-        Time -> reference positions, speeds, accelerations of the joints; at rest up to time 0.
-    duration : float
-        Length of the recording [s], a multiple of the step.
+    motion : callable; Time -> reference positions, speeds, accelerations of the joints; at rest up to time 0
+    duration : float; length of the recording [s], a multiple of the step
     hidden : BasiliskHidden
     urdf : path
     rate0, sigma0 : (3,) array_like
         Angular velocity in base axes [rad/s] and modified Rodrigues parameters of the base, `LEAD` steps before
         time 0.
-    accel_position : (3,) sequence
-        Mounting point of the accelerometer, base frame [m].
+    accel_position : (3,) sequence; mounting point of the accelerometer, base frame [m]
     frequency, damping : float
         Natural frequency [Hz] and damping relative to critical of each joint's servo, with the other joints locked and
         the base held.

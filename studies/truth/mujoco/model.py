@@ -100,18 +100,14 @@ class TruthModel:
     Parameters
     ----------
     urdf : path
-    orbit : Orbit, optional
-        Left out, no gravity gradient acts.
+    orbit : Orbit, optional; left out, no gravity gradient acts
     rotor : Rotor, optional
     appendages : sequence of Appendage
     thrusts : sequence of Thrust
-    accel_position : (3,) array_like
-        Mounting point of the accelerometer, base frame [m].
-    fields : sequence of Field
-        What else acts on the base.
+    accel_position : (3,) array_like; mounting point of the accelerometer, base frame [m]
+    fields : sequence of Field; what else acts on the base
     movers : sequence of Mover
-    changed : mapping
-        Links -> what is really there in place of the URDF's.
+    changed : mapping; links -> what is really there in place of the URDF's
     flexible : sequence of Flexibility
     configuration : (joints,) array_like, optional
         Joint positions at which the stiffness of flexible joints is set, in the order of the URDF; zero by default.
@@ -320,14 +316,11 @@ class TruthModel:
         ----------
         motion : callable
             Time -> positions, speeds, accelerations of the URDF's moving joints, in the order of the URDF.
-        times : (n,) array_like
-            Increasing [s]; those before 0 are reached backwards from the state at 0.
+        times : (n,) array_like; increasing [s]; those before 0 are reached backwards from the state at 0
         rate0 : (3,) array_like
             Initial angular velocity, base axes [rad/s]. Springs start at rest, and so does the base's origin (a gauge).
-        attitude0 : (4,) array_like
-            Initial quaternion x, y, z, w, base axes to orbit axes.
-        step : float
-            Largest step [s].
+        attitude0 : (4,) array_like; initial quaternion x, y, z, w, base axes to orbit axes
+        step : float; largest step [s]
 
         Returns
         -------
@@ -363,14 +356,10 @@ def rollout(exact: TruthModel, motion: Motion, count: int, step: float) -> Calla
 
     Parameters
     ----------
-    exact : TruthModel
-        The robot, without gravity gradient; its integrator is changed.
-    motion : callable
-        Time -> positions, speeds, accelerations of the joints.
-    count : int
-        Number of steps.
-    step : float
-        Length of a step [s].
+    exact : TruthModel; the robot, without gravity gradient; its integrator is changed
+    motion : callable; Time -> positions, speeds, accelerations of the joints
+    count : int; number of steps
+    step : float; length of a step [s]
 
     Returns
     -------

@@ -116,18 +116,12 @@ def panel(
 
     Parameters
     ----------
-    mass : float
-        Mass [kg].
-    size : (length, width)
-        Lengths of the edges [m]; the length points away from the base's origin.
-    anchor : (3,) array_like
-        Middle of the inner edge, base frame [m].
-    hinge : (3,) array_like
-        Axis of the hinge, base axes; the length is made perpendicular to it.
-    frequency : float
-        Natural frequency with the base held [Hz].
-    damping : float
-        Relative to critical.
+    mass : float; mass [kg]
+    size : (length, width); lengths of the edges [m]; the length points away from the base's origin
+    anchor : (3,) array_like; middle of the inner edge, base frame [m]
+    hinge : (3,) array_like; axis of the hinge, base axes; the length is made perpendicular to it
+    frequency : float; natural frequency with the base held [Hz]
+    damping : float; relative to critical
     """
     length, width = size
     root, across = np.asarray(anchor, dtype=float), np.asarray(hinge, dtype=float) / np.linalg.norm(hinge)

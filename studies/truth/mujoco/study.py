@@ -76,42 +76,31 @@ def write_study(
 
     Parameters
     ----------
-    folder : path
-        Folder of the study, made where it does not exist.
-    urdf : path
-        The robot as it truly is; the study's copy has a wrong base.
-    generator : numpy.random.Generator
-        Source of motions, initial values, guess and noise.
-    orbit : Orbit, optional
-        Orbit of all recordings; with None there is no gravity gradient.
+    folder : path; folder of the study, made where it does not exist
+    urdf : path; the robot as it truly is; the study's copy has a wrong base
+    generator : numpy.random.Generator; source of motions, initial values, guess and noise
+    orbit : Orbit, optional; orbit of all recordings; with None there is no gravity gradient
     hidden : Hidden
         Wheel, appendages, thrust. Only thrust is told to the study, and only with `record_thrusts`.
     sensors : Sensors
     manoeuvres : Manoeuvres
     effects : sequence of str, optional
         Effects the study's model has; by default the gravity gradient where there is an orbit.
-    guess_spread : float
-        How wrong the base of the study's URDF is, see `wrong_guess`; 0 leaves it true.
+    guess_spread : float; how wrong the base of the study's URDF is, see `wrong_guess`; 0 leaves it true
     declared_accel_position : (3,) array_like, optional
         What the study says in place of the true `sensors.accel_position` [m].
     record_thrusts : bool
         Whether thrusts are written as base_force and base_torque; they must then start and stop at sample times.
-    gaps : mapping, optional
-        Channel ("accel", "position.joint2") -> intervals (start, stop) [s] with empty cells.
+    gaps : mapping, optional; channel ("accel", "position.joint2") -> intervals (start, stop) [s] with empty cells
     distort : callable, optional
         Changes the noise-free columns (in place) of each recording, given with the truth: a sensor's error.
     spoil : callable, optional
         Changes the noisy columns (in place), given with their times and the generator: outliers, quantisation.
-    declared : Sensors, optional
-        What the study says in place of `sensors`; their delays are never told.
-    link_spread : float
-        Relative width of the study's priors of the links, within which the true links are drawn.
-    initial_rate : str, optional
-        What the study says of the initial rate.
-    latitudes : sequence of float, optional
-        Argument of latitude of each recording [rad] in place of the orbit's.
-    step : float
-        Largest integration step [s].
+    declared : Sensors, optional; what the study says in place of `sensors`; their delays are never told
+    link_spread : float; relative width of the study's priors of the links, within which the true links are drawn
+    initial_rate : str, optional; what the study says of the initial rate
+    latitudes : sequence of float, optional; argument of latitude of each recording [rad] in place of the orbit's
+    step : float; largest integration step [s]
     title : str
 
     Returns
