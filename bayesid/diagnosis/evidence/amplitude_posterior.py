@@ -14,14 +14,9 @@ from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 
 __all__ = ["AmplitudePosterior"]
 
-MOST_TERMS = 2000
-"""Most normal distributions in the mixture; the most probable are kept."""
-
-HELD = 1.0 - 1e-6
-"""Probability of the scales that are kept, unless `MOST_TERMS` hold less."""
-
-BISECTIONS = 60
-"""Halvings of the interval that contains a quantile."""
+MOST_TERMS = 2000  # normal distributions in the mixture; the most probable are kept
+KEPT = 1.0 - 1e-6  # probability of the scales that are kept, unless `MOST_TERMS` have less
+BISECTIONS = 60  # halvings of the interval that contains a quantile
 
 
 @dataclass(frozen=True)
@@ -52,27 +47,18 @@ class AmplitudePosterior:
         if not names:
             raise ValueError("a posterior of amplitudes needs at least one cause, received none")
         forms = evidence.forms(names)
-        average, spectra, places = (
-            evidence.average(names),
-            evidence.spectra(names, forms),
-            evidence.places(names, forms),
-        )
+        average, spectra = evidence.average(names), evidence.spectra(names, forms)
         weights = np.exp(average.log_posterior.ravel())
         order = np.argsort(-weights, kind="stable")
-        kept = order[: min(int(np.searchsorted(np.cumsum(weights[order]), HELD)) + 1, MOST_TERMS)]
+        kept = order[: min(int(np.searchsorted(np.cumsum(weights[order]), KEPT)) + 1, MOST_TERMS)]
         where = np.unravel_index(kept, average.log_posterior.shape)
-        deviations = np.concatenate(
-            [
-                nodes.scales[index, None] * own.root
-                for nodes, index, own in zip(average.nodes, where, spectra, strict=True)
-            ],
-            axis=1,
-        )
+        parts = zip(average.nodes, where, spectra, strict=True)
+        deviations = np.concatenate([nodes.scales[index, None] * own.root for nodes, index, own in parts], axis=1)
         columns = np.concatenate([own.columns for own in spectra])
         roots, _ = covariance_roots(evidence.gram.matrix[np.ix_(columns, columns)], deviations)
         means = -(np.swapaxes(roots, 1, 2) @ (roots @ evidence.gram.score[columns])[..., None])[..., 0]
         amplitudes, first = {}, 0
-        for (name, place), own in zip(places, spectra, strict=True):
+        for (name, place), own in zip(evidence.places(names, forms), spectra, strict=True):
             key = (name, evidence.causes[name].variants[forms[name]].groups[place].name)
             amplitudes[key] = np.arange(first, first + len(own.columns))
             first += len(own.columns)
@@ -95,10 +81,8 @@ class AmplitudePosterior:
         """Draw amplitudes, shape (draws, m)."""
         counts = rng.multinomial(draws, self.weights)
         normal = np.split(rng.normal(size=(draws, self.means.shape[1])), np.cumsum(counts)[:-1])
-        terms = [
-            mean + part @ root for mean, root, part in zip(self.means, self.roots, normal, strict=True) if len(part)
-        ]
-        return rng.permutation(np.concatenate([np.empty((0, self.means.shape[1])), *terms]))
+        terms = [mean + part @ root for mean, root, part in zip(self.means, self.roots, normal, strict=True)]
+        return rng.permutation(np.concatenate(terms))
 
     def upper_limits(self, probability: float = 0.95) -> Floats:
         """Return the values below which the magnitudes of the amplitudes lie with a probability, shape (m,)."""

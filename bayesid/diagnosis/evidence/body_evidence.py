@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sla
@@ -11,52 +12,11 @@ import scipy.linalg as sla
 from bayesid._math.arrays import Floats
 from bayesid._math.log_sum import log_sum
 
-__all__ = ["MissingBody", "MissingBodyPrior", "body_log_evidence", "outer_moments", "rigid_moments"]
+__all__ = ["MissingBody", "outer_moments", "rigid_moments"]
 
-ITERATIONS = 60
-"""Most steps of the search for the mode."""
-
-STEP = 1e-6
-"""Step of the derivative of the moments, relative to the prior's widths."""
-
-PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Entries of a symmetric matrix in the order of the ten moments."""
-
-
-@dataclass(frozen=True)
-class MissingBodyPrior:
-    """Prior of a body that the model lacks.
-
-    The logarithm of the mass has the mean and the variance of a uniform one, the place is normal about the origin, and
-    the inertia per mass about the body's own centre is normal about zero.
-
-    Attributes
-    ----------
-    lightest, heaviest : float
-        Range of the mass [kg].
-    reach : float
-        Largest distance from the origin, two standard deviations of the place [m].
-    radius : float
-        Radius of gyration of the body itself [m]; 0 for a point.
-    """
-
-    lightest: float
-    heaviest: float
-    reach: float
-    radius: float = 0.0
-
-    @property
-    def mean(self) -> Floats:
-        """Mean of the logarithm of the mass, the place and, of a body with extent, its six moments per mass."""
-        size = 10 if self.radius > 0.0 else 4
-        return np.concatenate([[0.5 * np.log(self.lightest * self.heaviest)], np.zeros(size - 1)])
-
-    @property
-    def sd(self) -> Floats:
-        """Standard deviations of the same."""
-        spread = max(np.log(self.heaviest / self.lightest), 1e-3) / np.sqrt(12.0)
-        own = np.full(6, self.radius**2) if self.radius > 0.0 else np.zeros(0)
-        return np.concatenate([[spread], np.full(3, 0.5 * self.reach), own])
+ITERATIONS = 60  # steps of the search for the mode
+STEP = 1e-6  # of the derivative of the moments, relative to the prior's widths
+PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # a symmetric matrix in the order of the ten moments
 
 
 @dataclass(frozen=True)
@@ -81,26 +41,25 @@ class MissingBody:
     moments: Callable[[Floats], Floats]
 
     def log_evidence(self, matrix: Floats, score: Floats, lightest: float) -> float:
-        """Return the log evidence of the body relative to no body, averaged over its size.
+        """Return the Laplace approximation of the log evidence of the body relative to none, averaged over its size.
 
         Parameters
         ----------
         matrix : (10, 10) array
             Information on the moments.
         score : (10,) array
+            The likelihood of moments ``a`` relative to none is ``exp(-score'a - a'matrix a / 2)``.
         lightest : float
             Mass below which the data cannot see it [kg].
         """
         length = np.sqrt(np.diag(matrix))
         ridge = np.diag(1e-9 * np.maximum(length, 1e-9 * length.max(initial=1.0)) ** 2)
         linear = -np.linalg.solve(matrix + ridge, score)
-        light = min(lightest, 0.5 * self.heaviest)
-        values = [
-            body_log_evidence(
-                matrix, score, MissingBodyPrior(light, self.heaviest, self.reach, radius), self.moments, linear
-            )
+        bodies = [
+            _SizedBody(min(lightest, 0.5 * self.heaviest), self.heaviest, self.reach, radius, self.moments)
             for radius in self.radii
         ]
+        values = [max(body.log_evidence(x, matrix, score) for x in body.starts(linear)) for body in bodies]
         return log_sum(values) - float(np.log(len(values)))
 
 
@@ -121,75 +80,79 @@ def outer_moments(theta: Floats) -> Floats:
     return np.concatenate([mass, mass * place, mass * second], axis=-1)
 
 
-def body_log_evidence(
-    matrix: Floats, score: Floats, prior: MissingBodyPrior, moments: Callable[[Floats], Floats], linear: Floats
-) -> float:
-    """Return the Laplace approximation of the log evidence of a body relative to no body.
+@dataclass(frozen=True)
+class _SizedBody:
+    """A body of one radius of gyration, in prior standard deviations ``x``.
 
-    Parameters
-    ----------
-    matrix : (10, 10) array
-        Information on the ten moments.
-    score : (10,) array
-        The likelihood of moments ``a`` relative to none is ``exp(-score'a - a'matrix a / 2)``.
-    prior : MissingBodyPrior
-    moments : callable
-        The ten moments of the logarithm of the mass, the place and so on, the last axis for the last axis.
-    linear : (10,) array
-        Moments from which a search starts, such as those that a linear fit gives.
+    The logarithm of the mass has the mean and the variance of a uniform one between the lightest and the heaviest, the
+    place is normal about the origin, the reach being two standard deviations, and the inertia per mass about the body's
+    own centre is normal about zero; of a point there is none.
     """
-    return max(_from(start, matrix, score, prior, moments) for start in _starts(prior, linear))
 
+    lightest: float
+    heaviest: float
+    reach: float
+    radius: float
+    moments: Callable[[Floats], Floats]
 
-def _starts(prior: MissingBodyPrior, linear: Floats) -> list[Floats]:
-    """Return starting points: the linear fit where it has a mass, and light bodies at the linear fit's direction."""
-    starts = []
-    first = linear[1:4]
-    length = float(np.linalg.norm(first))
-    masses = [linear[0]] if linear[0] > prior.lightest else []
-    masses += [length / (share * prior.reach) for share in (0.1, 0.4) if length > 0.0]
-    for mass in masses or [np.sqrt(prior.lightest * prior.heaviest)]:
-        mass = float(np.clip(mass, prior.lightest, prior.heaviest))
-        place = np.clip(first / mass, -prior.reach, prior.reach)
-        starts.append(np.concatenate([[np.log(mass)], place, np.zeros(len(prior.mean) - 4)]))
-    return starts
+    @cached_property
+    def mean(self) -> Floats:
+        """Mean of the logarithm of the mass, the place and, of a body with extent, its six moments per mass."""
+        size = 10 if self.radius > 0.0 else 4
+        return np.concatenate([[0.5 * np.log(self.lightest * self.heaviest)], np.zeros(size - 1)])
 
+    @cached_property
+    def sd(self) -> Floats:
+        """Standard deviations of the same."""
+        spread = max(np.log(self.heaviest / self.lightest), 1e-3) / np.sqrt(12.0)
+        extent = np.full(len(self.mean) - 4, self.radius**2)
+        return np.concatenate([[spread], np.full(3, 0.5 * self.reach), extent])
 
-def _from(
-    theta: Floats, matrix: Floats, score: Floats, prior: MissingBodyPrior, moments: Callable[[Floats], Floats]
-) -> float:
-    """Return the log evidence about the mode that a Levenberg-Marquardt search reaches, in prior deviations."""
-    mean, sd = prior.mean, prior.sd
-    x = (theta - mean) / sd
-    damping = 1e-2
+    def amplitudes(self, x: Floats) -> Floats:
+        """Return the ten moments, shape (..., 10)."""
+        return self.moments(self.mean + self.sd * x)
 
-    def cost(x: Floats) -> float:
-        a = moments(mean + sd * x)
-        return float(score @ a + 0.5 * a @ matrix @ a + 0.5 * x @ x)
+    def slope(self, x: Floats) -> Floats:
+        """Return the derivatives of the moments, shape (10, n), by central differences."""
+        steps = STEP * np.eye(len(x))
+        return (self.amplitudes(x + steps) - self.amplitudes(x - steps)).T / (2.0 * STEP)
 
-    here = cost(x)
-    for _ in range(ITERATIONS):
-        slope = _slope(x, mean, sd, moments)
-        a = moments(mean + sd * x)
-        hessian = slope.T @ matrix @ slope + np.eye(len(x))
-        gradient = slope.T @ (score + matrix @ a) + x
-        step = -sla.solve(hessian + damping * np.diag(np.diag(hessian)), gradient, assume_a="pos")
-        there = cost(x + step)
-        if np.isfinite(there) and there <= here:
-            x, damping, change = x + step, 0.2 * damping, here - there
-            here = there
-            if change < 1e-4:
-                break
-        else:
-            damping *= 8.0
-            if damping > 1e9:
-                break
-    slope = _slope(x, mean, sd, moments)
-    half_log_det = 0.5 * float(np.linalg.slogdet(slope.T @ matrix @ slope + np.eye(len(x)))[1])
-    return -here - half_log_det
+    def starts(self, linear: Floats) -> list[Floats]:
+        """Return starting points: the linear fit, (10,), where it has a mass, and light bodies in its direction."""
+        starts = []
+        first = linear[1:4]
+        length = float(np.linalg.norm(first))
+        masses = [linear[0]] if linear[0] > self.lightest else []
+        masses += [length / (share * self.reach) for share in (0.1, 0.4) if length > 0.0]
+        for mass in masses or [np.sqrt(self.lightest * self.heaviest)]:
+            mass = float(np.clip(mass, self.lightest, self.heaviest))
+            place = np.clip(first / mass, -self.reach, self.reach)
+            theta = np.concatenate([[np.log(mass)], place, np.zeros(len(self.mean) - 4)])
+            starts.append((theta - self.mean) / self.sd)
+        return starts
 
+    def log_evidence(self, x: Floats, matrix: Floats, score: Floats) -> float:
+        """Return the log evidence about the mode that a Levenberg-Marquardt search reaches from a point."""
 
-def _slope(x: Floats, mean: Floats, sd: Floats, moments: Callable[[Floats], Floats]) -> Floats:
-    """Return the derivatives of the moments in prior deviations, shape (10, n), by central differences."""
-    steps = STEP * np.eye(len(x))
-    return (moments(mean + sd * (x + steps)) - moments(mean + sd * (x - steps))).T / (2.0 * STEP)
+        def cost(x: Floats) -> float:
+            a = self.amplitudes(x)
+            return float(score @ a + 0.5 * a @ matrix @ a + 0.5 * x @ x)
+
+        damping, here = 1e-2, cost(x)
+        for _ in range(ITERATIONS):
+            slope = self.slope(x)
+            hessian = slope.T @ matrix @ slope + np.eye(len(x))
+            gradient = slope.T @ (score + matrix @ self.amplitudes(x)) + x
+            step = -sla.solve(hessian + damping * np.diag(np.diag(hessian)), gradient, assume_a="pos")
+            there = cost(x + step)
+            if np.isfinite(there) and there <= here:
+                x, damping, change = x + step, 0.2 * damping, here - there
+                here = there
+                if change < 1e-4:
+                    break
+            else:
+                damping *= 8.0
+                if damping > 1e9:
+                    break
+        slope = self.slope(x)
+        return -here - 0.5 * float(np.linalg.slogdet(slope.T @ matrix @ slope + np.eye(len(x)))[1])

@@ -18,24 +18,21 @@ __all__ = ["CausePrior", "CauseSet", "SetProbabilities", "enumerate_sets"]
 MOST_CAUSES = 3
 """Most causes of the catalogue in one set; a generic candidate may stand beside them."""
 
-FEW = 300
-"""Number of extensions of all sets of one size up to which none is left out."""
-
-BEST = 20
-"""Most sets of two and more candidates that are extended where there are more extensions than few."""
-
-SINGLES = 16
-"""Most single candidates that are extended to pairs where there are many."""
+FEW = 300  # extensions of all sets of one size up to which none is left out
+BEST = 20  # sets of two and more candidates that are extended where there are more extensions than few
+SINGLES = 16  # single candidates that are extended to pairs where there are many
 
 PROMISING = 1e-4
 """Probability relative to the most probable set so far down to which a set is extended, apart from the best of its
 size: what is added to a less probable one would have to earn some 15 nats to matter."""
 
-
 NEAR = 6.0
 """Logarithm of the probability relative to the most probable set so far down to which a set that the screening has
 weighed is evaluated in full. The screening is off by about one nat at most in such sets, bodies apart, where it is an
 upper bound."""
+
+_Key = tuple[tuple[str, ...], str | None]
+"""Causes and generic candidate of a set."""
 
 
 @dataclass(frozen=True)
@@ -81,12 +78,12 @@ class CausePrior:
         generics : int
             Number of generic candidates.
         """
-        found = np.log1p(-self.one_more) + size * np.log(self.one_more) - np.log(math.comb(causes, size))
+        log_prior = math.log1p(-self.one_more) + size * math.log(self.one_more) - math.log(math.comb(causes, size))
         if generic:
-            found += np.log(self.generic / generics)
+            log_prior += math.log(self.generic / generics)
         elif generics:
-            found += np.log1p(-self.generic)
-        return float(found)
+            log_prior += math.log1p(-self.generic)
+        return log_prior
 
 
 @dataclass(frozen=True)
@@ -142,19 +139,17 @@ class SetProbabilities:
         sets: Iterable[CauseSet], causes: Iterable[str], generics: Iterable[str], prior: CausePrior
     ) -> SetProbabilities:
         """Return the probabilities of sets of known evidence, the empty one among them."""
-        causes, generics = tuple(sorted(causes)), tuple(sorted(generics))
-        sets = list(sets)
+        causes, generics, sets = tuple(sorted(causes)), tuple(sorted(generics)), list(sets)
         sizes = [(len(item.causes), item.generic is not None) for item in sets]
         log_priors = {own: prior.log_probability(own[0], len(causes), own[1], len(generics)) for own in set(sizes)}
-        own_priors = [log_priors[own] for own in sizes]
-        totals = [log_prior + item.log_evidence for log_prior, item in zip(own_priors, sets, strict=True)]
+        totals = [log_priors[own] + item.log_evidence for own, item in zip(sizes, sets, strict=True)]
         shares = np.exp(np.array(totals) - logsumexp(totals)).tolist()
-        order = sorted(range(len(sets)), key=lambda index: (-totals[index], sets[index].names))
-        found = tuple(
-            CauseSet(item.causes, item.generic, item.log_evidence, own_priors[index], shares[index])
-            for index, item in ((index, sets[index]) for index in order)
+        rows = sorted(zip(sets, sizes, totals, shares, strict=True), key=lambda row: (-row[2], row[0].names))
+        ranked = tuple(
+            CauseSet(item.causes, item.generic, item.log_evidence, log_priors[size], share)
+            for item, size, _, share in rows
         )
-        return SetProbabilities(found, causes, generics, prior)
+        return SetProbabilities(ranked, causes, generics, prior)
 
     def under(self, prior: CausePrior) -> SetProbabilities:
         """Return the probabilities of the same sets under another prior of causes; no evidence is computed anew."""
@@ -212,119 +207,107 @@ def enumerate_sets(
     ----------
     evidence : SetEvidence
     prior : CausePrior, optional
-        Prior of sets; by default `CausePrior` with its defaults.
     largest : int
         Most candidates in one set.
     beside : collection of str, optional
         Causes of the catalogue that are in every set; sets grow from these in place of nothing.
     """
     prior = CausePrior() if prior is None else prior
-    found = [_whole((tuple(sorted(beside)), None), evidence) if beside else CauseSet((), None, 0.0)]
-    last = found
+    sets = [_whole((tuple(sorted(beside)), None), evidence) if beside else CauseSet((), None, 0.0)]
+    last = sets
     for size in range(len(beside) + 1, largest + 1):
         keys = _extensions(last, evidence)
-        many = size > 1 and sum(_cost(key, evidence) for key in keys) > FEW
+        many = size > 1 and sum(_combinations(key, evidence) for key in keys) > FEW
         if many and size == 2:
-            last = _strongest(found, evidence, prior)
+            last = [item for item in _ranked(sets, evidence, prior) if len(item.names) == 1][:SINGLES]
         elif size > 2 and len(keys) > FEW:
-            last = _best(found, size - 1, evidence, prior)
+            last = _best(_ranked(sets, evidence, prior), size - 1)
             keys = _extensions(last, evidence)
-        last = _screened(last, found, evidence, prior) if many else [_whole(key, evidence) for key in keys]
-        found = found + last
-    return SetProbabilities.of(found, evidence.catalogue, evidence.generics, prior)
+        last = _screened(last, sets, evidence, prior) if many else [_whole(key, evidence) for key in keys]
+        sets = sets + last
+    return SetProbabilities.of(sets, evidence.catalogue, evidence.generics, prior)
 
 
-def _cost(key: tuple[tuple[str, ...], str | None], evidence: SetEvidence) -> int:
-    """Return the number of combinations of forms of a set."""
-    count = 1
-    for name in _names(key):
-        count *= len(evidence.causes[name].variants)
-    return count
+def _ranked(sets: list[CauseSet], evidence: SetEvidence, prior: CausePrior) -> tuple[CauseSet, ...]:
+    """Return sets with their probabilities among themselves, the most probable first."""
+    return SetProbabilities.of(sets, evidence.catalogue, evidence.generics, prior).sets
 
 
-def _names(key: tuple[tuple[str, ...], str | None]) -> tuple[str, ...]:
+def _names(key: _Key) -> tuple[str, ...]:
     return key[0] if key[1] is None else (*key[0], key[1])
 
 
-def _whole(key: tuple[tuple[str, ...], str | None], evidence: SetEvidence) -> CauseSet:
+def _in_order(keys: Iterable[_Key]) -> list[_Key]:
+    return sorted(keys, key=lambda key: (key[0], key[1] or ""))
+
+
+def _combinations(key: _Key, evidence: SetEvidence) -> int:
+    """Return the number of combinations of forms of a set."""
+    return math.prod(len(evidence.causes[name].variants) for name in _names(key))
+
+
+def _whole(key: _Key, evidence: SetEvidence) -> CauseSet:
     """Return a set with its evidence integrated over all scales and forms."""
     return CauseSet(*key, evidence.log_evidence(_names(key)))
 
 
-def _screened(
-    parents: list[CauseSet], found: list[CauseSet], evidence: SetEvidence, prior: CausePrior
-) -> list[CauseSet]:
-    """Return the sets of one candidate more than their parents; those that matter are integrated in full."""
-    weighed: dict[tuple[tuple[str, ...], str | None], tuple[float, list[dict[str, int]]]] = {}
-    grown = [parent for parent in parents if len(parent.causes) < MOST_CAUSES and _others(parent, evidence)]
-    for parent, (forms, gains) in zip(grown, in_threads(lambda own: _gains(own, evidence), grown), strict=True):
-        for name, values in gains.items():
-            key = (tuple(sorted((*parent.causes, name))), parent.generic)
-            gain = log_sum(list(values.values())) + max(evidence.bodily.get(name, 0.0), 0.0)
-            choices = [{**forms, name: form} for form in near_best(values)]
-            before, others_choices = weighed.get(key, (-np.inf, []))
-            weighed[key] = (
-                max(before, parent.log_evidence + gain),
-                others_choices + [choice for choice in choices if choice not in others_choices],
-            )
-    sets = [
-        CauseSet(*key, value)
-        for key, (value, _) in sorted(weighed.items(), key=lambda item: (item[0][0], item[0][1] or ""))
-    ]
-    whole: set[tuple[tuple[str, ...], str | None]] = set()
-    while True:
-        # a bound that was too high hides others, so that the best one must have been evaluated
-        everything = SetProbabilities.of(found + sets, evidence.catalogue, evidence.generics, prior).sets
-        least = np.exp(-NEAR) * everything[0].probability
-        likely = {(item.causes, item.generic) for item in everything if item.probability >= least}
-        matter = likely & weighed.keys() - whole
-        if not matter:
-            return sets
-        ordered = sorted(matter, key=lambda key: (key[0], key[1] or ""))
-        totals = in_threads(lambda key: evidence.log_evidence(_names(key), weighed[key][1]), ordered)
-        exact = dict(zip(ordered, totals, strict=True))
-        sets = [replace(item, log_evidence=exact.get((item.causes, item.generic), item.log_evidence)) for item in sets]
-        whole |= matter
-
-
 def _others(parent: CauseSet, evidence: SetEvidence) -> list[str]:
-    """Return the causes of the catalogue that a set does not hold."""
-    return [name for name in evidence.catalogue if name not in parent.causes]
+    """Return the causes of the catalogue by which a set can grow."""
+    return [name for name in evidence.catalogue if name not in parent.causes and len(parent.causes) < MOST_CAUSES]
 
 
-def _gains(parent: CauseSet, evidence: SetEvidence) -> tuple[dict[str, int], dict[str, dict[int, float]]]:
-    """Return the forms of a set, and what every other cause adds to it, by the forms of that cause."""
-    forms = evidence.forms(parent.names)
-    return forms, evidence.gains_beside(parent.names, forms, _others(parent, evidence))
+def _extensions(sets: Iterable[CauseSet], evidence: SetEvidence) -> list[_Key]:
+    """Return all sets with one candidate more, each once, in the order of their names."""
+    keys: set[_Key] = set()
+    for item in sets:
+        keys.update((tuple(sorted((*item.causes, name))), item.generic) for name in _others(item, evidence))
+        if item.generic is None:
+            keys.update((item.causes, name) for name in evidence.generics)
+    return _in_order(keys)
 
 
-def _best(found: list[CauseSet], size: int, evidence: SetEvidence, prior: CausePrior) -> list[CauseSet]:
-    """Return the sets of one size that are worth extending.
+def _best(ranked: Iterable[CauseSet], size: int) -> list[CauseSet]:
+    """Return the sets of one size that are worth extending, among sets in the order of their probability.
 
     Where several causes are at work, something generic beside one of them takes the place of the others. The most
     probable set without it is therefore extended, too, however improbable it is.
     """
-    ranked = SetProbabilities.of(found, evidence.catalogue, evidence.generics, prior).sets
-    least = PROMISING * ranked[0].probability
+    ranked = list(ranked)
     last = [item for item in ranked if len(item.names) == size]
-    named = [item for item in last if item.generic is None]
-    always = (*last[:1], *named[:1])
+    always = (*last[:1], *[item for item in last if item.generic is None][:1])
+    least = PROMISING * ranked[0].probability
     return [item for place, item in enumerate(last) if item in always or (place < BEST and item.probability >= least)]
 
 
-def _strongest(found: list[CauseSet], evidence: SetEvidence, prior: CausePrior) -> list[CauseSet]:
-    """Return the single candidates that are worth extending, the most probable first."""
-    ranked = SetProbabilities.of(found, evidence.catalogue, evidence.generics, prior).sets
-    return [item for item in ranked if len(item.names) == 1][:SINGLES]
+def _screened(
+    parents: list[CauseSet], sets: list[CauseSet], evidence: SetEvidence, prior: CausePrior
+) -> list[CauseSet]:
+    """Return the sets of one candidate more than their parents; those that matter are integrated in full."""
 
+    def gains(parent: CauseSet) -> tuple[dict[str, int], dict[str, dict[int, float]]]:
+        forms = evidence.forms(parent.names)
+        return forms, evidence.gains_beside(parent.names, forms, _others(parent, evidence))
 
-def _extensions(sets: Iterable[CauseSet], evidence: SetEvidence) -> list[tuple[tuple[str, ...], str | None]]:
-    """Return all sets with one candidate more, each once, in the order of their names."""
-    keys: set[tuple[tuple[str, ...], str | None]] = set()
-    for item in sets:
-        if len(item.causes) < MOST_CAUSES:
-            others = [name for name in evidence.catalogue if name not in item.causes]
-            keys.update((tuple(sorted((*item.causes, name))), item.generic) for name in others)
-        if item.generic is None:
-            keys.update((item.causes, name) for name in evidence.generics)
-    return sorted(keys, key=lambda key: (key[0], key[1] or ""))
+    weighed: dict[_Key, tuple[float, list[dict[str, int]]]] = {}
+    grown = [parent for parent in parents if _others(parent, evidence)]
+    for parent, (forms, each) in zip(grown, in_threads(gains, grown), strict=True):
+        for name, values in each.items():
+            key = (tuple(sorted((*parent.causes, name))), parent.generic)
+            gain = log_sum(list(values.values())) + max(evidence.bodily.get(name, 0.0), 0.0)
+            before, choices = weighed.get(key, (-np.inf, []))
+            more = [{**forms, name: form} for form in near_best(values)]
+            choices = choices + [choice for choice in more if choice not in choices]
+            weighed[key] = max(before, parent.log_evidence + gain), choices
+    new = {key: CauseSet(*key, weighed[key][0]) for key in _in_order(weighed)}
+    whole: set[_Key] = set()
+    while True:
+        # a bound that was too high hides others, so that the best one must have been evaluated
+        ranked = _ranked([*sets, *new.values()], evidence, prior)
+        least = np.exp(-NEAR) * ranked[0].probability
+        likely = {(item.causes, item.generic) for item in ranked if item.probability >= least}
+        matter = _in_order(likely & weighed.keys() - whole)
+        if not matter:
+            return list(new.values())
+        totals = in_threads(lambda key: evidence.log_evidence(_names(key), weighed[key][1]), matter)
+        new |= {key: replace(new[key], log_evidence=total) for key, total in zip(matter, totals, strict=True)}
+        whole.update(matter)

@@ -20,11 +20,8 @@ __all__ = ["FAMILY_LEVEL", "EvidenceAlarm", "NullTail"]
 FAMILY_LEVEL = 0.01
 """Probability of an alarm where nothing is lacking, all candidates together."""
 
-REACH = 20
-"""Draws beyond a value below which its p-value comes from the fitted tail; above, counting them is good to a fifth."""
-
-TAIL = 0.05
-"""Fraction of the draws that the decay length of the tail is fitted to."""
+REACH = 20  # draws beyond a value below which its p-value comes from the tail; counting more is good to a fifth
+TAIL = 0.05  # share of the draws that the decay length of the tail is fitted to
 
 
 @dataclass(frozen=True)
@@ -49,20 +46,20 @@ class NullTail:
     values: Floats
     candidates: int
 
+    def _beyond(self, value: float) -> int:
+        return len(self.values) - int(np.searchsorted(self.values, value, side="left"))
+
     def log_p(self, value: float) -> float:
         """Return the logarithm of the probability that nothing but noise gives at least this value."""
-        draws = len(self.values)
-        beyond = draws - int(np.searchsorted(self.values, value, side="left"))
-        counted = float(np.log((beyond + 1.0) / (draws + 1.0)))
-        if beyond >= REACH:
-            return counted
+        if not self.extrapolated(value):
+            return float(np.log((self._beyond(value) + 1.0) / (len(self.values) + 1.0)))
         first, log_first, length = self._tail
         fitted = log_first - (value - first) / length
         return min(fitted, float(np.log(self.candidates)) - value, 0.0)
 
     def extrapolated(self, value: float) -> bool:
         """Return whether the p-value of a value comes from the fitted tail rather than from counted draws."""
-        return len(self.values) - int(np.searchsorted(self.values, value, side="left")) < REACH
+        return self._beyond(value) < REACH
 
     def threshold(self, level: float) -> float:
         """Return the value beyond which `log_p` is at most the logarithm of a level, by counting or in the tail."""

@@ -15,11 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from bayesid._math.arrays import Floats, Integers
-from bayesid._math.log_sum import log_sum
+from bayesid._math.log_sum import log_sum, log_sums
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.scales import (
     AmplitudeGroup,
@@ -33,21 +34,11 @@ from bayesid.diagnosis.evidence.scales import (
 
 __all__ = ["GroupSpectrum", "ScaleAverage", "average_over_scales", "log_evidences", "log_ratios"]
 
-MOST_NODES = 2000
-"""Product of the numbers of nodes of all groups but the last above which the grid is thinned and then narrowed."""
-
-COARSE_NODES = 40
-"""The same for the first grid of large groups, which only finds where the integrand is not negligible."""
-
-LARGE = 1e7
-"""Product of the number of nodes and the cube of the number of columns from which groups are large: some ten
-milliseconds of eigendecompositions."""
-
-NEGLIGIBLE = 9.0
-"""Logarithm below the largest of the integrand at which a coarse grid is cut off before it is refined."""
-
-ROUNDS = 4
-"""Most grids, one within another."""
+MOST_NODES = 2000  # in the product of all groups but the last, above which the grid is thinned and then narrowed
+COARSE_NODES = 40  # the same for the first grid of large groups, which only finds where the integrand matters
+LARGE = 1e7  # nodes times the cube of the columns of large groups: some ten milliseconds of eigendecompositions
+NEGLIGIBLE = 9.0  # nats below the largest of the integrand at which a coarse grid is cut off
+ROUNDS = 4  # grids, one within another
 
 
 @dataclass(frozen=True)
@@ -101,8 +92,7 @@ class GroupSpectrum:
         return log_nodes(self.range, part, self.values, thinned)
 
 
-@dataclass(frozen=True)
-class ScaleAverage:
+class ScaleAverage(NamedTuple):
     """Evidence of some groups, and what the data say about their scales.
 
     Attributes
@@ -125,7 +115,7 @@ def log_evidences(groups: Sequence[GroupSpectrum]) -> Floats:
 
     Groups of one size are averaged together.
     """
-    found = np.zeros(len(groups))
+    log_evidence = np.zeros(len(groups))
     sizes: dict[tuple[int, bool], list[int]] = {}
     for place, group in enumerate(groups):
         sizes.setdefault((len(group.columns), group.range.low == group.range.high), []).append(place)
@@ -142,9 +132,8 @@ def log_evidences(groups: Sequence[GroupSpectrum]) -> Floats:
         visible = 1.0 + squared * values[:, None, :]
         gain = np.einsum("ntk,nk->nt", squared / visible, scores**2) - np.log(visible).sum(axis=-1)
         terms = 0.5 * gain + log_weights
-        largest = terms.max(axis=1, keepdims=True)
-        found[places] = largest[:, 0] + np.log(np.exp(terms - largest).sum(axis=1))
-    return found
+        log_evidence[places] = log_sums(terms)
+    return log_evidence
 
 
 def log_ratios(groups: Sequence[GroupSpectrum], gram: Gram, nodes: Sequence[LogNodes]) -> Floats:

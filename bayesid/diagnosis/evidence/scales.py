@@ -162,27 +162,21 @@ class CandidateCause:
         """
         if self.fixed:
             return self
-        forms = []
-        for variant in self.variants:
-            groups = []
-            for group in variant.groups:
-                low = scale_range(group, gram).low if group.low is None and floor != 1.0 else group.low
-                groups.append(replace(group, high=group.high * bound, low=None if low is None else low * floor))
-            forms.append(tuple(groups))
+
+        def moved(group: AmplitudeGroup) -> AmplitudeGroup:
+            low = scale_range(group, gram).low if group.low is None and floor != 1.0 else group.low
+            return replace(group, high=group.high * bound, low=None if low is None else low * floor)
+
+        first, *others = (tuple(map(moved, variant.groups)) for variant in self.variants)
         body = None if self.body is None else replace(self.body, heaviest=self.body.heaviest * bound)
-        return replace(self, groups=forms[0], others=tuple(forms[1:]), body=body)
+        return replace(self, groups=first, others=tuple(others), body=body)
 
 
 @dataclass(frozen=True)
 class ScaleRange:
     """Range of a log-uniform scale.
 
-    Attributes
-    ----------
-    low, high : float
-        Ends, in the unit of the amplitudes. They are equal where the data cannot see the group within its bound.
-    visible : bool
-        Whether the data can see the group within its bound at all.
+    The ends are in the unit of the amplitudes, and equal where the data cannot see the group within its bound.
     """
 
     low: float
@@ -198,25 +192,18 @@ def scale_range(group: AmplitudeGroup, gram: Gram) -> ScaleRange:
 
 
 def range_of(group: AmplitudeGroup, largest: float) -> ScaleRange:
-    """Return the range of a group's scale, given the largest eigenvalue of its information in units of the scale.
+    """Return the range of a group's scale, given the largest eigenvalue of ``Lambda^1/2 A Lambda^1/2``.
 
-    The floor that the data set is the scale at which its square times the largest eigenvalue of
-    ``Lambda^1/2 A Lambda^1/2`` is 0.01. A group whose bound is below that floor is invisible: its evidence is that of
-    nothing, whatever the data.
+    The floor that the data set is the scale whose square times that eigenvalue is 0.01. A group whose bound is below
+    that floor is invisible: its evidence is that of nothing, whatever the data.
     """
     floor = np.sqrt(UNRESOLVED_GAIN / largest) if largest > 0.0 else np.inf
     low = min(floor, group.high) if group.low is None else group.low
     return ScaleRange(float(low), group.high, bool(floor <= group.high))
 
 
-@dataclass(frozen=True)
-class LogNodes:
-    """Scales, with the logarithms of their prior weights.
-
-    Attributes
-    ----------
-    scales, log_weights : (t,) arrays
-    """
+class LogNodes(NamedTuple):
+    """Nodes of the trapezoidal rule in the logarithm of a scale, (t,), with the logarithms of their prior weights."""
 
     scales: Floats
     log_weights: Floats

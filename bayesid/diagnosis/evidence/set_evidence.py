@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -20,24 +21,16 @@ from bayesid.diagnosis.evidence.scale_integral import (
     average_over_scales,
     log_evidences,
 )
-from bayesid.diagnosis.evidence.scales import CandidateCause, LogNodes, thinning
+from bayesid.diagnosis.evidence.scales import CandidateCause, thinning
 
 __all__ = ["SetEvidence", "near_best"]
 
-FEW_COMBINATIONS = 8
-"""Combinations of the forms of a set up to which all are integrated."""
+FEW_COMBINATIONS = 8  # combinations of the forms of a set up to which all are integrated
+MOST_FORMS = 12  # forms of one cause that are weighed beside a set: those that do best by themselves
+FORMS_NEAR, MOST_NEAR = 4.0, 4  # nats below a cause's best form of those evaluated in full, and how many at most
+BLOCK = 4_000_000  # numbers in one intermediate array where many scores are evaluated at once
 
-MOST_FORMS = 12
-"""Most forms of one cause that are weighed beside a set: those that do best by themselves."""
-
-FORMS_NEAR, MOST_NEAR = 4.0, 4
-"""Nats below a cause's best form down to which its forms are evaluated in full, and how many of them at most."""
-
-_Spectra = tuple[tuple[GroupSpectrum, ...], ...]
-"""Spectra of the groups of each form of a cause."""
-
-BLOCK = 4_000_000
-"""Most numbers in one intermediate array where many scores are evaluated at once."""
+_Forms = tuple[tuple[str, ...], tuple[int, ...]]  # causes, sorted, with a form of each
 
 
 def near_best(values: Mapping[int, float]) -> list[int]:
@@ -76,20 +69,17 @@ class SetEvidence:
                 if len({group.name for group in groups}) < len(groups):
                     raise ValueError(f"{cause.name!r} names one group of columns twice; each has one scale")
             self.causes[cause.name] = cause
-        self._spectra: dict[str, _Spectra] = {}
+        self._spectra: dict[str, tuple[tuple[GroupSpectrum, ...], ...]] = {}  # of the groups of each form
         self._chosen: dict[tuple[str, ...], dict[str, int]] = {}
-        self._known: dict[tuple[tuple[str, ...], tuple[int, ...]], float] = {}
-        self._scaled: dict[tuple[tuple[str, ...], tuple[int, ...]], tuple[Integers, Floats]] = {}
+        self._known: dict[_Forms, float] = {}
+        self._scaled: dict[_Forms, tuple[Integers, Floats]] = {}
         if known is not None:
             self._take(known)
         new = {name: cause for name, cause in self.causes.items() if name not in self._spectra}
-        found = iter(GroupSpectrum.of([g for cause in new.values() for v in cause.variants for g in v.groups], gram))
+        spectra = iter(GroupSpectrum.of([g for cause in new.values() for v in cause.variants for g in v.groups], gram))
         self._spectra |= {
-            name: tuple(tuple(next(found) for _ in variant.groups) for variant in cause.variants)
+            name: tuple(tuple(next(spectra) for _ in variant.groups) for variant in cause.variants)
             for name, cause in new.items()
-        }
-        self._log_weights = {
-            name: np.array([variant.log_weight for variant in cause.variants]) for name, cause in self.causes.items()
         }
 
     def _take(self, known: SetEvidence) -> None:
@@ -120,11 +110,9 @@ class SetEvidence:
     def invisible(self) -> tuple[str, ...]:
         """Names of the candidates that the data cannot see within their physical bounds, sorted."""
         return tuple(
-            sorted(
-                name
-                for name, forms in self._spectra.items()
-                if not any(spectrum.range.visible for form in forms for spectrum in form)
-            )
+            name
+            for name, forms in sorted(self._spectra.items())
+            if not any(spectrum.range.visible for form in forms for spectrum in form)
         )
 
     def forms(self, names: Iterable[str]) -> dict[str, int]:
@@ -139,10 +127,11 @@ class SetEvidence:
         return dict(self._chosen[ordered])
 
     def _most_probable_forms(self, ordered: Sequence[str]) -> dict[str, int]:
-        """Return what `forms` returns, and find it."""
-        if self._combinations(ordered) <= FEW_COMBINATIONS:
-            choices = list(product(*(range(len(self._spectra[name])) for name in ordered)))
-            best = choices[0] if len(choices) == 1 else max(choices, key=lambda own: self._log_evidence(ordered, own))
+        combinations = self._combinations(ordered)
+        if combinations is not None:
+            best = combinations[0]
+            if len(combinations) > 1:
+                best = max(combinations, key=lambda forms: self._log_evidence(ordered, forms))
             return dict(zip(ordered, best, strict=True))
         chosen = {name: 0 for name in ordered if len(self._spectra[name]) == 1}
         several = sorted(set(ordered) - set(chosen), key=lambda name: (-self.of_forms(name).max(), name))
@@ -152,9 +141,10 @@ class SetEvidence:
             chosen[name] = max(gains, key=lambda form: (gains[form], -form))
         return chosen
 
-    def _combinations(self, ordered: Sequence[str]) -> int:
-        """Return the number of combinations of the forms of some causes."""
-        return int(np.prod([len(self._spectra[name]) for name in ordered], dtype=float))
+    def _combinations(self, ordered: Sequence[str]) -> list[tuple[int, ...]] | None:
+        """Return all combinations of the forms of some causes, or None where they are many."""
+        counts = [len(self._spectra[name]) for name in ordered]
+        return list(product(*map(range, counts))) if math.prod(counts) <= FEW_COMBINATIONS else None
 
     def gains_beside(
         self, names: Iterable[str], forms: Mapping[str, int], others: Iterable[str]
@@ -168,9 +158,8 @@ class SetEvidence:
         Parameters
         ----------
         names : iterable of str
-            The set.
         forms : mapping of str to int
-            Form of each of its causes.
+            Form of each of the set's causes.
         others : iterable of str
             Causes to add, each by itself, in those of its forms that do best by themselves.
         """
@@ -193,8 +182,12 @@ class SetEvidence:
             Form of each cause; by default the most probable ones.
         """
         forms = self.forms(names) if forms is None else forms
-        found = [(name, place) for name in sorted(names) for place in range(len(self._spectra[name][forms[name]]))]
-        return sorted(found, key=lambda item: -len(self._spectra[item[0]][forms[item[0]]][item[1]].columns))
+        sizes = {
+            (name, place): len(spectrum.columns)
+            for name in sorted(names)
+            for place, spectrum in enumerate(self._spectra[name][forms[name]])
+        }
+        return sorted(sizes, key=lambda place: -sizes[place])
 
     def spectra(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[GroupSpectrum]:
         """Return the spectra of the groups of a set, in the order of `places`."""
@@ -217,17 +210,15 @@ class SetEvidence:
             Forms of each cause beyond which the evidence is negligible; by default all, or the best of each.
         """
         ordered = sorted(names)
-        forms = (
-            self._choices(ordered)
-            if choices is None
-            else [tuple(choice[name] for name in ordered) for choice in choices]
-        )
+        forms = self._choices(ordered)
+        if choices is not None:
+            forms = [tuple(choice[name] for name in ordered) for choice in choices]
         values = [self._log_evidence(ordered, own) for own in forms]
         best = dict(zip(ordered, forms[int(np.argmax(values))], strict=True))
         return log_sum(values) + self._bodily(ordered, best)
 
     def _log_evidence(self, ordered: Sequence[str], forms: tuple[int, ...]) -> float:
-        """Return the logarithm of the evidence of causes in given forms, times the prior probability of these."""
+        """Return the log evidence of causes in given forms, times the prior probability of these."""
         key = (tuple(ordered), forms)
         if key not in self._known:
             self._known[key] = self._of(ordered, forms).log_evidence + self._log_weight(ordered, forms)
@@ -245,12 +236,9 @@ class SetEvidence:
             if cause.body is not None:
                 (group,) = cause.variants[forms[name]].groups
                 beside = self.beside([other for other in ordered if other != name], forms, [group.name])
-                own = beside.groups[group.name]
                 lightest = self._spectra[name][forms[name]][0].range.low
-                body = cause.body.log_evidence(beside.matrix[np.ix_(own, own)], beside.score[own], lightest)
-                alone = SetEvidence(
-                    beside.keeping([group.name]), [replace(cause, groups=(group,), others=(), shares=())]
-                )
+                body = cause.body.log_evidence(beside.matrix, beside.score, lightest)
+                alone = SetEvidence(beside, [replace(cause, groups=(group,), others=(), shares=())])
                 total += body - alone._of([name], (0,)).log_evidence
         return total
 
@@ -266,9 +254,8 @@ class SetEvidence:
         Parameters
         ----------
         names : iterable of str
-            The set.
         forms : mapping of str to int
-            Form of each of its causes.
+            Form of each of the set's causes.
         groups : iterable of str
             Names of the groups in the Gram.
         """
@@ -280,15 +267,16 @@ class SetEvidence:
 
     def _log_weight(self, ordered: Sequence[str], forms: Sequence[int]) -> float:
         """Return the logarithm of the prior probability of a combination of forms."""
-        return sum(self._log_weights[name][form] for name, form in zip(ordered, forms, strict=True))
+        return sum(self.causes[name].variants[form].log_weight for name, form in zip(ordered, forms, strict=True))
 
     def of_forms(self, name: str) -> Floats:
         """Return the logarithms of the evidence of each form of one cause, times the form's prior probability."""
-        found = [
-            self._of([name], (place,)).log_evidence if alone is None else alone
-            for place, alone in enumerate(self._alone[name])
-        ]
-        return np.array(found) + self._log_weights[name]
+        return np.array(
+            [
+                (self._of([name], (form,)).log_evidence if alone is None else alone) + variant.log_weight
+                for form, (alone, variant) in enumerate(zip(self._alone[name], self.causes[name].variants, strict=True))
+            ]
+        )
 
     @cached_property
     def _alone(self) -> dict[str, list[float | None]]:
@@ -311,19 +299,15 @@ class SetEvidence:
         ordered = tuple(sorted(names))
         key = (ordered, tuple(forms[name] for name in ordered))
         if key not in self._scaled:
-            self._scaled[key] = self._at_peak(ordered, forms)
+            average = self._of(*key)
+            where = np.unravel_index(int(np.argmax(average.log_posterior)), average.log_posterior.shape)
+            columns, deviations = [np.zeros(0, dtype=int)], [np.zeros(0)]
+            spectra = self.spectra([name for name in ordered if not self.causes[name].fixed], forms)
+            for nodes, index, own in zip(average.nodes, where, spectra, strict=True):
+                columns.append(own.columns)
+                deviations.append(nodes.scales[index] * own.root)
+            self._scaled[key] = np.concatenate(columns), np.concatenate(deviations)
         return self._scaled[key]
-
-    def _at_peak(self, ordered: Sequence[str], forms: Mapping[str, int]) -> tuple[Integers, Floats]:
-        """Return what `most_probable` returns, and find it."""
-        average = self._of(ordered, tuple(forms[name] for name in ordered))
-        where = np.unravel_index(int(np.argmax(average.log_posterior)), average.log_posterior.shape)
-        free = [name for name in ordered if not self.causes[name].fixed]
-        spectra = self.spectra(free, forms)
-        empty = np.zeros(0)
-        columns = np.concatenate([empty.astype(int), *(own.columns for own in spectra)])
-        scales = [nodes.scales[index] for nodes, index in zip(average.nodes, where, strict=True)]
-        return columns, np.concatenate([empty, *(scale * own.root for scale, own in zip(scales, spectra, strict=True))])
 
     def score_beside(self, names: Iterable[str]) -> Floats:
         """Return the score of all columns after the causes of fixed size among a set are in the model."""
@@ -331,8 +315,8 @@ class SetEvidence:
 
     def _choices(self, ordered: Sequence[str]) -> list[tuple[int, ...]]:
         """Return the combinations of forms that are integrated: all, or those near the best."""
-        if self._combinations(ordered) <= FEW_COMBINATIONS:
-            return list(product(*(range(len(self._spectra[name])) for name in ordered)))
+        if (combinations := self._combinations(ordered)) is not None:
+            return combinations
         if len(ordered) == 1:
             return [(form,) for form in self.ranked[ordered[0]]]
         best = self.forms(ordered)
@@ -346,24 +330,19 @@ class SetEvidence:
     @cached_property
     def ranked(self) -> dict[str, tuple[int, ...]]:
         """Forms of each cause, the most probable by itself first."""
-        found = {}
-        for name in self._spectra:
-            values = self.of_forms(name)
-            found[name] = tuple(int(place) for place in np.argsort(-values, kind="stable"))
-        return found
+        return {name: tuple(np.argsort(-self.of_forms(name), kind="stable").tolist()) for name in self._spectra}
 
     def _of(self, ordered: Sequence[str], forms: tuple[int, ...]) -> ScaleAverage:
-        """Return the evidence of causes in given forms."""
+        """Return the evidence of causes, sorted, in given forms."""
         free = [name for name in ordered if not self.causes[name].fixed]
         chosen = dict(zip(ordered, forms, strict=True))
         spectra = self.spectra(free, chosen)
         if len(free) == len(ordered):
             return average_over_scales(spectra, self.gram)
         shifted, gain = self._with_fixed(ordered, self.gram.score[None])
-        score = shifted[0]
-        moved = [replace(own, score=own.vectors.T @ (own.root * score[own.columns])) for own in spectra]
-        average = average_over_scales(moved, replace(self.gram, score=score))
-        return replace(average, log_evidence=average.log_evidence + float(gain[0]))
+        moved = [replace(own, score=own.vectors.T @ (own.root * shifted[0][own.columns])) for own in spectra]
+        average = average_over_scales(moved, replace(self.gram, score=shifted[0]))
+        return average._replace(log_evidence=average.log_evidence + float(gain[0]))
 
     def _with_fixed(self, ordered: Sequence[str], scores: Floats) -> tuple[Floats, Floats]:
         """Return scores, (d, m), after the causes of fixed size are in the model, and what those gain, (d,)."""
@@ -396,7 +375,7 @@ class SetEvidence:
         return np.asarray(logsumexp(found, axis=0)) + gain
 
     def _many(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
-        """Return the logarithm of the evidence of groups for many scores."""
+        """Return the log evidence of groups for many scores."""
         if not spectra:
             return np.zeros(len(scores))
         if len(spectra) > 1:
@@ -412,23 +391,24 @@ class SetEvidence:
     def _several(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
         """Return the same for several groups, on the product of their nodes."""
         thinned = thinning([len(own.nodes().scales) for own in spectra], MOST_NODES)
-        nodes = _product([own.nodes(thinned) for own in spectra])
+        nodes = [own.nodes(thinned) for own in spectra]
+        scales = np.meshgrid(*(own.scales for own in nodes), indexing="ij")
+        log_weights = np.sum(np.meshgrid(*(own.log_weights for own in nodes), indexing="ij"), axis=0).ravel()
         columns = np.concatenate([own.columns for own in spectra])
         deviations = np.concatenate(
-            [nodes.scales[:, place, None] * own.root for place, own in enumerate(spectra)], axis=1
+            [grid.reshape(-1, 1) * own.root for grid, own in zip(scales, spectra, strict=True)], axis=1
         )
         roots, half_log_det = covariance_roots(self.gram.matrix[np.ix_(columns, columns)], deviations)
         covariance = np.swapaxes(roots, 1, 2) @ roots
         upper = np.triu_indices(len(columns))
         weights = 0.5 * covariance[:, upper[0], upper[1]] * np.where(upper[0] == upper[1], 1.0, 2.0)
-        found = np.empty(len(scores))
+        log_evidence = np.empty(len(scores))
         step = max(BLOCK // max(len(half_log_det), len(upper[0])), 1)
         for start in range(0, len(scores), step):
             part = scores[start : start + step][:, columns]
             products = part[:, upper[0]] * part[:, upper[1]]
-            terms = products @ weights.T + nodes.log_weights - half_log_det
-            found[start : start + step] = log_sums(terms)
-        return found
+            log_evidence[start : start + step] = log_sums(products @ weights.T + log_weights - half_log_det)
+        return log_evidence
 
 
 def _with_forms(cause: CandidateCause, places: Sequence[int]) -> CandidateCause:
@@ -436,10 +416,3 @@ def _with_forms(cause: CandidateCause, places: Sequence[int]) -> CandidateCause:
     chosen = [cause.variants[place] for place in places]
     shares = tuple(float(np.exp(variant.log_weight)) for variant in chosen)
     return replace(cause, groups=chosen[0].groups, others=tuple(own.groups for own in chosen[1:]), shares=shares)
-
-
-def _product(nodes: Sequence[LogNodes]) -> LogNodes:
-    """Return the product of the nodes of several groups: scales (t, k) and logarithms of weights (t,)."""
-    scales = np.stack([axis.ravel() for axis in np.meshgrid(*(own.scales for own in nodes), indexing="ij")], axis=1)
-    weights = np.meshgrid(*(own.log_weights for own in nodes), indexing="ij")
-    return LogNodes(scales, np.sum([axis.ravel() for axis in weights], axis=0))
