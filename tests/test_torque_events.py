@@ -11,7 +11,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis.candidates.generic_signatures import generic_signatures
 from bayesid.diagnosis.outcome.disturbance import Frame, disturbing_wrench
-from bayesid.diagnosis.outcome.torque_events import EventCandidates, Held
+from bayesid.diagnosis.outcome.torque_events import EventCandidates, Taken
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.noise_changes import relinearised
@@ -47,7 +47,7 @@ def test_two_events_are_found_with_their_torques():
     truth = np.zeros(3 * len(SHAPES))
     truth[3 * 6 : 3 * 6 + 3], truth[3 * 33 : 3 * 33 + 3] = (3.0, -2.0, 1.0), (0.0, 1.5, -1.0)
     found = candidates(-matrix @ truth + rng.normal(size=len(matrix)), matrix)
-    nothing = Held.nothing(matrix.shape[1])
+    nothing = Taken.nothing(matrix.shape[1])
     events = found.chosen(nothing)
     assert set(events.places) == {6, 33}
     assert events.log_evidence > 50.0
@@ -59,7 +59,7 @@ def test_two_events_are_found_with_their_torques():
 def test_noise_alone_has_no_event():
     rng = np.random.default_rng(2)
     matrix = columns(rng)
-    found = [candidates(rng.normal(size=len(matrix)), matrix).chosen(Held.nothing(matrix.shape[1])) for _ in range(40)]
+    found = [candidates(rng.normal(size=len(matrix)), matrix).chosen(Taken.nothing(matrix.shape[1])) for _ in range(40)]
     assert sum(bool(events.places) for events in found) <= 2  # the cost makes it one in fifty or fewer
     assert all(events.log_evidence >= 0.0 for events in found)
 
@@ -73,9 +73,9 @@ def test_what_is_held_is_not_found_again():
     # a column that takes the same share as the event, with a wide prior
     own = matrix[:, 18:21]
     lower = np.linalg.cholesky(own.T @ own + 1e-6 * np.eye(3))
-    held = Held(np.linalg.solve(lower, own.T @ matrix), np.linalg.solve(lower, found.score[18:21]))
+    held = Taken(np.linalg.solve(lower, own.T @ matrix), np.linalg.solve(lower, found.score[18:21]))
     assert 6 not in found.chosen(held).places
-    assert 6 in found.chosen(Held.nothing(matrix.shape[1])).places
+    assert 6 in found.chosen(Taken.nothing(matrix.shape[1])).places
 
 
 @pytest.mark.usefixtures("slow")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,23 +89,18 @@ def candidate_table(weighed: WeighedCauses, effects: Sequence[Effect], rng: np.r
     quantities = _quantities(effects)
     rows = []
     for name, cause in evidence.causes.items():
-        forms = evidence.forms([name])
-        groups = cause.variants[forms[name]].groups
-        sized = name in quantities and not cause.fixed
-        amplitude = _Amplitude.of(name, evidence, quantities) if sized else NO_AMPLITUDE
-        local, adjusted = p_values[name]
+        groups = [group.name for group in cause.variants[evidence.forms([name])[name]].groups]
+        amplitude: _Amplitudes = ((), np.zeros(0), np.zeros(0), np.zeros(0))
+        if name in quantities and not cause.fixed:
+            amplitude = _amplitudes(name, groups, evidence, quantities[name])
         rows.append(
             Candidate(
                 name,
                 inclusion[name],
-                evidence.gram.signal_to_noise(*(group.name for group in groups)),
-                float(np.exp(local)),
-                float(np.exp(adjusted)),
+                evidence.gram.signal_to_noise(*groups),
+                *np.exp(p_values[name]).tolist(),
                 alarm.candidates.log_evidence[name],
-                amplitude.quantities,
-                amplitude.mean,
-                amplitude.sd,
-                amplitude.limit,
+                *amplitude,
                 cause_power(name, evidence, alarm.candidates, rng, alarm.candidates_level, POWER_DRAWS),
                 cause.generic,
             )
@@ -118,31 +113,17 @@ def _factor(row: Candidate) -> float:
     return -np.inf if row.log_bayes_factor is None else row.log_bayes_factor
 
 
-@dataclass(frozen=True)
-class _Amplitude:
-    """Amplitudes of one candidate."""
-
-    quantities: tuple[Quantity, ...]
-    mean: Floats
-    sd: Floats
-    limit: Floats
-
-    @staticmethod
-    def of(name: str, evidence: SetEvidence, quantities: Mapping[str, tuple[Quantity, ...]]) -> _Amplitude:
-        posterior = AmplitudePosterior.of(evidence, [name])
-        forms = evidence.forms([name])
-        groups = evidence.causes[name].variants[forms[name]].groups
-        places = np.concatenate([posterior.amplitudes[name, group.name] for group in groups])
-        own = places[: len(quantities[name])]  # of a cause per recording, those of the first
-        return _Amplitude(
-            quantities[name],
-            posterior.mean[own],
-            np.sqrt(np.diag(posterior.covariance)[own]),
-            posterior.upper_limits()[own],
-        )
+_Amplitudes = tuple[tuple[Quantity, ...], Floats, Floats, Floats]
+"""Quantities of one candidate, with their means, standard deviations and upper limits."""
 
 
-NO_AMPLITUDE = _Amplitude((), np.zeros(0), np.zeros(0), np.zeros(0))
+def _amplitudes(
+    name: str, groups: Sequence[str], evidence: SetEvidence, quantities: tuple[Quantity, ...]
+) -> _Amplitudes:
+    posterior = AmplitudePosterior.of(evidence, [name])
+    places = np.concatenate([posterior.amplitudes[name, group] for group in groups])
+    own = places[: len(quantities)]  # of a cause per recording, those of the first
+    return quantities, posterior.mean[own], np.sqrt(np.diag(posterior.covariance)[own]), posterior.upper_limits()[own]
 
 
 def _quantities(effects: Sequence[Effect]) -> dict[str, tuple[Quantity, ...]]:
@@ -202,10 +183,10 @@ def cause_power(
         Number of draws; 2,000 are good to 0.011.
     """
     gram, cause = evidence.gram, evidence.causes[name]
-    own_columns = np.unique(np.concatenate([gram.groups[g.name] for v in cause.variants for g in v.groups]))
+    columns = np.unique(gram.columns(group.name for variant in cause.variants for group in variant.groups))
     scores = np.zeros((draws, len(gram.score)))
-    part = Gram(gram.matrix[np.ix_(own_columns, own_columns)], gram.score[own_columns], {})
-    scores[:, own_columns] = part.null_scores(rng, draws)
+    part = Gram(gram.matrix[np.ix_(columns, columns)], gram.score[columns], {})
+    scores[:, columns] = part.null_scores(rng, draws)
     shares = np.exp([variant.log_weight for variant in cause.variants])
     counts = rng.multinomial(draws, shares / shares.sum())
     for form, drawn in enumerate(np.split(np.arange(draws), np.cumsum(counts)[:-1])):
@@ -213,7 +194,7 @@ def cause_power(
             scales = np.exp(rng.uniform(np.log(own.range.low), np.log(own.range.high), size=(len(drawn), 1)))
             amplitudes = scales * own.root * rng.normal(size=(len(drawn), len(own.columns)))
             amplitudes = np.ones_like(amplitudes) if cause.fixed else amplitudes
-            scores[np.ix_(drawn, own_columns)] -= amplitudes @ gram.matrix[np.ix_(own.columns, own_columns)]
+            scores[np.ix_(drawn, columns)] -= amplitudes @ gram.matrix[np.ix_(own.columns, columns)]
     return float(np.mean(evidence.log_evidences([name], scores) > alarm.largest.threshold(level)))
 
 
@@ -251,12 +232,13 @@ def amplitudes_of_others(hypothesis: Hypothesis, label: str) -> list[CauseAmplit
     index = next((i for i, effect in enumerate(hypothesis.fit.effects) if label == effect.candidate), None)
     if index is None or not hypothesis.fit.effects[index].per_recording:
         return []
-    found = []
-    for recording, name in enumerate(names[1:], start=1):
-        mean, sd = effect_amplitude(hypothesis, index, recording)
-        for (key, unit), own_mean, own_sd in zip(hypothesis.fit.effects[index].quantities, mean, sd, strict=True):
-            found.append(CauseAmplitude(Quantity(f"{name}.{key}", unit), float(own_mean), float(own_sd)))
-    return found
+    return [
+        CauseAmplitude(Quantity(f"{name}.{key}", unit), float(mean), float(sd))
+        for recording, name in enumerate(names[1:], start=1)
+        for (key, unit), mean, sd in zip(
+            hypothesis.fit.effects[index].quantities, *effect_amplitude(hypothesis, index, recording), strict=True
+        )
+    ]
 
 
 def effect_amplitude(hypothesis: Hypothesis, index: int, recording: int = 0) -> tuple[Floats, Floats]:

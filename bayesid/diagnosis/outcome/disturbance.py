@@ -18,7 +18,7 @@ from bayesid.diagnosis.candidates.signature_bank import SignatureBank
 from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
 from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidates, Held
+from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidates, Taken
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.residual_view import by_recording
 
@@ -30,7 +30,8 @@ DECIDED = 6.0
 SHARE = 0.6
 """Share of what three free axes explain that one fixed direction must explain."""
 
-ROUNDS = 15
+ROUNDS = 15  # of the alternating least squares
+MOST_CORRELATIONS = 12
 
 
 class Frame(Enum):
@@ -108,56 +109,56 @@ def disturbing_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: b
     places = np.split(np.arange(columns.shape[1]), np.cumsum([part.shape[1] for part in parts])[:-1])
     gram = Gram(fit.project(columns), columns.T @ fit.residual, dict(zip(names, places, strict=True)))
     disturbance = _composed(hypothesis, gram, columns, [c for c in bank.causes if c.name in names], name_frame)
-    held = disturbance.held
+    smooth = disturbance.columns
     block = GaussianBlock.of(disturbance.matrix, disturbance.deviations)
     pull, posterior = block.share(disturbance.score), block.covariance
-    smooth, size = 2 * 3 * WAVES * count, len(disturbance.deviations)
-    where = np.concatenate([held, smooth + np.arange(size - len(held))])
-    amplitude, covariance = np.zeros(smooth + size - len(held)), np.zeros((smooth + size - len(held),) * 2)
+    cosines = 2 * 3 * WAVES * count  # of torque and force; those of no variance have none in the composition
+    where = np.concatenate([smooth, cosines + np.arange(len(pull) - len(smooth))])
+    size = cosines + len(pull) - len(smooth)
+    amplitude, covariance = np.zeros(size), np.zeros((size, size))
     amplitude[where], covariance[np.ix_(where, where)] = block.mean(disturbance.score), posterior
     freedom = float(np.einsum("ij,ji->", posterior, disturbance.matrix))
     snr = float(np.sqrt(max(float(pull @ pull) - freedom, 0.0)))
-    scale = float(disturbance.deviations[: len(held)][held < 3 * WAVES * count].max())  # of the torque's cosines
+    scale = float(disturbance.deviations[: len(smooth)][smooth < 3 * WAVES * count].max())  # of the torque's cosines
 
-    time, torque, force, torque_sd, force_sd = [], [], [], [], []
-    for r in range(count):
-        own = np.concatenate([[True], np.diff(times[r]) > 0.0])
-        waves = _waves(times[r][own])
-        events = [k for k, (recording, _) in enumerate(disturbance.events) if recording == r]
-        sudden = np.array([disturbance.events[k][1][own] for k in events]).reshape(len(events), len(waves[0]))
-        sides = []
-        for first, courses, more in ((0, np.concatenate([waves, sudden]), events), (smooth // 2, waves, [])):
-            even = np.arange(first + r * WAVES * 3, first + (r + 1) * WAVES * 3)
-            block = np.concatenate([even, *(smooth + 3 * k + np.arange(3) for k in more)])
-            spread = covariance[np.ix_(block, block)].reshape(len(courses), 3, len(courses), 3)
-            mean = np.einsum("kt,ka->ta", waves, amplitude[even].reshape(WAVES, 3))
-            variance = np.maximum(np.einsum("kt,kala,lt->ta", courses, spread, courses), 0.0)
-            for k in more:
-                _, event, over_shapes = disturbance.averaged[k]
-                mean, variance = mean + event[own], variance + over_shapes[own] ** 2
-            sides.append((mean, np.sqrt(variance)))
-        time.append(times[r][own])
-        torque.append(sides[0][0])
-        torque_sd.append(sides[0][1])
-        shown = 1.0 if FORCE in names else np.nan  # without an accelerometer nothing is known of the force
-        force.append(shown * sides[1][0])
-        force_sd.append(shown * sides[1][1])
+    fresh = [np.concatenate([[True], np.diff(time) > 0.0]) for time in times]  # shorter recordings end with one instant
 
-    def turned(series: list[Floats], frame: Frame) -> list[Floats]:
-        out = []
-        for r, value in enumerate(series):
-            own = np.concatenate([[True], np.diff(times[r]) > 0.0])
-            out.append(np.einsum("tba,tb->ta", rotations[frame][0][r][own], value))
-        return out
+    def course(r: int, first: int, events: Sequence[int]) -> tuple[Floats, Floats]:
+        """Mean and standard deviation in one recording, (S, 3), of a group's cosines and some events."""
+        waves = _waves(times[r][fresh[r]])
+        courses = np.stack([*waves, *(disturbance.events[k][1][fresh[r]] for k in events)])
+        even = np.arange(first + r * WAVES * 3, first + (r + 1) * WAVES * 3)
+        block = np.concatenate([even, *(cosines + 3 * k + np.arange(3) for k in events)])
+        spread = covariance[np.ix_(block, block)].reshape(len(courses), 3, len(courses), 3)
+        mean = np.einsum("kt,ka->ta", waves, amplitude[even].reshape(WAVES, 3))
+        variance = np.maximum(np.einsum("kt,kala,lt->ta", courses, spread, courses), 0.0)
+        for k in events:
+            _, event, over_shapes = disturbance.averaged[k]
+            mean, variance = mean + event[fresh[r]], variance + over_shapes[fresh[r]] ** 2
+        return mean, np.sqrt(variance)
+
+    within = [[k for k, (recording, _) in enumerate(disturbance.events) if recording == r] for r in range(count)]
+    torque, torque_sd = zip(*(course(r, 0, within[r]) for r in range(count)), strict=True)
+    shown = 1.0 if FORCE in names else np.nan  # without an accelerometer nothing is known of the force
+    force, force_sd = zip(*((shown * x for x in course(r, cosines // 2, ())) for r in range(count)), strict=True)
+
+    def turned(series: Sequence[Floats]) -> dict[Frame, list[Floats]]:
+        return {
+            frame: [
+                np.einsum("tba,tb->ta", turns[r][own], value)
+                for r, (own, value) in enumerate(zip(fresh, series, strict=True))
+            ]
+            for frame, (turns, _) in rotations.items()
+        }
 
     return DisturbingWrench(
         snr,
         tuple(manoeuvre.recording.name for manoeuvre in fit.posterior.manoeuvres),
-        time,
-        {frame: turned(torque, frame) for frame in Frame},
-        {frame: turned(force, frame) for frame in Frame},
-        torque_sd,
-        force_sd,
+        [time[own] for time, own in zip(times, fresh, strict=True)],
+        turned(torque),
+        turned(force),
+        list(torque_sd),
+        list(force_sd),
         _fixed_in(hypothesis, rotations, scale) if name_frame and snr > 0.0 else None,
         disturbance.log_evidence,
     )
@@ -196,8 +197,8 @@ class _Composed:
 
     Attributes
     ----------
-    held : (h,) array of int
-        Columns of the smooth disturbance.
+    columns : (h,) array of int
+        Of the smooth disturbance.
     deviations : (h + 3 e,) array
         Most probable standard deviations of all amplitudes.
     matrix, score : arrays
@@ -212,7 +213,7 @@ class _Composed:
         Recording, torque and standard deviation over the shapes of each event (`EventCandidates.averaged`).
     """
 
-    held: Integers
+    columns: Integers
     deviations: Floats
     matrix: Floats
     score: Floats
@@ -226,56 +227,53 @@ def _composed(
     hypothesis: Hypothesis, gram: Gram, columns: Floats, causes: Sequence[CandidateCause], sudden: bool
 ) -> _Composed:
     """Return the most probable of a smooth disturbance, one with events beside it, and events with one beside them."""
-    held, deviations, log_evidence = _most_probable(gram, causes)
-    matrix = gram.matrix[np.ix_(held, held)]
-    smooth = _Composed(held, deviations, matrix, gram.score[held], (), None, log_evidence)
+    own, deviations, log_evidence = _most_probable(gram, causes)
+    smooth = _Composed(own, deviations, gram.matrix[np.ix_(own, own)], gram.score[own], (), None, log_evidence)
     largest = next((cause.groups[0].high for cause in causes if cause.name == TORQUE), 0.0)
     if not sudden or not largest:
         return smooth
     candidates = EventCandidates.of(hypothesis, columns, largest)
-    options = [smooth, *_with_events(gram, smooth, candidates, causes)]
-    best = max(options, key=lambda option: option.log_evidence)
+    best = max(_options(gram, smooth, candidates, causes), key=lambda option: option.log_evidence)
     if best.chosen is None:
         return best
     finer = EventCandidates.of(hypothesis, columns, largest, candidates.nearby(best.chosen))
-    known = slice(0, len(best.held))
+    known = slice(0, len(best.columns))
     block = GaussianBlock.of(best.matrix[known, known], best.deviations[known])
-    beside = Held(block.share(finer.shared[:, best.held].T), block.share(best.score[known]))
+    beside = Taken(block.share(finer.shared[:, best.columns].T), block.share(best.score[known]))
     return replace(best, averaged=finer.averaged(beside, finer.like(candidates, best.chosen)))
 
 
-def _with_events(
+def _options(
     gram: Gram, smooth: _Composed, candidates: EventCandidates, causes: Sequence[CandidateCause]
-) -> list[_Composed]:
-    """Return events beside a smooth disturbance, and a smooth disturbance beside events."""
-    options = []
+) -> Iterator[_Composed]:
+    """Yield a smooth disturbance, events beside it, and a smooth disturbance beside events."""
+    yield smooth
     block = GaussianBlock.of(smooth.matrix, smooth.deviations)
-    beside = candidates.chosen(Held(block.share(candidates.shared[:, smooth.held].T), block.share(smooth.score)))
+    beside = candidates.chosen(Taken(block.share(candidates.shared[:, smooth.columns].T), block.share(smooth.score)))
     if beside.places:
         total = smooth.log_evidence + beside.log_evidence
-        options.append(_joined(gram, smooth.held, smooth.deviations, candidates, beside, total))
-    alone = candidates.chosen(Held.nothing(len(candidates.score)))
+        yield _joined(gram, smooth.columns, smooth.deviations, candidates, beside, total)
+    alone = candidates.chosen(Taken.nothing(len(candidates.score)))
     if alone.places:
         own = alone.columns
         block = GaussianBlock.of(candidates.matrix[np.ix_(own, own)], alone.deviations)
-        taken, pull = block.share(candidates.shared[own]), block.share(candidates.score[own])
-        left = Gram(gram.matrix - taken.T @ taken, gram.score - taken.T @ pull, gram.groups)
-        held, deviations, more = _most_probable(left, causes)
-        options.append(_joined(gram, held, deviations, candidates, alone, alone.log_evidence + more))
-    return options
+        share, pull = block.share(candidates.shared[own]), block.share(candidates.score[own])
+        left = Gram(gram.matrix - share.T @ share, gram.score - share.T @ pull, gram.groups)
+        columns, deviations, more = _most_probable(left, causes)
+        yield _joined(gram, columns, deviations, candidates, alone, alone.log_evidence + more)
 
 
 def _joined(
-    gram: Gram, held: Integers, deviations: Floats, candidates: EventCandidates, events: ChosenEvents, total: float
+    gram: Gram, columns: Integers, deviations: Floats, candidates: EventCandidates, events: ChosenEvents, total: float
 ) -> _Composed:
     own = events.columns
-    shared = candidates.shared[np.ix_(own, held)]
-    matrix = np.block([[gram.matrix[np.ix_(held, held)], shared.T], [shared, candidates.matrix[np.ix_(own, own)]]])
+    shared = candidates.shared[np.ix_(own, columns)]
+    whole = [[gram.matrix[np.ix_(columns, columns)], shared.T], [shared, candidates.matrix[np.ix_(own, own)]]]
     return _Composed(
-        held,
+        columns,
         np.concatenate([deviations, events.deviations]),
-        matrix,
-        np.concatenate([gram.score[held], candidates.score[own]]),
+        np.block(whole),
+        np.concatenate([gram.score[columns], candidates.score[own]]),
         [(int(candidates.recording[k]), candidates.course[k]) for k in events.places],
         events,
         total,
@@ -288,7 +286,7 @@ def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Intege
     One disturbance is taken after the other, each beside those before at their most probable scales: to integrate over
     all scales at once would take minutes.
     """
-    held, deviations, total = np.zeros(0, dtype=int), np.zeros(0), 0.0
+    columns, deviations, total = np.zeros(0, dtype=int), np.zeros(0), 0.0
     left = gram
     for cause in causes:
         name = cause.groups[0].name
@@ -296,9 +294,9 @@ def _most_probable(gram: Gram, causes: Sequence[CandidateCause]) -> tuple[Intege
         forms = own.forms([cause.name])
         total += own.log_evidence([cause.name])
         where, sigma = own.most_probable([cause.name], forms)
-        held, deviations = np.concatenate([held, gram.groups[name][where]]), np.concatenate([deviations, sigma])
-        left = gram.conditioned(held, deviations)
-    return held, deviations, total
+        columns, deviations = np.concatenate([columns, gram.groups[name][where]]), np.concatenate([deviations, sigma])
+        left = gram.conditioned(columns, deviations)
+    return columns, deviations, total
 
 
 def _whole_columns(bank: SignatureBank, name: str, recordings: int) -> Floats:
@@ -357,9 +355,6 @@ def _one_direction(gram: Floats, gradient: Floats, scale: float, direction: Floa
         direction = np.linalg.solve(quadratic + 1e-9 * np.trace(quadratic) * np.eye(3), trajectory @ gradient)
         direction = direction / np.linalg.norm(direction)
     return taken
-
-
-MOST_CORRELATIONS = 12
 
 
 class TorqueCorrelation(NamedTuple):

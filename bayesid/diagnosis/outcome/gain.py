@@ -27,7 +27,7 @@ class BodyFigures:
 
 
 @dataclass(frozen=True)
-class Side:
+class ModelFigures:
     """The figures of one model: before or after.
 
     Attributes
@@ -53,8 +53,8 @@ class Side:
 class Gain:
     """Before and after an extension."""
 
-    before: Side
-    after: Side
+    before: ModelFigures
+    after: ModelFigures
 
     @property
     def shift(self) -> Floats:
@@ -64,11 +64,11 @@ class Gain:
 
 def measure_gain(before: Hypothesis, after: Hypothesis, executor: Executor | None = None) -> Gain:
     """Compare two hypotheses on the same recordings; an executor refits them without each of the recordings at once."""
-    first = _side(before, executor)
-    return Gain(first, first if after is before else _side(after, executor))
+    first = _figures(before, executor)
+    return Gain(first, first if after is before else _figures(after, executor))
 
 
-def _side(hypothesis: Hypothesis, executor: Executor | None) -> Side:
+def _figures(hypothesis: Hypothesis, executor: Executor | None) -> ModelFigures:
     fit = hypothesis.fit
     posterior = fit.posterior
     whole, there = fit.view.values, fit.view.mask
@@ -77,7 +77,7 @@ def _side(hypothesis: Hypothesis, executor: Executor | None) -> Side:
         for c, name in enumerate(posterior.model.channels.names)
         if there[..., c].any()
     }
-    return Side(
+    return ModelFigures(
         fit.chi2 / posterior.samples,
         _held_out(hypothesis, executor) if len(posterior.manoeuvres) > 1 else None,
         rms,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as sla
@@ -19,11 +20,9 @@ from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.search.hypothesis import Hypothesis
 from bayesid.inference.residual_view import by_recording
 
-__all__ = ["ChosenEvents", "EventCandidates", "Held"]
+__all__ = ["ChosenEvents", "EventCandidates", "Taken"]
 
-INSTANTS = 80
-"""Instants per recording at which a torque may set in."""
-
+INSTANTS = 80  # per recording, at which a torque may set in
 DECAYS = (1.0 / 160.0, 1.0 / 40.0, 1.0 / 10.0, np.inf)
 """Times in which it falls to 1/e, relative to the length of the recording; the last stays."""
 
@@ -33,38 +32,32 @@ GRID = np.array([(k / INSTANTS, decay) for decay in DECAYS for k in range(INSTAN
 FINER, REFINED = 4, 8
 """Parts into which the interval of the grid is divided about the chosen events, and how many of these are refined."""
 
-MOST = 30
-"""Most events of all recordings."""
-
-ANOTHER = 0.5
-"""Prior probability of one more event."""
-
-DECADES = 4.0
-"""Decades over which the size of an event is log-uniform below its bound."""
-
-NODES = 25
-"""Nodes of the average over the size."""
+MOST = 30  # events of all recordings
+ANOTHER = 0.5  # prior probability of one more event
+DECADES = 4.0  # over which the size of an event is log-uniform below its bound
+NODES = 25  # of the average over the size
 
 
-@dataclass(frozen=True)
-class Held:
-    """Columns that are part of the disturbance already, at the most probable deviations of their amplitudes.
+class Taken(NamedTuple):
+    """What columns that are part of the disturbance already take of the candidates' information and score.
+
+    They do so at the most probable deviations of their amplitudes (`GaussianBlock`).
 
     Attributes
     ----------
     share : (h, c) array
-        Root of what they take of the information on the candidates' amplitudes: ``share' share``.
+        Root of what is taken of the information on the candidates' amplitudes: ``share' share``.
     pull : (h,) array
-        What they take of the candidates' score: ``share' pull``.
+        What is taken of the candidates' score: ``share' pull``.
     """
 
     share: Floats
     pull: Floats
 
     @staticmethod
-    def nothing(columns: int) -> Held:
-        """Return what holds nothing, for a number of candidates' columns."""
-        return Held(np.zeros((0, columns)), np.zeros(0))
+    def nothing(columns: int) -> Taken:
+        """Return what nothing takes of a number of candidates' columns."""
+        return Taken(np.zeros((0, columns)), np.zeros(0))
 
 
 @dataclass(frozen=True)
@@ -184,21 +177,21 @@ class EventCandidates:
         ]
         return np.unique(near, axis=0)
 
-    def chosen(self, held: Held) -> ChosenEvents:
-        """Choose events beside what is held, one by one."""
+    def chosen(self, taken: Taken) -> ChosenEvents:
+        """Choose events beside what is part of the disturbance already, one by one."""
         cost = float(np.log(self.among / ANOTHER))
         places: list[int] = []
         deviations: list[float] = []
         total = 0.0
         while len(places) < MOST:
-            gain = self._gains(held)[0]
+            gain = self._gains(taken)[0]
             averaged = logsumexp(gain, axis=1) - np.log(NODES)
             averaged[places] = -np.inf
             best = int(np.argmax(averaged))
             if averaged[best] < cost:
                 break
             deviation = float(self._scales[int(np.argmax(gain[best]))])
-            held = self._holding(held, best, deviation)
+            taken = self._with(taken, best, deviation)
             places.append(best)
             deviations.append(deviation)
             total += float(averaged[best]) - cost
@@ -206,16 +199,14 @@ class EventCandidates:
 
     def like(self, others: EventCandidates, events: ChosenEvents) -> ChosenEvents:
         """Return events that were chosen among other candidates by their places among these."""
+        within = len(others.shapes)
         places = []
         for place in events.places:
-            alike = (self.recording == others.recording[place]) & np.tile(
-                (self.shapes == others.shapes[place % len(others.shapes)]).all(axis=1),
-                len(self.recording) // len(self.shapes),
-            )
-            places.append(int(np.flatnonzero(alike)[0]))
+            alike = (self.shapes == others.shapes[place % within]).all(axis=1)
+            places.append(int(others.recording[place]) * len(self.shapes) + int(np.flatnonzero(alike)[0]))
         return replace(events, places=tuple(places))
 
-    def averaged(self, held: Held, events: ChosenEvents) -> list[tuple[int, Floats, Floats]]:
+    def averaged(self, taken: Taken, events: ChosenEvents) -> list[tuple[int, Floats, Floats]]:
         """Average each of the chosen events over all shapes, the others as chosen.
 
         Returns
@@ -225,10 +216,10 @@ class EventCandidates:
         """
         found = []
         for place in events.places:
-            beside = held
+            beside = taken
             for other, deviation in zip(events.places, events.deviations[::3], strict=True):
                 if other != place:
-                    beside = self._holding(beside, other, float(deviation))
+                    beside = self._with(beside, other, float(deviation))
             gain, vectors, along, visible = self._gains(beside)
             own = np.flatnonzero(self.recording == self.recording[place])
             weights = np.exp(gain[own] - logsumexp(gain[own]))
@@ -248,11 +239,11 @@ class EventCandidates:
     def _scales(self) -> Floats:
         return self.largest * 10.0 ** np.linspace(-DECADES, 0.0, NODES)
 
-    def _gains(self, held: Held) -> tuple[Floats, Floats, Floats, Floats]:
+    def _gains(self, taken: Taken) -> tuple[Floats, Floats, Floats, Floats]:
         """Return the log evidence of each event at each scale, (e, t), and what its amplitudes' mean follows from."""
-        part = held.share.reshape(len(held.share), len(self.recording), 3)
+        part = taken.share.reshape(len(taken.share), len(self.recording), 3)
         values, vectors = np.linalg.eigh(self._blocks - np.einsum("hea,heb->eab", part, part))
-        score = (self.score - held.share.T @ held.pull).reshape(-1, 3)
+        score = (self.score - taken.share.T @ taken.pull).reshape(-1, 3)
         visible = np.maximum(values, 0.0)[:, None] * self._scales[:, None] ** 2  # (e, t, 3)
         along = np.einsum("eab,ea->eb", vectors, score)[:, None] * self._scales[:, None]
         gain = 0.5 * (along**2 / (1.0 + visible) - np.log1p(visible)).sum(axis=-1)
@@ -264,14 +255,13 @@ class EventCandidates:
         each = np.arange(len(self.recording))
         return self.matrix.reshape(len(each), 3, -1, 3)[each, :, each]
 
-    def _holding(self, held: Held, place: int, deviation: float) -> Held:
-        """Return what is held with one more event."""
+    def _with(self, taken: Taken, place: int, deviation: float) -> Taken:
+        """Return what is taken with one more event."""
         own = slice(3 * place, 3 * place + 3)
-        rest = self.matrix[own] - held.share[:, own].T @ held.share
-        score = self.score[own] - held.share[:, own].T @ held.pull
+        rest = self.matrix[own] - taken.share[:, own].T @ taken.share
+        score = self.score[own] - taken.share[:, own].T @ taken.pull
         block = GaussianBlock.of(rest[:, own], np.full(3, deviation))
-        more = block.share(np.column_stack([rest, score]))
-        return Held(np.concatenate([held.share, more[:, :-1]]), np.concatenate([held.pull, more[:, -1]]))
+        return Taken(np.concatenate([taken.share, block.share(rest)]), np.concatenate([taken.pull, block.share(score)]))
 
 
 def _courses(time: Floats, end: float, width: float, shapes: Floats) -> Floats:
