@@ -119,7 +119,7 @@ class _SizedBody:
 
     def starts(self, linear: Floats) -> list[Floats]:
         """Return starting points: the linear fit, (10,), where it has a mass, and light bodies in its direction."""
-        starts = []
+        starts: list[Floats] = []
         first = linear[1:4]
         length = float(np.linalg.norm(first))
         masses = [linear[0]] if linear[0] > self.lightest else []

@@ -242,7 +242,7 @@ class Gram:
         """
         own = self.columns(names)
         fitted = independent_directions(self.matrix[np.ix_(own, own)]).T @ self.score[own]
-        return float(np.sqrt(max(fitted @ fitted - len(fitted), 0.0)))
+        return float(np.sqrt(max(float(fitted @ fitted) - len(fitted), 0.0)))
 
     def null_scores(self, rng: np.random.Generator, draws: int) -> Floats:
         """Draw scores of a model that lacks nothing, shape (draws, m): normal with covariance ``A``.
@@ -273,7 +273,7 @@ class Gram:
             root = np.linalg.cholesky(scaled)
         except np.linalg.LinAlgError:
             values, vectors = np.linalg.eigh(scaled)
-            root = np.linalg.qr((vectors * np.sqrt(np.maximum(values - JITTER, 0.0))).T, mode="r").T
+            root = np.transpose(np.linalg.qr((vectors * np.sqrt(np.maximum(values - JITTER, 0.0))).T, mode="r"))
         root *= length[:, None]
         return root
 
