@@ -16,7 +16,7 @@ from bayesid.diagnosis.candidates.mass_shift_signatures import mass_shift_signat
 from bayesid.diagnosis.candidates.signature_bank import Signatures
 from bayesid.diagnosis.candidates.signature_products import SignatureProducts
 from bayesid.diagnosis.candidates.vibration_signatures import PAIRS, slosh_entries
-from bayesid.diagnosis.evidence.body_evidence import MissingBodyPrior, body_log_evidence, outer_moments, rigid_moments
+from bayesid.diagnosis.evidence.body_evidence import MissingBody, outer_moments, rigid_moments
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
@@ -119,19 +119,20 @@ def test_coupling_of_slosh_is_linear_in_the_moments_of_its_mass():
 @pytest.mark.parametrize("moments", [outer_moments, rigid_moments])
 def test_evidence_of_a_body_is_that_of_a_sum_over_its_prior(moments):
     rng = np.random.default_rng(1)
-    prior = MissingBodyPrior(0.05, 20.0, 2.0)
+    lightest, body = 0.05, MissingBody(20.0, 2.0, (0.0,), moments)
+    mean = np.array([0.5 * np.log(lightest * body.heaviest), 0.0, 0.0, 0.0])
+    sd = np.array([np.log(body.heaviest / lightest) / np.sqrt(12.0), *[0.5 * body.reach] * 3])
     columns = rng.normal(size=(40, 10)) * np.array([1.0, *[2.0] * 3, *[3.0] * 6])
     true = moments(np.array([np.log(1.5), 0.4, -0.3, 0.2]))
     residual = rng.normal(size=40) - columns @ true
     matrix, score = columns.T @ columns, columns.T @ residual
-    draws = prior.mean + prior.sd * rng.normal(size=(100_000, 4))
+    draws = mean + sd * rng.normal(size=(100_000, 4))
     values = np.array([moments(theta) for theta in draws])
     logs = -values @ score - 0.5 * np.einsum("ni,ij,nj->n", values, matrix, values)
     expected = float(np.log(np.mean(np.exp(logs - logs.max()))) + logs.max())
-    start = -np.linalg.solve(matrix, score)
-    laplace = body_log_evidence(matrix, score, prior, moments, start)
+    laplace = body.log_evidence(matrix, score, lightest)
     assert laplace == pytest.approx(expected, abs=0.5)  # the moments are not linear in the place
-    assert body_log_evidence(matrix, -score, prior, moments, -start) < expected - 10.0  # a body has no negative mass
+    assert body.log_evidence(matrix, -score, lightest) < expected - 10.0  # a body has no negative mass
 
 
 def test_forms_of_a_cause_are_averaged_and_what_is_fixed_has_no_freedom():
