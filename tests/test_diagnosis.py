@@ -21,7 +21,7 @@ from bayesid.diagnosis.noise.noise_tests import chi2_log_sf
 from bayesid.diagnosis.outcome.gain import measure_gain
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.search.extended_model import extended_start
-from bayesid.diagnosis.search.left_beside import LeftBeside
+from bayesid.diagnosis.search.linearisation import Remaining
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create
@@ -66,11 +66,11 @@ def test_refits_without_a_recording_run_on_any_executor(wheel):
 
 @pytest.mark.parametrize("names", [(), ("wheel-momentum",), ("accel-scale", "disturbing torque", "rate-bias")])
 def test_what_a_set_leaves_of_columns_is_what_the_gram_of_all_leaves(wheel, names):
-    point = wheel.weighed.states[0].point
+    point = wheel.search.searches[0].point
     forms = point.evidence.forms(names)
     leak = point.evidence.causes["thruster-leak"].groups
     expected = point.evidence.beside(names, forms, [group.name for group in leak])
-    left = LeftBeside.of(point, names, forms)
+    left = Remaining.of(point, names, forms)
     for item in point.bank.signatures:
         if item.name in expected.groups:
             own = expected.groups[item.name]

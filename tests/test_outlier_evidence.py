@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesid.diagnosis.noise.noise_states import FaultyFit, faulty_fit
+from bayesid.diagnosis.noise.noise_model import NoiseModel
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.inference.posterior import Posterior
 from tests.conftest import SIGMA
@@ -26,8 +26,8 @@ def test_outliers_cost_what_their_density_says(planar_case, size):
     garbled = replace(manoeuvre, recording=replace(manoeuvre.recording, channels=channels))
     perturbed = PerturbedModel(Posterior.of(posterior.model, [garbled], step=posterior.step))
     fit = perturbed.fit()
-    declared = FaultyFit((), perturbed, fit, 0.0, False)
-    found = faulty_fit("outliers:accel", fit, declared, fit.log_evidence)
+    declared = NoiseModel((), perturbed, fit)
+    found = declared.with_fault("outliers:accel", fit, fit.log_evidence)
     mask = found.perturbed.posterior.data.left_out[0]
     assert mask.sum() == 2
     gone = fit.residual.reshape(fit.posterior.residual_shape)[0, : len(mask)][mask]

@@ -105,7 +105,7 @@ def weighed(result, *sets: tuple[tuple[str, ...], str | None, float]):
         result.probabilities.generics,
         CausePrior(),
     )
-    return replace(result, weighed=replace(result.weighed, probabilities=found))
+    return replace(result, search=replace(result.search, probabilities=found))
 
 
 @pytest.fixture(scope="module")
@@ -608,12 +608,12 @@ def test_the_most_probable_sets_have_sizes_beside_their_bounds(biased):
 
 def test_a_size_beyond_its_bound_is_called_so_and_nothing_has_none(biased):
     small = {"accel-bias": tuple(replace(item, largest=1e-6) for item in biased.bounds["accel-bias"])}
-    state = biased.weighed.states[0]
+    state = biased.search.searches[0]
     causes = [cause.rescaled(state.point.evidence.gram, 1e-6 / 0.049) for cause in state.point.evidence.causes.values()]
     evidence = type(state.point.evidence)(state.point.evidence.gram, causes)
     states = (replace(state, point=replace(state.point, evidence=evidence)),)
     result = weighed(biased, (("accel-bias",), None, 9.0))
-    result = replace(result, bounds=small, weighed=replace(result.weighed, states=states))
+    result = replace(result, bounds=small, search=replace(result.search, searches=states))
     named, nothing = set_rows(result, 2)
     assert named[4] == "10⁻⁶ m/s²" or named[4] == "1 × 10⁻⁶ m/s²"
     assert named[5].endswith(", beyond it")

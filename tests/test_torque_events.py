@@ -13,7 +13,7 @@ from bayesid.diagnosis.candidates.generic_signatures import generic_signatures
 from bayesid.diagnosis.outcome.disturbance import Frame, disturbing_wrench
 from bayesid.diagnosis.outcome.torque_events import EventCandidates, Taken
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from studies.truth import hidden_causes

@@ -15,7 +15,7 @@ from bayesid.diagnosis.evidence.verdict import ProbableVerdict
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead, read_torques, torques_beside
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.response.present_fit import fit_present_model
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import JointFriction, TorqueBias, WheelMomentum
 from bayesid.simulation.joint_torques import TorqueSensor

@@ -10,7 +10,7 @@ from bayesid.diagnosis.outcome.disturbance import DisturbingWrench, Frame
 from bayesid.diagnosis.outcome.gain import Gain
 from bayesid.diagnosis.outcome.torque_reading import TorqueCause, TorqueReading, TorquesNotRead
 from bayesid.diagnosis.result import Diagnosis
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
 
 __all__ = [
     "Candidate",

@@ -22,10 +22,10 @@ from bayesid.diagnosis.response.followed_motion import step_along_data, without_
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.response.present_fit import fit_present_model
 from bayesid.diagnosis.result import Diagnosis
-from bayesid.diagnosis.search.cause_weighing import weigh_causes
-from bayesid.diagnosis.search.hypothesis import Hypothesis
-from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
-from bayesid.diagnosis.search.left_over import with_left_over
+from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.search.linearisation import Catalogue
+from bayesid.diagnosis.search.misfit import with_misfit
+from bayesid.diagnosis.search.model_search import search_models
 from bayesid.inference import Identification, identify
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
@@ -119,26 +119,28 @@ def _diagnose(
     present = fit_present_model(perturbed, first.fit.z)
     before = Hypothesis(perturbed, present.fit)
     clock.ends("fit")
-    weighed = weigh_causes(perturbed, before.fit, catalogue, limits, prior, rng, progress, held=present.held)
+    search = search_models(
+        perturbed, before.fit, Catalogue(tuple(catalogue), limits, prior), rng, progress, bodies_fixed=present.held
+    )
     progress(0.65, "fitting the most probable causes")
-    weighed, fitted = with_left_over(weighed, catalogue)
-    classes = weighed.classes()
-    sensitivity = verdict_sensitivity(weighed.probabilities, classes, weighed.alarm.silent, weighed.widened)
+    search, fitted = with_misfit(search, catalogue)
+    classes = search.classes()
+    sensitivity = verdict_sensitivity(search.probabilities, classes, search.alarm.silent, search.widened)
     verdict = sensitivity.verdict
     clock.ends("verdict")
     named = list(verdict.causes)
     progress(0.7, "fitting the extended model")
     after = before
     if named:
-        after = fitted.get(frozenset(named)) or fit_hypothesis(weighed.state(named), named, catalogue)
+        after = fitted.get(frozenset(named)) or search.under(named).fit(named, catalogue)
     progress(0.75, "measuring the gain")
     gain = measure_gain(before, after, executor)
     progress(0.85, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
-    lacking = Hypothesis(perturbed, without_torque(weighed.base.fit)) if present.held else before
-    disturbance = disturbing_wrench(lacking, weighed.base.bank, open_question)
-    unexplained = disturbing_wrench(after, weighed.state(named).point.bank, False) if named else disturbance
-    table = candidate_table(weighed, catalogue, rng)
+    lacking = Hypothesis(perturbed, without_torque(search.base.fit)) if present.held else before
+    disturbance = disturbing_wrench(lacking, search.base.bank, open_question)
+    unexplained = disturbing_wrench(after, search.under(named).point.bank, False) if named else disturbance
+    table = candidate_table(search, catalogue, rng)
     torques: TorqueReading | TorquesNotRead | None = None
     if whole.torque is not None:
         progress(0.95, "reading the joint torques")
@@ -147,7 +149,7 @@ def _diagnose(
     return Diagnosis(
         before,
         after,
-        weighed,
+        search,
         classes,
         sensitivity,
         table,

@@ -26,10 +26,9 @@ from bayesid.diagnosis.outcome.model_change import (
     strongest_recording,
 )
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead
-from bayesid.diagnosis.search.cause_weighing import WeighedCauses
 from bayesid.diagnosis.search.extended_model import extended_posterior, extended_start
-from bayesid.diagnosis.search.hypothesis import Hypothesis
-from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.search.model_search import ModelSearch
 from bayesid.inference import Identification
 from bayesid.inference.body_quantities import quantity
 from bayesid.inference.posterior import Posterior
@@ -59,7 +58,7 @@ class Diagnosis:
         The present model.
     after : Hypothesis
         The extended model; the present one where nothing is named.
-    weighed : WeighedCauses
+    search : ModelSearch
         Every set of causes with its probability.
     classes : tuple of tuples of str
         Causes that change the model in the same way.
@@ -85,7 +84,7 @@ class Diagnosis:
 
     before: Hypothesis
     after: Hypothesis
-    weighed: WeighedCauses
+    search: ModelSearch
     classes: tuple[tuple[str, ...], ...]
     sensitivity: VerdictSensitivity
     candidates: list[Candidate]
@@ -106,22 +105,22 @@ class Diagnosis:
     @property
     def probabilities(self) -> SetProbabilities:
         """Probabilities of all sets."""
-        return self.weighed.probabilities
+        return self.search.probabilities
 
     @property
     def alarm(self) -> FamilyAlarm:
         """Whether data hold more than the declared noise."""
-        return self.weighed.alarm
+        return self.search.alarm
 
     @property
     def held(self) -> bool:
         """Whether every fit of the present model diverged, so that its bodies stay at their prior's centre."""
-        return self.weighed.base.held
+        return self.search.base.bodies_fixed
 
     @property
     def evidence(self) -> SetEvidence:
         """Evidence of sets of causes about the present model's fit."""
-        return self.weighed.base.evidence
+        return self.search.base.evidence
 
     @property
     def alternatives(self) -> tuple[tuple[str, ...], ...]:
@@ -237,11 +236,11 @@ class Diagnosis:
 
     def sizes_of(self, cause_set: CauseSet) -> list[GroupSize]:
         """Return the sizes of all causes of a set beside their bounds, by cause and group of amplitudes."""
-        return group_sizes(cause_set, self.weighed.state(cause_set.causes), self.bounds, self.candidates)
+        return group_sizes(cause_set, self.search.under(cause_set.causes), self.bounds, self.candidates)
 
     def fitted(self, causes: Sequence[str]) -> Hypothesis:
         """Fit the present model with some causes of the catalogue."""
-        return fit_hypothesis(self.weighed.state(causes), causes, self.effects) if causes else self.before
+        return self.search.under(causes).fit(causes, self.effects) if causes else self.before
 
     def to_dict(self, identification: Identification | None = None) -> dict[str, Any]:
         """Return the content of diagnosis.json.

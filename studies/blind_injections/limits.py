@@ -101,7 +101,7 @@ def _naming(
     and white noise, whose scores are normal with the Gram as covariance. The decision is the verdict on the
     probabilities of all sets of causes and generic candidates under the prior, the alarm apart.
     """
-    base = result.weighed.base
+    base = result.search.base
     evidence = base.evidence
     if not all(cause in evidence.causes for cause in causes):
         return None

@@ -9,7 +9,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.mass_shift_signatures import jump_signatures, sample_intervals
 from bayesid.diagnosis.response.effect_functions import CauseAmplitude
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.residual_view import rows_of
 from bayesid.simulation.effects.effect import Quantity
 from bayesid.simulation.effects.mass_shift import MassShift

@@ -26,8 +26,7 @@ from bayesid.diagnosis.candidates.vibration_signatures import (
 from bayesid.diagnosis.evidence.scale_integral import GroupSpectrum, log_evidences
 from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
-from bayesid.diagnosis.search.left_beside import LeftBeside
-from bayesid.diagnosis.search.linearisation import Linearisation
+from bayesid.diagnosis.search.linearisation import Linearisation, Remaining
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
@@ -117,7 +116,7 @@ def _tuned(
     """Return the bank of one vibration with the cells of its best tones resolved."""
     evidence = point.evidence
     cause, forms = evidence.causes[effect.label], evidence.forms(others)
-    left = LeftBeside.of(point, others, forms)
+    left = Remaining.of(point, others, forms)
     tried: dict[Tone, _Tried] = {}
 
     def value(log_frequency: float, damping: float) -> float:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bayesid.diagnosis.evidence.evidence_alarm import FAMILY_LEVEL, EvidenceAlarm
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.noise.encoder_fault import encoder_test
 from bayesid.diagnosis.noise.noise_tests import noise_tests, variance_tests
 from bayesid.diagnosis.response.perturbed_model import Fit
-from bayesid.diagnosis.search.linearisation import Linearisation
 
 __all__ = ["FamilyAlarm"]
 
@@ -34,11 +34,22 @@ class FamilyAlarm:
     level: float = FAMILY_LEVEL
 
     @staticmethod
-    def of(point: Linearisation, fit: Fit, rng: np.random.Generator, draws: int = 2000) -> FamilyAlarm:
-        """Test the present model: candidates by its linearisation, the noise by its fit."""
-        posterior = point.perturbed.posterior
+    def of(evidence: SetEvidence, fit: Fit, rng: np.random.Generator, draws: int = 2000) -> FamilyAlarm:
+        """Test the present model: candidates by their evidence, the noise by the residual of the fit.
+
+        Parameters
+        ----------
+        evidence : SetEvidence
+            Of all candidates about the fit.
+        fit : Fit
+            Of the present model.
+        rng : Generator
+        draws : int
+            Simulated studies without any cause.
+        """
+        posterior = fit.posterior
         tests = noise_tests(posterior, fit) | variance_tests(posterior, fit) | encoder_test(posterior)
-        return FamilyAlarm(EvidenceAlarm.of(point.evidence, rng, draws), tests)
+        return FamilyAlarm(EvidenceAlarm.of(evidence, rng, draws), tests)
 
     @property
     def candidates_level(self) -> float:

@@ -21,7 +21,7 @@ from bayesid.inference.residual_view import ResidualView
 from bayesid.simulation.effects.effect_parameters import Quantity
 from bayesid.simulation.sensors import Coloured, Quantised, Scaled, Sensor, SensorKind
 
-__all__ = ["SUMMARIES", "NoiseFault", "noise_fault", "refined"]
+__all__ = ["SUMMARIES", "FittedFault", "noise_fault", "refined"]
 
 OUTLYING = 4.5
 """Whitened residual from which a sample counts as an outlier."""
@@ -46,7 +46,7 @@ SUMMARIES = {
 
 
 @dataclass(frozen=True)
-class NoiseFault:
+class FittedFault:
     """A fault of a sensor's noise, with its size estimated from a residual.
 
     Attributes
@@ -76,7 +76,7 @@ class NoiseFault:
         return SUMMARIES.get(name, SUMMARIES["noise"])
 
 
-def noise_fault(label: str, fit: Fit, least: float = -np.inf) -> NoiseFault | None:
+def noise_fault(label: str, fit: Fit, least: float = -np.inf) -> FittedFault | None:
     """Estimate a noise fault from the residual of a fit and put it into the fit's posterior; None if it is no such.
 
     Parameters
@@ -98,27 +98,27 @@ def noise_fault(label: str, fit: Fit, least: float = -np.inf) -> NoiseFault | No
     return _understated(label, SensorKind.of(name.removesuffix("-noise")), fit)
 
 
-def _understated(label: str, kind: SensorKind, fit: Fit) -> NoiseFault:
+def _understated(label: str, kind: SensorKind, fit: Fit) -> FittedFault:
     residual, taken = fit.view.pooled(kind), ResidualView.of(fit.posterior, leverage(fit)).pooled(kind)
     energy, degrees = float((residual**2).sum()), float(len(residual) - taken.sum())
     factor = float(np.sqrt(energy / degrees))
     posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Scaled(s.noise, (factor,) * kind.size)))
-    return NoiseFault(
+    return FittedFault(
         label, (Quantity("factor", "1"),), np.array([factor]), np.array([factor / np.sqrt(2.0 * degrees)]), posterior
     )
 
 
-def _encoders(fit: Fit) -> NoiseFault | None:
+def _encoders(fit: Fit) -> FittedFault | None:
     found = encoder_noise(fit.posterior)
     if found is None:
         return None
     factor, relative = float(np.sqrt(found.ratio)), float(np.sqrt(0.5 / found.degrees))
     posterior, size = with_encoder_noise(fit.posterior, factor, fit.z), np.array([factor])
     quantities = (Quantity("factor", "1"),)
-    return NoiseFault(ENCODER_NOISE, quantities, size, size * relative, posterior, found.log_gain(factor))
+    return FittedFault(ENCODER_NOISE, quantities, size, size * relative, posterior, found.log_gain(factor))
 
 
-def _coloured(label: str, kind: SensorKind, fit: Fit, least: float) -> NoiseFault | None:
+def _coloured(label: str, kind: SensorKind, fit: Fit, least: float) -> FittedFault | None:
     spectra = _Spectra.of(fit, kind)
     shortest, longest = 0.2 * float(spectra.interval.min()), _longest(fit, kind)
 
@@ -197,16 +197,16 @@ def _longest(fit: Fit, kind: SensorKind) -> float:
 
 def _coloured_at(
     label: str, kind: SensorKind, fit: Fit, logs: Floats, relative: Floats, like: Posterior | None = None
-) -> NoiseFault:
+) -> FittedFault:
     """Coloured noise with the logarithms of its level, in sigma, and of its correlation time."""
     level, time = np.exp(logs[0]) * fit.posterior.data.sigma(0, kind), float(np.exp(logs[1]))
     noise = Coloured(tuple(level.tolist()), time)
     posterior = _with_sensor(fit, kind, lambda s: replace(s, coloured=noise), like)
     mean = np.array([float(level.mean()), time])
-    return NoiseFault(label, (Quantity("sigma", kind.unit), Quantity("time", "s")), mean, mean * relative, posterior)
+    return FittedFault(label, (Quantity("sigma", kind.unit), Quantity("time", "s")), mean, mean * relative, posterior)
 
 
-def refined(fault: NoiseFault, perturbed: PerturbedModel, fit: Fit) -> NoiseFault:
+def refined(fault: FittedFault, perturbed: PerturbedModel, fit: Fit) -> FittedFault:
     """Maximise the evidence over the size of coloured noise; other faults are returned as they are.
 
     The first estimate comes from a residual out of which the fit has taken slow waves, and is too small.
@@ -247,7 +247,7 @@ def _spread(points: Floats, values: Floats, otherwise: Floats) -> Floats:
     return np.sqrt(np.diag(np.linalg.inv(hessian)))
 
 
-def _outliers(label: str, kind: SensorKind, fit: Fit) -> NoiseFault | None:
+def _outliers(label: str, kind: SensorKind, fit: Fit) -> FittedFault | None:
     slot, whole = fit.posterior.model.channels.of(kind), fit.view.values
     masks = []
     outlying: list[Floats] = []
@@ -267,17 +267,17 @@ def _outliers(label: str, kind: SensorKind, fit: Fit) -> NoiseFault | None:
     count, total = sum(map(len, outlying)), sum(map(len, measured))
     fraction = count / max(total, 1)
     sd = np.sqrt(max(fraction * (1.0 - fraction), 1.0 / max(total, 1)) / max(total, 1))
-    return NoiseFault(
+    return FittedFault(
         label, (Quantity("fraction", "1"),), np.array([fraction]), np.array([sd]), leaving_out(fit.posterior, masks)
     )
 
 
-def _quantisation(label: str, kind: SensorKind, fit: Fit) -> NoiseFault:
+def _quantisation(label: str, kind: SensorKind, fit: Fit) -> FittedFault:
     step = lattice(fit.posterior, kind)
     if step is None:
         raise ValueError(f"{label}: the values lie on no lattice")
     posterior = _with_sensor(fit, kind, lambda s: replace(s, noise=Quantised(s.noise, tuple(step.tolist()))))
-    return NoiseFault(label, (Quantity("step", kind.unit),), np.array([float(step.mean())]), np.zeros(1), posterior)
+    return FittedFault(label, (Quantity("step", kind.unit),), np.array([float(step.mean())]), np.zeros(1), posterior)
 
 
 def _with_sensor(

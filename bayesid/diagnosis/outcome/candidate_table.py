@@ -16,8 +16,8 @@ from bayesid.diagnosis.evidence.evidence_alarm import FAMILY_LEVEL, EvidenceAlar
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.response.effect_functions import CauseAmplitude, report_of, report_slopes
-from bayesid.diagnosis.search.cause_weighing import WeighedCauses
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.search.model_search import ModelSearch
 from bayesid.simulation.effects.effect import Effect, Quantity
 
 __all__ = [
@@ -73,19 +73,19 @@ class Candidate:
     generic: bool = False
 
 
-def candidate_table(weighed: WeighedCauses, effects: Sequence[Effect], rng: np.random.Generator) -> list[Candidate]:
+def candidate_table(search: ModelSearch, effects: Sequence[Effect], rng: np.random.Generator) -> list[Candidate]:
     """Return every candidate, the most probable first, then by Bayes factor.
 
     Parameters
     ----------
-    weighed : WeighedCauses
+    search : ModelSearch
     effects : sequence of Effect
         Candidates of the catalogue.
     rng : Generator
         For the power.
     """
-    evidence, alarm = weighed.base.evidence, weighed.alarm
-    inclusion, p_values = weighed.probabilities.inclusion, alarm.log_p_values()
+    evidence, alarm = search.base.evidence, search.alarm
+    inclusion, p_values = search.probabilities.inclusion, alarm.log_p_values()
     quantities = _quantities(effects)
     rows = []
     for name, cause in evidence.causes.items():
@@ -105,7 +105,7 @@ def candidate_table(weighed: WeighedCauses, effects: Sequence[Effect], rng: np.r
                 cause.generic,
             )
         )
-    rows += [_noise(name, weighed) for name in alarm.noise if name in inclusion]
+    rows += [_noise(name, search) for name in alarm.noise if name in inclusion]
     return sorted(rows, key=lambda row: (-round(row.probability, 6), -_factor(row), row.name))
 
 
@@ -136,19 +136,19 @@ def _quantities(effects: Sequence[Effect]) -> dict[str, tuple[Quantity, ...]]:
     return found
 
 
-def _noise(name: str, weighed: WeighedCauses) -> Candidate:
+def _noise(name: str, search: ModelSearch) -> Candidate:
     """Return a fault of the noise, with its size where it was weighed."""
-    local, adjusted = weighed.alarm.log_p_values()[name]
-    state = next((state for state in weighed.states if name in state.names), None)
-    fault = None if state is None else next(fault for fault in state.faults if fault.label == name)
+    local, adjusted = search.alarm.log_p_values()[name]
+    under = next((each for each in search.searches if name in each.noise.names), None)
+    fault = None if under is None else next(fault for fault in under.noise.faults if fault.label == name)
     mean, sd = (np.zeros(0), np.zeros(0)) if fault is None else (fault.mean, fault.sd)
     return Candidate(
         name,
-        weighed.probabilities.inclusion[name],
+        search.probabilities.inclusion[name],
         float(max(stats.norm.isf(np.exp(max(local, -700.0))), 0.0)),
         float(np.exp(local)),
         float(np.exp(adjusted)),
-        None if state is None else state.log_nothing - weighed.states[0].log_nothing,
+        None if under is None else under.log_nothing - search.searches[0].log_nothing,
         () if fault is None else fault.quantities,
         mean,
         sd,

@@ -13,10 +13,10 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.evidence.cause_sets import CauseSet
 from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup
-from bayesid.diagnosis.noise.noise_states import NoiseState
 from bayesid.diagnosis.outcome.candidate_table import Candidate
 from bayesid.diagnosis.response.effect_functions import report_of, report_slopes
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.search.relinearise import SetSearch
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 __all__ = ["Z95", "GroupSize", "VectorSize", "group_sizes", "vector_size"]
@@ -160,7 +160,7 @@ class GroupSize:
 
 def group_sizes(
     cause_set: CauseSet,
-    state: NoiseState,
+    search: SetSearch,
     bounds: Mapping[str, Sequence[PhysicalBound]],
     candidates: Sequence[Candidate],
 ) -> list[GroupSize]:
@@ -169,17 +169,19 @@ def group_sizes(
     Parameters
     ----------
     cause_set : CauseSet
-    state : NoiseState
-        State of the noise in the set.
+    search : SetSearch
+        Under the noise of the set.
     bounds : mapping of str to sequence of PhysicalBound
         Bounds of each cause, for their units.
     candidates : sequence of Candidate
         All candidates, for the units of those without stated bounds.
     """
-    evidence = state.point.evidence
+    evidence = search.point.evidence
     ordered = sorted(name for name in cause_set.names if name in evidence.causes)
-    sizes = [_of_fault(fault.label, fault.mean[0], fault.quantities[0]) for fault in state.faults]
-    rest = [GroupSize(name) for name in cause_set.names if name not in evidence.causes and name not in state.names]
+    sizes = [_of_fault(fault.label, fault.mean[0], fault.quantities[0]) for fault in search.noise.faults]
+    rest = [
+        GroupSize(name) for name in cause_set.names if name not in evidence.causes and name not in search.noise.names
+    ]
     if not ordered:
         return sizes + rest
     forms = evidence.forms(ordered)

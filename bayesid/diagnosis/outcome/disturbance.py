@@ -19,7 +19,7 @@ from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
 from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidates, Taken
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.residual_view import by_recording
 
 __all__ = ["DisturbingWrench", "Frame", "TorqueCorrelation", "disturbing_wrench", "torque_correlations"]

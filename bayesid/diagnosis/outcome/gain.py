@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.response.perturbed_model import Fit
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.inference.noise_changes import leaving_out
 from bayesid.robot.inertial_parameters import PARAMETERS, mass_com_inertia

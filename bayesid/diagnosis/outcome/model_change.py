@@ -9,7 +9,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.outcome.gain import Gain
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of
 from bayesid.inference.contraction import half_range
 from bayesid.inference.posterior import Posterior

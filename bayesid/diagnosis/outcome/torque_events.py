@@ -17,7 +17,7 @@ from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.evidence.gram import GaussianBlock
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.residual_view import by_recording
 
 __all__ = ["ChosenEvents", "EventCandidates", "Taken"]

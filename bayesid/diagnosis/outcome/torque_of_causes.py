@@ -12,7 +12,7 @@ from jax import Array
 from bayesid._math.arrays import Floats
 from bayesid._math.on_device import on_device
 from bayesid.diagnosis.outcome.disturbance import WAVES, DisturbingWrench, Frame
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.instant import Instant
 

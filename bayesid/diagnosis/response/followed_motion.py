@@ -8,7 +8,6 @@ linear model says what each set of causes leaves where the torque is zero again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -16,17 +15,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.response.present_fit import bodies_frozen
-from bayesid.diagnosis.search.linearisation import Linearisation, linearise
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import Parameter
-from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.instant import Instant, Wrench
 
-__all__ = ["FollowingTorque", "follow", "linearise_along_data", "step_along_data", "without_torque"]
+__all__ = ["FollowingTorque", "follow", "step_along_data", "without_torque"]
 
 KNOTS = 32
 """Instants per recording and axis at which the torque is free."""
@@ -77,24 +73,6 @@ def follow(perturbed: PerturbedModel) -> Fit:
     found = frozen.fit([torque])
     whole = perturbed.fit([torque], found.coordinates, z=found.z, operating=found.operating, iterations=0)
     return replace(whole, converged=found.converged)
-
-
-def linearise_along_data(
-    perturbed: PerturbedModel, effects: Sequence[Effect], bounds: Mapping[str, Sequence[PhysicalBound]]
-) -> Linearisation:
-    """Linearise the model and all candidates about the motion that the data show, bodies held at their prior.
-
-    Parameters
-    ----------
-    perturbed, effects, bounds
-        As for `linearise`.
-    """
-    fit = follow(perturbed)
-    (torque,) = fit.effects
-    columns = fit.added[0] / fit.effects[0].parameters[0].sigma
-    return linearise(
-        perturbed, fit, effects, bounds, held=True, far=True, beside=SignatureBank((Signatures(torque.label, columns),))
-    )
 
 
 def step_along_data(posterior: Posterior) -> float:

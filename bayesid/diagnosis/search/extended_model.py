@@ -16,7 +16,7 @@ import numpy as np
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.response.perturbed_model import CLOSE
-from bayesid.diagnosis.search.hypothesis import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect

@@ -12,8 +12,8 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import CauseSet, Status, diagnose
 from bayesid.diagnosis.candidates.candidate_effects import candidates
 from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
-from bayesid.diagnosis.search import left_over
-from bayesid.diagnosis.search.left_over import LEFT_OVER, log_odds_of_anything, log_p_left, with_left_over
+from bayesid.diagnosis.search.misfit import UNNAMED, log_odds_of_anything, log_p_of_misfit, with_misfit
+from bayesid.diagnosis.search.relinearise import SetSearch
 from studies.truth import hidden_causes
 
 
@@ -47,32 +47,32 @@ def test_a_gear_with_backlash_is_called_unknown(backlash) -> None:
 
 def test_a_set_is_fitted_in_full_and_what_it_leaves_is_weighed(backlash) -> None:
     """A soft joint alone is made certain, and is then seen not to follow the data."""
-    weighed = backlash.weighed
-    found = weighed.probabilities
+    search = backlash.search
+    found = search.probabilities
     sure = next(item for item in found.sets if item.causes == ("joint-flexibility:joint2",) and item.generic is None)
     only = SetProbabilities.of([sure, CauseSet((), None, -1e3)], found.causes, found.generics, found.prior)
     assert only.unknown == 0.0
-    weighed, fitted = with_left_over(replace(weighed, probabilities=only), backlash.effects)
+    search, fitted = with_misfit(replace(search, probabilities=only), backlash.effects)
     (hypothesis,) = fitted.values()
-    assert log_p_left(hypothesis) < -20.0
+    assert log_p_of_misfit(hypothesis) < -20.0
     fit = hypothesis.fit
     assert stats.chi2.logsf(fit.chi2, fit.posterior.samples) < -20.0
-    assert weighed.probabilities.inclusion[LEFT_OVER] > 0.9
-    assert sum(item.probability for item in weighed.probabilities.sets) == pytest.approx(1.0)
+    assert search.probabilities.inclusion[UNNAMED] > 0.9
+    assert sum(item.probability for item in search.probabilities.sets) == pytest.approx(1.0)
 
 
 def test_a_set_with_which_nothing_moves_is_no_explanation(backlash, monkeypatch) -> None:
     def without_motion(*_: object) -> None:
         raise InputError("the simulation diverges")
 
-    monkeypatch.setattr(left_over, "fit_hypothesis", without_motion)
-    found = backlash.weighed.probabilities
+    monkeypatch.setattr(SetSearch, "fit", without_motion)
+    found = backlash.search.probabilities
     sure = [item for item in found.sets if len(item.causes) == 1 and item.generic is None]
     nothing = CauseSet((), None, min(item.log_evidence for item in sure) - 20.0)
     only = SetProbabilities.of([*sure, nothing], found.causes, found.generics, found.prior)
-    weighed, fitted = with_left_over(replace(backlash.weighed, probabilities=only), backlash.effects)
+    search, fitted = with_misfit(replace(backlash.search, probabilities=only), backlash.effects)
     assert not fitted
-    assert weighed.probabilities.unknown > 0.9
+    assert search.probabilities.unknown > 0.9
     most = max(item.log_evidence for item in sure)
-    assert [item.log_evidence for item in weighed.probabilities.sets if item.generic == LEFT_OVER] == [most]
-    assert sum(item.probability for item in weighed.probabilities.sets) == pytest.approx(1.0)
+    assert [item.log_evidence for item in search.probabilities.sets if item.generic == UNNAMED] == [most]
+    assert sum(item.probability for item in search.probabilities.sets) == pytest.approx(1.0)

@@ -11,15 +11,14 @@ from bayesid._io.errors import InputError
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.noise.noise_tests import noise_tests
 from bayesid.diagnosis.noise.structure_tests import structure_tests
-from bayesid.diagnosis.search.cause_weighing import WeighedCauses
 from bayesid.diagnosis.search.extended_model import exactly_fitted
-from bayesid.diagnosis.search.hypothesis import Hypothesis
-from bayesid.diagnosis.search.hypothesis_fit import fit_hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.search.model_search import ModelSearch
 from bayesid.simulation.effects.effect import Effect
 
-__all__ = ["LEFT_OVER", "log_odds_of_anything", "log_p_left", "with_left_over"]
+__all__ = ["UNNAMED", "log_odds_of_anything", "log_p_of_misfit", "with_misfit"]
 
-LEFT_OVER = "something beside the fitted causes"
+UNNAMED = "something beside the fitted causes"
 """Generic candidate that has no form: whatever the fitted causes leave."""
 
 MOST_FITS = 4
@@ -29,9 +28,7 @@ LIKELY = 0.05
 """Probability from which a set is fitted in full."""
 
 
-def with_left_over(
-    weighed: WeighedCauses, effects: Sequence[Effect]
-) -> tuple[WeighedCauses, dict[frozenset[str], Hypothesis]]:
+def with_misfit(search: ModelSearch, effects: Sequence[Effect]) -> tuple[ModelSearch, dict[frozenset[str], Hypothesis]]:
     """Fit the most probable sets of causes in full, and weigh that they do not suffice.
 
     The probabilities come from linear signatures. A set that does not follow the data once its effects are simulated
@@ -41,51 +38,52 @@ def with_left_over(
 
     Parameters
     ----------
-    weighed : WeighedCauses
+    search : ModelSearch
     effects : sequence of Effect
         Candidates of the catalogue.
 
     Returns
     -------
-    weighed : WeighedCauses
+    search : ModelSearch
         With such companions among the sets.
     fitted : dict of frozenset of str to Hypothesis
         Fits by the names of their causes.
     """
     fitted: dict[frozenset[str], Hypothesis] = {}
-    if weighed.alarm.silent:
-        return weighed, fitted
-    found = weighed.probabilities
-    generics = (*found.generics, LEFT_OVER)
+    if search.alarm.silent:
+        return search, fitted
+    found = search.probabilities
+    generics = (*found.generics, UNNAMED)
     found = SetProbabilities.of(found.sets, found.causes, generics, found.prior)
     for _ in range(MOST_FITS):
         known = (item for item in found.sets if item.causes and item.generic is None)
         best = next((item for item in known if frozenset(item.causes) not in fitted), None)
         if best is None or best.probability < LIKELY:
             break
+        under = search.under(best.causes)
         try:
-            hypothesis = fit_hypothesis(weighed.state(best.causes), best.causes, effects)
+            hypothesis = under.fit(best.causes, effects)
         except InputError:
             found = _without_motion(found, best)
             continue
-        if weighed.state(best.causes).point.far:
+        if under.point.far:
             hypothesis = exactly_fitted(hypothesis)
         fitted[frozenset(best.causes)] = hypothesis
-        more = log_odds_of_anything(log_p_left(hypothesis))
-        companion = CauseSet(best.causes, LEFT_OVER, best.log_evidence + more)
+        more = log_odds_of_anything(log_p_of_misfit(hypothesis))
+        companion = CauseSet(best.causes, UNNAMED, best.log_evidence + more)
         found = SetProbabilities.of([*found.sets, companion], found.causes, generics, found.prior)
-    return replace(weighed, probabilities=found), fitted
+    return replace(search, probabilities=found), fitted
 
 
 def _without_motion(found: SetProbabilities, refuted: CauseSet) -> SetProbabilities:
     """Return the probabilities where the evidence of one set speaks for something else alone."""
-    alone = [item for item in found.sets if item.names == (LEFT_OVER,)]
+    alone = [item for item in found.sets if item.names == (UNNAMED,)]
     others = [item for item in found.sets if item is not refuted and item not in alone]
     most = max(item.log_evidence for item in (refuted, *alone))
-    return SetProbabilities.of([*others, CauseSet((), LEFT_OVER, most)], found.causes, found.generics, found.prior)
+    return SetProbabilities.of([*others, CauseSet((), UNNAMED, most)], found.causes, found.generics, found.prior)
 
 
-def log_p_left(hypothesis: Hypothesis) -> float:
+def log_p_of_misfit(hypothesis: Hypothesis) -> float:
     """Return the logarithm of the p-value of the loudest test of the residual, for the number of tests."""
     tests = noise_tests(hypothesis.fit.posterior, hypothesis.fit) | structure_tests(hypothesis.fit)
     return min(0.0, min(tests.values()) + float(np.log(len(tests))))

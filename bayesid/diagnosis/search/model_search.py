@@ -1,0 +1,227 @@
+"""Probabilities of all sets of causes and of faults of the noise, alone and two together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bayesid._io.progress import Progress, silent
+from bayesid._math.memory import give_back_memory
+from bayesid.diagnosis.evidence.cause_sets import SetProbabilities, enumerate_sets
+from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.evidence.verdict import classes_of_equivalents
+from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
+from bayesid.diagnosis.noise.noise_model import NoiseModel, fault_names
+from bayesid.diagnosis.noise.noise_tests import noise_tests
+from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
+from bayesid.diagnosis.search.linearisation import Catalogue, Linearisation, linearise, linearise_along_data
+from bayesid.diagnosis.search.relinearise import SetSearch, plausible_vibrations, search_sets, with_fitted_vibrations
+
+__all__ = ["ModelSearch", "search_models"]
+
+MATTERS = 3e-3
+"""Probability from which a set is evaluated anew under other ranges of the scales."""
+
+FAR_BEHIND = 10.0
+"""Nats by which the sets under a fault may be expected to stay behind the best explanation to be weighed."""
+
+SUSPECT = 1e-3
+"""Local p-value of a test of the noise below which the fault is weighed as a cause."""
+
+
+@dataclass(frozen=True)
+class ModelSearch:
+    """All explanations with their probabilities.
+
+    Attributes
+    ----------
+    base : Linearisation
+        About the fit of the present model.
+    alarm : FamilyAlarm
+    searches : tuple of SetSearch
+        Under the noise as declared first, then under the faults that were weighed.
+    probabilities : SetProbabilities
+        Of sets of causes, faults of the noise among them.
+    """
+
+    base: Linearisation
+    alarm: FamilyAlarm
+    searches: tuple[SetSearch, ...]
+    probabilities: SetProbabilities
+
+    def under(self, causes: Sequence[str]) -> SetSearch:
+        """Return the search under the faults of the noise that are among some causes."""
+        faulty = {name for search in self.searches for name in search.noise.names} & set(causes)
+        return next((search for search in self.searches if set(search.noise.names) == faulty), self.searches[0])
+
+    def widened(self, bound: float, floor: float) -> SetProbabilities:
+        """Return the probabilities with the bounds and the floors of all scales multiplied by factors.
+
+        Only sets that matter are evaluated anew, in the most probable forms of their causes; the others keep their
+        evidence.
+
+        Parameters
+        ----------
+        bound, floor : float
+        """
+        found = self.probabilities
+        matter = {name for item in found.sets if item.probability >= MATTERS for name in item.names}
+        wider = {
+            search.noise.names: SetEvidence(
+                search.point.evidence.gram,
+                [
+                    cause.rescaled(search.point.evidence.gram, bound, floor)
+                    for name, cause in search.point.evidence.causes.items()
+                    if name in matter
+                ],
+            )
+            for search in self.searches
+        }
+        sets = []
+        for item in found.sets:
+            search = self.under(item.causes)
+            evidence = search.point.evidence
+            names = [name for name in item.names if name in evidence.causes]
+            if item.probability >= MATTERS and names:
+                forms = [evidence.forms(names)]
+                change = wider[search.noise.names].log_evidence(names, forms) - evidence.log_evidence(names, forms)
+                item = replace(item, log_evidence=item.log_evidence + change)
+            sets.append(item)
+        return SetProbabilities.of(sets, found.causes, found.generics, found.prior)
+
+    def classes(self) -> tuple[tuple[str, ...], ...]:
+        """Return the causes in classes of equivalents; a fault of the noise is a class of its own."""
+        classes = classes_of_equivalents(self.searches[0].point.evidence)
+        members = {name for names in classes for name in names}
+        return (*classes, *((name,) for name in self.probabilities.causes if name not in members))
+
+
+def search_models(
+    perturbed: PerturbedModel,
+    fit: Fit,
+    catalogue: Catalogue,
+    rng: np.random.Generator,
+    progress: Progress = silent,
+    *,
+    bodies_fixed: bool = False,
+) -> ModelSearch:
+    """Weigh every set of causes.
+
+    Parameters
+    ----------
+    perturbed : PerturbedModel
+    fit : Fit
+        Of the present model.
+    catalogue : Catalogue
+    rng : Generator
+        For the alarm.
+    progress : Progress, optional
+    bodies_fixed : bool
+        Whether the bodies are fixed in the fit, which diverged: the model is then linearised along the data.
+    """
+    progress(0.2, "computing what each candidate would change")
+    base = linearise_along_data(perturbed, catalogue) if bodies_fixed else linearise(perturbed, fit, catalogue)
+    progress(0.4, "testing the present model")
+    alarm = FamilyAlarm.of(base.evidence, fit, rng)
+    faults = fault_names(perturbed.posterior)
+    declared = NoiseModel((), base.perturbed, base.fit, 0.0, base.bodies_fixed)
+    if alarm.silent:
+        single = SetSearch(declared, base, enumerate_sets(base.evidence, catalogue.prior, largest=1), base.fit)
+        return ModelSearch(base, alarm, (single,), _joined([single], faults))
+    progress(0.5, "weighing the sets of causes")
+    first = search_sets(declared, catalogue, base)
+    base = base.without_products()
+    give_back_memory()
+    searches = _with_faults(first, alarm, catalogue, progress)
+    likeliest = max(searches, key=lambda search: search.highest)
+    if plausible_vibrations(_joined(searches, faults), catalogue):
+        progress(0.6, "fitting vibrations")
+        fitted = with_fitted_vibrations(likeliest, catalogue)
+        if likeliest is first:
+            searches = _with_faults(fitted, alarm, catalogue, progress)
+        else:
+            searches = [fitted if search is likeliest else search for search in searches]
+    return ModelSearch(base, alarm, tuple(searches), _joined(searches, faults))
+
+
+def _joined(searches: Sequence[SetSearch], faults: Sequence[str]) -> SetProbabilities:
+    """Return the probabilities of all sets, with evidence relative to the declared noise and nothing."""
+    declared = searches[0]
+    every = []
+    for search in searches:
+        offset = search.log_nothing - declared.log_nothing
+        for item in search.probabilities.sets:
+            causes = tuple(sorted((*item.causes, *search.noise.names)))
+            every.append(replace(item, causes=causes, log_evidence=item.log_evidence + offset))
+    found = declared.probabilities
+    return SetProbabilities.of(every, (*found.causes, *faults), found.generics, found.prior)
+
+
+def _with_faults(first: SetSearch, alarm: FamilyAlarm, catalogue: Catalogue, progress: Progress) -> list[SetSearch]:
+    """Return the searches under the noise as declared, under suspected faults by themselves, and under two together.
+
+    A fault takes its share of what causes explain, so that sets of causes add no more to it than they do to the
+    declared noise. Faults with which the best explanation would stay behind even so are left out; the others are
+    weighed with all sets of causes, the most promising first.
+    """
+    reach = first.highest - first.log_nothing
+    models: dict[tuple[str, ...], NoiseModel] = {}
+    searches = {first.noise.names: first}
+
+    def best() -> SetSearch:
+        return max(searches.values(), key=lambda search: search.highest)
+
+    def fit(before: NoiseModel, suspects: Sequence[tuple[str, Fit]]) -> None:
+        for label, residual in suspects:
+            if label in before.names:
+                continue
+            progress(0.6, f"fitting {label}")
+            known = models.get(tuple(sorted((*before.names, label))))
+            model = before.with_fault(label, residual, best().highest, known)
+            if model is not None and (known is None or model.log_nothing > known.log_nothing):
+                models[model.names] = model
+                searches.pop(model.names, None)
+
+    def weigh() -> None:
+        for model in sorted(models.values(), key=lambda model: -model.log_nothing):
+            if model.names in searches or model.log_nothing + reach < best().highest - FAR_BEHIND:
+                continue
+            progress(0.6, f"weighing the causes beside {' and '.join(model.names)}")
+            searches[model.names] = search_sets(model, catalogue)
+            give_back_memory()
+
+    fit(first.noise, _suspects(alarm, first))
+    if models:
+        loudest = max(models.values(), key=lambda model: model.log_nothing)
+        fit(loudest, [(label, loudest.fit) for label in _seen(loudest.fit)])
+    weigh()
+    if best() is not first:
+        fit(best().noise, [(label, best().best) for label in _seen(best().best)])
+        weigh()
+    return list(searches.values())
+
+
+def _seen(fit: Fit) -> list[str]:
+    """Return the names of the faults that a residual shows."""
+    return [name for name, log_p in noise_tests(fit.posterior, fit).items() if log_p < np.log(SUSPECT)]
+
+
+def _suspects(alarm: FamilyAlarm, first: SetSearch) -> list[tuple[str, Fit]]:
+    """Return the faults of the noise to weigh, each with the fit from whose residual its size follows.
+
+    What the best set leaves counts first; a fault that only the present model's residual shows may yet explain all of
+    it by itself, unless there is no such residual because the present model's fit diverged. Coloured noise is weighed
+    from both: causes that vary with time take its slow part, and what is left of it seems to have a short correlation
+    time.
+    """
+    best, base = first.best, first.noise.fit
+    suspects = [(name, best) for name in _seen(best)]
+    of_best = {name for name, _ in suspects}
+    for name, log_p in () if first.noise.bodies_fixed else alarm.noise.items():
+        if log_p < np.log(SUSPECT) and not name.startswith("variance"):
+            again = best is not base and name.startswith("coloured-noise")
+            if name not in of_best or again:
+                suspects.append((name, base))
+    return suspects

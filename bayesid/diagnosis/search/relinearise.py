@@ -1,0 +1,280 @@
+"""Sets of causes at one noise, enumerated about the best of them and linearised there anew until the model holds.
+
+Vibrations are not linear in their frequency and coupling: where one is plausible all of them are fitted in full, and
+their evidence is corrected by these fits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from bayesid._io.errors import InputError
+from bayesid._math.memory import give_back_memory
+from bayesid.diagnosis.candidates.burst_signatures import burst_signatures
+from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
+from bayesid.diagnosis.candidates.shift_tuning import plausible_shift, with_tuned_shift
+from bayesid.diagnosis.candidates.signature_bank import SignatureBank
+from bayesid.diagnosis.candidates.tone_tuning import with_tuned_tones
+from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities, enumerate_sets
+from bayesid.diagnosis.noise.noise_model import NoiseModel
+from bayesid.diagnosis.response.perturbed_model import Fit
+from bayesid.diagnosis.search.fitted_set import Hypothesis, fit_hypothesis, fit_in_amplitudes
+from bayesid.diagnosis.search.linearisation import Catalogue, Linearisation, linearise, linearise_along_data
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.mass_shift import MassShift
+
+__all__ = ["SetSearch", "plausible_vibrations", "search_sets", "with_fitted_vibrations"]
+
+AGREES = 0.5
+"""Difference between the cost of a fit and its linear prediction below which the linear evidence stands [nats]."""
+
+ROUNDS = 3
+"""Most linearisations about the best set."""
+
+LARGE = 50.0
+"""Log evidence of a cause beside the others of a fit from which no linear model can leave it out [nats]: that of ten
+standard deviations."""
+
+PLAUSIBLE = 0.01
+"""Probability from which a vibration is tuned and fitted, and with it all others of the catalogue."""
+
+BEHIND = 40.0
+"""Nats behind the best vibration from which the fit of another is not followed to its end."""
+
+
+@dataclass(frozen=True)
+class SetSearch:
+    """All sets of causes, weighed under one model of the noise.
+
+    Attributes
+    ----------
+    noise : NoiseModel
+    point : Linearisation
+        About the best set, with bursts of the sensors among its candidates.
+    probabilities : SetProbabilities
+    best : Fit
+        Of the most probable set that names all of its causes.
+    """
+
+    noise: NoiseModel
+    point: Linearisation
+    probabilities: SetProbabilities
+    best: Fit
+
+    @property
+    def log_nothing(self) -> float:
+        """Logarithm of the evidence of the present model with this noise and no other cause."""
+        return self.point.log_nothing + self.noise.log_charge
+
+    @property
+    def highest(self) -> float:
+        """Log evidence of the best explanation."""
+        return self.log_nothing + max(item.log_evidence for item in self.probabilities.sets)
+
+    def fit(self, causes: Sequence[str], effects: Sequence[Effect], hopeless: float = np.inf) -> Hypothesis:
+        """Fit the present model with some causes (`fit_hypothesis`)."""
+        return fit_hypothesis(self.point, self.noise.faults, causes, effects, hopeless)
+
+
+def search_sets(noise: NoiseModel, catalogue: Catalogue, base: Linearisation | None = None) -> SetSearch:
+    """Enumerate, linearise about the best set where the linear model fails there, and again until it holds.
+
+    Parameters
+    ----------
+    noise : NoiseModel
+    catalogue : Catalogue
+    base : Linearisation, optional
+        About the fit of the noise model, which has no causes.
+    """
+    if base is None and noise.bodies_fixed:
+        base = linearise_along_data(noise.perturbed, catalogue)
+    base = _with_bursts(linearise(noise.perturbed, noise.fit, catalogue) if base is None else base)
+    point, found, best = *_tuned(base, enumerate_sets(base.evidence, catalogue.prior), catalogue), base.fit
+    if base.bodies_fixed:
+        point, found = _about_large_causes(point, found, catalogue)
+        best = point.fit
+    else:
+        for _ in range(ROUNDS):
+            chosen, released = _best_known(found, catalogue)
+            if not chosen and not released:
+                break
+            fit, expected = fit_in_amplitudes(point, chosen, released)
+            if not np.isfinite(fit.cost) or fit.cost > best.cost:
+                break
+            best = fit
+            if abs(fit.cost - expected) < AGREES:
+                break
+            point = _with_bursts(linearise(point.perturbed, best, catalogue))
+            point, found = _tuned(point, enumerate_sets(point.evidence, catalogue.prior), catalogue)
+    return SetSearch(noise, point.without_products(), found, best)
+
+
+def _tuned(
+    point: Linearisation, found: SetProbabilities, catalogue: Catalogue
+) -> tuple[Linearisation, SetProbabilities]:
+    """Resolve plausible forms between those of the grid: frequencies of vibrations, instants of a jump."""
+    if beside := plausible_vibrations(found, catalogue):
+        point = with_tuned_tones(point, catalogue.effects, catalogue.bounds, beside)
+        found = enumerate_sets(point.evidence, catalogue.prior)
+    if plausible := plausible_shift(found, catalogue.effects):
+        point = with_tuned_shift(point, *plausible, catalogue.bounds)
+        found = enumerate_sets(point.evidence, catalogue.prior)
+    return point, found
+
+
+def _about_large_causes(
+    base: Linearisation, found: SetProbabilities, catalogue: Catalogue
+) -> tuple[Linearisation, SetProbabilities]:
+    """Weigh every set about the nearest motion, where the present model itself comes nowhere near the data.
+
+    A linear model about the fit of some causes cannot say what happens without one of them that is large: it lets
+    others make up for it that never would. Sets that hold all large causes of a fit are therefore weighed about that
+    fit, with free bodies, and the others along the data, until the most probable set has a fit of its own.
+    """
+    near: dict[frozenset[str], _Near] = {}
+    fitted: set[frozenset[str]] = set()
+    point, along = base, found
+    for _ in range(ROUNDS):
+        chosen, released = _best_known(found, catalogue)
+        names = frozenset([*(effect.label for effect in chosen), *([INITIAL_RATE] if released else [])])
+        if not names or names in fitted:
+            break
+        fit, _ = fit_in_amplitudes(base, chosen, released)
+        if not np.isfinite(fit.cost):
+            break
+        fitted.add(names)
+        point = _with_bursts(linearise(base.perturbed, fit, catalogue, far=True))
+        large = _large(point, names)
+        near[large] = _Near(point, enumerate_sets(point.evidence, catalogue.prior, beside=large))
+        found = _nearest(_Near(base, along), near, point.log_nothing)
+    return point, found
+
+
+def _large(point: Linearisation, names: frozenset[str]) -> frozenset[str]:
+    """Return the causes of a fit without which its motion would be another: bodies do not make up for them."""
+    evidence = point.with_bodies_fixed().evidence
+    rest = {name: names - {name} for name in names}
+    whole = evidence.log_evidence(names)
+    return frozenset(
+        name for name, others in rest.items() if whole - (evidence.log_evidence(others) if others else 0.0) > LARGE
+    )
+
+
+class _Near(NamedTuple):
+    """A linearisation, and the sets that are weighed there."""
+
+    point: Linearisation
+    found: SetProbabilities
+
+
+def _nearest(along: _Near, near: Mapping[frozenset[str], _Near], log_nothing: float) -> SetProbabilities:
+    """Return the probabilities of all sets, each from the fit with most of its large causes, or else along the data."""
+    best: dict[tuple[tuple[str, ...], str | None], tuple[int, CauseSet]] = {}
+    for size, (point, found) in [(0, along), *((len(names), there) for names, there in near.items())]:
+        for item in found.sets:
+            key = (item.causes, item.generic)
+            if key not in best or size >= best[key][0]:
+                moved = replace(item, log_evidence=item.log_evidence + point.log_nothing - log_nothing)
+                best[key] = size, moved
+    catalogue = along.found
+    sets = (item for _, item in best.values())
+    return SetProbabilities.of(sets, catalogue.causes, catalogue.generics, catalogue.prior)
+
+
+def _with_bursts(point: Linearisation) -> Linearisation:
+    """Return the linearisation with bursts of the sensors among its candidates."""
+    extended = point.with_bank(SignatureBank.joined([point.bank, burst_signatures(point.perturbed, point.fit)]))
+    give_back_memory()
+    return extended
+
+
+def _best_known(found: SetProbabilities, catalogue: Catalogue) -> tuple[list[Effect], bool]:
+    """Return the effects of the most probable set that names all of its causes, and whether it frees initial rates.
+
+    There are none where one of them has several forms.
+    """
+    best = next((item for item in found.sets if item.causes and item.generic is None), None)
+    causes = () if best is None else best.causes
+    chosen = [effect for effect in catalogue.effects if effect.label in causes]
+    if any(effect.modes_count or isinstance(effect, MassShift) for effect in chosen):
+        return [], False
+    return chosen, INITIAL_RATE in causes
+
+
+def plausible_vibrations(found: SetProbabilities, catalogue: Catalogue) -> dict[str, tuple[str, ...]]:
+    """Return all vibrations where one is plausible, each with its company in the most probable set that holds it.
+
+    Parameters
+    ----------
+    found : SetProbabilities
+    catalogue : Catalogue
+    """
+    inclusion = found.inclusion
+    if not any(inclusion[label] > PLAUSIBLE for label in catalogue.vibrations):
+        return {}
+    return _companies(found, catalogue.vibrations)
+
+
+def _companies(found: SetProbabilities, labels: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return vibrations, each with the other causes of the most probable set that holds it and nothing generic."""
+    beside = {}
+    for label in labels:
+        best = next(item for item in found.sets if label in item.causes and item.generic is None)
+        beside[label] = tuple(name for name in best.causes if name not in labels)
+    return beside
+
+
+def with_fitted_vibrations(search: SetSearch, catalogue: Catalogue) -> SetSearch:
+    """Return a search with the evidence of vibrations taken from fits, and the fit of the best set.
+
+    Each vibration is fitted in its best company, with its frequency, its damping and the yielding of the base. What the
+    Laplace evidence of that fit is above the linear one counts in all sets that hold the vibration. A fit that ends
+    below the linear evidence has failed and counts for nothing.
+
+    Parameters
+    ----------
+    search : SetSearch
+    catalogue : Catalogue
+    """
+    point, found = search.point, search.probabilities
+    gains: dict[str, float] = {}
+    fits: dict[str, Fit] = {}
+    each = {item.names: item.log_evidence for item in found.sets}
+    linear = {}
+    for label, others in _companies(found, catalogue.vibrations).items():
+        names = tuple(sorted((*others, label)))
+        linear[label, names] = each[names] if names in each else point.evidence.log_evidence(names)
+    for label, names in sorted(linear, key=lambda key: -linear[key]):
+        hopeless = min((fit.cost for fit in fits.values()), default=np.inf) + BEHIND
+        try:
+            fits[label] = search.fit(names, catalogue.effects, hopeless).fit
+        except InputError:  # no motion with this vibration
+            continue
+        gains[label] = max(fits[label].log_evidence - point.log_nothing - linear[label, names], 0.0)
+    if not gains:
+        return search
+    sets = [replace(item, log_evidence=_corrected(item, gains, each)) for item in found.sets]
+    corrected = SetProbabilities.of(sets, found.causes, found.generics, found.prior)
+    top = next((item for item in corrected.sets if item.names), None)
+    named = [label for label in fits if top is not None and label in top.causes]
+    return replace(search, probabilities=corrected, best=fits[named[0]] if named else search.best)
+
+
+def _corrected(item: CauseSet, gains: Mapping[str, float], known: Mapping[tuple[str, ...], float]) -> float:
+    """Return the log evidence of a set with the gain of its vibration.
+
+    Two vibrations of the linear model may stand for one that is not linear: a set with both is at least as probable as
+    one of them fitted, but does not gain again.
+    """
+    vibrations = [name for name in item.causes if name in gains]
+    if len(vibrations) < 2:
+        return item.log_evidence + sum(gains[name] for name in vibrations)
+    values = [item.log_evidence]
+    for label in vibrations:
+        fewer = tuple(name for name in item.names if name == label or name not in vibrations)
+        values.append(known.get(fewer, -np.inf) + gains[label])
+    return max(values)
