@@ -32,8 +32,8 @@ from bayesid.design import (
     design,
 )
 from bayesid.design.flight import Flight, Outcome
+from bayesid.design.search_starts import adapted_to_family
 from bayesid.design.trajectory import Trajectory
-from bayesid.design.visible_directions import with_visible_directions
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.composite_tables import link_table
@@ -235,13 +235,13 @@ def test_separation_seeks_the_worst_direction_among_those_that_manoeuvres_show()
     result = flown(own)
     assert everywhere.noncentrality(own, result)[0] == pytest.approx(0.0, abs=1e-6)
     rng = np.random.default_rng(1)
-    problem = with_visible_directions(Problem(own, Limits(joint_speed=0.5), (DOptimal(), everywhere)), rng)
+    problem = adapted_to_family(Problem(own, Limits(joint_speed=0.5), (DOptimal(), everywhere)), rng)
     other, seeing = problem.criteria
     assert other == DOptimal()
     np.testing.assert_allclose(np.abs(seeing.visible[0]), [[1.0, 0.0]], atol=1e-9)
-    assert seeing.left_out == {"half": 1}
+    assert seeing.unseen == {"half": 1}
     np.testing.assert_allclose(seeing.noncentrality(own, result), told_apart(own), rtol=1e-6)
-    assert with_visible_directions(problem, rng) is problem
+    assert adapted_to_family(problem, rng) is problem
 
 
 def test_gradients_are_those_of_finite_differences(flywheel: Problem) -> None:

@@ -13,8 +13,8 @@ import typer
 
 import bayesid
 from bayesid.app.command_line import app
-from bayesid.app.schema.design_section import CriterionName
 from bayesid.app.schema.editor_schema import editor_schema
+from bayesid.design import known_criteria
 from bayesid.diagnosis.evidence.verdict import Status
 from bayesid.inference.recording_check import ChannelSampling, JointCheck, RecordingCheck, SensorCheck
 from bayesid.report.effect_catalogue import catalogue
@@ -90,7 +90,7 @@ def test_every_key_of_the_study_file_is_in_the_manual(text):
 
 def test_every_effect_criterion_verdict_and_public_name_is_in_the_manual(text):
     effects = {entry.name for entry in catalogue()} | set(known_effects())
-    names = [*effects, *CriterionName.__args__, *(status.value for status in Status), *bayesid.__all__]
+    names = [*effects, *known_criteria(), *(status.value for status in Status), *bayesid.__all__]
     assert [name for name in names if name not in text] == []
 
 

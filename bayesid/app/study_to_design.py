@@ -13,18 +13,8 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.app.named_joints import named_joint
 from bayesid.app.schema import DesignSection, Study
-from bayesid.app.study_to_model import load_model
-from bayesid.design.criteria import (
-    AOptimal,
-    ConditionNumber,
-    Criterion,
-    DOptimal,
-    EOptimal,
-    InformationGain,
-    Paper26,
-    Paper26Intended,
-    Separation,
-)
+from bayesid.app.study_to_model import criteria_of, load_model
+from bayesid.design.criteria import DOptimal, Separation
 from bayesid.design.design_problem import Problem
 from bayesid.design.extended_posture import extended_posture
 from bayesid.design.motion_limits import Limits
@@ -46,17 +36,6 @@ LONGEST_STEP, STEPS = 2.0, 60
 
 FUNCTIONS = 8
 """Default number of free functions of every joint."""
-
-CRITERIA: tuple[Criterion, ...] = (
-    Paper26(),
-    Paper26Intended(),
-    ConditionNumber(),
-    DOptimal(),
-    AOptimal(),
-    EOptimal(),
-    InformationGain(),
-)
-"""Criteria that have no parameters."""
 
 BASE_AT_START = ("attitude", "attitude_sigma", "argument_of_latitude")
 """Keys of the base's initial state, which ``[design]`` shares with a recording."""
@@ -89,7 +68,7 @@ def load_problem(study: Study) -> Problem:
             thinning=math.ceil(section.duration / section.interval / SAMPLES),
         )
         _check_traceable(plan)
-        return Problem(plan, limits, tuple(_criterion(name, section) for name in section.chosen_criteria))
+        return Problem(plan, limits, criteria_of(section))
     except InputError as error:
         raise error.within(file=study.file) from None
 
@@ -149,12 +128,6 @@ def _with_rivals(model: Model, section: DesignSection) -> Model:
                 remedy="Name effects with parameters",
             )
     return model
-
-
-def _criterion(name: str, section: DesignSection) -> Criterion:
-    if name == Separation.name:
-        return Separation(section.rivals)
-    return next(criterion for criterion in CRITERIA if criterion.name == name)
 
 
 def _family(robot: Robot, section: DesignSection, tip: Tip) -> TrajectoryFamily:

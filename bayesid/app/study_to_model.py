@@ -11,9 +11,10 @@ import numpy as np
 from bayesid._io.errors import InputError
 from bayesid._io.store import file_key
 from bayesid.app.named_joints import named_joint
-from bayesid.app.schema import OtherSensor, RecordingSection, Study
+from bayesid.app.schema import DesignSection, OtherSensor, RecordingSection, Study
 from bayesid.app.study_to_encoders import encoder_noise
 from bayesid.app.user_files import run_user_file
+from bayesid.design.criteria import Criterion, named_criteria
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
 from bayesid.recording.channel_families import JOINT_FAMILIES
@@ -30,7 +31,7 @@ from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.own_effects import check_own_effect
 from bayesid.simulation.sensors import Filter, Sensor, SensorKind, White
 
-__all__ = ["load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
+__all__ = ["criteria_of", "load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
 
 
 FARTHEST = 10.0
@@ -119,11 +120,18 @@ def load_model(study: Study) -> Model:
             torque=_torque(study, robot),
         )
         _check_levers(model)
+        if study.design is not None:
+            criteria_of(study.design)
         for effect in model.effects:
             check_own_effect(effect, robot, model.sensors)
     except InputError as error:
         raise error.within(file=study.file) from None
     return model
+
+
+def criteria_of(section: DesignSection) -> tuple[Criterion, ...]:
+    """Return the criteria by which a study designs; the plugins with those of a user's own must have run."""
+    return named_criteria(section.criteria, section.rivals, section.options)
 
 
 def _check_levers(model: Model) -> None:

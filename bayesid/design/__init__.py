@@ -16,11 +16,15 @@ from bayesid.design.criteria import (
     Paper26,
     Paper26Intended,
     Separation,
+    expected_probability,
+    known_criteria,
+    named_criteria,
+    noncentrality_for,
+    register_criterion,
 )
 from bayesid.design.design_problem import Problem
 from bayesid.design.designed import Design, best_design, design, evaluate
 from bayesid.design.excitation_loop import Loop, NotFlown
-from bayesid.design.expected_probability import expected_probability, noncentrality_for
 from bayesid.design.knowledge_update import Laplace, Sampled, worst_relative_sd
 from bayesid.design.loop_goals import CauseProbability, Goal, QuantitySd, RelativePrecision, TipRegion
 from bayesid.design.motion_limits import Limit, Limits
@@ -74,10 +78,13 @@ __all__ = [
     "design",
     "evaluate",
     "expected_probability",
+    "known_criteria",
+    "named_criteria",
     "noncentrality_for",
     "optimise",
     "planned_manoeuvre",
     "planned_posterior",
     "predict",
+    "register_criterion",
     "worst_relative_sd",
 ]

@@ -2,19 +2,22 @@
 
 The paper's (26) evaluates the motion of the base, the condition number evaluates the regressor. The other criteria
 evaluate the posterior covariance given the sensors' noise, in which all unknowns other than the bodies to identify are
-marginalised.
+marginalised. A criterion of a user's own is one class, decorated with `register_criterion` so that study files can name
+it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, TypeVar
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from scipy.optimize import brentq
+from scipy.special import expit
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
@@ -32,31 +35,136 @@ __all__ = [
     "Paper26Intended",
     "Separation",
     "covariance",
+    "expected_probability",
+    "known_criteria",
+    "named_criteria",
+    "noncentrality_for",
+    "register_criterion",
 ]
 
+_REGISTER: dict[str, type[Criterion]] = {}
 
-class Criterion(Protocol):
-    """Interface of a criterion.
+C = TypeVar("C", bound="type[Criterion]")
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """Cost of a planned manoeuvre; a subclass sets the attributes and overrides `cost`.
+
+    Parameters
+    ----------
+    draws : int
+        Number of draws of the prior over which the cost is averaged; 0 for the prior's centre alone.
 
     Attributes
     ----------
     name : str
-        Name of the criterion in design.json.
+        Name of the criterion in study files, reports and design.json.
+    meaning : str
+        What the criterion rewards, as reports print it.
     informed : bool
         Whether the cost depends on the information of the sensors, which takes longest to compute.
+    usual : bool
+        Whether a study that names no criteria designs by this one.
+    compares_rivals : bool
+        Whether the criterion takes ``rivals``, the effects to distinguish that a study names under ``design.rivals``.
+    rivals : tuple of str
+        Labels of the effects that the criterion distinguishes.
     """
 
-    name: ClassVar[str]
-    informed: ClassVar[bool]
-
-    @property
-    def draws(self) -> int:
-        """Number of draws of the prior over which the cost is averaged; 0 for the prior's centre alone."""
-        ...
+    name: ClassVar[str] = ""
+    meaning: ClassVar[str] = "A criterion that the user defined."
+    informed: ClassVar[bool] = True
+    usual: ClassVar[bool] = False
+    compares_rivals: ClassVar[bool] = False
+    draws: int = field(default=0, kw_only=True)
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
-        """Return the scalar to be minimised, differentiable by JAX."""
-        ...
+        """Return the scalar to be minimised, differentiable by JAX.
+
+        Parameters
+        ----------
+        plan : Plan
+            Model, family and unknowns of the manoeuvre.
+        outcome : Outcome
+            Motion of the robot, information of the sensors and regressor.
+        """
+        raise NotImplementedError
+
+    @property
+    def rivals(self) -> tuple[str, ...]:
+        """Labels of the effects that the criterion distinguishes, by default none."""
+        return ()
+
+    @property
+    def unseen(self) -> Mapping[str, int]:
+        """Number of directions of a rival's amplitudes that are left out since no manoeuvre shows them, by label."""
+        return {}
+
+    @property
+    def adaptable(self) -> bool:
+        """Whether the criterion is still to be adapted to what the manoeuvres of a family can show."""
+        return False
+
+    def shown(self, plan: Plan, outcome: Outcome) -> list[Array]:
+        """Return what a manoeuvre shows, arrays whose sums over some manoeuvres `adapted` takes."""
+        raise NotImplementedError
+
+    def adapted(self, shown: Sequence[Floats]) -> Criterion:
+        """Return the criterion adapted to what some manoeuvres of a family show."""
+        raise NotImplementedError
+
+
+def register_criterion(criterion: C) -> C:
+    """Make a criterion known to study files by its name; a class decorator."""
+    if not criterion.name:
+        raise InputError(f"criterion {criterion.__name__} has no name", remedy="Set the class attribute `name`")
+    _REGISTER[criterion.name] = criterion
+    return criterion
+
+
+def known_criteria() -> dict[str, type[Criterion]]:
+    """Return all registered criteria by their names, in the order of registration."""
+    return dict(_REGISTER)
+
+
+def named_criteria(
+    names: Sequence[str] | None, rivals: Sequence[str] = (), options: Mapping[str, Mapping[str, Any]] | None = None
+) -> tuple[Criterion, ...]:
+    """Return the criteria that a study names.
+
+    Parameters
+    ----------
+    names : sequence of str or None
+        Names of registered criteria; None for the usual ones and, if there are rivals, those that compare them.
+    rivals : sequence of str
+        Labels of the effects to distinguish.
+    options : mapping of str to mapping, optional
+        Parameters of the criteria, by the name of the criterion.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or a criterion does not take its parameters.
+    """
+    if names is None:
+        names = [key for key, kind in _REGISTER.items() if kind.usual or (kind.compares_rivals and rivals)]
+    return tuple(
+        _made(name, f"design.criteria #{number}", tuple(rivals), (options or {}).get(name, {}))
+        for number, name in enumerate(names, start=1)
+    )
+
+
+def _made(name: str, place: str, rivals: tuple[str, ...], options: Mapping[str, Any]) -> Criterion:
+    if name not in _REGISTER:
+        remedy = f"Give one of {', '.join(_REGISTER)}, or name your file under model.plugins"
+        raise InputError(f"got {name!r}", place=place, remedy=remedy)
+    given = {"rivals": rivals} if _REGISTER[name].compares_rivals else {}
+    try:
+        return _REGISTER[name](**given, **options)
+    except TypeError as error:
+        remedy = "Give the parameters of the criterion"
+        raise InputError(f"{name!r} cannot be made: {error}", place=f"design.options.{name}", remedy=remedy) from error
 
 
 def covariance(plan: Plan, outcome: Outcome) -> Array:
@@ -64,6 +172,12 @@ def covariance(plan: Plan, outcome: Outcome) -> Array:
 
     All other unknowns are marginalised. The coordinates are relative: the relative standard deviation of a mass is
     twice that of its coordinate.
+
+    Parameters
+    ----------
+    plan : Plan
+    outcome : Outcome
+        Outcome with information and prior of all unknowns, (n, n) each.
     """
     return _of_bodies(plan, outcome.information + _prior(plan, outcome))
 
@@ -78,58 +192,80 @@ def _of_bodies(plan: Plan, precision: Array) -> Array:
     return every[jnp.ix_(identified, identified)]
 
 
+def _inverse(matrix: Array) -> Array:
+    """Return the inverse of a positive-definite matrix whose rows differ in scale."""
+    scale = 1.0 / jnp.sqrt(jnp.diag(matrix))
+    return jnp.linalg.inv(matrix * jnp.outer(scale, scale)) * jnp.outer(scale, scale)
+
+
+@register_criterion
 @dataclass(frozen=True)
-class Paper26:
+class Paper26(Criterion):
     """The paper's (26) as printed, computed from the largest excursion of each state of the base.
 
     Its signed differences cancel most terms. For three states -y1^2 + y2^2 + 3 y3^2 remains, which rewards mostly the
     third state, penalises the first, and does not measure balance. It also adds metres to radians.
     """
 
-    name: ClassVar[str] = "paper-26"
-    informed: ClassVar[bool] = False
-    draws: int = 0
+    name = "paper-26"
+    meaning = (
+        "The paper's (26) as printed, of the largest excursions y1, y2, y3 of the base's position and of its "
+        "attitude. The signed differences cancel most of it: of each triple −y1² + y2² + 3 y3² remains to be "
+        "maximised, which rewards the third state, penalises the first and says nothing of balance. Metres are added "
+        "to radians."
+    )
+    informed = False
+    usual = True
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus (26)."""
-        squares = _largest_squares(outcome)
+        squares = jnp.max(jnp.abs(outcome.trajectory.excursion), axis=0) ** 2
         value = jnp.sum(squares)
         for triple in (squares[:3], squares[3:]):
-            value = value - sum(triple[i] - triple[j] for i, j in combinations(range(3), 2))
+            value = value - sum(self._weighed(triple[i] - triple[j]) for i, j in combinations(range(3), 2))
         return -value
 
+    @staticmethod
+    def _weighed(difference: Array) -> Array:
+        return difference
 
+
+@register_criterion
 @dataclass(frozen=True)
-class Paper26Intended:
+class Paper26Intended(Paper26):
     """Apparent intention of (26): large differences between the states increase the cost, whatever their sign.
 
     For three states, 3 smallest^2 + middle^2 - largest^2 remains.
     """
 
-    name: ClassVar[str] = "paper-26-intended"
-    informed: ClassVar[bool] = False
-    draws: int = 0
+    name = "paper-26-intended"
+    meaning = (
+        "What (26) appears to intend: the squares of the excursions less the sizes of their differences, so that an "
+        "uneven motion counts against itself whatever the sign."
+    )
+    usual = False
 
-    def cost(self, plan: Plan, outcome: Outcome) -> Array:
-        """Return minus (26) with the sizes of the differences."""
-        squares = _largest_squares(outcome)
-        value = jnp.sum(squares)
-        for triple in (squares[:3], squares[3:]):
-            value = value - sum(jnp.abs(triple[i] - triple[j]) for i, j in combinations(range(3), 2))
-        return -value
+    @staticmethod
+    def _weighed(difference: Array) -> Array:
+        return jnp.abs(difference)
 
 
+@register_criterion
 @dataclass(frozen=True)
-class ConditionNumber:
+class ConditionNumber(Criterion):
     """Logarithm of the condition number of the regressor (Armstrong 1989, Gautier & Khalil 1992).
 
     The regressor is that of the base's balance (19) along the manoeuvre. Columns are per unit of the prior's standard
     deviation, and torques are divided by the bodies' radius of gyration, so that no units are mixed.
     """
 
-    name: ClassVar[str] = "condition-number"
-    informed: ClassVar[bool] = False
-    draws: int = 0
+    name = "condition-number"
+    meaning = (
+        "The smallest condition number of the regressor of the base's force balance, columns per unit of the prior's "
+        "width, torques over the radius of gyration."
+    )
+    informed = False
+    usual = True
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return the logarithm of the largest singular value over the smallest."""
@@ -137,55 +273,63 @@ class ConditionNumber:
         return 0.5 * (jnp.log(squares[-1]) - jnp.log(jnp.maximum(squares[0], 1e-15 * squares[-1])))
 
 
+@register_criterion
 @dataclass(frozen=True)
-class DOptimal:
+class DOptimal(Criterion):
     """Volume of the posterior, as half the logarithm of the determinant of its covariance."""
 
-    name: ClassVar[str] = "d-optimal"
-    informed: ClassVar[bool] = True
-    draws: int = 0
+    name = "d-optimal"
+    meaning = "The smallest volume of the posterior: the determinant of its covariance."
+    usual = True
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return half the log-determinant."""
         return 0.5 * jnp.linalg.slogdet(covariance(plan, outcome))[1]
 
 
+@register_criterion
 @dataclass(frozen=True)
-class AOptimal:
+class AOptimal(Criterion):
     """Logarithm of the root mean square of the standard deviations of the log-Cholesky coordinates."""
 
-    name: ClassVar[str] = "a-optimal"
-    informed: ClassVar[bool] = True
-    draws: int = 0
+    name = "a-optimal"
+    meaning = "The smallest mean variance of the log-Cholesky coordinates of the bodies."
+    usual = True
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return the logarithm of the root mean square."""
         return 0.5 * jnp.log(jnp.mean(jnp.diag(covariance(plan, outcome))))
 
 
+@register_criterion
 @dataclass(frozen=True)
-class EOptimal:
+class EOptimal(Criterion):
     """Logarithm of the standard deviation of the log-Cholesky coordinates along the worst direction."""
 
-    name: ClassVar[str] = "e-optimal"
-    informed: ClassVar[bool] = True
-    draws: int = 0
+    name = "e-optimal"
+    meaning = "The smallest standard deviation along the direction that is known worst."
+    usual = True
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return the logarithm of the largest standard deviation over all directions."""
         return 0.5 * jnp.log(jnp.linalg.eigvalsh(covariance(plan, outcome))[-1])
 
 
+@register_criterion
 @dataclass(frozen=True)
-class InformationGain:
+class InformationGain(Criterion):
     """Minus the expected information gain about the bodies, averaged over their prior [nats].
 
     The posterior at each draw is approximated as normal (Chaloner & Verdinelli 1995, section 2.2).
     """
 
-    name: ClassVar[str] = "information-gain"
-    informed: ClassVar[bool] = True
-    draws: int = 4
+    name = "information-gain"
+    meaning = (
+        "The largest expected gain of information on the bodies, averaged over draws of their prior instead of taken "
+        "at its centre."
+    )
+    usual = True
+    draws: int = field(default=4, kw_only=True)
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         """Return minus the gain at one draw."""
@@ -193,8 +337,9 @@ class InformationGain:
         return 0.5 * (jnp.linalg.slogdet(covariance(plan, outcome))[1] - prior)
 
 
+@register_criterion
 @dataclass(frozen=True)
-class Separation:
+class Separation(Criterion):
     """Smallest signal-to-noise ratio of any of several rival effects, with all other unknowns marginalised.
 
     The other unknowns include the remaining rivals. Half the squared ratio is the expected log Bayes factor of the
@@ -202,21 +347,29 @@ class Separation:
     For two effects of one parameter the squared ratio is lambda (1 - rho^2) of the weaker one. The model of the plan
     must contain the rivals.
 
+    A direction that all other unknowns imitate in every manoeuvre, such as a constant force beside the bias of an
+    accelerometer, would be the worst of each manoeuvre, whatever the manoeuvre does for the others. `adapted` leaves
+    such directions out.
+
     Parameters
     ----------
     rivals : tuple of str
         Labels of the effects to distinguish, at least two.
     visible : tuple of tuple of tuple of float, optional
         Orthonormal directions (k, n) of each rival's n amplitudes among which the worst is sought, by default all.
-        `bayesid.design.visible_directions` finds those that a family of manoeuvres can show at all; the others are as
-        small in every manoeuvre, so that a search for the best of them would decide nothing.
     """
 
-    rivals: tuple[str, ...]
+    name = "separation"
+    meaning = (
+        "The largest expected log Bayes factor between the rival effects, each in the direction of its amplitudes that "
+        "shows least, with everything else unknown. Directions that no manoeuvre shows are left out."
+    )
+    compares_rivals = True
+    LEAST: ClassVar[float] = 1.0
+    """Noncentrality that all of some manoeuvres must reach in a direction: half a nat of expected log Bayes factor."""
+
+    rivals: tuple[str, ...] = ()
     visible: tuple[tuple[tuple[float, ...], ...], ...] | None = None
-    name: ClassVar[str] = "separation"
-    informed: ClassVar[bool] = True
-    draws: int = 0
 
     def __post_init__(self) -> None:
         if len(self.rivals) < 2:
@@ -225,30 +378,33 @@ class Separation:
             )
 
     @property
-    def left_out(self) -> dict[str, int]:
+    def unseen(self) -> Mapping[str, int]:
         """Number of directions of its amplitudes in which no manoeuvre shows a rival, by its label, where any."""
         pairs = zip(self.rivals, self.visible or (), strict=False)
         counts = {label: len(directions[0]) - len(directions) for label, directions in pairs}
         return {label: count for label, count in counts.items() if count}
 
-    def seeing(self, shown: Sequence[Floats], least: float) -> Separation:
-        """Return the criterion restricted to directions in which the rivals are shown.
+    @property
+    def adaptable(self) -> bool:
+        """Whether the worst direction is still sought among all."""
+        return self.visible is None
+
+    def adapted(self, shown: Sequence[Floats]) -> Separation:
+        """Return the criterion restricted to directions in which the rivals are shown; the best shown always is one.
 
         Parameters
         ----------
         shown : sequence of (n, n) arrays
-            Sum of `unexplained` over some manoeuvres, for each rival.
-        least : float
-            Smallest noncentrality that counts; the direction that is shown best always does.
+            Sum of the quadratic forms `shown` over some manoeuvres, for each rival.
         """
         visible = []
         for matrix in shown:
             values, directions = np.linalg.eigh(matrix)
-            kept = directions.T[values >= min(least, values[-1])]
+            kept = directions.T[values >= min(self.LEAST, values[-1])]
             visible.append(tuple(tuple(map(float, direction)) for direction in kept))
         return replace(self, visible=tuple(visible))
 
-    def unexplained(self, plan: Plan, outcome: Outcome) -> list[Array]:
+    def shown(self, plan: Plan, outcome: Outcome) -> list[Array]:
         """Return for each rival the quadratic form of its amplitudes that is lambda (1 - rho^2), shape (n, n).
 
         Amplitudes are in standard deviations of their prior.
@@ -267,7 +423,7 @@ class Separation:
 
     def noncentrality(self, plan: Plan, outcome: Outcome) -> Array:
         """Return lambda (1 - rho^2) of each rival in its worst direction, at the size of its prior, shape (rivals,)."""
-        forms = self.unexplained(plan, outcome)
+        forms = self.shown(plan, outcome)
         if self.visible is not None:
             bases = [jnp.asarray(directions) for directions in self.visible]
             forms = [basis @ form @ basis.T for basis, form in zip(bases, forms, strict=True)]
@@ -288,11 +444,17 @@ class Separation:
         return coordinates
 
 
-def _largest_squares(outcome: Outcome) -> Array:
-    return jnp.max(jnp.abs(outcome.trajectory.excursion), axis=0) ** 2
+def expected_probability(noncentrality: float) -> float:
+    """Return the mean posterior probability of the true one of two rivals that were equally probable before.
+
+    The log Bayes factor of two rivals of known size is normal with mean ``lambda / 2`` and variance ``lambda``, where
+    ``lambda`` is the noncentrality that the true one keeps after the other has taken its share.
+    """
+    points, weights = np.polynomial.hermite_e.hermegauss(61)  # so many nodes are good to 1e-6
+    factors = 0.5 * noncentrality + np.sqrt(noncentrality) * points
+    return float(weights @ expit(factors) / weights.sum())
 
 
-def _inverse(matrix: Array) -> Array:
-    """Return the inverse of a positive-definite matrix whose rows differ in scale."""
-    scale = 1.0 / jnp.sqrt(jnp.diag(matrix))
-    return jnp.linalg.inv(matrix * jnp.outer(scale, scale)) * jnp.outer(scale, scale)
+def noncentrality_for(probability: float) -> float:
+    """Return the noncentrality at which the true one is expected to have a probability between 0.5 and 1."""
+    return float(brentq(lambda value: expected_probability(value) - probability, 0.0, 200.0))

@@ -14,13 +14,14 @@ from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, part_of, silent
 from bayesid._math.arrays import Floats
 from bayesid.design.concurrently import Shares, each
+from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem, Reached
 from bayesid.design.predicted_posterior import Encoder, Predicted, planned_manoeuvre, planned_posterior, predict
+from bayesid.design.search_starts import adapted_to_family
 from bayesid.design.search_store import Store
 from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.design.trajectory import Trajectory
 from bayesid.design.trajectory_search import Found, Search, optimise
-from bayesid.design.visible_directions import with_visible_directions
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.model import Manoeuvre
 
@@ -104,6 +105,11 @@ class Design:
     predicted: Predicted
     reached: Sequence[Reached]
     risks: Sequence[Risk]
+
+    @property
+    def designed_by(self) -> Criterion | None:
+        """Criterion by which it was designed, None if that is not one of the problem's."""
+        return next((one for one in self.problem.criteria if one.name == self.criterion), None)
 
     @property
     def manoeuvre(self) -> Manoeuvre:
@@ -195,8 +201,8 @@ def design(
     """Design a manoeuvre by every criterion of a problem.
 
     Each criterion is minimised from many starts, and again from any other manoeuvre that is better by it, until the
-    manoeuvre designed by each criterion is the best by it. Effects are told apart in the directions that the family's
-    manoeuvres can show (`bayesid.design.visible_directions`).
+    manoeuvre designed by each criterion is the best by it. Criteria are adapted to what the family's manoeuvres can
+    show.
 
     Parameters
     ----------
@@ -223,7 +229,7 @@ def design(
     store = Store.forgetful() if store is None else store
     count = len(problem.criteria)
     *seeds, last, visible = np.random.SeedSequence(seed).spawn(2 * count + 2)
-    problem = with_visible_directions(problem.with_encoder(encoder), np.random.default_rng(visible))
+    problem = adapted_to_family(problem.with_encoder(encoder), np.random.default_rng(visible))
     points = {
         criterion.name: problem.points(criterion, np.random.default_rng(own))
         for criterion, own in zip(problem.criteria, seeds[count:], strict=True)

@@ -18,7 +18,6 @@ import numpy as np
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._io.store import content_key
-from bayesid._math.arrays import Floats
 from bayesid.design.design_problem import Problem
 from bayesid.design.designed import sample_times
 from bayesid.design.go_no_go import plan_to_go
@@ -34,11 +33,11 @@ from bayesid.design.loop_goals import Goal, RelativePrecision, StepKnowledge, go
 from bayesid.design.loop_history import History
 from bayesid.design.plan import Plan
 from bayesid.design.predicted_posterior import Encoder
+from bayesid.design.search_starts import adapted_to_family
 from bayesid.design.search_store import Store
 from bayesid.design.simulated_spacecraft import Spacecraft, plan_recording
 from bayesid.design.step_review import Reviewer
 from bayesid.design.trajectory_search import Search
-from bayesid.design.visible_directions import with_visible_directions
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
 from bayesid.inference.recorded_samples import RecordedSamples
@@ -124,7 +123,7 @@ class Loop:
             If a plan is impossible or a recording does not fit.
         """
         history = History.open(folder, self._key(), reviewed=self.reviewer is not None)
-        first = with_visible_directions(self.problem, np.random.default_rng([self.seed, 0]))
+        first = adapted_to_family(self.problem, np.random.default_rng([self.seed, 0]))
         problem, model = first, first.plan.model
         for number in range(1, self.at_most + 1):
             progress((number - 1) / self.at_most, f"step {number}: planning")
@@ -262,7 +261,7 @@ class Loop:
                 model.rate_sigma,
             ),
             (plan.family.name, plan.family.names, plan.family.duration, plan.interval, plan.tip.name),
-            start_of(plan),
+            plan.family.posture_at_rest,
             (plan.attitude.tolist(), plan.attitude_sigma, plan.argument_of_latitude, plan.step, plan.thinning),
             [(limit.name, limit.bound) for limit in limits],
             (self.problem.criteria[0], self.seed, self.search, self.identifier, dict(self.encoder), self.reviewer),
@@ -282,11 +281,6 @@ def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
         if time[0] == 0.0:
             attitude, sigma = values[0], max(sigma, LOOSE * float(np.max(star.noise.sigma(plan.interval))))
     names = [joint.name for joint in plan.model.robot.joints]
-    start = dict(zip(names, start_of(plan).tolist(), strict=True))
+    start = dict(zip(names, plan.family.posture_at_rest.tolist(), strict=True))
     motion = MeasuredMotion.from_recording(recording, plan.model.robot, sigma=encoder, start=start)
     return Manoeuvre(recording, motion, attitude, attitude_sigma=sigma, argument_of_latitude=plan.argument_of_latitude)
-
-
-def start_of(plan: Plan) -> Floats:
-    """Return the positions of all joints at the start of a plan's manoeuvres, shape (joints,) [rad or m]."""
-    return plan.family.motion(plan.family.centre).evaluate(np.zeros(1)).position[0]

@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid.design.design_problem import Problem
-from bayesid.design.trajectories import Linear, PaperExcitation
+from bayesid.design.trajectories import PaperExcitation
 from bayesid.robot.composite_tables import ENTRIES, composite_rows
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
@@ -51,16 +51,12 @@ def reacting_swing(problem: Problem, rng: np.random.Generator) -> Floats:
     Parameters
     ----------
     problem : Problem
-        Problem with a linear family.
+        Problem whose family imitates other motions.
     rng : numpy.random.Generator
         Source of posture, number of periods and size.
     """
     family, robot = problem.plan.family, problem.plan.model.robot
-    if not isinstance(family, Linear):
-        raise TypeError(f"the family {family.name!r} is not linear in its parameters")
-    start = family.motion(family.centre).evaluate(np.zeros(1)).position[0]
-    basis = family.matrices(np.linspace(0.0, family.duration, 64))[1][0]
-    moving = np.flatnonzero(np.abs(basis).max(axis=(0, 2)) > 0.0)
+    start, moving = family.posture_at_rest, family.moving_joints
     posture, speed = _chosen(problem, start, moving, rng)
     paper = PaperExcitation(start, family.duration, moving.tolist(), int(rng.integers(1, PERIODS + 1)))
     swing = rng.uniform(*FILLED) * speed / paper.frequency

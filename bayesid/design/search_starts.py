@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import jax
 import numpy as np
+from jax import Array
 from scipy.optimize import minimize
 
 from bayesid._math.arrays import Floats
+from bayesid._math.kept_jit import QUICKLY
 from bayesid.design.design_problem import Problem
-from bayesid.design.trajectories import Linear, PaperExcitation
+from bayesid.design.flight import Flight, Outcome
+from bayesid.design.trajectories import PaperExcitation, TrajectoryFamily
 
-__all__ = ["SLACK", "exchanged", "random_start", "repaired", "within_limits"]
+__all__ = ["SLACK", "adapted_to_family", "exchanged", "random_start", "repaired", "within_limits"]
 
 FILLED = (0.3, 0.95)
 """Fractions of the tightest limit between which random starts fill it, so that they begin inside the limits."""
@@ -29,6 +33,9 @@ FROM_ANOTHER = 0.5
 EXCHANGED = 3
 """Of so many groups of parameters, such as joints, one is exchanged at most."""
 
+MANOEUVRES = 16
+"""Number of random manoeuvres that are taken for a family."""
+
 SLACK = 1e-6
 """Fraction of a limit by which the optimiser may exceed it, since the smooth maximum lies above the true one."""
 
@@ -40,7 +47,7 @@ def random_start(problem: Problem, rng: np.random.Generator) -> Floats:
     """
     family = problem.plan.family
     direction = family.scale * rng.normal(size=family.size)
-    if isinstance(family, Linear) and not isinstance(family, PaperExcitation) and rng.random() < LIKE_THE_PAPER:
+    if family.imitates and rng.random() < LIKE_THE_PAPER:
         direction = _like_the_paper(family, rng) - family.centre
     filled, size = rng.uniform(*FILLED), 1.0
     helped = problem.shrinkable
@@ -62,13 +69,11 @@ def exchanged(problem: Problem, motions: Sequence[Floats], rng: np.random.Genera
     return np.where(np.isin(groups, taken), other, chosen)
 
 
-def _like_the_paper(family: Linear, rng: np.random.Generator) -> Floats:
+def _like_the_paper(family: TrajectoryFamily, rng: np.random.Generator) -> Floats:
     """Return the parameters closest to an oscillation (27) of three random joints about the start."""
-    posture = family.motion(family.centre).evaluate(np.zeros(1)).position[0]
-    basis = family.matrices(np.linspace(0.0, family.duration, 64))[1][0]
-    moving = np.flatnonzero(np.abs(basis).max(axis=(0, 2)) > 0.0)
-    joints = rng.choice(moving, min(3, len(moving)), replace=False)
-    paper = PaperExcitation(posture, family.duration, [int(joint) for joint in joints], int(rng.integers(1, 4)))
+    moving = family.moving_joints
+    joints = rng.choice(moving, min(3, len(moving)), replace=False).tolist()
+    paper = PaperExcitation(family.posture_at_rest, family.duration, joints, int(rng.integers(1, 4)))
     return family.nearest(paper.motion(paper.centre + paper.scale * rng.normal(size=paper.size)))
 
 
@@ -99,3 +104,29 @@ def repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) ->
             break
         found = family.centre + np.clip(0.97 * bound / largest, 0.1, 0.9) * (found - family.centre)
     return found
+
+
+def adapted_to_family(problem: Problem, rng: np.random.Generator) -> Problem:
+    """Return the problem whose criteria are adapted to what manoeuvres of its family can show.
+
+    Parameters
+    ----------
+    problem : Problem
+        The same problem is returned where no criterion is still to be adapted.
+    rng : numpy.random.Generator
+        Source of the random manoeuvres that are taken for the family.
+    """
+    adaptable = [criterion for criterion in problem.criteria if criterion.adaptable]
+    if not adaptable:
+        return problem
+
+    def shown(parameters: Array, z: Array, prior: Array, shadow: Array) -> list[list[Array]]:
+        flight = Flight(problem.plan, parameters, z)
+        outcome = Outcome(flight, flight.information(shadow), prior)
+        return [criterion.shown(problem.plan, outcome) for criterion in adaptable]
+
+    compiled = jax.jit(shown, compiler_options=QUICKLY)
+    starts = [random_start(problem, rng) for _ in range(MANOEUVRES)]
+    each = [compiled(start, problem.centre, problem.precision, problem.shadow) for start in starts]
+    sums = iter(jax.tree.map(lambda *parts: np.sum(parts, axis=0), *each))
+    return problem.judged_by([one.adapted(next(sums)) if one.adaptable else one for one in problem.criteria])

@@ -45,6 +45,8 @@ class TrajectoryFamily:
         Typical size of each parameter, for random starts and for the optimiser's steps.
     centre : (n,) array
         Parameters about which random starts are drawn; the motion with these parameters should be slow.
+    imitates : bool
+        Whether the family has `nearest` and `moving_joints`, so that a search may start from swings of another one.
     """
 
     name: str
@@ -52,6 +54,7 @@ class TrajectoryFamily:
     duration: float
     scale: Floats
     centre: Floats
+    imitates: bool = False
 
     def position(self, parameters: Array, time: Array) -> Array:
         """Return the positions of all joints at one instant, shape (joints,) [rad or m], computed in JAX."""
@@ -84,6 +87,20 @@ class TrajectoryFamily:
         """Number of the group of each parameter, shape (n,); a search exchanges whole groups between motions."""
         return np.arange(self.size)
 
+    @property
+    def posture_at_rest(self) -> Floats:
+        """Positions of all joints at the start of the motion with the parameters `centre`, (joints,) [rad or m]."""
+        return self.motion(self.centre).evaluate(np.zeros(1)).position[0]
+
+    @property
+    def moving_joints(self) -> Integers:
+        """Indices of the joints that some parameter moves."""
+        raise NotImplementedError
+
+    def nearest(self, motion: Motion) -> Floats:
+        """Return the parameters (n,) of the motion closest to another one."""
+        raise NotImplementedError
+
     def motion(self, parameters: Floats | Array) -> ParameterisedMotion:
         """Return the motion with given parameters, shape (n,)."""
         return ParameterisedMotion(self, parameters)
@@ -114,9 +131,17 @@ class ParameterisedMotion:
 class Linear(TrajectoryFamily):
     """Family of motions linear in its parameters, ``rest(t) + basis(t) parameters``."""
 
+    imitates = True
+
     def matrices(self, time: Floats) -> tuple[Floats, Floats]:
         """Return rest (3, T, joints) and basis (3, T, joints, n), each for position, velocity and acceleration."""
         raise NotImplementedError
+
+    @property
+    def moving_joints(self) -> Integers:
+        """Indices of the joints that some parameter moves."""
+        basis = self.matrices(np.linspace(0.0, self.duration, 64))[1][0]
+        return np.flatnonzero(np.abs(basis).max(axis=(0, 2)) > 0.0)
 
     def nearest(self, motion: Motion) -> Floats:
         """Return the parameters of the motion closest to another one's excursion from its start, by least squares.
@@ -126,10 +151,8 @@ class Linear(TrajectoryFamily):
         time = np.linspace(0.0, self.duration, FITTED)
         basis = self.matrices(time)[1][0].reshape(-1, self.size)
         position = np.asarray(motion.evaluate(time).position)
-        offset = np.asarray(self.motion(self.centre).evaluate(time).position)[0]
-        rest = self.matrices(time)[0][0]
-        wanted = position - position[0] + offset - rest
-        return np.asarray(np.linalg.lstsq(basis, wanted.ravel(), rcond=None)[0])
+        excursion = position - position[0] + self.posture_at_rest - self.matrices(time)[0][0]
+        return np.asarray(np.linalg.lstsq(basis, excursion.ravel(), rcond=None)[0])
 
     def slopes(self, parameters: Array, time: Floats) -> Array:
         """Return the derivatives of position, velocity and acceleration, shape (3, T, joints, n)."""
@@ -283,6 +306,7 @@ class PaperExcitation(Linear):
     """
 
     name = "paper"
+    imitates = False
 
     def __init__(
         self,

@@ -24,7 +24,6 @@ from bayesid.design.design_problem import Problem
 from bayesid.design.polish import Polished, Shared, Task, fitted_to_fine_limits, polish
 from bayesid.design.reacting_swing import reacting_swing
 from bayesid.design.search_starts import SLACK, exchanged, random_start
-from bayesid.design.trajectories import Linear, PaperExcitation
 
 __all__ = ["THOROUGH", "Found", "Search", "optimise"]
 
@@ -171,8 +170,7 @@ def optimise(
 def _start(problem: Problem, rng: np.random.Generator) -> Floats:
     """Draw a start: mostly a swing to which the base reacts much, else a random motion."""
     family = problem.plan.family
-    swings = isinstance(family, Linear) and not isinstance(family, PaperExcitation)
-    return reacting_swing(problem, rng) if swings and rng.random() < REACTING else random_start(problem, rng)
+    return reacting_swing(problem, rng) if family.imitates and rng.random() < REACTING else random_start(problem, rng)
 
 
 def _ranked(done: Sequence[Polished], problem: Problem) -> list[Polished]:

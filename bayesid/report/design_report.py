@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from bayesid._io.words import counted, joined, ordinal
-from bayesid.design import Design, Separation, expected_probability, noncentrality_for
+from bayesid.design import Criterion, Design, expected_probability, noncentrality_for
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.report import figures
 from bayesid.report.document import Document, Rows
@@ -32,24 +32,6 @@ PAIRS = (
 SURE = 0.95  # probability of the right one of two rivals at which they count as told apart
 REFERENCE = "paper-26"  # name of the design that the others are compared with
 
-MEANING: Mapping[str, str] = {
-    "paper-26": "The paper's (26) as printed, of the largest excursions y1, y2, y3 of the base's position and of its "
-    "attitude. The signed differences cancel most of it: of each triple −y1² + y2² + 3 y3² remains to be maximised, "
-    "which rewards the third state, penalises the first and says nothing of balance. Metres are added to radians.",
-    "paper-26-intended": "What (26) appears to intend: the squares of the excursions less the sizes of their "
-    "differences, so that an uneven motion counts against itself whatever the sign.",
-    "condition-number": "The smallest condition number of the regressor of the base's force balance, columns per unit "
-    "of the prior's width, torques over the radius of gyration.",
-    "d-optimal": "The smallest volume of the posterior: the determinant of its covariance.",
-    "a-optimal": "The smallest mean variance of the log-Cholesky coordinates of the bodies.",
-    "e-optimal": "The smallest standard deviation along the direction that is known worst.",
-    "information-gain": "The largest expected gain of information on the bodies, averaged over draws of their prior "
-    "instead of taken at its centre.",
-    "separation": "The largest expected log Bayes factor between the rival effects, each in the direction of its "
-    "amplitudes that shows least, with everything else unknown. Directions that no manoeuvre shows are left out.",
-}
-"""Meaning of each criterion, by its name."""
-
 
 def design_report(designs: Sequence[Design], best: Design, title: str, file: Path, *, origin: str = "") -> None:
     """Write the report of designs of one problem as PDF, whole or not at all.
@@ -72,9 +54,7 @@ def design_report(designs: Sequence[Design], best: Design, title: str, file: Pat
     _add_manoeuvres(document, designs, best)
     _add_uncertainty(document, designs)
     document.section("Criteria")
-    document.items(
-        [f"{design.name}. {MEANING.get(design.criterion, 'A criterion that the user defined.')}" for design in designs]
-    )
+    document.items([f"{design.name}. {(design.designed_by or Criterion).meaning}" for design in designs])
     document.section("Assumptions")
     document.items(assumption_sentences(best))
     document.write(file)
@@ -193,26 +173,18 @@ def design_sentences(designs: Sequence[Design], best: Design) -> list[str]:
         size = "" if design is reference else f"standard deviations {ratio:.3g} times those of {reference.name}, and "
         kept = "every limit is kept" if design.go else "some limit is not kept"
         lines.append(f"{design.name}: {size}{kept} with 99 % probability under the present uncertainty of the robot.")
-    return [*lines, *map(separation_sentence, filter(_separates, designs)), f"Best: {best.name}."]
-
-
-def _separates(design: Design) -> bool:
-    return isinstance(_separation(design), Separation)
-
-
-def _separation(design: Design) -> Separation | None:
-    criteria = (item for item in design.problem.criteria if item.name == design.criterion)
-    return next((item for item in criteria if isinstance(item, Separation)), None)
+    separated = [design for design in designs if design.designed_by is not None and design.designed_by.rivals]
+    return [*lines, *map(separation_sentence, separated), f"Best: {best.name}."]
 
 
 def separation_sentence(design: Design) -> str:
     """Return how well a manoeuvre that was designed to tell effects apart does so, and down to which size."""
-    criterion = _separation(design)
-    if criterion is None:
+    criterion = design.designed_by
+    if criterion is None or not criterion.rivals:
         raise ValueError(f"{design.name} was not designed to tell effects apart")
     noncentrality = float(np.exp(-2.0 * design.costs[criterion.name]))
     share = float(np.sqrt(noncentrality_for(SURE) / noncentrality))
-    unseen = [f"{count} of {label}" for label, count in criterion.left_out.items()]
+    unseen = [f"{count} of {label}" for label, count in criterion.unseen.items()]
     rest = f" Directions of the amplitudes that no manoeuvre shows are left out: {joined(unseen)}." if unseen else ""
     return (
         f"{design.name} tells {joined(criterion.rivals)} apart: of the size of their priors, the least distinct has a "

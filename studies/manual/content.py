@@ -18,7 +18,7 @@ import typer
 import bayesid
 from bayesid.app.command_line import app
 from bayesid.app.schema.editor_schema import editor_schema
-from bayesid.design import criteria
+from bayesid.design import known_criteria
 from bayesid.report.effect_catalogue import CatalogueEntry, catalogue
 from bayesid.report.numbers import format_text
 from bayesid.simulation.effects.effect import Effect
@@ -43,11 +43,7 @@ def content() -> dict[str, Any]:
         "commands": [_command(name, made) for name, made in _commands()],
         "sections": list(_sections()),
         "effects": [_effect(entry) for entry in catalogue()],
-        "criteria": [
-            {"name": kind.name, "paragraphs": _paragraphs(kind)}
-            for kind in (getattr(criteria, name) for name in criteria.__all__)
-            if hasattr(kind, "informed") and kind.__name__ != "Criterion"
-        ],
+        "criteria": [{"name": kind.name, "paragraphs": _paragraphs(kind)} for kind in known_criteria().values()],
         "rooms": list(_rooms(project["tool"]["importlinter"]["contracts"][0]["layers"])),
         "names": [{"name": name, "text": _first(getattr(bayesid, name))} for name in sorted(bayesid.__all__)],
         "hooks": [
@@ -150,7 +146,7 @@ def _type(value: Mapping[str, Any]) -> str:
     match value["type"]:
         case "array":
             item = value["prefixItems"][0] if "prefixItems" in value else value["items"]
-            if item.get("enum"):
+            if any("enum" in one for one in item.get("anyOf", [item])):
                 return "list of text"
             if "$ref" in item:
                 return "sections"

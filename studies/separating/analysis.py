@@ -15,7 +15,7 @@ from bayesid._math.arrays import Floats
 from bayesid.design import THOROUGH, DOptimal, Problem, Search, Separation, Store, optimise
 from bayesid.design.design_problem import Known
 from bayesid.design.trajectories import ParameterisedMotion
-from bayesid.design.visible_directions import with_visible_directions
+from bayesid.design.search_starts import adapted_to_family
 from bayesid.inference.unknowns import Unknowns
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.effects import ThrusterLeak, WheelMomentum
@@ -116,7 +116,7 @@ def design_both(
     problem: Problem, seed: int, search: Search, store: Store, progress: Callable[[str], None]
 ) -> dict[str, Designed]:
     """Design by both criteria from the same random starts, the second also from the first's best."""
-    problem = with_visible_directions(problem, np.random.default_rng(seed))
+    problem = adapted_to_family(problem, np.random.default_rng(seed))
     found: list[np.ndarray] = []
     for criterion in problem.criteria:
         kept = store.of(criterion.name)
@@ -136,7 +136,7 @@ def design_both(
             costs=problem.costs(best),
             largest={item.name: item.largest for item in problem.reached(best)},
             motion=problem.plan.family.motion(best),
-            left_out=criterion.left_out if isinstance(criterion, Separation) else {},
+            left_out=dict(criterion.unseen),
         )
         for criterion, best in zip(problem.criteria, found, strict=True)
     }

@@ -26,28 +26,6 @@ from bayesid.app.schema.value_types import (
 FEWEST_SAMPLES = 16
 """Smallest number of samples of a manoeuvre, since fewer do not determine a motion."""
 
-CriterionName = Literal[
-    "paper-26",
-    "paper-26-intended",
-    "condition-number",
-    "d-optimal",
-    "a-optimal",
-    "e-optimal",
-    "information-gain",
-    "separation",
-]
-"""Names of all criteria."""
-
-USUAL: tuple[CriterionName, ...] = (
-    "paper-26",
-    "condition-number",
-    "d-optimal",
-    "a-optimal",
-    "e-optimal",
-    "information-gain",
-)
-"""Names of the default criteria."""
-
 
 class DesignLimits(Section):
     """Section ``[design.limits]``, the limits of a designed manoeuvre; only those given apply.
@@ -101,7 +79,9 @@ class DesignSection(Section):
     functions : int, optional
         Number of free functions of every joint, by default 8; the paper's family has none.
     criteria : sequence of str, optional
-        Names of the criteria, each of which designs one manoeuvre.
+        Names of the criteria, each of which designs one manoeuvre; a plugin may register further ones.
+    options : table of criterion to table, optional
+        Parameters of the criteria that have some, such as those of a plugin.
     rivals : sequence of str, optional
         Labels of the effects to distinguish, for the criterion "separation".
     attitude : (4,), optional
@@ -120,16 +100,12 @@ class DesignSection(Section):
     start: Mapping[Name, Number] = Field(default_factory=dict)
     parameterisation: Literal["b-splines", "fourier", "paper"] = "b-splines"
     functions: Annotated[int, Strict(), Field(ge=1, le=60)] | None = None
-    criteria: Annotated[tuple[CriterionName, ...], Field(min_length=1), AfterValidator(distinct)] | None = None
+    criteria: Annotated[tuple[Name, ...], Field(min_length=1), AfterValidator(distinct)] | None = None
+    options: Mapping[Name, Mapping[Name, bool | int | float | str]] = Field(default_factory=dict)
     rivals: Names = ()
     attitude: Quaternion = (0.0, 0.0, 0.0, 1.0)
     attitude_sigma: Annotated[NonNegative, no_more_than(math.pi, "Radians, not arcsec or degrees?")] = 0.0
     argument_of_latitude: Annotated[Number, FULL_TURN] = 0.0
-
-    @property
-    def chosen_criteria(self) -> tuple[str, ...]:
-        """Names of the criteria, by default those of `USUAL` and, if there are rivals, their separation."""
-        return self.criteria or (*USUAL, *(("separation",) if self.rivals else ()))
 
     @model_validator(mode="after")
     def _check_samples(self) -> DesignSection:
@@ -159,11 +135,6 @@ class DesignSection(Section):
 
     @model_validator(mode="after")
     def _check_rivals(self) -> DesignSection:
-        wanted = "separation" in (self.criteria or ())
-        if len(self.rivals) < 2 and (self.rivals or wanted):
-            raise InputError(
-                f"{len(self.rivals)} effects to tell apart",
-                place="rivals",
-                remedy="Name at least two, or neither rivals nor separation",
-            )
+        if len(self.rivals) == 1:
+            raise InputError("1 effects to tell apart", place="rivals", remedy="Name at least two, or no rivals")
         return self

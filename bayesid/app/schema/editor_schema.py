@@ -24,7 +24,12 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 def editor_schema() -> dict[str, Any]:
     """Return the JSON Schema of a study file."""
+    from bayesid.design.criteria import known_criteria  # JAX takes seconds to import
+
     schema = Study.model_json_schema(schema_generator=_FromDocstrings)
+    criteria = schema["$defs"]["DesignSection"]["properties"]["criteria"]
+    shipped = [name for name, kind in known_criteria().items() if kind.__module__ == known_criteria.__module__]
+    criteria["items"] = {"anyOf": [{"enum": shipped}, criteria["items"]]}  # a plugin may register others
     return {"$schema": DIALECT, **schema, "title": "Study of bayesid"}
 
 

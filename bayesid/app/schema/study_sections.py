@@ -178,7 +178,7 @@ class ModelSection(Section):
     initial_rate_sigma : float, optional
         Prior standard deviation of an unknown initial rate, by default that of the model [rad/s].
     plugins : sequence of Path, optional
-        Python files with effects of the user.
+        Python files of the user that register effects, sensors or criteria of design.
     priors : table of effect to table of key to float, optional
         Prior standard deviations in place of an effect's defaults, in the unit of the key.
     """
