@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 
 __all__ = ["abridged", "counted", "joined", "ordinal"]
 
-NAMED = 8
-"""Number of texts that an abridged list names by default."""
+NAMED = 8  # number of texts that an abridged list names by default
 
 
 def joined(texts: Iterable[str]) -> str:

@@ -34,19 +34,17 @@ if TYPE_CHECKING:
 
 __all__ = ["app", "main"]
 
-SUFFIX = "_command"
-"""Ending of the names of those modules of this folder that are commands."""
+SUFFIX = "_command"  # ending of the names of those modules of this folder that are commands
 
 FULL, CLOSED = "Free space there, and call the command again", "Choose another output folder, or allow writing there"
 
+# objects made from one search for unused cycles to the next; drawings make many objects and hardly any cycles
 SELDOM = 100_000
-"""Objects made from one search for unused cycles to the next; drawings make many objects and hardly any cycles."""
-
+# remedies by the number of an error of the system
 REMEDIES = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), FULL),
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), CLOSED),
 }
-"""Remedies by the number of an error of the system."""
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
 """Application of typer, to which the commands are added below."""

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["diagnose_study", "run"]
 
-VERDICT = 0.3
-"""Share of the time until the verdict where the extended model is sampled afterwards."""
+VERDICT = 0.3  # share of the time until the verdict where the extended model is sampled afterwards
 
 
 def run(

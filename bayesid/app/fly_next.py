@@ -18,8 +18,7 @@ __all__ = ["FILE", "fly_next", "write_motion"]
 FILE = "next-manoeuvre.csv"
 """Name of the file of the joints' motion."""
 
-STARTS, ITERATIONS = 2, 60
-"""Effort of the search, a small part of that of ``bayesid design``."""
+STARTS, ITERATIONS = 2, 60  # effort of the search, a small part of that of ``bayesid design``
 
 
 def fly_next(study: Study, rivals: tuple[str, str], seed: int, progress: Progress) -> Design:

@@ -18,14 +18,10 @@ from bayesid.recording.smoothing import JointSamples, smooth
 
 __all__ = ["channel_noise", "vector_noise"]
 
-LEAST = 1e-9
-"""Noise relative to the range of the samples below which there is none: it is the rounding of their digits."""
-
+LEAST = 1e-9  # noise relative to the range of the samples below which there is none: it is the rounding of their digits
+# degrees of freedom of the differences from which on they are taken, since smoothing takes some noise for motion
 FEWEST = 3.0
-"""Degrees of freedom of the differences from which on they are taken, since smoothing takes some noise for motion."""
-
-MOST = 500
-"""Number of samples that are smoothed at most, because more make the estimate slow and no better."""
+MOST = 500  # number of samples that are smoothed at most, because more make the estimate slow and no better
 
 
 def channel_noise(recordings: Sequence[Recording], column: str) -> float | None:

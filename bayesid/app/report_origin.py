@@ -12,11 +12,8 @@ from bayesid.app.schema import Study
 
 __all__ = ["origin_text", "report_origin"]
 
-Option = bool | str | int | float | Path | list[str] | tuple[str, ...] | None
-"""Value of an option of a command."""
-
-DIGITS = 12
-"""Digits of a hash that are printed."""
+Option = bool | str | int | float | Path | list[str] | tuple[str, ...] | None  # value of an option of a command
+DIGITS = 12  # digits of a hash that are printed
 
 
 def report_origin(study: Study, command: str, seed: int | None, **options: Option) -> str:

@@ -11,8 +11,7 @@ from bayesid._io.errors import InputError
 
 __all__ = ["Scheduler", "executor_at"]
 
-SECONDS = 10
-"""Time in which a scheduler must answer [s]."""
+SECONDS = 10  # time in which a scheduler must answer [s]
 
 Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="Scheduler of dask.distributed, such as tcp://host:8786.")

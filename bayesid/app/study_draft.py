@@ -22,17 +22,12 @@ __all__ = ["CHECK", "draft_study", "open_places"]
 CHECK = "# please check"
 """Mark of every value that recordings cannot tell."""
 
+# noise of a sensor whose readings show none [rad/s, m/s2, rad]
 UNSEEN = {"rate": 1e-5, "accel": 1e-5, "attitude": 1e-5}
-"""Noise of a sensor whose readings show none [rad/s, m/s2, rad]."""
-
-ALIKE = 1.5
-"""Ratio up to which the noises of several axes or joints are written as one number."""
-
-NOTES = 32
-"""Column at which the notes begin, unless a value is longer."""
-
+ALIKE = 1.5  # ratio up to which the noises of several axes or joints are written as one number
+NOTES = 32  # column at which the notes begin, unless a value is longer
+# sensors of the base, with the units of their noise
 UNITS = {"rate": "rad/s", "accel": "m/s2", "attitude": "rad, small rotation in base axes"}
-"""Sensors of the base, with the units of their noise."""
 
 
 def draft_study(

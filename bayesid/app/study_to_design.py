@@ -28,17 +28,11 @@ from bayesid.simulation.own_effects import check_own_effect
 
 __all__ = ["load_loop_problem", "load_problem", "separating"]
 
-SAMPLES = 120
-"""Largest number of samples that are simulated; in longer manoeuvres each of them stands for several."""
-
-LONGEST_STEP, STEPS = 2.0, 60
-"""Longest step of the integration [s], and smallest number of steps of a manoeuvre."""
-
-FUNCTIONS = 8
-"""Default number of free functions of every joint."""
-
+SAMPLES = 120  # largest number of samples that are simulated; in longer manoeuvres each of them stands for several
+LONGEST_STEP, STEPS = 2.0, 60  # longest step of the integration [s], and smallest number of steps of a manoeuvre
+FUNCTIONS = 8  # default number of free functions of every joint
+# keys of the base's initial state, which ``[design]`` shares with a recording
 BASE_AT_START = ("attitude", "attitude_sigma", "argument_of_latitude")
-"""Keys of the base's initial state, which ``[design]`` shares with a recording."""
 
 
 def load_problem(study: Study) -> Problem:

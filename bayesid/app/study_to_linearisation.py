@@ -25,8 +25,8 @@ from bayesid.simulation.model import Manoeuvre, Model
 __all__ = ["LinearisationPoint", "missing_part", "prepare"]
 
 
+# deviation of chi-square from its mean, in standard deviations of chi-square, that noise alone rarely reaches
 MISFIT = 3.0
-"""Deviation of chi-square from its mean, in standard deviations of chi-square, that noise alone rarely reaches."""
 
 
 @dataclass(frozen=True)

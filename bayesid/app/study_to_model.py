@@ -34,11 +34,9 @@ from bayesid.simulation.sensors import Filter, Sensor, SensorKind, White
 __all__ = ["criteria_of", "load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
 
 
+# distance of a sensor from the base's origin, in radii of the base, beyond which its unit must be wrong
 FARTHEST = 10.0
-"""Distance of a sensor from the base's origin, in radii of the base, beyond which its unit must be wrong."""
-
-CHANGE_SEED = 0
-"""Seed of the draws of an uncertain mass-property change, so that a study always has the same prior."""
+CHANGE_SEED = 0  # seed of the draws of an uncertain mass-property change, so that a study always has the same prior
 
 
 def load_posterior(study: Study, window: int | None = None) -> Posterior:

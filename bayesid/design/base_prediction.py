@@ -30,14 +30,10 @@ from bayesid.simulation.sensors import Sensor, SensorKind, White
 
 __all__ = ["BasePredictor", "Prediction", "last_link", "predict"]
 
+# sensor that sets the integration step, whose error stays below a hundredth of the sensor's noise [rad]
 ATTITUDE = Sensor(SensorKind.ATTITUDE, White(1e-6))
-"""Sensor that sets the integration step, whose error stays below a hundredth of the sensor's noise [rad]."""
-
-INSTANTS = 121
-"""Number of instants of a predicted trajectory, enough for a smooth curve in a figure."""
-
-FEWEST = 16
-"""Smallest number of draws from which the covariance of a region is computed."""
+INSTANTS = 121  # number of instants of a predicted trajectory, enough for a smooth curve in a figure
+FEWEST = 16  # smallest number of draws from which the covariance of a region is computed
 
 
 @dataclass(frozen=True)

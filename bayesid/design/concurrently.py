@@ -11,8 +11,7 @@ from bayesid._io.progress import Progress
 
 __all__ = ["Shares", "each"]
 
-T = TypeVar("T")
-"""Type of the result of one search."""
+T = TypeVar("T")  # type of the result of one search
 
 
 def each(function: Callable[[int], T], count: int, executor: Executor | None) -> list[T]:

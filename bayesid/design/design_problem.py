@@ -31,8 +31,8 @@ __all__ = ["FINER", "Known", "Problem", "Reached"]
 FINER = 8
 """Ratio of the optimiser's time step to the one at which the limits of a result are checked."""
 
+# names of the compiled functions that depend neither on bounds nor on prior knowledge, both of which are arguments
 _SHARED = ("_informed_cost", "_motion_cost", "_fractions", "_fine_trajectory")
-"""Names of the compiled functions that depend neither on bounds nor on prior knowledge, both of which are arguments."""
 
 
 @dataclass(frozen=True)

@@ -27,17 +27,11 @@ from bayesid.simulation.model import Manoeuvre
 
 __all__ = ["Design", "Risk", "best_design", "design", "evaluate", "sample_times"]
 
-CERTAIN = 0.99
-"""Probability with which a limit must hold for a manoeuvre to be flown."""
-
-PASSES = 4
-"""Largest number of passes over all criteria until the manoeuvres agree; the last one only exchanges them."""
-
+CERTAIN = 0.99  # probability with which a limit must hold for a manoeuvre to be flown
+PASSES = 4  # largest number of passes over all criteria until the manoeuvres agree; the last one only exchanges them
+# shares of a design's progress at which the searches from random starts and all searches end
 SEARCHING, EVALUATING = 0.7, 0.9
-"""Shares of a design's progress at which the searches from random starts and all searches end."""
-
-DRAWS = 200
-"""Number of draws of the prior for the risk of breaking a limit, enough for a 99 % quantile."""
+DRAWS = 200  # number of draws of the prior for the risk of breaking a limit, enough for a 99 % quantile
 
 
 @dataclass(frozen=True)

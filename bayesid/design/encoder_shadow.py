@@ -22,14 +22,9 @@ __all__ = ["Encoder", "encoder_shadow", "likely_shadow", "position_noise"]
 Encoder = Mapping[int, float | Mapping[str, float | None] | None]
 """Standard deviation of joint position (0), velocity (1) and acceleration (2), for all joints or by joint."""
 
-FASTEST = 60
-"""Largest number of cosines per joint; faster errors do not resemble what a manoeuvre shows."""
-
-NEGLIGIBLE = 1e-4
-"""Fraction of a direction's information below which its loss is neglected."""
-
-UNIT = 16
-"""Unit of the padded number of directions, so that motions share compiled functions."""
+FASTEST = 60  # largest number of cosines per joint; faster errors do not resemble what a manoeuvre shows
+NEGLIGIBLE = 1e-4  # fraction of a direction's information below which its loss is neglected
+UNIT = 16  # unit of the padded number of directions, so that motions share compiled functions
 
 
 def position_noise(encoder: Encoder, joints: tuple[str, ...]) -> Floats:

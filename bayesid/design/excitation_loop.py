@@ -50,11 +50,10 @@ from bayesid.simulation.sensors import SensorKind
 
 __all__ = ["Loop", "NotFlown"]
 
+# factor on a star sensor's noise for an initial attitude from its first sample, as the fit uses that sample again
 LOOSE = 10.0
-"""Factor on a star sensor's noise for an initial attitude from its first sample, as the fit uses that sample again."""
-
+# largest relative width of a prior at which readings ten times too large mean wrong units and not another body
 NARROW = 0.5
-"""Largest relative width of a prior at which readings ten times too large mean wrong units and not another body."""
 
 
 class NotFlown(Exception):  # noqa: N818  (nothing went wrong)

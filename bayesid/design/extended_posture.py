@@ -15,11 +15,8 @@ from bayesid.robot.robot import Robot
 
 __all__ = ["extended_posture"]
 
-STARTS = 12
-"""Number of random starts of the search, since the distance has several local maxima."""
-
-PULL = 1e-6
-"""Penalty on the squared distance from the start [m/rad2, 1/m], so that joints without influence stay there."""
+STARTS = 12  # number of random starts of the search, since the distance has several local maxima
+PULL = 1e-6  # penalty on the squared distance from the start [m/rad2, 1/m], so that joints without influence stay there
 
 
 def extended_posture(robot: Robot, start: Sequence[float] | Floats, free: Sequence[int], last: int, tip: Tip) -> Floats:

@@ -19,20 +19,11 @@ from bayesid.design.trajectory_search import Found, Search, optimise
 
 __all__ = ["Attempt", "plan_to_go"]
 
-ATTEMPTS = 5
-"""Largest number of designs before the last one is only made smaller."""
-
-SHRUNK = 30
-"""Largest number of times that the last design is made smaller before the step is a no-go."""
-
-LEAST = 0.1
-"""Smallest factor by which it is made smaller at a time."""
-
-MARGIN = 0.97
-"""Factor on a tightened limit, since the quantile is not exactly proportional to the limit."""
-
-SMALLEST = 0.05
-"""Smallest factor by which one attempt tightens a limit, so that a manoeuvre remains possible."""
+ATTEMPTS = 5  # largest number of designs before the last one is only made smaller
+SHRUNK = 30  # largest number of times that the last design is made smaller before the step is a no-go
+LEAST = 0.1  # smallest factor by which it is made smaller at a time
+MARGIN = 0.97  # factor on a tightened limit, since the quantile is not exactly proportional to the limit
+SMALLEST = 0.05  # smallest factor by which one attempt tightens a limit, so that a manoeuvre remains possible
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,7 @@ from bayesid.simulation.model import Manoeuvre, Model
 
 __all__ = ["CauseProbability", "Goal", "QuantitySd", "RelativePrecision", "StepKnowledge", "TipRegion", "goal_dict"]
 
-DRAWS = 300
-"""Number of draws of what is known from which the region of the end-effector is computed."""
+DRAWS = 300  # number of draws of what is known from which the region of the end-effector is computed
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from bayesid._io.store import JsonStore, file_key
 
 __all__ = ["History"]
 
+# stages of a step, in their order; a loop that is reviewed has the diagnosis as well
 STAGES = ("plan", "recording", "identification")
-"""Stages of a step, in their order; a loop that is reviewed has the diagnosis as well."""
 
 
 @dataclass
@@ -125,10 +125,10 @@ class History:
                 return
 
 
+# endings of the file names, by stage
 _ENDING = {
     "plan": "plan.csv",
     "recording": "recording.csv",
     "identification": "posterior.nc",
     "diagnosis": "diagnosis.json",
 }
-"""Endings of the file names, by stage."""

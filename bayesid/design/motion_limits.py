@@ -14,23 +14,16 @@ from bayesid.robot.robot import Robot
 
 __all__ = ["ACTIVE", "Limit", "Limits", "smooth_largest"]
 
-QUIET = 1e-3
-"""Largest fraction of the power of the base's motion that may lie in a quiet band."""
-
+QUIET = 1e-3  # largest fraction of the power of the base's motion that may lie in a quiet band
+# power added on both sides of the ratio, so that it exists when the base does not move [(rad/s2)^2 s, (m/s2)^2 s]
 NOTHING = 1e-20
-"""Power added on both sides of the ratio, so that it exists when the base does not move [(rad/s2)^2 s, (m/s2)^2 s]."""
-
-SHARPNESS = 300.0
-"""Sharpness of the smooth maximum, at which 500 equal values are overestimated by 2 % of the limit."""
-
-PARTS = 8
-"""Number of parts of a manoeuvre whose largest values are limited separately."""
+SHARPNESS = 300.0  # sharpness of the smooth maximum, at which 500 equal values are overestimated by 2 % of the limit
+PARTS = 8  # number of parts of a manoeuvre whose largest values are limited separately
 
 ACTIVE = 0.97
 """Fraction of a limit above which it is called active, as the smooth maximum keeps motions slightly below it."""
 
-REST = 1e-6
-"""Largest joint speed that counts as rest at both ends [rad/s or m/s]."""
+REST = 1e-6  # largest joint speed that counts as rest at both ends [rad/s or m/s]
 
 
 @dataclass(frozen=True)

@@ -19,14 +19,11 @@ from bayesid.design.search_starts import repaired, within_limits
 
 __all__ = ["Polished", "Shared", "Task", "fitted_to_fine_limits", "polish"]
 
+# largest number of times that a descent goes on because its end breaks a limit between the instants of the search
 TRIES = 8
-"""Largest number of times that a descent goes on because its end breaks a limit between the instants of the search."""
-
+# effort of a descent within loosened limits: largest number of iterations, and factor on the tolerance
 LOOSENED_ITERATIONS, LOOSENED_TOLERANCE = 60, 10.0
-"""Effort of a descent within loosened limits: largest number of iterations, and factor on the tolerance."""
-
-SPARE = 0.999
-"""Fraction of a bound at which such a limit is to end."""
+SPARE = 0.999  # fraction of a bound at which such a limit is to end
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ __all__ = ["CONTENT", "Pose", "Region"]
 CONTENT = 0.95
 """Probability content of a region, the usual one for intervals."""
 
+# distance from the mean to the surface of a region of normal draws in three dimensions, in standard deviations
 REACH = float(np.sqrt(chi2.ppf(CONTENT, 3)))
-"""Distance from the mean to the surface of a region of normal draws in three dimensions, in standard deviations."""
 
 
 @dataclass(frozen=True)

@@ -19,26 +19,14 @@ from bayesid.robot.robot import Robot
 
 __all__ = ["base_rates", "reacting_swing"]
 
-POSTURES, BEST = 400, 5
-"""Number of postures that are drawn, and of the best of them from which one is taken."""
-
-SPREAD = 0.4
-"""Standard deviation of the postures about that at the start, as a fraction of half of each joint's range."""
-
-UNLIMITED = np.pi
-"""Half of the range of a joint that has no limits [rad or m], and its largest speed [rad/s or m/s]."""
-
-SLOWEST = 1e-6
-"""Largest speed that counts for a joint whose URDF allows none [rad/s or m/s]."""
-
-FILLED = (0.3, 0.95)
-"""Fractions of the largest swing that a start may take."""
-
+POSTURES, BEST = 400, 5  # number of postures that are drawn, and of the best of them from which one is taken
+SPREAD = 0.4  # standard deviation of the postures about that at the start, as a fraction of half of each joint's range
+UNLIMITED = np.pi  # half of the range of a joint that has no limits [rad or m], and its largest speed [rad/s or m/s]
+SLOWEST = 1e-6  # largest speed that counts for a joint whose URDF allows none [rad/s or m/s]
+FILLED = (0.3, 0.95)  # fractions of the largest swing that a start may take
+# swing that remains where a posture leaves less room [rad or m]; what breaks a limit is repaired by the descent
 LEAST = 0.3
-"""Swing that remains where a posture leaves less room [rad or m]; what breaks a limit is repaired by the descent."""
-
-PERIODS = 3
-"""Largest number of periods."""
+PERIODS = 3  # largest number of periods
 
 
 def reacting_swing(problem: Problem, rng: np.random.Generator) -> Floats:

@@ -18,23 +18,13 @@ from bayesid.design.trajectories import PaperExcitation, TrajectoryFamily
 
 __all__ = ["SLACK", "adapted_to_family", "exchanged", "random_start", "repaired", "within_limits"]
 
+# fractions of the tightest limit between which random starts fill it, so that they begin inside the limits
 FILLED = (0.3, 0.95)
-"""Fractions of the tightest limit between which random starts fill it, so that they begin inside the limits."""
-
-SHRUNK = 12
-"""Largest number of times that a random start is shrunk."""
-
-LIKE_THE_PAPER = 0.25
-"""Fraction of the random starts that swing three joints as the paper's (27) does."""
-
-FROM_ANOTHER = 0.5
-"""Probability that an exchange takes courses from another of the motions, else from a random start."""
-
-EXCHANGED = 3
-"""Of so many groups of parameters, such as joints, one is exchanged at most."""
-
-MANOEUVRES = 16
-"""Number of random manoeuvres that are taken for a family."""
+SHRUNK = 12  # largest number of times that a random start is shrunk
+LIKE_THE_PAPER = 0.25  # fraction of the random starts that swing three joints as the paper's (27) does
+FROM_ANOTHER = 0.5  # probability that an exchange takes courses from another of the motions, else from a random start
+EXCHANGED = 3  # of so many groups of parameters, such as joints, one is exchanged at most
+MANOEUVRES = 16  # number of random manoeuvres that are taken for a family
 
 SLACK = 1e-6
 """Fraction of a limit by which the optimiser may exceed it, since the smooth maximum lies above the true one."""

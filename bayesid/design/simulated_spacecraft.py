@@ -23,8 +23,7 @@ from bayesid.simulation.model import Model
 
 __all__ = ["PlannedMotion", "SimulatedSpacecraft", "Spacecraft", "plan_recording"]
 
-FAMILIES = ("position", "velocity", "acceleration")
-"""Families of columns in a plan, in the order of `JointState`."""
+FAMILIES = ("position", "velocity", "acceleration")  # families of columns in a plan, in the order of `JointState`
 
 
 class Spacecraft(Protocol):

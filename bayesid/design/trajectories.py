@@ -26,8 +26,7 @@ from bayesid.robot.joint_state import JointState
 __all__ = ["BSplines", "Fourier", "Linear", "PaperExcitation", "ParameterisedMotion", "TrajectoryFamily"]
 
 
-FITTED = 400
-"""Number of instants at which a motion is fitted to another one."""
+FITTED = 400  # number of instants at which a motion is fitted to another one
 
 
 class TrajectoryFamily:

@@ -27,26 +27,15 @@ from bayesid.design.search_starts import SLACK, exchanged, random_start
 
 __all__ = ["THOROUGH", "Found", "Search", "optimise"]
 
-REACTING = 2.0 / 3.0
-"""Fraction of the starts that are swings to which the base reacts much, where the family is linear."""
-
-FOLLOWED = 3
-"""Number of motions that are followed to the end, unless there are fewer."""
-
-GENERATION = 6
-"""Exchanges that are made between the same motions; so many descents may run at once."""
-
-PARENTS = 4
-"""Number of the best motions between which courses are exchanged."""
-
+REACTING = 2.0 / 3.0  # fraction of the starts that are swings to which the base reacts much, where the family is linear
+FOLLOWED = 3  # number of motions that are followed to the end, unless there are fewer
+GENERATION = 6  # exchanges that are made between the same motions; so many descents may run at once
+PARENTS = 4  # number of the best motions between which courses are exchanged
+# factor on the tolerance with which they are: where limits change, SLSQP's first end is 1 to 2 nats too early
 FINISH = 1e-3
-"""Factor on the tolerance with which they are: where limits change, SLSQP's first end is 1 to 2 nats too early."""
-
+# difference of the cost below which two motions count as one: 1 % of ten parameters, where the cost is in nats
 ALIKE = 0.1
-"""Difference of the cost below which two motions count as one: 1 % of ten parameters, where the cost is in nats."""
-
-Kept = tuple[Floats, float, int]
-"""Parameters, cost and number of evaluations of one descent."""
+Kept = tuple[Floats, float, int]  # parameters, cost and number of evaluations of one descent
 
 
 @dataclass(frozen=True)

@@ -31,23 +31,14 @@ from bayesid.simulation.sensors import Sensor, SensorKind
 
 __all__ = ["AddedMeasurement", "NotEvaluated", "Swung", "candidates"]
 
-KNOWN_MASS = 0.01
-"""Relative standard deviation of a mass that counts as known."""
-
+KNOWN_MASS = 0.01  # relative standard deviation of a mass that counts as known
+# acceleration [m/s2] and angular acceleration [rad/s2] of the whole robot by a pulse of thrust and of torque
 PUSH, TURN = 1e-3, 1e-4
-"""Acceleration [m/s2] and angular acceleration [rad/s2] of the whole robot by a pulse of thrust and of torque."""
-
-SPIN = 2e-3
-"""Change of the robot's angular velocity by a pulse of the wheels [rad/s]."""
-
-SWING = {"rad": 0.5, "m": 0.2}
-"""Amplitude of an added swing of a revolute joint [rad] and of a prismatic one [m]."""
-
-SHARE = 0.9
-"""Largest fraction of a joint's speed limit that an added swing may reach, so that it keeps a margin."""
-
+SPIN = 2e-3  # change of the robot's angular velocity by a pulse of the wheels [rad/s]
+SWING = {"rad": 0.5, "m": 0.2}  # amplitude of an added swing of a revolute joint [rad] and of a prismatic one [m]
+SHARE = 0.9  # largest fraction of a joint's speed limit that an added swing may reach, so that it keeps a margin
+# bounds of the three parts of a pulse, one part for each axis, as fractions of the manoeuvre's duration
 PARTS = (0.35, 0.45, 0.55, 0.65)
-"""Bounds of the three parts of a pulse, one part for each axis, as fractions of the manoeuvre's duration."""
 
 
 class NotEvaluated(Exception):  # noqa: N818 - a verdict, not an error

@@ -38,8 +38,7 @@ LINEAR = (
 )
 """Names of `InertialParameters.vector`; first moment of mass and inertia are about the link's origin, in its axes."""
 
-SEED = 1991
-"""Seed of the random states where no generator is given, so that results repeat."""
+SEED = 1991  # seed of the random states where no generator is given, so that results repeat
 
 
 @dataclass(frozen=True)

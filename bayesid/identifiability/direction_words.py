@@ -13,17 +13,11 @@ from bayesid.inference.contraction import ContractionVerdict
 
 __all__ = ["Part", "describe", "parts_of", "subject"]
 
-ALIKE = 0.95
-"""Cosine between displacement and pattern, in prior standard deviations, above which the pattern is named."""
-
-NEGLIGIBLE = 0.25
-"""Size relative to the largest part below which a part is left out of the words."""
-
-NAMED = 3
-"""Largest number of parts named, so that the words remain readable."""
-
+ALIKE = 0.95  # cosine between displacement and pattern, in prior standard deviations, above which the pattern is named
+NEGLIGIBLE = 0.25  # size relative to the largest part below which a part is left out of the words
+NAMED = 3  # largest number of parts named, so that the words remain readable
+# nouns in sentences by the first part of a quantity's name
 NOUNS = {"mass": "mass", "com": "centre of mass", "inertia": "inertia"}
-"""Nouns in sentences by the first part of a quantity's name."""
 
 
 class Part(Enum):

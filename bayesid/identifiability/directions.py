@@ -20,11 +20,9 @@ from bayesid.inference.contraction import ContractionVerdict
 
 __all__ = ["Direction", "common_factor", "directions"]
 
+# shrinkage below which the data do not distinguish directions, so that any basis of their space is as good
 UNTOLD = 0.01
-"""Shrinkage below which the data do not distinguish directions, so that any basis of their space is as good."""
-
-TURNS = 200
-"""Largest number of iterations in the rotation of that basis; it usually converges much earlier."""
+TURNS = 200  # largest number of iterations in the rotation of that basis; it usually converges much earlier
 
 
 @dataclass(frozen=True)

@@ -27,11 +27,9 @@ TYPICAL: dict[SensorKind, Sensor] = {
 }
 """Sensors that could be added, with typical noise per sample: 1e-5 rad/s, 1e-5 m/s2 (1 micro-g) and 5 arcsec."""
 
-TYPICAL_TORQUE = 0.1
-"""Typical noise per sample of torque sensors that could be added to all joints [N m, N]."""
-
+TYPICAL_TORQUE = 0.1  # typical noise per sample of torque sensors that could be added to all joints [N m, N]
+# factors on the noise of a sensor that stand for an absent sensor, and for the best sensor that is considered
 ABSENT, FINEST = 1e6, 0.1
-"""Factors on the noise of a sensor that stand for an absent sensor, and for the best sensor that is considered."""
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,7 @@ from bayesid.robot.robot import Robot
 __all__ = ["Determined", "consistent_accelerations", "determined", "rates_at_rest"]
 
 
-SEEN = 1e-7
-"""Relative size above which a component along the base parameters is more than rounding."""
+SEEN = 1e-7  # relative size above which a component along the base parameters is more than rounding
 
 
 @dataclass(frozen=True)

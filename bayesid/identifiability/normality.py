@@ -18,14 +18,12 @@ from bayesid.inference.posterior import Posterior
 
 __all__ = ["Draws", "Method", "draw", "shape_errors", "weighted_quantile"]
 
+# probabilities at which quantiles are compared, and the quantiles of a standard normal distribution there
 LEVELS = {0.025: -1.959963984540054, 0.16: -0.994457883209753, 0.84: 0.994457883209753, 0.975: 1.959963984540054}
-"""Probabilities at which quantiles are compared, and the quantiles of a standard normal distribution there."""
-
+# largest difference between a quantile and the normal one at which a posterior counts as normal, in its sd
 NORMAL = 0.3
-"""Largest difference between a quantile and the normal one at which a posterior counts as normal, in its sd."""
-
+# largest numbers of steps and of unknowns for emcee, which takes too long with many strongly correlated unknowns
 STEPS, LARGEST = 2000, 40
-"""Largest numbers of steps and of unknowns for emcee, which takes too long with many strongly correlated unknowns."""
 
 
 class Method(Enum):

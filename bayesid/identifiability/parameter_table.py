@@ -18,8 +18,7 @@ from bayesid.inference.posterior import Posterior
 
 __all__ = ["ParameterRow", "profiled", "quantity_of", "tabulate"]
 
-CORRELATED = 0.9
-"""Absolute correlation above which the table names two quantities as confused with each other."""
+CORRELATED = 0.9  # absolute correlation above which the table names two quantities as confused with each other
 
 
 @dataclass(frozen=True)

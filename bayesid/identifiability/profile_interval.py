@@ -20,29 +20,17 @@ from bayesid._math.least_squares import levenberg_marquardt
 
 __all__ = ["Profile", "Target", "profile"]
 
-Vector = Callable[[Floats], Floats]
-"""Function of the coordinates (n,) that returns an array."""
-
+Vector = Callable[[Floats], Floats]  # function of the coordinates (n,) that returns an array
+# square roots of the chi-square quantiles of one degree of freedom, by the level of the interval
 LEVELS = {"68 %": 1.0, "95 %": 1.959963984540054}
-"""Square roots of the chi-square quantiles of one degree of freedom, by the level of the interval."""
-
-STEP = 0.5
-"""Intended change of that square root from one point of a profile to the next."""
-
+STEP = 0.5  # intended change of that square root from one point of a profile to the next
+# residual that the penalty adds per standard deviation between the quantity and the value at which it is held
 STIFF = 30.0
-"""Residual that the penalty adds per standard deviation between the quantity and the value at which it is held."""
-
-MOST = 24
-"""Largest number of refits on each side of the mode, which bounds the run time."""
-
-TOLERANCE = 1e-8
-"""Relative tolerance of a refit on its cost, coordinates and gradient."""
-
+MOST = 24  # largest number of refits on each side of the mode, which bounds the run time
+TOLERANCE = 1e-8  # relative tolerance of a refit on its cost, coordinates and gradient
+# step, in standard deviations, below which a jump of the profile is accepted instead of refined further
 SHORTEST = 1e-3
-"""Step, in standard deviations, below which a jump of the profile is accepted instead of refined further."""
-
-GROWTH = 3.0
-"""Largest factor by which the expected step grows from one point to the next."""
+GROWTH = 3.0  # largest factor by which the expected step grows from one point to the next
 
 
 class Target(NamedTuple):

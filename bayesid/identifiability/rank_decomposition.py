@@ -18,14 +18,11 @@ __all__ = ["ZERO", "checked_rank", "equilibrated", "regrouping", "spanning"]
 ZERO = 1e-10
 """Relative size up to which a singular value, or the part of a column that no other column explains, is rounding."""
 
+# relative length below which a column is not scaled to unit length, because that would amplify its rounding errors
 FAINT = 1e-3
-"""Relative length below which a column is not scaled to unit length, because that would amplify its rounding errors."""
-
-GAP = 1e3
-"""Smallest ratio of the last singular value kept to the first dropped at which the rank counts as determined."""
-
+GAP = 1e3  # smallest ratio of the last singular value kept to the first dropped at which the rank counts as determined
+# remedy in the errors of this module: nearly dependent columns come from nearly degenerate geometry
 REMEDY = "Look for joints that are almost, but not quite, parallel or on one axis"
-"""Remedy in the errors of this module: nearly dependent columns come from nearly degenerate geometry."""
 
 
 def equilibrated(matrix: Floats) -> tuple[Floats, Floats]:

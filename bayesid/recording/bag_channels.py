@@ -18,15 +18,11 @@ JOINTS = ("sensor_msgs/JointState",)
 IMU = ("sensor_msgs/Imu",)
 ATTITUDES = ("geometry_msgs/QuaternionStamped", "geometry_msgs/PoseStamped")
 
-GRAVITY = 9.80665
-"""Standard gravity, the specific force of what rests on the ground [m/s2]."""
-
+GRAVITY = 9.80665  # standard gravity, the specific force of what rests on the ground [m/s2]
+# relative difference of a median magnitude from that of gravity up to which it is gravity: no robot that is free
+# accelerates so steadily, and gravity differs by 0.5 % over the Earth
 NEAR = 0.05
-"""Relative difference of a median magnitude from that of gravity up to which it is gravity: no robot that is free
-accelerates so steadily, and gravity differs by 0.5 % over the Earth."""
-
-NOT_MEASURED = -1.0
-"""First element of a covariance by which an IMU says that it does not measure the quantity."""
+NOT_MEASURED = -1.0  # first element of a covariance by which an IMU says that it does not measure the quantity
 
 Channels = dict[str, Floats]
 

@@ -11,9 +11,9 @@ from bayesid.recording.ros_bag import StampedTopic
 
 __all__ = ["refuse_mixed_clocks"]
 
+# difference of the stamps of two topics, against their arrival, from which on their clocks are others [s]; a slow
+# telemetry stamps its samples once in a second
 APART = 1.0
-"""Difference of the stamps of two topics, against their arrival, from which on their clocks are others [s]; a slow
-telemetry stamps its samples once in a second."""
 
 
 def refuse_mixed_clocks(topics: Sequence[StampedTopic]) -> None:

@@ -25,8 +25,7 @@ from bayesid.robot.robot import Robot
 __all__ = ["Excitation", "MeasuredMotion", "Motion", "check_joints"]
 
 
-EXTENDED = 3.0
-"""Sample intervals by which the smoothed motion of a joint is extended at most beyond its samples."""
+EXTENDED = 3.0  # sample intervals by which the smoothed motion of a joint is extended at most beyond its samples
 
 
 class Motion(Protocol):

@@ -21,29 +21,14 @@ from bayesid.recording.smoothing import SmoothedJoint
 
 __all__ = ["placed_jumps"]
 
-PARTS = 10
-"""Parts of a step, of which each may hold the jump."""
-
-BESIDE = 1
-"""Steps on either side of those found that may hold the jump, too."""
-
-SWEEPS = 3
-"""Times that every jump is placed beside the others."""
-
-NARROW = 2
-"""Most steps of a place that is widened where another jump shares a node with it."""
-
-MOST_STEPS = 8
-"""Steps above which a jump stays where it was found: the samples show too little of it to say more."""
-
-UNLIKELY = 1e-4
-"""Probability of a part relative to the likeliest below which the jump is not there."""
-
-ROUNDING = 1e-14
-"""Variance of an increment relative to its prior below which it is rounding."""
-
-UNSEEN = 1e-9
-"""Information on an increment relative to its prior below which it is none."""
+PARTS = 10  # parts of a step, of which each may hold the jump
+BESIDE = 1  # steps on either side of those found that may hold the jump, too
+SWEEPS = 3  # times that every jump is placed beside the others
+NARROW = 2  # most steps of a place that is widened where another jump shares a node with it
+MOST_STEPS = 8  # steps above which a jump stays where it was found: the samples show too little of it to say more
+UNLIKELY = 1e-4  # probability of a part relative to the likeliest below which the jump is not there
+ROUNDING = 1e-14  # variance of an increment relative to its prior below which it is rounding
+UNSEEN = 1e-9  # information on an increment relative to its prior below which it is none
 
 
 def placed_jumps(joints: Sequence[SmoothedJoint]) -> list[SmoothedJoint]:

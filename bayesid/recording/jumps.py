@@ -24,40 +24,28 @@ from bayesid.recording.smoothing import ORDERS, JointSamples, SmoothedJoint, smo
 
 __all__ = ["smooth_joints"]
 
-DERIVATIVES = (2, 3)
-"""Derivatives of the position that may jump: acceleration and jerk."""
-
+DERIVATIVES = (2, 3)  # derivatives of the position that may jump: acceleration and jerk
+# p-value below which a jump is an unknown. Each step is tested, so that a rough joint without a jump gets one or two: a
+# jump too many widens the errors near one instant, a jump missed makes errors of ten times what is stated.
 LEVEL = 1e-3
-"""p-value below which a jump is an unknown. Each step is tested, so that a rough joint without a jump gets one or two:
-a jump too many widens the errors near one instant, a jump missed makes errors of ten times what is stated."""
-
+# p-value below which a jump counts while the roughness is even. With 1e-3, smooth moves with rests between hold 20 to
+# 30 jumps where there is none, and errors reach 12 stated deviations; with 1e-8, single jumps are taken for roughness.
 STRONG = 1e-5
-"""p-value below which a jump counts while the roughness is even. With 1e-3, smooth moves with rests between hold 20 to
-30 jumps where there is none, and errors reach 12 stated deviations; with 1e-8, single jumps are taken for roughness."""
-
+# most rounds of the search: what has jumped less is seen once the larger jumps no longer count as roughness
 MOST_ROUNDS = 20
-"""Most rounds of the search: what has jumped less is seen once the larger jumps no longer count as roughness."""
-
+# most times that jumps are sought and placed: a small one next to a large one is seen once that has its place
 CYCLES = 4
-"""Most times that jumps are sought and placed: a small one next to a large one is seen once that has its place."""
-
-ROUNDS_OF_ORDERS = 2
-"""Rounds in which the order of the process is chosen anew: the largest jumps decide on it."""
-
+ROUNDS_OF_ORDERS = 2  # rounds in which the order of the process is chosen anew: the largest jumps decide on it
+# Steps between two jumps that are found in one round, as the smaller one may be the shadow of the larger. With 10, the
+# begin of a move just after the end of another is missed more often, and errors there reach 14 stated deviations.
 APART = 5
-"""Steps between two jumps that are found in one round, as the smaller one may be the shadow of the larger. With 10, the
-begin of a move just after the end of another is missed more often, and errors there reach 14 stated deviations."""
-
-UNLIKELY = 0.05
-"""Probability of a step relative to the likeliest below which the jump is not placed there."""
-
+UNLIKELY = 0.05  # probability of a step relative to the likeliest below which the jump is not placed there
+# Prior standard deviation of a jump over its estimate, with which the data decide on its size. With 10, errors where
+# the samples do not show the instant are a fifth smaller than is stated; with 2, some are many times larger.
 FREE = 5.0
-"""Prior standard deviation of a jump over its estimate, with which the data decide on its size. With 10, errors where
-the samples do not show the instant are a fifth smaller than is stated; with 2, some are many times larger."""
-
+# log likelihood that a jump may cost a joint: twice that of a jump of two derivatives of which it shows nothing, ``2
+# log(FREE)``
 MOST_LOST = 10.0
-"""Log likelihood that a jump may cost a joint: twice that of a jump of two derivatives of which it shows nothing,
-``2 log(FREE)``."""
 
 
 class _Scores(NamedTuple):

@@ -19,18 +19,13 @@ from bayesid.recording.smoothing import SmoothedJoint
 
 __all__ = ["roughened"]
 
+# Degrees of freedom of the prior of each factor. With four, errors where a move begins reach six stated deviations;
+# with one, four to five, which is what the largest of some thousand samples is.
 PRIOR = 1.0
-"""Degrees of freedom of the prior of each factor. With four, errors where a move begins reach six stated deviations;
-with one, four to five, which is what the largest of some thousand samples is."""
-
+# most updates of the factors; each is half a step in their logarithms at first, so that they do not overshoot
 ROUNDS = 8
-"""Most updates of the factors; each is half a step in their logarithms at first, so that they do not overshoot."""
-
-SETTLED = 0.3
-"""Change of the logarithm of a factor below which it counts as settled: its uncertainty is some two."""
-
-FEWEST = 1.0
-"""Degrees of freedom of all steps below which the samples say nothing of the roughness."""
+SETTLED = 0.3  # change of the logarithm of a factor below which it counts as settled: its uncertainty is some two
+FEWEST = 1.0  # degrees of freedom of all steps below which the samples say nothing of the roughness
 
 
 def roughened(joint: SmoothedJoint) -> SmoothedJoint:

@@ -11,20 +11,11 @@ from bayesid.robot.robot import Robot
 
 __all__ = ["refuse_impossible_motion"]
 
-FASTEST = 5.0
-"""Speed of a joint relative to its limit that none reaches."""
-
-READING_ERROR = 0.01
-"""Largest change of a reading by the noise and the steps of a coarse encoder [rad or m]."""
-
-SPAN = 1.0
-"""Time in which a joint in wrong units moves by much more than that error even where its limit is low [s]."""
-
-FASTEST_BASE = 20.0
-"""Angular speed of the base that no free-flying robot keeps up, some three turns a second [rad/s]."""
-
-RATE = ("rate.x", "rate.y", "rate.z")
-"""Columns of the angular velocity of the base."""
+FASTEST = 5.0  # speed of a joint relative to its limit that none reaches
+READING_ERROR = 0.01  # largest change of a reading by the noise and the steps of a coarse encoder [rad or m]
+SPAN = 1.0  # time in which a joint in wrong units moves by much more than that error even where its limit is low [s]
+FASTEST_BASE = 20.0  # angular speed of the base that no free-flying robot keeps up, some three turns a second [rad/s]
+RATE = ("rate.x", "rate.y", "rate.z")  # columns of the angular velocity of the base
 
 
 def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:

@@ -27,14 +27,9 @@ __all__ = ["Recording"]
 
 Array = Floats
 
-MINIMUM_ROWS = 8
-"""Number of rows below which a motion is not determined."""
-
-ABSURD = 1e9
-"""Size above which no sample can be a measurement in SI units."""
-
-NORM_TOLERANCE = 1e-3
-"""Deviation of a quaternion's norm from one above which it is taken for an error."""
+MINIMUM_ROWS = 8  # number of rows below which a motion is not determined
+ABSURD = 1e9  # size above which no sample can be a measurement in SI units
+NORM_TOLERANCE = 1e-3  # deviation of a quaternion's norm from one above which it is taken for an error
 
 
 @dataclass(frozen=True, eq=False)

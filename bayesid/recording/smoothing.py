@@ -32,15 +32,13 @@ ORDERS = (4, 3, 5)
 spline, the roughest with a continuous acceleration, 5 leaves a fiftieth of its error on smooth motion, and 6 would need
 square-root algebra."""
 
+# information on a jump over that on it if the process were observed, below which it is lost in rounding
 RELIABLE = 1e-6
-"""Information on a jump over that on it if the process were observed, below which it is lost in rounding."""
-
+# steps within which a process leaves a polynomial that is rough enough for the information on a jump, which grows with
+# the fifth power of their number, not to be lost in rounding
 HORIZON = 3.0
-"""Steps within which a process leaves a polynomial that is rough enough for the information on a jump, which grows with
-the fifth power of their number, not to be lost in rounding."""
-
+# fraction of the median step below which two sample times share a node, because the algebra needs separate nodes
 SNAP = 0.02
-"""Fraction of the median step below which two sample times share a node, because the algebra needs separate nodes."""
 
 
 @dataclass(frozen=True)

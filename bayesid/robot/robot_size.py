@@ -19,14 +19,10 @@ from bayesid.robot.robot import Robot
 
 __all__ = ["BeyondJoint", "RobotSize", "beyond_joint", "half_edges", "link_radius"]
 
-STEEL = 7800.0
-"""Density of steel [kg/m3], above which no body of a spacecraft lies as a whole."""
-
+STEEL = 7800.0  # density of steel [kg/m3], above which no body of a spacecraft lies as a whole
+# Area of solar panels per mass of the spacecraft [m2/kg], for 4 W per kilogram and 200 W per square metre. It is
+# assumed and by no source, and generous on purpose: it makes most of the area of a compact robot.
 PANEL_AREA = 0.02
-"""Area of solar panels per mass of the spacecraft [m2/kg], for 4 W per kilogram and 200 W per square metre.
-
-It is assumed and by no source, and generous on purpose: it makes most of the area of a compact robot.
-"""
 
 
 @dataclass(frozen=True)

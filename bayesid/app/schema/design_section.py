@@ -23,8 +23,7 @@ from bayesid.app.schema.value_types import (
     no_more_than,
 )
 
-FEWEST_SAMPLES = 16
-"""Smallest number of samples of a manoeuvre, since fewer do not determine a motion."""
+FEWEST_SAMPLES = 16  # smallest number of samples of a manoeuvre, since fewer do not determine a motion
 
 
 class DesignLimits(Section):

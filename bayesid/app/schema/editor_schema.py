@@ -18,8 +18,7 @@ from bayesid.app.schema.study_file import Study
 
 __all__ = ["editor_schema"]
 
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
-"""Version of JSON Schema that pydantic writes."""
+DIALECT = "https://json-schema.org/draft/2020-12/schema"  # version of JSON Schema that pydantic writes
 
 
 def editor_schema() -> dict[str, Any]:

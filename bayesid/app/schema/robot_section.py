@@ -27,11 +27,8 @@ from bayesid.app.schema.value_types import (
 if TYPE_CHECKING:
     from bayesid.robot.inertial_parameters import InertialParameters
 
-LOWEST_ORBIT = 6.3e6
-"""Radius below which an orbit is inside the Earth [m]."""
-
-HIGHEST_ORBIT = 1.5e9
-"""Radius above which an orbit is outside the Earth's sphere of influence [m]."""
+LOWEST_ORBIT = 6.3e6  # radius below which an orbit is inside the Earth [m]
+HIGHEST_ORBIT = 1.5e9  # radius above which an orbit is outside the Earth's sphere of influence [m]
 
 
 class BodySection(Section):

@@ -14,6 +14,7 @@ from pydantic_core import ErrorDetails
 
 from bayesid._io.errors import InputError
 
+# required values by pydantic's type of error; other types use pydantic's message
 _WANTED = {
     "model_type": "a table",
     "dict_type": "a table",
@@ -25,7 +26,6 @@ _WANTED = {
     "path_type": "a path in quotes",
     "string_too_short": "a name",
 }
-"""Required values by pydantic's type of error; other types use pydantic's message."""
 
 
 def suggest(name: str, known: Sequence[str]) -> str | None:

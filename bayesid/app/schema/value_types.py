@@ -24,8 +24,8 @@ from pydantic import (
 
 from bayesid._io.errors import InputError
 
+# largest deviation from one of the norm of a unit vector or quaternion, for values rounded to some digits
 UNIT_TOLERANCE = 1e-3
-"""Largest deviation from one of the norm of a unit vector or quaternion, for values rounded to some digits."""
 
 
 def _numbers(value: Any) -> Iterable[float]:
@@ -127,11 +127,10 @@ PerName = Annotated[
     Discriminator(lambda value: "table" if isinstance(value, Mapping) else "number"),
 ]
 
+# validator of angles, which are at most one turn [rad]
 FULL_TURN = no_more_than(2.0 * math.pi, "Radians, not degrees?")
-"""Validator of angles, which are at most one turn [rad]."""
-
+# validator of the noise of angles, which no sensor exceeds [rad]
 ANGLE_SIGMA = no_more_than(0.1, "Radians, not arcsec or degrees?")
-"""Validator of the noise of angles, which no sensor exceeds [rad]."""
 
 
 class Section(BaseModel):
