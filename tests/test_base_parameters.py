@@ -11,7 +11,7 @@ import scipy.linalg as sla
 
 from bayesid import InputError
 from bayesid.identifiability import Base, BaseParameters, base_parameters
-from bayesid.identifiability.stacked_regressor import massive_bodies, stacked_regressor
+from bayesid.identifiability.base_parameters import massive_bodies, stacked_regressor
 from bayesid.robot.inertial_parameters import BASIS, InertialParameters, parameters_from_pseudo_inertia
 from bayesid.robot.kinematics import configuration, joint_twist
 from bayesid.robot.robot import Load, Robot

@@ -17,13 +17,12 @@ from test_cli import run
 from bayesid._io.errors import InputError
 from bayesid._io.progress import silent
 from bayesid.app import study_to_design
-from bayesid.app.fly_next import fly_next, write_motion
 from bayesid.app.schema import Study
-from bayesid.app.study_to_design import load_problem
+from bayesid.app.study_to_design import fly_next, load_problem, write_motion
 from bayesid.app.study_to_encoders import assume_missing, encoder_noise
 from bayesid.design import Store, expected_probability, noncentrality_for
-from bayesid.design.extended_posture import extended_posture
 from bayesid.design.polish import _Descent
+from bayesid.design.trajectories import extended_posture
 from bayesid.recording.recording import Recording
 from bayesid.report.numbers import format_fixed, format_number
 from bayesid.robot.end_effector import Tip

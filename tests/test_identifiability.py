@@ -7,13 +7,11 @@ import pytest
 import scipy.linalg as sla
 from conftest import ENCODER, ORBIT, PLANAR, POINT, SIGMA, STEP
 
-from bayesid.identifiability.added_information import NotEvaluated, Swung, candidates
-from bayesid.identifiability.direction_words import describe, subject
-from bayesid.identifiability.directions import Direction, directions
+from bayesid.identifiability.advice import NotEvaluated, Swung, candidates
+from bayesid.identifiability.directions import Direction, describe, directions, subject
 from bayesid.identifiability.hypothetical_experiment import Experiment, InformationPredictor
 from bayesid.identifiability.local_knowledge import Knowledge
-from bayesid.identifiability.normality import Draws, Method, shape_errors, weighted_quantile
-from bayesid.identifiability.parameter_table import quantity_of
+from bayesid.identifiability.parameter_table import Draws, Method, quantity_of, shape_errors, weighted_quantile
 from bayesid.identifiability.practical_identifiability import covers_all
 from bayesid.identifiability.profile_interval import Target, profile
 from bayesid.inference import maximise

@@ -12,8 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from bayesid.app.command_line import app
-from bayesid.app.noise_estimates import channel_noise
 from bayesid.app.schema import Study
+from bayesid.app.study_draft import channel_noise
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.recording.recording import Recording
 from studies.truth.bodies import SERVICER3

@@ -12,9 +12,9 @@ from test_cli import run
 
 from bayesid.app.schema import DesignSection, Study
 from bayesid.app.study_to_design import load_loop_problem
-from bayesid.app.user_spacecraft import load_spacecraft
+from bayesid.app.user_files import load_spacecraft
 from bayesid.design import Loop
-from bayesid.design.excitation_loop import flown, start_of
+from bayesid.design.excitation_loop import flown
 from bayesid.design.loop_history import History
 from bayesid.recording.recording import Recording
 
@@ -77,7 +77,7 @@ DESIGN = {
     "interval": ("duration = 10.0\ninterval = 0.25", lambda p: p.plan.interval, 0.25),
     "tip_frame": ("duration = 10.0\ntip_frame = 'link1'", lambda p: p.plan.tip.name, "link1"),
     "joints": ("duration = 10.0\njoints = ['joint2', 'joint1']", lambda p: p.plan.family.moving, (1, 0)),
-    "start": ("duration = 10.0\nstart = {joint1 = 0.4}", lambda p: start_of(p.plan).tolist(), [0.4, 0.0]),
+    "start": ("duration = 10.0\nstart = {joint1 = 0.4}", lambda p: p.plan.family.posture_at_rest.tolist(), [0.4, 0.0]),
     "parameterisation": ("duration = 10.0\nparameterisation = 'fourier'", lambda p: p.plan.family.name, "fourier"),
     "functions": ("duration = 10.0\nfunctions = 3", lambda p: p.plan.family.size, 6),
     "criteria": (

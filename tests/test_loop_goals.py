@@ -15,9 +15,8 @@ from test_loop import ENCODER, PROBLEM, TRUE, model_of
 from bayesid._io.errors import InputError
 from bayesid.design import CauseProbability, Loop, QuantitySd, RelativePrecision, TipRegion
 from bayesid.design.base_prediction import predict
-from bayesid.design.loop_goals import StepKnowledge
+from bayesid.design.loop_goals import Review, StepKnowledge
 from bayesid.design.loop_history import History
-from bayesid.design.step_review import Review
 from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws
 from bayesid.inference.posterior_file import write_draws
 from bayesid.recording.joint_motion import MeasuredMotion

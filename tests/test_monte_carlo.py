@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from bayesid._io.errors import InputError
-from bayesid.app.scheduler import executor_at
+from bayesid.app.options import executor_at
 from studies.common.monte_carlo import read_store, run_trials
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -81,7 +81,7 @@ def test_a_scheduler_of_dask_that_loses_a_worker_gives_the_same(tmp_path):
 
 def test_a_scheduler_that_does_not_answer_is_one_clear_error(monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("bayesid.app.scheduler.SECONDS", 0.5)
+    monkeypatch.setattr("bayesid.app.options.SECONDS", 0.5)
     with pytest.raises(InputError, match=r"--scheduler: no scheduler answers at tcp://127.0.0.1:9"):
         executor_at("tcp://127.0.0.1:9")
 

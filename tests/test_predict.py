@@ -13,7 +13,7 @@ from test_cli import run
 
 from bayesid._io.errors import InputError
 from bayesid.design.base_prediction import BasePredictor
-from bayesid.design.pose_region import REACH, Region
+from bayesid.design.pose_trajectory import REACH, Region
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.report.numbers import format_quantity

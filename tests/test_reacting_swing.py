@@ -9,7 +9,7 @@ from search_robots import search_problem
 from test_design import plan as flywheel_plan
 
 from bayesid.design import DOptimal, Limits, PaperExcitation, Problem
-from bayesid.design.reacting_swing import _chosen, _largest, base_rates, reacting_swing
+from bayesid.design.search_starts import _chosen, _largest, base_rates, reacting_swing
 from bayesid.robot.robot import Robot
 from studies.truth.bodies import BRANCHED, SERVICER4
 

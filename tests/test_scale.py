@@ -6,13 +6,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bayesid.identifiability import base_parameters, consistent_accelerations, determined, rates_at_rest
-from bayesid.identifiability.stacked_regressor import massive_bodies, random_motion
+from bayesid.identifiability import base_parameters
+from bayesid.identifiability.base_parameters import massive_bodies, random_motion
 from bayesid.robot.composite_tables import link_table
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import configuration, kinematics
 from bayesid.robot.regressors import balance_regressor, gradient_regressor, torque_regressor
 from bayesid.robot.robot import Robot
+from studies.common.mass_scale import consistent_accelerations, determined, rates_at_rest
 from studies.truth.stepwise import Reference
 from tests.trees import random_tree
 

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bayesid._io.files import create_folder, write_text
 from bayesid._io.progress import Progress
 from bayesid.app.options import Output, Samples, Seed
 
 if TYPE_CHECKING:
     from bayesid.diagnosis import Diagnosis
 
-__all__ = ["run"]
+__all__ = ["copy_demonstration", "run"]
 
 
 def run(output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4000.0) -> Iterator[str]:
     """Diagnose shipped recordings with a hidden cause, show that cause and write the report, without any input file."""
-    from bayesid.app.demonstration import copy_demonstration
     from bayesid.app.diagnose_command import diagnose_study
     from bayesid.app.schema import Study
 
@@ -29,3 +32,23 @@ def run(output: Output, progress: Progress, seed: Seed = 0, samples: Samples = 4
     for cause, values in answer.items():
         parts = ", ".join(f"{key} {value:.4g}" for key, value in values.items())
         yield f"Hidden was {cause}: {parts}. {'It was found.' if cause in named else 'It was not found.'}"
+
+
+def copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
+    """Copy the shipped study into a folder.
+
+    Returns
+    -------
+    dict
+        True values of the effects hidden in its recordings, by effect and key, in SI units.
+    """
+    create_folder(folder)
+    shipped = files("bayesid.app") / "demonstration_data"
+    answer: dict[str, dict[str, float]] = {}
+    for item in shipped.iterdir():
+        text = item.read_text(encoding="utf-8")
+        if item.name == "hidden.json":
+            answer = json.loads(text)
+        else:
+            write_text(folder / item.name, text)
+    return answer

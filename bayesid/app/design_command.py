@@ -12,8 +12,7 @@ import typer
 
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress
-from bayesid.app.options import Output, Seed, StudyFile
-from bayesid.app.scheduler import Scheduler, executor_at
+from bayesid.app.options import Output, Scheduler, Seed, StudyFile, executor_at
 
 __all__ = ["run"]
 
@@ -43,9 +42,8 @@ def run(
     from bayesid._io.files import claimed_folder, complete_folder, write_json
     from bayesid._io.store import content_key
     from bayesid._io.words import counted
-    from bayesid.app.fly_next import write_motion
     from bayesid.app.report_origin import report_origin
-    from bayesid.app.study_to_design import load_problem, separating
+    from bayesid.app.study_to_design import load_problem, separating, write_motion
     from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
     from bayesid.design import THOROUGH, Search, Store, best_design, design
     from bayesid.report import design_report

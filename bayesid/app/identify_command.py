@@ -64,7 +64,7 @@ def run(
 
 
 def _summary(result: Identification) -> Iterator[str]:
-    from bayesid.identifiability.unidentifiable import unidentifiable_sentences
+    from bayesid.identifiability.directions import unidentifiable_sentences
 
     yield f"chi-square {result.optimum.chi2:.0f} over {result.posterior.samples} samples."
     for name, body in result.bodies.items():

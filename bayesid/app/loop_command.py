@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,7 +12,11 @@ from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress
 from bayesid.app.options import Output, Samples, Seed, StudyFile
 
-__all__ = ["run"]
+if TYPE_CHECKING:
+    from bayesid.design.loop_goals import Goal
+    from bayesid.simulation.model import Model
+
+__all__ = ["goals_of", "run"]
 
 
 def run(
@@ -52,11 +56,10 @@ def run(
 
     from bayesid._io.files import claimed_folder
     from bayesid.app.report_origin import report_origin
-    from bayesid.app.study_to_causes import loop_review
     from bayesid.app.study_to_design import load_loop_problem
     from bayesid.app.study_to_encoders import encoder_noise
-    from bayesid.app.user_spacecraft import Nobody, load_spacecraft
-    from bayesid.app.wanted import goals_of
+    from bayesid.app.study_to_model import loop_review
+    from bayesid.app.user_files import load_spacecraft
     from bayesid.design import Loop, Sampled
     from bayesid.report import loop_report
     from bayesid.report.loop_report import loop_sentences
@@ -72,7 +75,7 @@ def run(
         identifier=Sampled(samples),
         reviewer=loop_review(study) if diagnose else None,
     )
-    executing = Nobody() if spacecraft is None else load_spacecraft(spacecraft)
+    executing = None if spacecraft is None else load_spacecraft(spacecraft)
     with claimed_folder(output):
         history = loop.run(executing, output, progress)
         written = any("identification" in step for step in history.steps)
@@ -96,3 +99,72 @@ def run(
     if written:
         yield f"Wrote {output / 'report.pdf'}."
     yield f"Wrote {history.folder / 'loop.json'}."
+
+
+def goals_of(
+    model: Model,
+    precision: float | None,
+    deviations: Sequence[str],
+    region: float | None,
+    cause: str | None,
+    tip_frame: str | None,
+) -> tuple[Goal, ...]:
+    """Return the goals of a loop; a relative precision of 1 % where nothing else is wanted.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the loop.
+    precision : float or None
+        Relative standard deviation of mass and principal moments.
+    deviations : sequence of str
+        ``BODY.QUANTITY=SD``, in SI units.
+    region : float or None
+        Longest semi-axis of the end-effector's region [mm].
+    cause : str or None
+        ``NAME`` or ``NAME=PROBABILITY``.
+    tip_frame : str or None
+        Frame of the end-effector.
+
+    Raises
+    ------
+    InputError
+        If an option cannot be read, or the model has no such body.
+    """
+    from bayesid.design.loop_goals import CauseProbability, QuantitySd, RelativePrecision, TipRegion
+
+    goals: list[Goal] = []
+    if precision is not None:
+        if not 0.0 < precision < 1.0:
+            raise InputError(
+                f"{precision:g} is not between 0 and 1",
+                place="--wanted",
+                remedy="Give a relative precision: 0.01 is 1 %",
+            )
+        goals.append(RelativePrecision(precision))
+    for text in deviations:
+        name, _, value = text.partition("=")
+        bodies = [body.name for body in model.bodies]
+        body = next((body for body in bodies if name.startswith(f"{body}.")), None)
+        if body is None:
+            raise InputError(
+                f"{text!r} names no body to identify",
+                place="--wanted-sd",
+                remedy=f"Write BODY.QUANTITY=SD, with a body among {', '.join(bodies)}: {bodies[0]}.mass=0.5",
+            )
+        goals.append(QuantitySd(body, name.removeprefix(f"{body}."), _number(value, text, "--wanted-sd")))
+    if region is not None:
+        if not region > 0.0:
+            raise InputError(f"{region:g} mm", place="--wanted-tip", remedy="Give a positive number of millimetres")
+        goals.append(TipRegion(1e-3 * region, tip_frame))
+    if cause is not None:
+        name, sign, value = cause.partition("=")
+        goals.append(CauseProbability(name, _number(value, cause, "--wanted-cause") if sign else 0.95))
+    return tuple(goals) or (RelativePrecision(),)
+
+
+def _number(text: str, whole: str, place: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{whole!r} has no number after '='", place=place, remedy="Write NAME=NUMBER") from None

@@ -26,8 +26,8 @@ def run(
     import numpy as np
 
     from bayesid._io.files import complete_folder, write_json
-    from bayesid.app.planned_motion import lacking_sensors, planned_manoeuvres
     from bayesid.app.report_origin import report_origin
+    from bayesid.app.study_to_linearisation import lacking_sensors, planned_manoeuvres
     from bayesid.app.study_to_model import load_manoeuvres, load_model
     from bayesid.inference.posterior import Posterior
     from bayesid.inference.predicted_readings import integration_error_at

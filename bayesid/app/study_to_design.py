@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import jax
@@ -10,23 +13,25 @@ import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
+from bayesid._io.progress import Progress
 from bayesid._math.arrays import Floats
-from bayesid.app.named_joints import named_joint
 from bayesid.app.schema import DesignSection, Study
+from bayesid.app.study_to_encoders import assume_missing, encoder_noise, named_joint
 from bayesid.app.study_to_model import criteria_of, load_model
+from bayesid.design import Design, Search, best_design, design
 from bayesid.design.criteria import DOptimal, Separation
 from bayesid.design.design_problem import Problem
-from bayesid.design.extended_posture import extended_posture
 from bayesid.design.motion_limits import Limits
 from bayesid.design.plan import Plan
-from bayesid.design.trajectories import BSplines, Fourier, PaperExcitation, TrajectoryFamily
+from bayesid.design.trajectories import BSplines, Fourier, PaperExcitation, TrajectoryFamily, extended_posture
+from bayesid.recording.recording import Recording
 from bayesid.robot.end_effector import Tip
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import create
 from bayesid.simulation.model import Model
 from bayesid.simulation.own_effects import check_own_effect
 
-__all__ = ["load_loop_problem", "load_problem", "separating"]
+__all__ = ["FILE", "fly_next", "load_loop_problem", "load_problem", "separating", "write_motion"]
 
 SAMPLES = 120  # largest number of samples that are simulated; in longer manoeuvres each of them stands for several
 LONGEST_STEP, STEPS = 2.0, 60  # longest step of the integration [s], and smallest number of steps of a manoeuvre
@@ -185,3 +190,31 @@ def _check_traceable(plan: Plan) -> None:
                 place="model.effects",
                 remedy="Leave it out of the model for the design",
             ) from error
+
+
+FILE = "next-manoeuvre.csv"
+"""Name of the file of the joints' motion."""
+
+STARTS, ITERATIONS = 2, 60  # effort of the search, a small part of that of ``bayesid design``
+
+
+def fly_next(study: Study, rivals: tuple[str, str], seed: int, progress: Progress) -> Design:
+    """Design a manoeuvre that tells two effects apart within the limits of the study, with little effort.
+
+    Raises
+    ------
+    InputError
+        If the study defines no design problem for these effects.
+    """
+    problem = load_problem(separating(study, rivals))
+    noise, _ = assume_missing(encoder_noise(study, problem.plan.model.robot))
+    with ThreadPoolExecutor(os.cpu_count()) as executor:
+        effort = Search(STARTS, ITERATIONS, executor=executor)
+        return best_design(design(problem, seed, noise, effort, progress=progress))
+
+
+def write_motion(item: Design, file: Path) -> None:
+    """Write the positions of the joints along a manoeuvre as a recording."""
+    recording = item.manoeuvre.recording
+    joints = {key: values for key, values in recording.channels.items() if key.startswith("position.")}
+    Recording(item.name, None, recording.time, joints).write(file)

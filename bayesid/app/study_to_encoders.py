@@ -1,15 +1,17 @@
-"""Noise of the joints' encoders, as a study states it."""
+"""Joints that a study names, and the noise of their encoders as it states it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Literal
 
-from bayesid.app.named_joints import named_joint
+from bayesid._io.errors import InputError
 from bayesid.app.schema import Study
+from bayesid.app.schema.validation_messages import suggest
 from bayesid.robot.robot import Robot
 
-__all__ = ["ASSUMED", "JointNoise", "assume_missing", "encoder_noise"]
+__all__ = ["ASSUMED", "JointNoise", "assume_missing", "encoder_noise", "named_joint"]
 
 ASSUMED = 1e-6
 """Noise of an encoder for which neither study nor data give a value, that of a good encoder [rad or m]."""
@@ -45,3 +47,23 @@ def assume_missing(noise: JointNoise) -> tuple[JointNoise, list[str]]:
     """
     positions = {joint: ASSUMED if sigma is None else sigma for joint, sigma in noise[0].items()}
     return {**noise, 0: {**positions}}, [joint for joint, sigma in noise[0].items() if sigma is None]
+
+
+def named_joint(name: str, robot: Robot, place: str, file: Path | None = None) -> int:
+    """Return the index in `Robot.joints` of the joint that a study names at a place of its file.
+
+    Raises
+    ------
+    InputError
+        If the robot has no moving joint of that name.
+    """
+    names = [joint.name for joint in robot.joints]
+    if name not in names:
+        hint = suggest(name, names)
+        raise InputError(
+            f"the robot has no moving joint '{name}'",
+            file=file,
+            place=place,
+            remedy=hint or (f"Choose one of {', '.join(names)}" if names else "Take it out"),
+        )
+    return names.index(name)

@@ -6,24 +6,24 @@ Planned motion without readings gives a prediction.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from bayesid.app.planned_motion import lacking_sensors, planned_manoeuvres
 from bayesid.app.schema import Study
-from bayesid.app.study_to_encoders import ASSUMED
+from bayesid.app.study_to_encoders import ASSUMED, assume_missing, encoder_noise
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.design.predicted_posterior import planned_posterior
+from bayesid.identifiability.hypothetical_experiment import blanked, has
 from bayesid.identifiability.practical_identifiability import Basis
 from bayesid.inference.mode import Optimum, fit, maximise
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.wrong_units import refuse_wrong_units
+from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.simulation.model import Manoeuvre, Model
 
-__all__ = ["LinearisationPoint", "missing_part", "prepare"]
-
+__all__ = ["LinearisationPoint", "lacking_sensors", "missing_part", "planned_manoeuvres", "prepare"]
 
 # deviation of chi-square from its mean, in standard deviations of chi-square, that noise alone rarely reaches
 MISFIT = 3.0
@@ -105,3 +105,31 @@ def _predicted(
 
 def _count(manoeuvres: Sequence[Manoeuvre]) -> str:
     return "1 recording" if len(manoeuvres) == 1 else f"{len(manoeuvres)} recordings"
+
+
+def lacking_sensors(model: Model, manoeuvres: Sequence[Manoeuvre]) -> list[str]:
+    """Return the declared sensors that some recording does not hold."""
+    lacking = [
+        sensor.kind.value
+        for sensor in model.sensors
+        if not all(has(manoeuvre.recording, sensor.kind) for manoeuvre in manoeuvres)
+    ]
+    columns = [f"torque.{joint}" for joint in (model.torque.joints if model.torque is not None else ())]
+    recorded = all(column in manoeuvre.recording.channels for manoeuvre in manoeuvres for column in columns)
+    return lacking if recorded else [*lacking, "torque"]
+
+
+def planned_manoeuvres(
+    study: Study, model: Model, manoeuvres: Sequence[Manoeuvre]
+) -> tuple[list[Manoeuvre], list[str]]:
+    """Return the manoeuvres of a study with placeholders for the readings that they lack, to be simulated.
+
+    A plan has no noise from which that of the encoders could be estimated. Where the study does not give it either it
+    is assumed, for the joints of the list.
+    """
+    robot, (noise, assumed) = model.robot, assume_missing(encoder_noise(study, model.robot))
+    planned = []
+    for section, manoeuvre in zip(study.recordings, manoeuvres, strict=True):
+        motion = MeasuredMotion.from_recording(manoeuvre.recording, robot, sigma=noise, start=section.start)
+        planned.append(blanked(replace(manoeuvre, motion=motion), model.sensors, model.torque))
+    return planned, assumed

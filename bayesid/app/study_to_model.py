@@ -5,16 +5,17 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._io.store import file_key
-from bayesid.app.named_joints import named_joint
 from bayesid.app.schema import DesignSection, OtherSensor, RecordingSection, Study
-from bayesid.app.study_to_encoders import encoder_noise
+from bayesid.app.study_to_encoders import encoder_noise, named_joint
 from bayesid.app.user_files import run_user_file
 from bayesid.design.criteria import Criterion, named_criteria
+from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
 from bayesid.recording.channel_families import JOINT_FAMILIES
@@ -25,14 +26,27 @@ from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
 from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.effects import Effect, SensorBias, create, known_effects
+from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.own_effects import check_own_effect
 from bayesid.simulation.sensors import Filter, Sensor, SensorKind, White
 
-__all__ = ["criteria_of", "load_manoeuvre", "load_manoeuvres", "load_model", "load_posterior", "load_robot"]
+if TYPE_CHECKING:
+    from bayesid.diagnosis.loop_review import DiagnosisReview
 
+__all__ = [
+    "cause_prior",
+    "criteria_of",
+    "load_manoeuvre",
+    "load_manoeuvres",
+    "load_model",
+    "load_posterior",
+    "load_robot",
+    "loop_review",
+    "stated_bounds",
+]
 
 # distance of a sensor from the base's origin, in radii of the base, beyond which its unit must be wrong
 FARTHEST = 10.0
@@ -330,3 +344,25 @@ def _rate_sigma(study: Study) -> float:
     if study.model.initial_rate == "zero":
         return 0.0
     return study.model.initial_rate_sigma or RATE_SIGMA
+
+
+def stated_bounds(study: Study) -> dict[str, list[PhysicalBound]]:
+    """Return the largest sizes that the study states, by the candidates' labels."""
+    return {
+        label: [PhysicalBound(unit, size, "Stated in the study.") for unit, size in sizes.items()]
+        for label, sizes in study.diagnosis.bounds.items()
+    }
+
+
+def cause_prior(study: Study) -> CausePrior:
+    """Return the study's prior of the number of causes, and of something generic."""
+    return CausePrior(study.diagnosis.one_more_cause, study.diagnosis.outside_catalogue)
+
+
+def loop_review(study: Study) -> DiagnosisReview:
+    """Return the diagnosis of what a loop has flown, with what the study says of causes."""
+    from bayesid.diagnosis.loop_review import DiagnosisReview
+
+    stated = study.design is not None and "argument_of_latitude" in study.design.model_fields_set
+    first = study.recordings[0].argument_of_latitude if study.recordings else None
+    return DiagnosisReview(stated_bounds(study), cause_prior(study), stated or first is not None)

@@ -30,10 +30,9 @@ from bayesid.design.loop_goals import CauseProbability, Goal, QuantitySd, Relati
 from bayesid.design.motion_limits import Limit, Limits
 from bayesid.design.plan import Plan
 from bayesid.design.predicted_posterior import Predicted, planned_manoeuvre, planned_posterior, predict
-from bayesid.design.search_store import Store
 from bayesid.design.simulated_spacecraft import PlannedMotion, SimulatedSpacecraft, Spacecraft
 from bayesid.design.trajectories import BSplines, Fourier, Linear, PaperExcitation, TrajectoryFamily
-from bayesid.design.trajectory_search import THOROUGH, Found, Search, optimise
+from bayesid.design.trajectory_search import THOROUGH, Found, Search, Store, optimise
 from bayesid.robot.end_effector import Tip
 
 __all__ = [

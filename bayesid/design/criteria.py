@@ -159,9 +159,10 @@ def _made(name: str, place: str, rivals: tuple[str, ...], options: Mapping[str, 
     if name not in _REGISTER:
         remedy = f"Give one of {', '.join(_REGISTER)}, or name your file under model.plugins"
         raise InputError(f"got {name!r}", place=place, remedy=remedy)
-    given = {"rivals": rivals} if _REGISTER[name].compares_rivals else {}
+    kind = _REGISTER[name]
+    given: dict[str, Any] = {**options, "rivals": rivals} if kind.compares_rivals else {**options}
     try:
-        return _REGISTER[name](**given, **options)
+        return kind(**given)
     except TypeError as error:
         remedy = "Give the parameters of the criterion"
         raise InputError(f"{name!r} cannot be made: {error}", place=f"design.options.{name}", remedy=remedy) from error

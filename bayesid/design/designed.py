@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from threading import Lock
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -13,19 +15,17 @@ from threadpoolctl import threadpool_limits
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, part_of, silent
 from bayesid._math.arrays import Floats
-from bayesid.design.concurrently import Shares, each
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem, Reached
 from bayesid.design.predicted_posterior import Encoder, Predicted, planned_manoeuvre, planned_posterior, predict
 from bayesid.design.search_starts import adapted_to_family
-from bayesid.design.search_store import Store
 from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.design.trajectory import Trajectory
-from bayesid.design.trajectory_search import Found, Search, optimise
+from bayesid.design.trajectory_search import Found, Search, Store, optimise
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.model import Manoeuvre
 
-__all__ = ["Design", "Risk", "best_design", "design", "evaluate", "sample_times"]
+__all__ = ["Design", "Risk", "Shares", "best_design", "design", "each", "evaluate", "sample_times"]
 
 CERTAIN = 0.99  # probability with which a limit must hold for a manoeuvre to be flown
 PASSES = 4  # largest number of passes over all criteria until the manoeuvres agree; the last one only exchanges them
@@ -365,3 +365,46 @@ def _consistent(
         if not changed:
             break
     return result
+
+
+T = TypeVar("T")  # type of the result of one search
+
+
+def each(function: Callable[[int], T], count: int, executor: Executor | None) -> list[T]:
+    """Return a function's values at 0 to ``count`` - 1, computed in threads if there is an executor.
+
+    If one fails or the user interrupts, the executor is shut down, so that the others end as well.
+    """
+    if executor is None:
+        return [function(index) for index in range(count)]
+    with ThreadPoolExecutor(count) as threads:
+        try:
+            return list(threads.map(function, range(count)))
+        except BaseException:
+            executor.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+class Shares:
+    """Progress of several computations at once, which is their mean.
+
+    Parameters
+    ----------
+    progress : Progress
+        Receiver of the mean.
+    count : int
+        Number of computations.
+    """
+
+    def __init__(self, progress: Progress, count: int) -> None:
+        self._progress, self._fractions, self._lock = progress, [0.0] * count, Lock()
+
+    def of(self, index: int) -> Progress:
+        """Return the progress of one computation."""
+
+        def receive(fraction: float, text: str) -> None:
+            with self._lock:
+                self._fractions[index] = fraction
+                self._progress(sum(self._fractions) / len(self._fractions), text)
+
+        return receive

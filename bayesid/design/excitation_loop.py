@@ -29,15 +29,13 @@ from bayesid.design.knowledge_update import (
     known_of,
     updated_model,
 )
-from bayesid.design.loop_goals import Goal, RelativePrecision, StepKnowledge, goal_dict
+from bayesid.design.loop_goals import Goal, RelativePrecision, Reviewer, StepKnowledge, goal_dict
 from bayesid.design.loop_history import History
 from bayesid.design.plan import Plan
 from bayesid.design.predicted_posterior import Encoder
 from bayesid.design.search_starts import adapted_to_family
-from bayesid.design.search_store import Store
 from bayesid.design.simulated_spacecraft import Spacecraft, plan_recording
-from bayesid.design.step_review import Reviewer
-from bayesid.design.trajectory_search import Search
+from bayesid.design.trajectory_search import Search, Store
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
 from bayesid.inference.recorded_samples import RecordedSamples
@@ -103,13 +101,14 @@ class Loop:
                 remedy="Give a reviewer, such as DiagnosisReview",
             )
 
-    def run(self, spacecraft: Spacecraft, folder: Path, progress: Progress = silent) -> History:
+    def run(self, spacecraft: Spacecraft | None, folder: Path, progress: Progress = silent) -> History:
         """Run the loop until its goals are reached, the limit of steps, a wrong model, a no-go, or `NotFlown`.
 
         Parameters
         ----------
-        spacecraft : Spacecraft
-            Spacecraft that executes the plans.
+        spacecraft : Spacecraft or None
+            Spacecraft that executes the plans; None where it is flown elsewhere, and its recordings are put into the
+            folder.
         folder : Path
             Folder of ``step-N-plan.csv``, ``step-N-recording.csv``, ``step-N-posterior.nc``, ``step-N-diagnosis.json``
             where the steps are reviewed, and ``loop.json``.
@@ -181,10 +180,12 @@ class Loop:
         store.remove()
         return best.go
 
-    def _execute(self, history: History, number: int, spacecraft: Spacecraft) -> None:
+    def _execute(self, history: History, number: int, spacecraft: Spacecraft | None) -> None:
         """Have a step executed unless its recording exists."""
         file = history.path(number, "recording")
         if not file.is_file():
+            if spacecraft is None:
+                raise NotFlown
             plan = replace(Recording.read(history.path(number, "plan")), name=f"step-{number}")
             recording = spacecraft.execute(plan)
             self._check(recording)

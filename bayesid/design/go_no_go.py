@@ -14,8 +14,7 @@ from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem, Reached
 from bayesid.design.designed import Risk, risks
 from bayesid.design.motion_limits import Limits
-from bayesid.design.search_store import Store
-from bayesid.design.trajectory_search import Found, Search, optimise
+from bayesid.design.trajectory_search import Found, Search, Store, optimise
 
 __all__ = ["Attempt", "plan_to_go"]
 

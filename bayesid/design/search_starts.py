@@ -8,17 +8,31 @@ from typing import Any
 import jax
 import numpy as np
 from jax import Array
+from scipy.linalg import eigh
 from scipy.optimize import minimize
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid._math.kept_jit import QUICKLY
 from bayesid.design.design_problem import Problem
 from bayesid.design.flight import Flight, Outcome
 from bayesid.design.trajectories import PaperExcitation, TrajectoryFamily
+from bayesid.robot.composite_tables import ENTRIES, composite_rows
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import kinematics
+from bayesid.robot.robot import Robot
 
-__all__ = ["SLACK", "adapted_to_family", "exchanged", "random_start", "repaired", "within_limits"]
+__all__ = [
+    "SLACK",
+    "adapted_to_family",
+    "base_rates",
+    "exchanged",
+    "random_start",
+    "reacting_swing",
+    "repaired",
+    "within_limits",
+]
 
-# fractions of the tightest limit between which random starts fill it, so that they begin inside the limits
+# fractions of the tightest limit, or of the largest swing, between which a start lies, so that it begins inside them
 FILLED = (0.3, 0.95)
 SHRUNK = 12  # largest number of times that a random start is shrunk
 LIKE_THE_PAPER = 0.25  # fraction of the random starts that swing three joints as the paper's (27) does
@@ -28,6 +42,13 @@ MANOEUVRES = 16  # number of random manoeuvres that are taken for a family
 
 SLACK = 1e-6
 """Fraction of a limit by which the optimiser may exceed it, since the smooth maximum lies above the true one."""
+
+POSTURES, BEST = 400, 5  # number of postures that are drawn, and of the best of them from which one is taken
+SPREAD = 0.4  # standard deviation of the postures about that at the start, as a fraction of half of each joint's range
+SLOWEST = 1e-6  # largest speed that counts for a joint whose URDF allows none [rad/s or m/s]
+# swing that remains where a posture leaves less room [rad or m]; what breaks a limit is repaired by the descent
+LEAST = 0.3
+PERIODS = 3  # largest number of periods
 
 
 def random_start(problem: Problem, rng: np.random.Generator) -> Floats:
@@ -120,3 +141,108 @@ def adapted_to_family(problem: Problem, rng: np.random.Generator) -> Problem:
     each = [compiled(start, problem.centre, problem.precision, problem.shadow) for start in starts]
     sums = iter(jax.tree.map(lambda *parts: np.sum(parts, axis=0), *each))
     return problem.judged_by([one.adapted(next(sums)) if one.adaptable else one for one in problem.criteria])
+
+
+UNLIMITED = np.pi  # half of the range of a joint that has no limits [rad or m], and its largest speed [rad/s or m/s]
+
+
+def reacting_swing(problem: Problem, rng: np.random.Generator) -> Floats:
+    """Return parameters of a swing as the paper's (27), of all joints that move, about a posture drawn at random.
+
+    Of many postures those few are kept where the largest rate of the base is greatest: that over all joint speeds v
+    with ``v' (J' J + D) v = 1``, where J is the Jacobian of the tip over its limits and D the inverse squares of the
+    joints' largest speeds. The joints swing along that v.
+
+    Parameters
+    ----------
+    problem : Problem
+        Problem whose family imitates other motions.
+    rng : numpy.random.Generator
+        Source of posture, number of periods and size.
+    """
+    family, robot = problem.plan.family, problem.plan.model.robot
+    start, moving = family.posture_at_rest, family.moving_joints
+    posture, speed = _chosen(problem, start, moving, rng)
+    paper = PaperExcitation(start, family.duration, moving.tolist(), int(rng.integers(1, PERIODS + 1)))
+    swing = rng.uniform(*FILLED) * speed / paper.frequency
+    size = np.linalg.norm(swing)
+    lower, upper = _ranges(robot)
+    room = np.min(np.minimum(upper - posture, posture - lower)[moving] / np.maximum(np.abs(swing) / size, 1e-3))
+    swing *= min(1.0, max(room, LEAST) / size)
+    return family.nearest(paper.motion(np.stack([posture[moving], swing], axis=1).ravel()))
+
+
+def _ranges(robot: Robot) -> tuple[Floats, Floats]:
+    """Return the lower and upper limits of all joints, (joints,) each [rad or m]."""
+    lower, upper = (np.array([getattr(joint, end) for joint in robot.joints]) for end in ("lower", "upper"))
+    return lower, upper
+
+
+def _chosen(problem: Problem, start: Floats, moving: Integers, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Draw one of the best postures, (joints,), with the speeds of the moving joints that turn the base most there."""
+    lower, upper = _ranges(problem.plan.model.robot)
+    half = 0.5 * (upper - lower)
+    drawn = start + SPREAD * np.where(np.isfinite(half), half, UNLIMITED) * rng.normal(size=(POSTURES, len(start)))
+    postures = np.tile(start, (POSTURES, 1))
+    postures[:, moving] = np.clip(drawn, lower, upper)[:, moving]
+    rates, speeds = _largest(problem, postures, moving)
+    taken = rng.choice(np.argsort(-rates)[:BEST])
+    return postures[taken], speeds[taken]
+
+
+def base_rates(robot: Robot, postures: Floats) -> Floats:
+    """Return the angular rate of a base that floats at rest for a unit speed of each joint, base axes.
+
+    With both momenta zero the composite body turns against the arm's angular momentum about the centre of mass
+    (Umetani and Yoshida, IEEE Transactions on Robotics and Automation 5, 1989).
+
+    Parameters
+    ----------
+    robot : Robot
+    postures : (P, joints) array
+        Positions of the joints [rad or m].
+
+    Returns
+    -------
+    (P, 3, joints) array
+        [rad/s per rad/s or m/s]
+    """
+    count = len(robot.joints)
+    rows = composite_rows(robot, kinematics(robot, _unit_speeds(postures)))
+    part = {name: rows[:, columns] for name, columns in ENTRIES.items()}
+    mass, first, flow = part["mass"], part["first"], part["first_rate"]
+    xx, yy, zz, xy, xz, yz = part["second"].T
+    second = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=1).reshape(-1, 3, 3)
+    second = second - first[:, :, None] * first[:, None, :] / mass[:, :, None]  # about the centre of mass
+    inertia = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+    spin = part["spin"] - np.cross(first, flow) / mass
+    rates = -np.linalg.solve(inertia, spin[:, :, None])[:, :, 0]
+    return rates.reshape(len(postures), count, 3).swapaxes(1, 2)
+
+
+def _largest(problem: Problem, postures: Floats, moving: Integers) -> tuple[Floats, Floats]:
+    """Return the largest rate of the base at each posture, (P,) [rad/s], and the joint speeds there, (P, moving)."""
+    robot, limits = problem.plan.model.robot, problem.limits
+    pose, flow = problem.plan.tip.motion(robot, _unit_speeds(postures))
+    turning = flow[:, :3, :3] @ pose[:, :3, :3].swapaxes(1, 2)
+    rate = np.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], axis=1)
+    speeds = np.array([joint.velocity for joint in robot.joints])
+    speeds = np.minimum(np.where(np.isfinite(speeds), speeds, UNLIMITED), limits.joint_speed or np.inf)
+    cost = np.tile(np.diag(np.maximum(speeds, SLOWEST) ** -2.0), (len(postures), 1, 1))
+    for bound, change in ((limits.tip_speed, flow[:, :3, 3]), (limits.tip_rate, rate)):
+        if bound is not None:
+            jacobian = change.reshape(len(postures), len(speeds), 3) / bound
+            cost += jacobian @ jacobian.swapaxes(1, 2)
+    turned = base_rates(robot, postures)
+    gain = turned.swapaxes(1, 2) @ turned
+    inner = np.ix_(moving, moving)
+    found = [eigh(one[inner], other[inner]) for one, other in zip(gain, cost, strict=True)]
+    squares = np.array([values[-1] for values, _ in found])
+    return np.sqrt(np.maximum(squares, 0.0)), np.array([vectors[:, -1] for _, vectors in found])
+
+
+def _unit_speeds(postures: Floats) -> JointState:
+    """Return every posture with a unit speed of each joint in turn, (P joints, joints)."""
+    count = postures.shape[1]
+    position = np.repeat(postures, count, axis=0)
+    return JointState(position, np.tile(np.eye(count), (len(postures), 1)), np.zeros_like(position))

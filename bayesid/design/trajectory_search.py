@@ -1,7 +1,7 @@
 """Search for the best manoeuvre: descents from many starts, of which the best are followed to the end.
 
 On ETS-VII 1 of 100 descents from random motions ends in the basin of the best manoeuvre. Those from swings to which the
-base reacts much (`bayesid.design.reacting_swing`) end lower, descents that pass through loosened limits end there more
+base reacts much (`bayesid.design.search_starts`) end lower, descents that pass through loosened limits end there more
 often, and so do those from good manoeuvres with the courses of some joints exchanged; a thorough search makes use of
 all three.
 """
@@ -12,20 +12,22 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, as_completed
 from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Lock
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
+from bayesid._io.store import JsonStore
 from bayesid._math.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem
 from bayesid.design.polish import Polished, Shared, Task, fitted_to_fine_limits, polish
-from bayesid.design.reacting_swing import reacting_swing
-from bayesid.design.search_starts import SLACK, exchanged, random_start
+from bayesid.design.search_starts import SLACK, exchanged, random_start, reacting_swing
 
-__all__ = ["THOROUGH", "Found", "Search", "optimise"]
+__all__ = ["THOROUGH", "Found", "Search", "Store", "optimise"]
 
 REACTING = 2.0 / 3.0  # fraction of the starts that are swings to which the base reacts much, where the family is linear
 FOLLOWED = 3  # number of motions that are followed to the end, unless there are fewer
@@ -272,3 +274,79 @@ def _describe(problem: Problem, parameters: Floats) -> str:
             text = f"{limit.name} {fraction * limit.bound:.4g}{unit} where {limit.bound:.4g} is allowed"
             largest[limit.name] = (float(fraction), text)
     return "; ".join(text for _, text in largest.values())
+
+
+@dataclass
+class Store:
+    """Results of several searches, each of several descents.
+
+    Parameters
+    ----------
+    file : Path or None
+        JSON file of the results; None keeps them in memory only.
+    key : str
+        Key of the design problem; results under another key are discarded.
+    results : dict
+        Parameters, cost and number of evaluations by search and descent.
+    lock : threading.Lock
+        Lock of the results, which several searches may add at once.
+    """
+
+    file: Path | None
+    key: str
+    results: dict[str, dict[str, tuple[list[float], float, int]]] = field(default_factory=dict)
+    lock: Lock = field(default_factory=Lock, repr=False)
+
+    @classmethod
+    def forgetful(cls) -> Store:
+        """Return a store that keeps the results in memory only."""
+        return cls(None, "")
+
+    @classmethod
+    def open(cls, file: Path, key: str) -> Store:
+        """Read the results of an interrupted run with the same key, if there are any.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read.
+        """
+        return cls(file, key, _kept(file, key).read("results") or {})
+
+    def of(self, search: str) -> Starts:
+        """Return the results of one search, by its name."""
+        return Starts(self, search)
+
+    def write(self) -> None:
+        """Write the file, whole or not at all."""
+        if self.file is not None:
+            _kept(self.file, self.key).write(results=self.results)
+
+    def remove(self) -> None:
+        """Delete the file once the results are no longer needed."""
+        if self.file is not None:
+            self.file.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Results of one search, by the name of the descent."""
+
+    store: Store
+    search: str
+
+    def known(self, descent: str) -> tuple[Floats, float, int] | None:
+        """Return parameters, cost and number of evaluations of a descent, None where there are none."""
+        entry = self.store.results.get(self.search, {}).get(descent)
+        return None if entry is None else (np.array(entry[0]), float(entry[1]), int(entry[2]))
+
+    def keep(self, descent: str, parameters: Floats, cost: float, evaluations: int) -> None:
+        """Add the result of a descent, and write the file."""
+        with self.store.lock:
+            results = self.store.results.setdefault(self.search, {})
+            results[descent] = ([float(value) for value in parameters], float(cost), evaluations)
+            self.store.write()
+
+
+def _kept(file: Path, key: str) -> JsonStore:
+    return JsonStore(file, key, "search", "study, seed or effort", disposable=True)

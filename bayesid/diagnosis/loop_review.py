@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from bayesid._io.files import write_json
-from bayesid.design.step_review import Review
+from bayesid.design.loop_goals import Review
 from bayesid.diagnosis.diagnose import diagnose
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.simulation.effects.physical_bound import PhysicalBound

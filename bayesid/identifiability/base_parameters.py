@@ -11,34 +11,201 @@ a fixed robot has some (Mayeda, Yoshida and Osuka, IEEE Trans. Robotics and Auto
 section 9.4).
 
 The method is that of Gautier (J. Robotic Systems 1991): QR decompositions of the regressor in random states
-(`bayesid.identifiability.rank_decomposition`).
+(`bayesid.identifiability.base_parameters`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import qr
 from threadpoolctl import threadpool_limits
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.identifiability.rank_decomposition import ZERO, checked_rank, equilibrated, regrouping, spanning
-from bayesid.identifiability.stacked_regressor import GRAVITY, Base, massive_bodies, stacked_regressor
-from bayesid.robot.kinematics import joint_twist
+from bayesid.robot.joint_state import JointState
+from bayesid.robot.kinematics import Kinematics, joint_twist, kinematics
+from bayesid.robot.regressors import torque_regressor
 from bayesid.robot.robot import Robot
 
-__all__ = ["LINEAR", "BaseParameters", "base_parameters", "standard_names"]
+__all__ = [
+    "GRAVITY",
+    "LINEAR",
+    "ZERO",
+    "Base",
+    "BaseParameters",
+    "base_parameters",
+    "checked_rank",
+    "equilibrated",
+    "massive_bodies",
+    "random_motion",
+    "regrouping",
+    "spanning",
+    "stacked_regressor",
+    "standard_names",
+]
+
+GRAVITY = (0.0, 0.0, -9.81)
+"""Acceleration of gravity on a fixed base, base axes [m/s2]."""
+
+# relative length below which a column is not scaled to unit length, because that would amplify its rounding errors
+FAINT = 1e-3
+GAP = 1e3  # smallest ratio of the last singular value kept to the first dropped at which the rank counts as determined
+# remedy in the errors of this module: nearly dependent columns come from nearly degenerate geometry
+REMEDY = "Look for joints that are almost, but not quite, parallel or on one axis"
+SEED = 1991  # seed of the random states where no generator is given, so that results repeat
+
+
+class Base(Enum):
+    """Support of the base body."""
+
+    FREE = "free-flying"
+    """The base moves freely: the equations are its force and torque balance and the joint torques, without gravity."""
+    FIXED = "fixed"
+    """The base is bolted to the ground: the equations are the joint torques, with gravity."""
+
+
+def massive_bodies(robot: Robot) -> tuple[str, ...]:
+    """Return the links with mass and the loads, every body after those that carry it."""
+    bodies = [name for name, link in robot.links.items() if link.inertial.mass > 0.0 or name in robot.loads]
+    return tuple(sorted(bodies, key=lambda name: robot.link(name).joint))
+
+
+def random_motion(robot: Robot, count: int, rng: np.random.Generator) -> Kinematics:
+    """Draw random joint states with unit standard deviations of speed and acceleration.
+
+    Revolute joints are drawn anywhere on the circle, prismatic joints with a standard deviation of 1 m about zero.
+    """
+    position, velocity, acceleration = rng.normal(size=(3, count, len(robot.joints)))
+    turning = np.array([joint.kind != "prismatic" for joint in robot.joints], dtype=bool)
+    position[:, turning] = rng.uniform(-np.pi, np.pi, size=(count, int(turning.sum())))
+    return kinematics(robot, JointState(position, velocity, acceleration))
+
+
+def stacked_regressor(
+    robot: Robot,
+    bodies: Sequence[str],
+    base: Base,
+    rng: np.random.Generator,
+    *,
+    gravity: ArrayLike = GRAVITY,
+    surplus: float = 3.0,
+) -> Floats:
+    """Return the regressor of all equations of motion in random states, stacked as in the paper's (23).
+
+    Parameters
+    ----------
+    robot : Robot
+        Robot with its joints and links.
+    bodies : sequence of str
+        Bodies whose parameters multiply the columns, ten for each body.
+    base : Base
+        Support of the base, which decides the equations.
+    rng : numpy.random.Generator
+        Source of the random states.
+    gravity : (3,) array_like
+        Acceleration of gravity on a fixed base, base axes [m/s2].
+    surplus : float
+        Smallest number of rows per column.
+
+    Returns
+    -------
+    (rows, 10 bodies) array
+        Stacked regressor; it has no rows where a fixed base has no joints.
+    """
+    free = base is Base.FREE
+    per_state = len(robot.joints) + (6 if free else 0)
+    count = int(np.ceil(surplus * 10 * len(bodies) / max(per_state, 1)))
+    motion = random_motion(robot, count, rng)
+    if free:
+        rate, change, acceleration = rng.normal(size=(3, count, 3))
+    else:
+        rate = change = np.zeros((count, 3))
+        acceleration = np.tile(-np.asarray(gravity, dtype=float), (count, 1))
+    regressor = torque_regressor(robot, bodies, motion, rate, change, acceleration)
+    return regressor[:, 0 if free else 6 :].reshape(-1, 10 * len(bodies))
+
+
+ZERO = 1e-10
+"""Relative size up to which a singular value, or the part of a column that no other column explains, is rounding."""
+
+
+def equilibrated(matrix: Floats) -> tuple[Floats, Floats]:
+    """Return a matrix with its columns scaled to unit length, and the divisors of the columns.
+
+    Faint columns are divided by the length at which a column starts to count as faint, and zero columns by one.
+    """
+    length = np.linalg.norm(matrix, axis=0)
+    length = np.maximum(length, FAINT * length.max(initial=0.0))
+    length = np.where(length > 0.0, length, 1.0)
+    return matrix / length, length
+
+
+def spanning(matrix: Floats, order: Sequence[int]) -> list[int]:
+    """Return the indices of the columns, taken in the given order, that the columns before them do not span."""
+    basis = np.zeros((len(matrix), 0))
+    chosen: list[int] = []
+    for index in order:
+        rest = matrix[:, index]
+        for _ in range(2):  # twice is enough against rounding
+            rest = rest - basis @ (basis.T @ rest)
+        if (size := np.linalg.norm(rest)) > ZERO:
+            basis = np.column_stack([basis, rest / size])
+            chosen.append(index)
+    return chosen
+
+
+def checked_rank(matrix: Floats, rank: int) -> tuple[float, float]:
+    """Check a rank, and return the last singular value kept and the first dropped, relative to the largest.
+
+    Raises
+    ------
+    InputError
+        If QR with column pivoting or the singular values give another rank, or the two values are too close.
+    """
+    if not matrix.size:
+        return 1.0, 0.0
+    values = np.linalg.svd(matrix, compute_uv=False)
+    diagonal = np.abs(np.diag(qr(matrix, mode="r", pivoting=True)[0]))
+    ranks = {rank, int(np.sum(diagonal > ZERO)), int(np.sum(values > ZERO))}
+    kept = float(values[rank - 1] / values[0])
+    dropped = float(values[rank] / values[0]) if rank < len(values) else 0.0
+    if len(ranks) > 1 or kept < GAP * dropped:
+        raise InputError(
+            f"the number of base parameters cannot be told: {' or '.join(map(str, sorted(ranks)))}, with relative "
+            f"singular values {kept:.2g} and {dropped:.2g} on both sides",
+            remedy=REMEDY,
+        )
+    return kept, dropped
+
+
+def regrouping(matrix: Floats, independent: Sequence[int], dependent: Sequence[int]) -> Floats:
+    """Solve ``matrix[:, dependent] = matrix[:, independent] beta`` with one refinement, and set rounding to zero.
+
+    Raises
+    ------
+    InputError
+        If the solution leaves a residual larger than rounding.
+    """
+    first, second = matrix[:, independent], matrix[:, dependent]
+    beta = np.linalg.lstsq(first, second)[0]
+    beta = beta + np.linalg.lstsq(first, second - first @ beta)[0]
+    beta[np.abs(beta) < ZERO] = 0.0
+    worst = float(np.abs(second - first @ beta).max(initial=0.0))
+    if worst > 10.0 * ZERO:
+        raise InputError(f"the dependent parameters regroup only to {worst:.2g}", remedy=REMEDY)
+    return beta
+
 
 LINEAR = (
     *("mass", "first.x", "first.y", "first.z"),
     *("inertia.xx", "inertia.xy", "inertia.yy", "inertia.xz", "inertia.yz", "inertia.zz"),
 )
 """Names of `InertialParameters.vector`; first moment of mass and inertia are about the link's origin, in its axes."""
-
-SEED = 1991  # seed of the random states where no generator is given, so that results repeat
 
 
 @dataclass(frozen=True)

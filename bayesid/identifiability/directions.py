@@ -1,28 +1,38 @@
-"""Directions of the parameter space, from worst to best known relative to the prior.
+"""Directions of the parameter space, from worst to best known relative to the prior, and their description in words.
 
 In coordinates in which the prior is standard normal, the posterior covariance of the bodies has orthogonal
 eigenvectors: along one of them the data tell most, along another least or nothing. In physical quantities each
 eigenvector is a combination ``v`` with standard deviation ``sqrt(v' C v)``, and a displacement: the change of all
-quantities by one standard deviation of that combination, with all other combinations unchanged.
+quantities by one standard deviation of that combination, with all other combinations unchanged. The words say the
+pattern that the numbers of a direction show, and no more.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 from typing import Any
 
 import numpy as np
 
+from bayesid._io.words import abridged, joined
 from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.inference.contraction import ContractionVerdict
+from bayesid.inference.identification import Identification
+from bayesid.inference.posterior import Posterior
 
-__all__ = ["Direction", "common_factor", "directions"]
+__all__ = ["Direction", "Part", "covers_all", "describe", "directions", "subject", "unidentifiable_sentences"]
 
 # shrinkage below which the data do not distinguish directions, so that any basis of their space is as good
 UNTOLD = 0.01
 TURNS = 200  # largest number of iterations in the rotation of that basis; it usually converges much earlier
+ALIKE = 0.95  # cosine between displacement and pattern, in prior standard deviations, above which the pattern is named
+NEGLIGIBLE = 0.25  # size relative to the largest part below which a part is left out of the words
+NAMED = 3  # largest number of parts named, so that the words remain readable
+# nouns in sentences by the first part of a quantity's name
+NOUNS = {"mass": "mass", "com": "centre of mass", "inertia": "inertia"}
 
 
 @dataclass(frozen=True)
@@ -131,3 +141,107 @@ def _varimax(loadings: Floats) -> Floats:
             break
         before = size.sum()
     return turn
+
+
+class Part(Enum):
+    """Sign of a part's change relative to the largest part."""
+
+    WITH = "with"
+    AGAINST = "against"
+
+
+def describe(direction: Direction, values: Floats, prior_sd: Floats, whole: bool = True) -> str:
+    """Describe a direction, and how much of the prior's width the data left in it.
+
+    Parameters
+    ----------
+    direction : Direction
+        Direction over n quantities.
+    values, prior_sd : (n,) array
+        Values and prior standard deviations of these quantities, each in its unit.
+    whole : bool
+        True if the quantities are those of all bodies that are not known exactly.
+    """
+    what, ratio = subject(direction, values, prior_sd, whole), direction.sd / direction.prior_sd
+    verdict = direction.verdict
+    if verdict is ContractionVerdict.NOT:
+        shared = "cannot be told apart" if " against " in what else "not learnt"
+        return f"{what}: {shared}, {_percent(ratio)} of the prior's width is left"
+    if verdict is ContractionVerdict.WEAKLY:
+        return f"{what}: weakly learnt, {_percent(ratio)} of the prior's width is left"
+    return f"{what}: known to {_percent(ratio)} of the prior's width"
+
+
+def subject(direction: Direction, values: Floats, prior_sd: Floats, whole: bool = True) -> str:
+    """Name the quantities that a direction moves."""
+    moved = direction.displacement / prior_sd
+    bodies = list(dict.fromkeys(name.split(".")[0] for name in direction.names))
+    owner = np.array([bodies.index(name.split(".")[0]) for name in direction.names])
+    factor = common_factor(direction.names, values)
+    if len(bodies) > 1 and _cosine(moved, factor / prior_sd) > ALIKE:
+        return "all masses and inertias in proportion (the scale)" if whole else f"{joined(bodies)} in proportion"
+    for index, body in enumerate(bodies):
+        if _cosine(moved, np.where(owner == index, factor, 0.0) / prior_sd) > ALIKE:
+            return f"mass and inertia of {body} in proportion"
+    phrases: list[str] = []
+    for sign, name in parts_of(direction, prior_sd):
+        text = _noun(name, len(bodies) > 1)
+        phrases.append(text if not phrases else f"{sign.value} {text}")
+    return " ".join(phrases)
+
+
+def parts_of(direction: Direction, prior_sd: Floats) -> list[tuple[Part, str]]:
+    """Return the largest parts of a displacement in units of the prior's widths, with signs relative to the first."""
+    moved = direction.displacement / prior_sd
+    order = np.argsort(-np.abs(moved))[:NAMED]
+    kept = [k for k in order if abs(moved[k]) >= NEGLIGIBLE * abs(moved[order[0]])]
+    return [(Part.WITH if moved[k] * moved[order[0]] > 0.0 else Part.AGAINST, direction.names[k]) for k in kept]
+
+
+def _noun(name: str, several: bool) -> str:
+    body, _, key = name.partition(".")
+    family, _, axis = key.partition(".")
+    text = f"{NOUNS[family]} {axis}".strip()
+    return f"{text} of {body}" if several else text
+
+
+def _cosine(first: Floats, second: Floats) -> float:
+    size = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(abs(first @ second)) / size if size > 0.0 else 0.0
+
+
+def _percent(ratio: float) -> str:
+    value = 100.0 * ratio
+    return f"{value:.0f} %" if value >= 1.0 else f"{value:.1g} %"
+
+
+def covers_all(posterior: Posterior) -> bool:
+    """Return whether every body of the robot that has mass is to be identified."""
+    named = {body.name for body in posterior.model.bodies}
+    return {name for name, link in posterior.model.robot.links.items() if link.inertial.mass > 0.0} <= named
+
+
+def unidentifiable_sentences(result: Identification) -> list[str]:
+    """Return sentences that name the quantities and directions in which the posterior is nearly the prior.
+
+    The list is empty where there are none.
+    """
+    if not result.bodies:
+        return []
+    sentences = []
+    for verdict, text in (
+        (ContractionVerdict.NOT, "is the prior"),
+        (ContractionVerdict.WEAKLY, "owes more to the prior than to the data"),
+    ):
+        names = [name for name, item in result.contraction.items() if item.verdict is verdict]
+        if names:
+            sentences.append(f"What is said of {abridged(names)} {text}.")
+    knowledge = Knowledge.at(result.posterior, result.optimum.z)
+    subjects = [
+        subject(item, knowledge.values, knowledge.prior_sd, covers_all(result.posterior))
+        for item in directions(knowledge)
+        if item.verdict is ContractionVerdict.NOT
+    ]
+    if subjects:
+        sentences.append(f"The data do not tell of these directions: {abridged(subjects, separator='; ')}.")
+    return sentences

@@ -9,18 +9,15 @@ from typing import Any
 import numpy as np
 
 from bayesid._io.progress import Progress, part_of, silent
-from bayesid.identifiability.added_information import candidates
-from bayesid.identifiability.advice import Advice, advise
-from bayesid.identifiability.direction_words import describe
-from bayesid.identifiability.directions import Direction, directions
+from bayesid.identifiability.advice import Advice, advise, candidates
+from bayesid.identifiability.directions import Direction, covers_all, describe, directions
 from bayesid.identifiability.hypothetical_experiment import InformationPredictor
 from bayesid.identifiability.local_knowledge import Knowledge
-from bayesid.identifiability.normality import Draws, draw
-from bayesid.identifiability.parameter_table import ParameterRow, profiled, tabulate
+from bayesid.identifiability.parameter_table import Draws, ParameterRow, draw, profiled, tabulate
 from bayesid.inference.mode import Optimum
 from bayesid.inference.posterior import Posterior
 
-__all__ = ["Basis", "Practical", "covers_all", "practical"]
+__all__ = ["Basis", "Practical", "practical"]
 
 
 class Basis(Enum):
@@ -135,9 +132,3 @@ def practical(
     predictor = InformationPredictor(posterior.model, posterior.manoeuvres, optimum.z, posterior.step)
     advice = advise(predictor, candidates(posterior.model), ordered, knowledge, part_of(progress, 0.6, 1.0))
     return Practical(basis, posterior, optimum, knowledge, ordered, words, tuple(parameters), draws, tuple(advice))
-
-
-def covers_all(posterior: Posterior) -> bool:
-    """Return whether every body of the robot that has mass is to be identified."""
-    named = {body.name for body in posterior.model.bodies}
-    return {name for name, link in posterior.model.robot.links.items() if link.inertial.mass > 0.0} <= named

@@ -15,7 +15,7 @@ from scipy.linalg import subspace_angles
 from bayesid import Robot
 from bayesid._math.arrays import Floats
 from bayesid.identifiability import Base, base_parameters, standard_names
-from bayesid.identifiability.stacked_regressor import GRAVITY
+from bayesid.identifiability.base_parameters import GRAVITY
 
 STATES = 80  # number of random states, many more than the parameters need
 

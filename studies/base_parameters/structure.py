@@ -9,21 +9,14 @@ import pinocchio as pin
 
 from bayesid import Load, Robot
 from bayesid._math.arrays import Floats
-from bayesid.identifiability import (
-    Base,
-    BaseParameters,
-    Determined,
-    base_parameters,
-    consistent_accelerations,
-    determined,
-    rates_at_rest,
-)
-from bayesid.identifiability.stacked_regressor import massive_bodies, random_motion, stacked_regressor
+from bayesid.identifiability import Base, BaseParameters, base_parameters
+from bayesid.identifiability.base_parameters import massive_bodies, random_motion, stacked_regressor
 from bayesid.robot.composite_tables import link_table
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import Kinematics, configuration, kinematics
 from bayesid.robot.regressors import gradient_regressor, torque_regressor
+from studies.common.mass_scale import Determined, consistent_accelerations, determined, rates_at_rest
 
 SEED = 1991  # seed of the random states in which singular values are computed
 

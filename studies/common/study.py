@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 
 from bayesid._io.files import complete_file, write_json
 from bayesid.app.compilation_cache import keep_compiled
-from bayesid.app.scheduler import executor_at
+from bayesid.app.options import executor_at
 from bayesid.report import Document
 from studies.common.provenance import MODELS, study_origin
 from studies.common.report_parts import glossary

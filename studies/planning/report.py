@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import binomtest
 
-from bayesid.design.pose_region import CONTENT
+from bayesid.design.pose_trajectory import CONTENT
 from bayesid.report import Document, figures
 from bayesid.report.figures.figure_style import AFTER, BEFORE, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector

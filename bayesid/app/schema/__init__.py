@@ -7,8 +7,6 @@ not even NumPy before a body needs it, so that errors in the file are reported a
 """
 
 from bayesid.app.schema.design_section import DesignLimits, DesignSection
-from bayesid.app.schema.diagnosis_section import DiagnosisSection
-from bayesid.app.schema.robot_section import BodySection, LoadSection, OrbitSection, RobotSection
 from bayesid.app.schema.sensor_sections import (
     AccelSensor,
     AttitudeSensor,
@@ -18,7 +16,16 @@ from bayesid.app.schema.sensor_sections import (
     SensorsSection,
 )
 from bayesid.app.schema.study_file import Study
-from bayesid.app.schema.study_sections import ModelSection, RecordingSection, UnknownsSection
+from bayesid.app.schema.study_sections import (
+    BodySection,
+    DiagnosisSection,
+    LoadSection,
+    ModelSection,
+    OrbitSection,
+    RecordingSection,
+    RobotSection,
+    UnknownsSection,
+)
 
 __all__ = [
     "AccelSensor",

@@ -11,10 +11,16 @@ from pydantic import BeforeValidator, PrivateAttr, ValidationError, model_valida
 
 from bayesid._io.errors import InputError
 from bayesid.app.schema.design_section import DesignSection
-from bayesid.app.schema.diagnosis_section import DiagnosisSection
-from bayesid.app.schema.robot_section import OrbitSection, RobotSection
 from bayesid.app.schema.sensor_sections import SensorsSection
-from bayesid.app.schema.study_sections import ModelSection, RecordingSection, UnknownsSection, check_extended
+from bayesid.app.schema.study_sections import (
+    DiagnosisSection,
+    ModelSection,
+    OrbitSection,
+    RecordingSection,
+    RobotSection,
+    UnknownsSection,
+    check_extended,
+)
 from bayesid.app.schema.validation_messages import explain, syntax_error
 from bayesid.app.schema.value_types import Section, array_of_tables
 

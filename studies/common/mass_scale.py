@@ -14,8 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from bayesid._math.arrays import Floats
-from bayesid.identifiability.base_parameters import BaseParameters
-from bayesid.identifiability.rank_decomposition import ZERO, equilibrated
+from bayesid.identifiability.base_parameters import ZERO, BaseParameters, equilibrated
 from bayesid.robot.composite_tables import composite_rows
 from bayesid.robot.kinematics import Kinematics
 from bayesid.robot.regressors import balance_regressor, gradient_regressor, momentum_regressor
