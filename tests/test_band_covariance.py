@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg as sla
 
-from bayesid.recording.band_covariance import covariances_by_distance
+from bayesid.recording.integrated_process import covariances_by_distance
 from bayesid.recording.smoothing import JointSamples, smooth
 
 

@@ -22,9 +22,8 @@ from bayesid.inference.simulated_recordings import blank_channels, simulate_reco
 from bayesid.inference.unknowns import Unknowns
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, draw_inertial
-from bayesid.robot.inertial_parameters import InertialParameters
+from bayesid.robot.inertial_parameters import BodyChange, InertialParameters
 from bayesid.robot.joint_state import JointState
-from bayesid.robot.mass_property_change import BodyChange
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White

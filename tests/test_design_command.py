@@ -25,7 +25,7 @@ from bayesid.design.polish import _Descent
 from bayesid.design.trajectories import extended_posture
 from bayesid.recording.recording import Recording
 from bayesid.report.numbers import format_fixed, format_number
-from bayesid.robot.end_effector import Tip
+from bayesid.robot.kinematics import Tip
 from bayesid.robot.robot import Robot
 from studies.common.ets7 import extended_wrist
 from tests.pdf_text import PdfText

@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bayesid.recording.jumps import smooth_joints
-from bayesid.recording.local_roughness import roughened
+from bayesid.recording.jumps import roughened, smooth_joints
 from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
 from studies.truth.motions import ProfiledManoeuvres, cycloid, septic
 from tests.test_smoothing import TIME, wiener

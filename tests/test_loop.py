@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -28,7 +27,7 @@ from bayesid.design import (
     SimulatedSpacecraft,
     Tip,
 )
-from bayesid.design.criteria import covariance
+from bayesid.design.criteria import Criterion, covariance
 from bayesid.design.excitation_loop import flown
 from bayesid.design.flight import Outcome
 from bayesid.design.knowledge_update import bodies_of_draws, known_of
@@ -58,15 +57,14 @@ def model_of(base: InertialParameters, spread: float) -> Model:
 
 
 @dataclass(frozen=True)
-class Swing:
+class Swing(Criterion):
     """A criterion of one's own: how far the base turns about z.
 
     It needs no derivative of what the sensors read, which would take long to compile.
     """
 
-    name: ClassVar[str] = "swing"
-    informed: ClassVar[bool] = False
-    draws: int = 0
+    name = "swing"
+    informed = False
 
     def cost(self, plan: Plan, outcome: Outcome) -> Array:
         return -jnp.mean(outcome.trajectory.excursion[:, 5] ** 2)

@@ -85,6 +85,7 @@ DESIGN = {
         lambda p: names_of(p.criteria),
         ["e-optimal"],
     ),
+    "options": ("duration = 10.0\noptions = {d-optimal = {draws = 3}}", lambda p: p.criteria[0].draws, 3),
     "rivals": (
         "duration = 10.0\nrivals = ['rate-bias', 'rate-scale']",
         lambda p: [effect.label for effect in p.plan.model.effects],

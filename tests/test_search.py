@@ -23,10 +23,9 @@ from bayesid.design.go_no_go import plan_to_go
 from bayesid.design.polish import Shared, Task, fitted_to_fine_limits, polish
 from bayesid.design.predicted_posterior import planned_manoeuvre, planned_posterior, predict
 from bayesid.design.search_starts import exchanged, random_start
-from bayesid.robot.composite_tables import composite_rows
+from bayesid.robot.composite_tables import composite_rows, row_sensitivity, screws
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
-from bayesid.robot.row_sensitivity import row_sensitivity, screws
 
 
 @pytest.fixture(scope="module")

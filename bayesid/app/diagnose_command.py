@@ -99,7 +99,7 @@ def _written(
 
     from bayesid._io.errors import InputError
     from bayesid._io.files import complete_folder, write_json
-    from bayesid._io.phase_clock import PhaseClock
+    from bayesid._io.progress import PhaseClock
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_to_design import FILE, fly_next, write_motion
     from bayesid.app.study_to_model import cause_prior, stated_bounds

@@ -26,7 +26,7 @@ def run(
     import numpy as np
 
     from bayesid._io.files import claimed_folder, complete_folder, write_json
-    from bayesid._io.phase_clock import PhaseClock
+    from bayesid._io.progress import PhaseClock
     from bayesid.app.report_origin import report_origin
     from bayesid.app.study_draft import open_places
     from bayesid.app.study_to_model import load_posterior

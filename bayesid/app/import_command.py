@@ -40,8 +40,7 @@ def run(
 ) -> Iterator[str]:
     """Make a recording from a bag of ROS 1 or ROS 2: NAME.csv, and NAME.import.json on where it comes from."""
     from bayesid._io.files import complete_folder, write_json
-    from bayesid.recording.bag_import import BagTopics, import_bag
-    from bayesid.recording.bag_window import TimeWindow
+    from bayesid.recording.bag_import import BagTopics, TimeWindow, import_bag
     from bayesid.recording.ros_bag import format_stamp
 
     window = TimeWindow.of_options(start, end, duration)

@@ -249,7 +249,12 @@ MOST = 500  # number of samples that are smoothed at most, because more make the
 
 
 def channel_noise(recordings: Sequence[Recording], column: str) -> float | None:
-    """Return the standard deviation per sample of a channel, the median over the recordings; None if none is seen."""
+    """Return the standard deviation per sample of a channel, the median over the recordings; None if none is seen.
+
+    High differences of the samples leave noise and no motion, and the median over them leaves out where the motion is
+    rough; where the samples are too uneven for differences, the likelihood of a smoothing spline says how noisy they
+    are.
+    """
     found = [_noise(*recording.series(column)) for recording in recordings if column in recording.channels]
     return _median(found)
 

@@ -25,7 +25,7 @@ from bayesid.design.motion_limits import Limits
 from bayesid.design.plan import Plan
 from bayesid.design.trajectories import BSplines, Fourier, PaperExcitation, TrajectoryFamily, extended_posture
 from bayesid.recording.recording import Recording
-from bayesid.robot.end_effector import Tip
+from bayesid.robot.kinematics import Tip
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects import create
 from bayesid.simulation.model import Model

@@ -18,10 +18,9 @@ from bayesid.design.criteria import Criterion, named_criteria
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
-from bayesid.recording.channel_families import JOINT_FAMILIES
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_motion
-from bayesid.recording.recording import Recording
+from bayesid.recording.recording import JOINT_FAMILIES, Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
 from bayesid.robot.robot_size import RobotSize

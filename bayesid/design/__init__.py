@@ -33,7 +33,7 @@ from bayesid.design.predicted_posterior import Predicted, planned_manoeuvre, pla
 from bayesid.design.simulated_spacecraft import PlannedMotion, SimulatedSpacecraft, Spacecraft
 from bayesid.design.trajectories import BSplines, Fourier, Linear, PaperExcitation, TrajectoryFamily
 from bayesid.design.trajectory_search import THOROUGH, Found, Search, Store, optimise
-from bayesid.robot.end_effector import Tip
+from bayesid.robot.kinematics import Tip
 
 __all__ = [
     "THOROUGH",

@@ -23,7 +23,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.recorded_samples import first_rate
 from bayesid.inference.simulated_recordings import blank_channels
 from bayesid.recording.recording import Recording
-from bayesid.robot.end_effector import Tip
+from bayesid.robot.kinematics import Tip
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind, White

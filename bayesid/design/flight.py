@@ -18,11 +18,10 @@ from jax import Array
 from bayesid._math.rotation import rotation, tilted
 from bayesid.design.plan import Plan
 from bayesid.design.trajectory import BaseAtStart, Trajectory, base_quantities, trajectory_of
-from bayesid.robot.composite_tables import ENTRIES
+from bayesid.robot.composite_tables import ENTRIES, Screws, beyond, row_sensitivity, screws
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import Kinematics, joint_motion, kinematics
 from bayesid.robot.regressors import balance_regressor
-from bayesid.robot.row_sensitivity import Screws, beyond, row_sensitivity, screws
 from bayesid.simulation.dynamics import Grid, Samples, Start, TimeTables, UnitSpeed
 from bayesid.simulation.instant import Readings
 from bayesid.simulation.simulator import Values

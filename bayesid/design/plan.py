@@ -12,7 +12,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.design.trajectories import TrajectoryFamily
 from bayesid.inference.unknowns import Unknowns
-from bayesid.robot.end_effector import Tip
+from bayesid.robot.kinematics import Tip
 from bayesid.simulation.model import Model
 from bayesid.simulation.simulator import ModelConstants, Simulator
 

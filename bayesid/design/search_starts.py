@@ -149,6 +149,10 @@ UNLIMITED = np.pi  # half of the range of a joint that has no limits [rad or m],
 def reacting_swing(problem: Problem, rng: np.random.Generator) -> Floats:
     """Return parameters of a swing as the paper's (27), of all joints that move, about a posture drawn at random.
 
+    A joint that turns against another one of parallel axis, with the tip on the axis of the first, moves the tip little
+    and the base much. On ETS-VII the best manoeuvres known do that, and descents from random motions hardly ever find
+    it.
+
     Of many postures those few are kept where the largest rate of the base is greatest: that over all joint speeds v
     with ``v' (J' J + D) v = 1``, where J is the Jacobian of the tip over its limits and D the inverse squares of the
     joints' largest speeds. The joints swing along that v.

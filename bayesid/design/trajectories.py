@@ -23,9 +23,8 @@ from scipy.optimize import minimize
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
 from bayesid.recording.joint_motion import Excitation, Motion
-from bayesid.robot.end_effector import Tip
 from bayesid.robot.joint_state import JointState
-from bayesid.robot.kinematics import kinematics
+from bayesid.robot.kinematics import Tip, kinematics
 from bayesid.robot.robot import Robot
 
 __all__ = [
@@ -376,8 +375,8 @@ def extended_posture(robot: Robot, start: Sequence[float] | Floats, free: Sequen
         Positions of all joints [rad or m].
     """
     start = np.array(start, dtype=float)
-    between = [joint for joint in _chain(robot, tip.joint) if joint in free and joint > last]
-    if last not in _chain(robot, tip.joint) or not between:
+    between = [joint for joint in robot.chain(tip.joint) if joint in free and joint > last]
+    if last not in robot.chain(tip.joint) or not between:
         return start
     bounds = [_range(robot, joint) for joint in between]
     low, high = np.transpose(bounds)
@@ -399,15 +398,6 @@ def extended_posture(robot: Robot, start: Sequence[float] | Floats, free: Sequen
     begins = [start[between], *(low + (high - low) * rng.uniform(size=(STARTS, len(between))))]
     ends = [minimize(shortness, begin, method="L-BFGS-B", bounds=bounds) for begin in begins]
     return posture(min(ends, key=lambda end: end.fun).x)
-
-
-def _chain(robot: Robot, joint: int) -> list[int]:
-    """Return the indices of the joints from one joint down to the base."""
-    chain = []
-    while joint >= 0:
-        chain.append(joint)
-        joint = robot.model.parents[joint + 2] - 2
-    return chain
 
 
 def _range(robot: Robot, index: int) -> tuple[float, float]:

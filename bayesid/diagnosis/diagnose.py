@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from bayesid._io.phase_clock import PhaseClock
-from bayesid._io.progress import Progress, silent
+from bayesid._io.progress import PhaseClock, Progress, silent
 from bayesid.diagnosis.candidates.candidate_effects import candidates
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.diagnosis.evidence.verdict import Status, verdict_sensitivity

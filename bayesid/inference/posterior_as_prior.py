@@ -18,9 +18,8 @@ from bayesid._math.arrays import Floats
 from bayesid._math.on_device import on_device
 from bayesid.inference.identification import Identification
 from bayesid.robot.body_prior import BodyPrior, Mixing
-from bayesid.robot.inertial_parameters import BASIS, InertialParameters
+from bayesid.robot.inertial_parameters import BASIS, BodyChange, InertialParameters
 from bayesid.robot.log_cholesky import log_cholesky_coordinates, log_cholesky_vector
-from bayesid.robot.mass_property_change import BodyChange
 
 __all__ = ["BodyChange", "InertialDraws", "JointPrior", "joint_prior"]
 

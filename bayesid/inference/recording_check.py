@@ -10,9 +10,8 @@ from scipy.spatial.transform import Rotation
 from bayesid._math.arrays import Floats
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
-from bayesid.recording.channel_families import JOINT_FAMILIES
 from bayesid.recording.joint_motion import MeasuredMotion
-from bayesid.recording.recording import Recording
+from bayesid.recording.recording import JOINT_FAMILIES, Recording
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind

@@ -2,7 +2,7 @@
 
 Time is that of the headers' stamps, from the first message of the joints. Every message keeps its own time and none is
 interpolated, so that gaps stay gaps. Readings of the base before the first and after the last message of the joints are
-left out, since nothing is known of the motion there.
+left out, since nothing is known of the motion there. The topics of a bag must be stamped by one clock.
 """
 
 from __future__ import annotations
@@ -24,12 +24,74 @@ from bayesid.recording.bag_channels import (
     joint_channels,
     of_joints,
 )
-from bayesid.recording.bag_clocks import refuse_mixed_clocks
-from bayesid.recording.bag_window import TimeWindow
 from bayesid.recording.recording import Recording
 from bayesid.recording.ros_bag import StampedTopic, read_topics
 
-__all__ = ["BagTopics", "ImportedBag", "ImportedTopic", "import_bag"]
+__all__ = ["BagTopics", "ImportedBag", "ImportedTopic", "TimeWindow", "import_bag", "refuse_mixed_clocks"]
+
+# difference of the stamps of two topics, against their arrival, from which on their clocks are others [s]; a slow
+# telemetry stamps its samples once in a second
+APART = 1.0
+
+
+@dataclass(frozen=True)
+class TimeWindow:
+    """Part of a bag in seconds from the first stamp of all topics that are read; both ends belong to it.
+
+    Parameters
+    ----------
+    start : float
+        First instant [s].
+    end : float, optional
+        Last instant [s]; by default that of the bag.
+
+    Raises
+    ------
+    InputError
+        If it starts before the bag or has no length.
+    """
+
+    start: float = 0.0
+    end: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.start >= 0.0:
+            raise InputError(
+                f"the window starts at {self.start:g} s, before the bag", remedy="Give --start in seconds from 0 on"
+            )
+        if self.end is not None and not self.end > self.start:
+            raise InputError(
+                f"the window from {self.start:g} to {self.end:g} s is empty",
+                remedy="Give --end after --start, or a --duration above 0",
+            )
+
+    @staticmethod
+    def of_options(start: float, end: float | None, duration: float | None) -> TimeWindow:
+        """Return the window from a start to an end or of a duration [s], of which one may be given."""
+        if end is not None and duration is not None:
+            raise InputError("both --end and --duration are given", remedy="Give one of them")
+        return TimeWindow(start, start + duration if duration is not None else end)
+
+    def of(self, topics: Mapping[str, StampedTopic]) -> dict[str, StampedTopic]:
+        """Return the messages of topics in the window.
+
+        Raises
+        ------
+        InputError
+            If a topic has none.
+        """
+        first = min(int(topic.stamps[0]) for topic in topics.values())
+        last = max(int(topic.stamps[-1]) for topic in topics.values())
+        low = first + round(1e9 * self.start)
+        high = last if self.end is None else first + round(1e9 * self.end)
+        found = {name: topic.kept([low <= stamp <= high for stamp in topic.stamps]) for name, topic in topics.items()}
+        for name, topic in found.items():
+            if not topic.messages:
+                raise topics[name].error(
+                    f"it has no message from {self.start:g} to {(high - first) / 1e9:g} s",
+                    remedy=f"Choose a window within the bag, which lasts {(last - first) / 1e9:.6g} s",
+                )
+        return found
 
 
 @dataclass(frozen=True)
@@ -163,4 +225,38 @@ def _described(topic: StampedTopic, channels: Mapping[str, Floats], messages: in
         used=len(topic.messages),
         interval=float(np.median(steps)),
         longest_gap=float(steps.max()),
+    )
+
+
+def refuse_mixed_clocks(topics: Sequence[StampedTopic]) -> None:
+    """Refuse topics whose stamps come from different clocks.
+
+    All messages of a bag arrive on one clock. By how much stamps precede the arrival is a small delay, or, where the
+    stamps are those of a simulation, the same function of time for every topic.
+
+    Raises
+    ------
+    InputError
+        If the stamps of a topic are far from those of the first at the same arrival, or they have no time in common.
+    """
+    reference = topics[0]
+    for topic in topics[1:]:
+        ahead = (topic.stamps - topic.arrivals) / 1e9
+        expected = np.interp(
+            (topic.arrivals - reference.arrivals[0]) / 1e9,
+            (reference.arrivals - reference.arrivals[0]) / 1e9,
+            (reference.stamps - reference.arrivals) / 1e9,
+        )
+        apart = float(np.median(ahead - expected))
+        if abs(apart) > APART:
+            raise _error(
+                topic, f"its stamps are {abs(apart):.6g} s {'ahead of' if apart > 0 else 'behind'} those of", reference
+            )
+        if topic.stamps[-1] < reference.stamps[0] or topic.stamps[0] > reference.stamps[-1]:
+            raise _error(topic, "it has no time in common with", reference)
+
+
+def _error(topic: StampedTopic, problem: str, reference: StampedTopic) -> InputError:
+    return topic.error(
+        f"{problem} {reference.name}", remedy="Stamp all topics by one clock, either the computer's or the simulation's"
     )

@@ -15,8 +15,7 @@ import numpy as np
 import scipy.linalg as sla
 
 from bayesid._math.arrays import Floats
-from bayesid.recording.band_covariance import covariances_by_distance
-from bayesid.recording.integrated_process import IntegratedProcess, Jump, jump_moments
+from bayesid.recording.integrated_process import IntegratedProcess, Jump, covariances_by_distance, jump_moments
 from bayesid.recording.smoothing import SmoothedJoint
 
 __all__ = ["placed_jumps"]
@@ -211,9 +210,3 @@ def _whitener(covariance: Floats) -> Floats:
     """Return the inverse of the Cholesky factor of a covariance whose entries differ by orders of magnitude."""
     deviation = np.sqrt(np.diag(covariance))
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance / np.outer(deviation, deviation))) / deviation)
-
-
-def _root(covariance: Floats) -> Floats:
-    """Return the Cholesky factor of a covariance whose entries differ by many orders of magnitude."""
-    deviation = np.sqrt(np.diag(covariance))
-    return np.asarray(deviation[:, None] * np.linalg.cholesky(covariance / np.outer(deviation, deviation)))

@@ -5,7 +5,7 @@ given the samples is the smoothing spline of degree ``2 order - 1`` (Wahba 1978)
 the likelihood needs: the uncertainty of velocity and acceleration with their correlation in time. The order, the
 intensity of the process, and any noise level the user did not declare, maximise the marginal likelihood. All algebra
 is banded. Instants at which the acceleration or the jerk jumps, and intensities that change along the recording, are
-found elsewhere (`bayesid.recording.jumps`, `bayesid.recording.local_roughness`).
+found elsewhere (`bayesid.recording.jumps`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,7 @@ from scipy.interpolate import PPoly
 from scipy.optimize import minimize, minimize_scalar
 
 from bayesid._math.arrays import Floats, Integers
-from bayesid.recording.band_covariance import covariances_by_distance
-from bayesid.recording.integrated_process import IntegratedProcess, Jump
+from bayesid.recording.integrated_process import IntegratedProcess, Jump, covariances_by_distance
 
 __all__ = ["ORDERS", "JointSamples", "SmoothedJoint", "smooth"]
 
@@ -326,7 +325,7 @@ def smooth(
     orders : sequence of int, optional
         Orders of the derivative that may be white noise, of which the marginal likelihood chooses one.
     roughness : (n - 1,) array, optional
-        Factor on the variance of the process in each step, as `bayesid.recording.local_roughness` finds it.
+        Factor on the variance of the process in each step, as `bayesid.recording.jumps` finds it.
     """
     nodes, scale = _nodes(np.concatenate([series.time for series in samples]))
     best = None

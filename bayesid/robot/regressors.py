@@ -172,10 +172,7 @@ def carried_bodies(robot: Robot, bodies: Sequence[str]) -> Floats:
     """Return 1 where a joint carries a body and 0 elsewhere, shape (joints, bodies)."""
     carried = np.zeros((len(robot.joints), len(bodies)))
     for column, name in enumerate(bodies):
-        joint = robot.link(name).joint
-        while joint >= 0:
-            carried[joint, column] = 1.0
-            joint = robot.model.parents[joint + 2] - 2
+        carried[robot.chain(robot.link(name).joint), column] = 1.0
     return carried
 
 

@@ -211,6 +211,14 @@ class Robot:
             )
         return self.links[name]
 
+    def chain(self, joint: int) -> list[int]:
+        """Return a joint and those between it and the base, outermost first; none for the base itself (-1)."""
+        chain = []
+        while joint >= 0:
+            chain.append(joint)
+            joint = self.model.parents[joint + 2] - 2
+        return chain
+
     def with_inertial(self, name: str, inertial: InertialParameters) -> Robot:
         """Return the robot with other inertial parameters of one link or load."""
         links = dict(self.links)

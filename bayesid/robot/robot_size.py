@@ -95,7 +95,7 @@ def beyond_joint(robot: Robot, joint: int) -> BeyondJoint:
 
     A joint that carries no mass is said to carry a gram within a centimetre, so that bounds stay above zero.
     """
-    carried = {name: link for name, link in robot.links.items() if joint in _chain(robot, link.joint)}
+    carried = {name: link for name, link in robot.links.items() if joint in robot.chain(link.joint)}
     mass = sum(link.inertial.mass for link in carried.values())
     inertia = sum(link.inertial.mass * _outer_distance(robot, name, joint) ** 2 for name, link in carried.items())
     return BeyondJoint(max(mass, 1e-3), max(inertia, 1e-7))
@@ -129,15 +129,6 @@ def link_radius(robot: Robot, name: str) -> float:
     return max(float(np.linalg.norm(link.inertial.com) + np.linalg.norm(box)), *distances)
 
 
-def _chain(robot: Robot, joint: int) -> list[int]:
-    """Return a joint and those between it and the base, outermost first; none for the base itself (-1)."""
-    chain = []
-    while joint >= 0:
-        chain.append(joint)
-        joint = robot.model.parents[joint + 2] - 2
-    return chain
-
-
 def _outer_distance(robot: Robot, name: str, origin: int = -1) -> float:
     """Return the largest distance of a body's matter from the frame of a joint (-1: base) in any posture [m].
 
@@ -146,7 +137,7 @@ def _outer_distance(robot: Robot, name: str, origin: int = -1) -> float:
     link = robot.link(name)
     com = link.placement @ np.array([*link.inertial.com, 1.0])
     distance = float(np.linalg.norm(com[:3]) + np.linalg.norm(half_edges(link.inertial)))
-    for joint in _chain(robot, link.joint):
+    for joint in robot.chain(link.joint):
         if joint == origin:
             break
         distance += float(np.linalg.norm(robot.model.jointPlacements[joint + 2].translation))

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.recording.channel_families import declare_family
+from bayesid.recording.recording import declare_family
 from bayesid.simulation.sensor_noise import (
     ARCSEC,
     AngleRandomWalk,

@@ -31,8 +31,7 @@ from bayesid.app.schema.value_types import (
 )
 
 if TYPE_CHECKING:
-    from bayesid.robot.inertial_parameters import InertialParameters
-    from bayesid.robot.mass_property_change import BodyChange
+    from bayesid.robot.inertial_parameters import BodyChange, InertialParameters
 
 
 def check_extended(body: BodySection, place: str) -> None:
@@ -100,7 +99,7 @@ class ChangeSection(Section):
     @property
     def change(self) -> BodyChange:
         """Mass-property change as a `BodyChange`, which validates it."""
-        from bayesid.robot.mass_property_change import BodyChange
+        from bayesid.robot.inertial_parameters import BodyChange
 
         xx, yy, zz, xy, xz, yz = self.inertia
         tensor = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
