@@ -21,7 +21,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_design import fly_next, load_problem, write_motion
 from bayesid.app.study_to_encoders import assume_missing, encoder_noise
 from bayesid.design import Store, expected_probability, noncentrality_for
-from bayesid.design.polish import _Descent
+from bayesid.design.refine import _Descent
 from bayesid.design.trajectories import extended_posture
 from bayesid.recording.recording import Recording
 from bayesid.report.numbers import format_fixed, format_number

@@ -33,7 +33,7 @@ WRITERS = (
     "app.predict_command",
     "app.simulate_command",
     "design.base_prediction",
-    "design.designed",
+    "design.design_result",
     "design.go_no_go",
     "design.loop_goals",
     "design.pose_trajectory",

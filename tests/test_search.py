@@ -16,12 +16,12 @@ from test_design import plan as flywheel_plan
 
 from bayesid._math.arrays import Floats
 from bayesid.design import DOptimal, Fourier, Limits, Problem, Search, Store, optimise
-from bayesid.design.designed import sample_times
-from bayesid.design.encoder_shadow import encoder_shadow
+from bayesid.design.design_result import sample_times
+from bayesid.design.encoder_information import encoder_directions
 from bayesid.design.flight import Flight
 from bayesid.design.go_no_go import plan_to_go
-from bayesid.design.polish import Shared, Task, fitted_to_fine_limits, polish
 from bayesid.design.predicted_posterior import planned_manoeuvre, planned_posterior, predict
+from bayesid.design.refine import Shared, Task, fitted_to_fine_limits, refine
 from bayesid.design.search_starts import exchanged, random_start
 from bayesid.robot.composite_tables import composite_rows, row_sensitivity, screws
 from bayesid.robot.joint_state import JointState
@@ -68,13 +68,13 @@ def test_the_information_is_that_of_the_likelihood(planar: Problem) -> None:
 def test_errors_of_an_encoder_hide_a_swinging_rate_in_closed_form() -> None:
     """A flywheel's speed error turns the base by its share: a cosine of the position is a sine of the rate."""
     plan = replace(flywheel_plan(), encoder_sigma=(3e-4,))
-    shadow = encoder_shadow(plan, PARAMETERS, np.zeros((len(plan.samples), 3)))
+    explained = encoder_directions(plan, PARAMETERS, np.zeros((len(plan.samples), 3)))
     share, end = 0.5 / 3.5, plan.family.duration
     for periods in (2, 3, 4):
         w = 2.0 * np.pi * periods / end
         signal = np.zeros((len(plan.samples), 3))
         signal[:, 2] = np.sin(w * plan.samples) / plan.sigma[2]
-        hidden = shadow.T @ signal.ravel()
+        hidden = explained.T @ signal.ravel()
         left = signal.ravel() @ signal.ravel() - hidden @ hidden
         expected = 0.5 * (len(plan.samples) - 1) / (plan.sigma[2] ** 2 + (share * w * 3e-4) ** 2)
         assert left == pytest.approx(expected, rel=0.05)  # the ends count double in the encoders' cosines
@@ -125,7 +125,7 @@ def test_an_exchange_takes_whole_courses_of_few_joints(planar: Problem) -> None:
 def test_a_descent_within_loosened_limits_ends_within_the_limits(planar: Problem) -> None:
     start = random_start(planar, np.random.default_rng(12))
     task = Task(Shared(planar), planar.criteria[0], [], start, 10, 1e-3)
-    plain, loosened = polish(task), polish(replace(task, loosened=3.0))
+    plain, loosened = refine(task), refine(replace(task, loosened=3.0))
     assert planar.fractions(loosened.parameters)[0].max() <= 1.0 + 1e-5
     assert np.isfinite(loosened.cost)
     assert loosened.evaluations > plain.evaluations
@@ -179,7 +179,7 @@ def test_a_search_finds_what_three_descents_from_other_starts_find(name: str) ->
     assert all(item.kept for item in own.reached(found.parameters))
     rng, shared = np.random.default_rng(77), Shared(own)
     tasks = [Task(shared, own.criteria[0], [], random_start(own, rng), 400, 1e-3) for _ in range(3)]
-    others = [fitted_to_fine_limits(replace(task, start=polish(task).parameters)) for task in tasks]
+    others = [fitted_to_fine_limits(replace(task, start=refine(task).parameters)) for task in tasks]
     assert np.exp((found.cost - min(other.cost for other in others)) / 10.0) < 1.02
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bayesid.design.designed import sample_times
+from bayesid.design.design_result import sample_times
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.recording import Recording
 from bayesid.simulation.model import Manoeuvre

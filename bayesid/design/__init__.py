@@ -1,9 +1,9 @@
 """Design of the excitation: manoeuvres chosen by the posterior they lead to, within the limits of the robot.
 
 Data flow in one direction: `trajectories` -> `plan` (motion of the robot and information of its sensors) -> `criteria`
-and `motion_limits` -> `design_problem` (compiled, with gradients) -> `trajectory_search` -> `designed` (each manoeuvre
-with its predicted posterior). `excitation_loop` plans a manoeuvre, has a spacecraft execute it, identifies the bodies
-and plans again from the posterior.
+and `motion_limits` -> `design_problem` (compiled, with gradients) -> `trajectory_search` -> `design_result` (each
+manoeuvre with its predicted posterior). `excitation_loop` plans a manoeuvre, has a spacecraft execute it, identifies
+the bodies and plans again from the posterior.
 """
 
 from bayesid.design.criteria import (
@@ -23,7 +23,7 @@ from bayesid.design.criteria import (
     register_criterion,
 )
 from bayesid.design.design_problem import Problem
-from bayesid.design.designed import Design, best_design, design, evaluate
+from bayesid.design.design_result import Design, best_design, design, evaluate
 from bayesid.design.excitation_loop import Loop, NotFlown
 from bayesid.design.knowledge_update import Laplace, Sampled, worst_relative_sd
 from bayesid.design.loop_goals import CauseProbability, Goal, QuantitySd, RelativePrecision, TipRegion

@@ -20,7 +20,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.kept_jit import QUICKLY
 from bayesid.design.criteria import Criterion
-from bayesid.design.encoder_shadow import Encoder, encoder_shadow, likely_shadow, position_noise
+from bayesid.design.encoder_information import Encoder, encoder_directions, likely_directions, position_noise
 from bayesid.design.flight import Flight, Outcome
 from bayesid.design.motion_limits import ACTIVE, Limit, Limits, smooth_largest
 from bayesid.design.plan import Plan
@@ -119,18 +119,18 @@ class Problem:
         return bounds if self.shares is None else bounds * self.shares
 
     @cached_property
-    def shadow(self) -> Floats:
-        """Directions of the readings that errors of the encoders could explain (`encoder_shadow`), at rest."""
-        return self.shadow_along(self.plan.family.centre)
+    def explained(self) -> Floats:
+        """Directions of the readings that errors of the encoders could explain (`encoder_directions`), at rest."""
+        return self.explained_along(self.plan.family.centre)
 
-    def shadow_along(self, parameters: Floats) -> Floats:
+    def explained_along(self, parameters: Floats) -> Floats:
         """Return the directions of the readings that errors of the encoders could explain along a motion."""
         samples = self.plan.samples
         if not any(self.plan.encoder_sigma):
-            return encoder_shadow(self.plan, parameters, np.zeros((len(samples), 3)))
+            return encoder_directions(self.plan, parameters, np.zeros((len(samples), 3)))
         fine = self.trajectory(parameters)
         rate = np.stack([np.interp(samples, fine.time, fine.rate[:, axis]) for axis in range(3)], axis=1)
-        return encoder_shadow(self.plan, parameters, rate)
+        return encoder_directions(self.plan, parameters, rate)
 
     @cached_property
     def limit_of_fraction(self) -> Integers:
@@ -202,7 +202,7 @@ class Problem:
         """
         if "_latest" in self.__dict__:
             return
-        parameters, likely = self.plan.family.centre, likely_shadow(self.plan)
+        parameters, likely = self.plan.family.centre, likely_directions(self.plan)
         costs: list[Any] = [self._informed_cost for one in self.criteria if one.informed][:1]
         costs += [self._motion_cost for one in self.criteria if not one.informed][:1]
         arguments: tuple[Any, ...] = (parameters, self.centre, 0, self.precision, likely)
@@ -214,12 +214,12 @@ class Problem:
             self._fractions.lower(parameters, self.centre, self.bounds)
             pending.append(pool.submit(self.fractions, parameters))
             self._fine_trajectory.lower(parameters, self.centre)
-            pending.append(pool.submit(lambda: (self.trajectory(parameters), self.shadow)))
+            pending.append(pool.submit(lambda: (self.trajectory(parameters), self.explained)))
             for future in pending:
                 future.result()
-        if self.shadow.shape != likely.shape:
+        if self.explained.shape != likely.shape:
             for cost in costs:
-                cost(parameters, self.centre, 0, self.precision, self.shadow)
+                cost(parameters, self.centre, 0, self.precision, self.explained)
 
     def draws(self, count: int, rng: np.random.Generator) -> Floats:
         """Return draws of the bodies from their prior, other unknowns at its centre, shape (count, n)."""
@@ -234,7 +234,7 @@ class Problem:
         alike = [own for own in self.criteria if own.informed is criterion.informed]
         compiled = self._informed_cost if criterion.informed else self._motion_cost
         index = alike.index(criterion)
-        pairs = [compiled(parameters, z, index, self.precision, self.shadow) for z in (points or [self.centre])]
+        pairs = [compiled(parameters, z, index, self.precision, self.explained) for z in (points or [self.centre])]
         return float(np.mean([pair[0] for pair in pairs])), np.mean([np.asarray(pair[1]) for pair in pairs], axis=0)
 
     def costs(self, parameters: Floats, points: Mapping[str, list[Floats]] = MappingProxyType({})) -> dict[str, float]:
@@ -291,9 +291,9 @@ class Problem:
     def _informed_cost(self):  # type: ignore[no-untyped-def]
         """Criteria that depend on the information, compiled."""
 
-        def cost(parameters: Array, z: Array, index: Array, prior: Array, shadow: Array) -> Array:
+        def cost(parameters: Array, z: Array, index: Array, prior: Array, explained: Array) -> Array:
             flight = Flight(self.plan, parameters, z)
-            information = flight.information(shadow)
+            information = flight.information(explained)
             flight.prepare()
             return self._chosen(True, flight, index, information, prior)
 
@@ -303,7 +303,7 @@ class Problem:
     def _motion_cost(self):  # type: ignore[no-untyped-def]
         """All other criteria, compiled."""
 
-        def cost(parameters: Array, z: Array, index: Array, prior: Array, shadow: Array) -> Array:
+        def cost(parameters: Array, z: Array, index: Array, prior: Array, explained: Array) -> Array:
             flight = Flight(self.plan, parameters, z)
             flight.prepare()
             return self._chosen(False, flight, index, jnp.zeros_like(prior), prior)

@@ -19,7 +19,7 @@ from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid._io.store import content_key
 from bayesid.design.design_problem import Problem
-from bayesid.design.designed import sample_times
+from bayesid.design.design_result import sample_times
 from bayesid.design.go_no_go import plan_to_go
 from bayesid.design.knowledge_update import (
     Identifier,

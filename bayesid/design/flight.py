@@ -72,14 +72,14 @@ class Flight:
         time = self.plan.instants
         return trajectory_of(time, self._joints, base), trajectory_of(time, JointState(*by_joint), change)
 
-    def information(self, shadow: Array | None = None) -> Array:
-        """Return the Fisher information of z, shape (n, n), from the sensors' white noise and an `encoder_shadow`."""
+    def information(self, explained: Array | None = None) -> Array:
+        """Return the Fisher information of z, (n, n), given the sensors' white noise and the `encoder_directions`."""
         slopes = self.reading_slopes()
         flat = slopes.reshape(-1, slopes.shape[-1])
         information = flat.T @ flat
-        if shadow is None or not shadow.shape[1]:
+        if explained is None or not explained.shape[1]:
             return information
-        hidden = shadow.T @ flat
+        hidden = explained.T @ flat
         return information - hidden.T @ hidden
 
     def reading_slopes(self) -> Array:

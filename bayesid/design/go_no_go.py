@@ -12,7 +12,7 @@ from bayesid._io.errors import InputError
 from bayesid._io.progress import Progress, silent
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem, Reached
-from bayesid.design.designed import Risk, risks
+from bayesid.design.design_result import Risk, risks
 from bayesid.design.motion_limits import Limits
 from bayesid.design.trajectory_search import Found, Search, Store, optimise
 

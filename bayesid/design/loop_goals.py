@@ -57,27 +57,29 @@ class StepKnowledge:
 
 
 class Goal(Protocol):
-    """Something that a loop is to reach."""
+    """Something that a loop is to reach.
+
+    Attributes
+    ----------
+    text, unit : str
+        What is measured, as it is printed, and the unit of its value.
+    target : float
+        Value to be reached.
+    diagnosed : bool
+        Whether the recordings must be diagnosed to know the value.
+    """
 
     @property
-    def text(self) -> str:
-        """What is measured, as it is printed."""
-        ...
+    def text(self) -> str: ...  # noqa: D102
 
     @property
-    def unit(self) -> str:
-        """Unit of the value."""
-        ...
+    def unit(self) -> str: ...  # noqa: D102
 
     @property
-    def wanted(self) -> float:
-        """Value to be reached."""
-        ...
+    def target(self) -> float: ...  # noqa: D102
 
     @property
-    def diagnosed(self) -> bool:
-        """Whether the recordings must be diagnosed to know the value."""
-        ...
+    def diagnosed(self) -> bool: ...  # noqa: D102
 
     def value(self, knowledge: StepKnowledge) -> float:
         """Return the value after a step."""
@@ -92,11 +94,11 @@ class _Smaller:
     """Goal that is reached where its value is small enough."""
 
     diagnosed = False
-    wanted: float
+    target: float
 
     def reached(self, value: float) -> bool:
-        """Return whether a value is at most the wanted one."""
-        return bool(value <= self.wanted)
+        """Return whether a value is at most the target."""
+        return bool(value <= self.target)
 
 
 @dataclass(frozen=True)
@@ -105,12 +107,12 @@ class RelativePrecision(_Smaller):
 
     Parameters
     ----------
-    wanted : float
+    target : float
     measure : callable
         Function of the draws of the bodies to identify, by name.
     """
 
-    wanted: float = 0.01
+    target: float = 0.01
     measure: Callable[[Mapping[str, BodyDraws]], float] = worst_relative_sd
     text = "worst relative sd of mass and principal moments"
     unit = "1"
@@ -130,13 +132,13 @@ class QuantitySd(_Smaller):
         Name of the link or load.
     quantity : str
         One of `BODY_QUANTITIES`.
-    wanted : float
+    target : float
         In the quantity's unit.
     """
 
     body: str
     quantity: str
-    wanted: float
+    target: float
 
     def __post_init__(self) -> None:
         if self.quantity not in BODY_QUANTITIES:
@@ -145,8 +147,8 @@ class QuantitySd(_Smaller):
                 place="wanted sd",
                 remedy=f"Name one of {', '.join(BODY_QUANTITIES)}",
             )
-        if not 0.0 < self.wanted < np.inf:
-            raise InputError(f"{self.wanted:g} is no sd", place="wanted sd", remedy="Give a positive number")
+        if not 0.0 < self.target < np.inf:
+            raise InputError(f"{self.target:g} is no sd", place="wanted sd", remedy="Give a positive number")
 
     @property
     def text(self) -> str:
@@ -175,13 +177,13 @@ class TipRegion(_Smaller):
 
     Parameters
     ----------
-    wanted : float
+    target : float
         [m]
     frame : str, optional
         Frame of the end-effector in the URDF, by default the last link.
     """
 
-    wanted: float
+    target: float
     frame: str | None = None
     text = "95 % region of the end-effector where the last manoeuvre ends, longest semi-axis"
     unit = "m"
@@ -201,19 +203,19 @@ class CauseProbability:
     ----------
     cause : str
         Label of an effect of the catalogue, or ``"unknown"``.
-    wanted : float
+    target : float
         Probability from which it is taken to be there, or not there.
     """
 
     cause: str
-    wanted: float = 0.95
+    target: float = 0.95
     unit = "1"
     diagnosed = True
 
     def __post_init__(self) -> None:
-        if not 0.5 < self.wanted < 1.0:
+        if not 0.5 < self.target < 1.0:
             raise InputError(
-                f"{self.wanted:g} is no probability that decides", place="wanted cause", remedy="Give 0.9 to 0.99"
+                f"{self.target:g} is no probability that decides", place="wanted cause", remedy="Give 0.9 to 0.99"
             )
 
     @property
@@ -233,7 +235,7 @@ class CauseProbability:
 
     def reached(self, value: float) -> bool:
         """Return whether the cause is decided, either way."""
-        return max(value, 1.0 - value) >= self.wanted
+        return max(value, 1.0 - value) >= self.target
 
 
 def goal_dict(goal: Goal, value: float) -> dict[str, Any]:
@@ -241,7 +243,7 @@ def goal_dict(goal: Goal, value: float) -> dict[str, Any]:
     return {
         "goal": goal.text,
         "value": value,
-        "wanted": goal.wanted,
+        "wanted": goal.target,
         "unit": goal.unit,
         "reached": goal.reached(value),
     }

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bayesid._math.arrays import Floats
-from bayesid.design.encoder_shadow import Encoder
+from bayesid.design.encoder_information import Encoder
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.posterior import Posterior
@@ -105,7 +105,6 @@ def planned_manoeuvre(
 def planned_posterior(
     model: Model,
     manoeuvres: Sequence[Manoeuvre],
-    like: Posterior | None = None,
     z: Floats | None = None,
     step: float | None = None,
 ) -> Posterior:
@@ -117,8 +116,6 @@ def planned_posterior(
         Model of the posterior.
     manoeuvres : sequence of Manoeuvre
         Planned manoeuvres.
-    like : Posterior, optional
-        Earlier posterior of the same kind; it has no effect any more.
     z : (n,) array, optional
         Coordinates of the point, by default the prior's centre.
     step : float, optional

@@ -131,14 +131,14 @@ def adapted_to_family(problem: Problem, rng: np.random.Generator) -> Problem:
     if not adaptable:
         return problem
 
-    def shown(parameters: Array, z: Array, prior: Array, shadow: Array) -> list[list[Array]]:
+    def shown(parameters: Array, z: Array, prior: Array, explained: Array) -> list[list[Array]]:
         flight = Flight(problem.plan, parameters, z)
-        outcome = Outcome(flight, flight.information(shadow), prior)
+        outcome = Outcome(flight, flight.information(explained), prior)
         return [criterion.shown(problem.plan, outcome) for criterion in adaptable]
 
     compiled = jax.jit(shown, compiler_options=QUICKLY)
     starts = [random_start(problem, rng) for _ in range(MANOEUVRES)]
-    each = [compiled(start, problem.centre, problem.precision, problem.shadow) for start in starts]
+    each = [compiled(start, problem.centre, problem.precision, problem.explained) for start in starts]
     sums = iter(jax.tree.map(lambda *parts: np.sum(parts, axis=0), *each))
     return problem.judged_by([one.adapted(next(sums)) if one.adaptable else one for one in problem.criteria])
 

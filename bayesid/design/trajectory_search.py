@@ -24,7 +24,7 @@ from bayesid._io.store import JsonStore
 from bayesid._math.arrays import Floats
 from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem
-from bayesid.design.polish import Polished, Shared, Task, fitted_to_fine_limits, polish
+from bayesid.design.refine import Refined, Shared, Task, fitted_to_fine_limits, refine
 from bayesid.design.search_starts import SLACK, exchanged, random_start, reacting_swing
 
 __all__ = ["THOROUGH", "Found", "Search", "Store", "optimise"]
@@ -164,7 +164,7 @@ def _start(problem: Problem, rng: np.random.Generator) -> Floats:
     return reacting_swing(problem, rng) if family.imitates and rng.random() < REACTING else random_start(problem, rng)
 
 
-def _ranked(done: Sequence[Polished], problem: Problem) -> list[Polished]:
+def _ranked(done: Sequence[Refined], problem: Problem) -> list[Refined]:
     """Return what keeps the limits, the best first, without what is alike.
 
     Raises
@@ -172,7 +172,7 @@ def _ranked(done: Sequence[Polished], problem: Problem) -> list[Polished]:
     InputError
         If nothing keeps the limits; the message names the broken ones.
     """
-    ranked: list[Polished] = []
+    ranked: list[Refined] = []
     for item in sorted((item for item in done if np.isfinite(item.cost)), key=lambda item: item.cost):
         if not ranked or item.cost - ranked[-1].cost > ALIKE * min(abs(item.cost), 1.0):
             ranked.append(item)
@@ -209,14 +209,14 @@ class _Work:
         tolerance: float,
         points: list[Floats],
         loosened: Sequence[float] | None = None,
-    ) -> list[Polished]:
+    ) -> list[Refined]:
         """Run the descents of one round that no earlier run has finished, each within loosened limits first."""
-        results: dict[int, Polished] = {}
+        results: dict[int, Refined] = {}
         shared, tasks = Shared(self.problem), {}
         for index, start in enumerate(starts):
             earlier = self.known(f"{number}.{index}")
             if earlier is not None:
-                self._finish(results, index, Polished(*earlier))
+                self._finish(results, index, Refined(*earlier))
             else:
                 wide = 1.0 if loosened is None else loosened[index]
                 tasks[index] = Task(shared, self.criterion, points, start, self.search.iterations, tolerance, wide)
@@ -226,7 +226,7 @@ class _Work:
             self._finish(results, index, result)
         return [results[index] for index in range(len(starts))]
 
-    def fitted(self, ends: Sequence[Polished], tolerance: float, points: list[Floats]) -> list[Polished]:
+    def fitted(self, ends: Sequence[Refined], tolerance: float, points: list[Floats]) -> list[Refined]:
         """Go on with descents until they keep the limits between the instants of the search, too."""
         kept = [
             fitted_to_fine_limits(
@@ -241,9 +241,9 @@ class _Work:
     def _each(self, tasks: dict[int, Task]):  # type: ignore[no-untyped-def]
         """Return the results of tasks as they become known, each with its number."""
         if self.search.executor is None:
-            yield from ((index, polish(task)) for index, task in tasks.items())
+            yield from ((index, refine(task)) for index, task in tasks.items())
             return
-        futures = {self.search.executor.submit(polish, task): index for index, task in tasks.items()}
+        futures = {self.search.executor.submit(refine, task): index for index, task in tasks.items()}
         try:
             for future in as_completed(futures):
                 yield futures[future], future.result()
@@ -251,7 +251,7 @@ class _Work:
             for future in futures:
                 future.cancel()
 
-    def _finish(self, results: dict[int, Polished], index: int, result: Polished) -> None:
+    def _finish(self, results: dict[int, Refined], index: int, result: Refined) -> None:
         results[index] = result
         self.done += self.search.iterations + 1
         self.evaluations += result.evaluations

@@ -17,7 +17,7 @@ from bayesid import (
     SensorKind,
     White,
 )
-from bayesid.design.designed import sample_times
+from bayesid.design.design_result import sample_times
 from bayesid.inference.simulated_recordings import simulate_manoeuvre
 from bayesid.simulation.effects import GravityGradient
 from studies.common.ets7 import INTERVAL, RADIUS

@@ -16,7 +16,7 @@ import numpy as np
 from bayesid import Manoeuvre, Model, Robot, SensorKind
 from bayesid._math.arrays import Floats
 from bayesid.design import BSplines, Criterion, Limits, Plan, Problem, Tip, TrajectoryFamily
-from bayesid.design.designed import sample_times
+from bayesid.design.design_result import sample_times
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import draw_inertial
 from bayesid.simulation.model import spread_links

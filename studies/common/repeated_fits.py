@@ -17,7 +17,7 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.design import planned_manoeuvre, planned_posterior
-from bayesid.design.designed import sample_times
+from bayesid.design.design_result import sample_times
 from bayesid.design.predicted_posterior import describe
 from bayesid.inference.data import Data, grids_of, stacked
 from bayesid.inference.noise_changes import relinearised

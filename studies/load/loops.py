@@ -24,7 +24,7 @@ from bayesid.design import (
     optimise,
 )
 from bayesid.design.design_problem import Known
-from bayesid.design.designed import sample_times
+from bayesid.design.design_result import sample_times
 from bayesid.design.excitation_loop import flown
 from bayesid.design.knowledge_update import bodies_of_draws, updated_model
 from bayesid.design.simulated_spacecraft import plan_recording

@@ -17,7 +17,7 @@ from jax import Array
 
 from bayesid import BodyPrior, Manoeuvre, MeasuredMotion, Model, Posterior, SensorKind
 from bayesid._math.arrays import Floats
-from bayesid.design.designed import sample_times
+from bayesid.design.design_result import sample_times
 from bayesid.inference import (
     LinearParameterisation,
     Optimum,

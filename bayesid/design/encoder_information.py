@@ -1,4 +1,4 @@
-"""Noise of the encoders in a criterion: the readings' directions that errors of the joints' positions could explain.
+"""Information lost to the encoders' noise: directions of the readings that errors of the joints could explain.
 
 The error of each joint's smoothed position is a series of cosines, whose coefficients the encoder's samples determine.
 Seen by the sensors it is a signal like any other, which the information about the unknowns must not use. It is
@@ -17,7 +17,7 @@ from bayesid.design.plan import Plan
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
 from bayesid.simulation.time_grid import time_tables
 
-__all__ = ["Encoder", "encoder_shadow", "likely_shadow", "position_noise"]
+__all__ = ["Encoder", "encoder_directions", "likely_directions", "position_noise"]
 
 Encoder = Mapping[int, float | Mapping[str, float | None] | None]
 """Standard deviation of joint position (0), velocity (1) and acceleration (2), for all joints or by joint."""
@@ -34,7 +34,7 @@ def position_noise(encoder: Encoder, joints: tuple[str, ...]) -> Floats:
     return np.array([by_joint.get(joint) or 0.0 for joint in joints])
 
 
-def encoder_shadow(plan: Plan, parameters: Floats, rate: Floats) -> Floats:
+def encoder_directions(plan: Plan, parameters: Floats, rate: Floats) -> Floats:
     """Return the directions V for which the information is ``J' (1 - V V') J``, shape (samples * 3 sensors, r).
 
     Parameters
@@ -64,13 +64,13 @@ def encoder_shadow(plan: Plan, parameters: Floats, rate: Floats) -> Floats:
     directions, sizes, _ = np.linalg.svd(signals, full_matrices=False)
     lost = sizes**2 / (1.0 + sizes**2)
     used = int((lost > NEGLIGIBLE).sum())
-    shadow = np.zeros((len(signals), -(-used // UNIT) * UNIT))
-    shadow[:, :used] = directions[:, :used] * np.sqrt(lost[:used])
-    return shadow
+    explained = np.zeros((len(signals), -(-used // UNIT) * UNIT))
+    explained[:, :used] = directions[:, :used] * np.sqrt(lost[:used])
+    return explained
 
 
-def likely_shadow(plan: Plan) -> Floats:
-    """Return zeros of the shape that `encoder_shadow` most likely has, so that what uses it can be compiled before."""
+def likely_directions(plan: Plan) -> Floats:
+    """Return zeros of the likeliest shape of `encoder_directions`, so that what uses them can be compiled before."""
     return np.zeros((len(plan.samples) * len(plan.sigma), UNIT if any(plan.encoder_sigma) else 0))
 
 

@@ -17,7 +17,7 @@ from bayesid.design.criteria import Criterion
 from bayesid.design.design_problem import Problem
 from bayesid.design.search_starts import repaired, within_limits
 
-__all__ = ["Polished", "Shared", "Task", "fitted_to_fine_limits", "polish"]
+__all__ = ["Refined", "Shared", "Task", "fitted_to_fine_limits", "refine"]
 
 # largest number of times that a descent goes on because its end breaks a limit between the instants of the search
 TRIES = 8
@@ -27,7 +27,7 @@ SPARE = 0.999  # fraction of a bound at which such a limit is to end
 
 
 @dataclass(frozen=True)
-class Polished:
+class Refined:
     """Best motion of a descent that keeps the limits.
 
     Attributes
@@ -102,7 +102,7 @@ class Task:
 
 
 @threadpool_limits.wrap(limits=1)  # sums of several threads are rounded by chance
-def polish(task: Task) -> Polished:
+def refine(task: Task) -> Refined:
     """Run a descent, from a start that is repaired first if it breaks a limit.
 
     Within loosened limits a descent passes by many of the minima at which one within the limits ends.
@@ -123,7 +123,7 @@ def polish(task: Task) -> Polished:
         start, earlier = wide.best, wide.evaluations
     run = _Descent(replace(task, start=start))
     run.run()
-    return Polished(run.best, run.best_cost, earlier + run.evaluations)
+    return Refined(run.best, run.best_cost, earlier + run.evaluations)
 
 
 class _Descent:
@@ -178,7 +178,7 @@ class _Descent:
         return -self.problem.fractions(self._parameters(x))[1] * self.problem.plan.family.scale
 
 
-def fitted_to_fine_limits(task: Task) -> Polished:
+def fitted_to_fine_limits(task: Task) -> Refined:
     """Go on with a descent until its end keeps the limits between the instants of the search, too.
 
     A limit that is broken there gets as much less of its bound at the instants as it is broken by, and the descent goes
@@ -190,8 +190,8 @@ def fitted_to_fine_limits(task: Task) -> Polished:
         used = np.array([reached.largest / reached.limit for reached in problem.reached(parameters)])
         if used.max() <= 1.0:
             cost = problem.cost(task.criterion, parameters, task.points)[0]
-            return Polished(parameters, cost, evaluations + 1)
+            return Refined(parameters, cost, evaluations + 1)
         shares = np.where(used > 1.0, SPARE * shares / np.maximum(used, 1.0), shares)
-        done = polish(replace(task, shared=Shared(problem.using(shares)), start=parameters))
+        done = refine(replace(task, shared=Shared(problem.using(shares)), start=parameters))
         parameters, evaluations = done.parameters, evaluations + done.evaluations
-    return Polished(parameters, np.inf, evaluations)
+    return Refined(parameters, np.inf, evaluations)

@@ -264,7 +264,6 @@ def evaluate(
     found: Found,
     encoder: Encoder,
     rng: np.random.Generator,
-    like: Posterior | None = None,
     *,
     points: Mapping[str, list[Floats]] = MappingProxyType({}),
 ) -> Design:
@@ -282,8 +281,6 @@ def evaluate(
         Noise of the encoders.
     rng : numpy.random.Generator
         Source of the draws for the risks.
-    like : Posterior, optional
-        Posterior of another design of the problem; it has no effect any more.
     points : mapping of str to list of (n,) arrays
         Points of the unknowns over which each criterion is averaged, by its name; by default the prior's centre.
     """
@@ -299,7 +296,7 @@ def evaluate(
         attitude_sigma=plan.attitude_sigma,
         argument_of_latitude=plan.argument_of_latitude,
     )
-    posterior = planned_posterior(plan.model, [manoeuvre], like)
+    posterior = planned_posterior(plan.model, [manoeuvre])
     return Design(
         name=name,
         criterion=name,
