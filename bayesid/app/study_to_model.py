@@ -12,6 +12,7 @@ import numpy as np
 from bayesid._io.errors import InputError
 from bayesid._io.store import file_key
 from bayesid.app.schema import DesignSection, OtherSensor, RecordingSection, Study
+from bayesid.app.schema.sensor_sections import FilteredSensor
 from bayesid.app.study_to_encoders import encoder_noise, named_joint
 from bayesid.app.user_files import run_user_file
 from bayesid.design.criteria import Criterion, named_criteria
@@ -30,7 +31,7 @@ from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
 from bayesid.simulation.orbit import Orbit
 from bayesid.simulation.own_effects import check_own_effect
-from bayesid.simulation.sensors import Filter, Sensor, SensorKind, White
+from bayesid.simulation.sensors import Filter, Noise, Sensor, SensorKind, White
 
 if TYPE_CHECKING:
     from bayesid.diagnosis.loop_review import DiagnosisReview
@@ -239,25 +240,15 @@ def _orbit(study: Study) -> Orbit | None:
 
 
 def _sensors(study: Study) -> tuple[Sensor, ...]:
-    sensors = []
-    rate, accel, attitude = study.sensors.rate, study.sensors.accel, study.sensors.attitude
-    if rate is not None:
-        sensors.append(
-            Sensor(SensorKind.RATE, rate.noise, mounting=rate.mounting, filter=Filter(rate.low_pass, rate.decimate))
-        )
-    if accel is not None:
-        sensors.append(
-            Sensor(
-                SensorKind.ACCEL,
-                accel.noise,
-                mounting=accel.mounting,
-                position=accel.position,
-                filter=Filter(accel.low_pass, accel.decimate),
-            )
-        )
-    if attitude is not None:
-        sensors.append(Sensor(SensorKind.ATTITUDE, attitude.noise, filter=Filter(attitude.low_pass, attitude.decimate)))
-    return (*sensors, *(_other_sensor(name, section) for name, section in study.sensors.other.items()))
+    given = study.sensors
+    own = {SensorKind.RATE: given.rate, SensorKind.ACCEL: given.accel, SensorKind.ATTITUDE: given.attitude}
+    sensors = [_sensor(kind, section.noise, section) for kind, section in own.items() if section is not None]
+    return (*sensors, *(_other_sensor(name, section) for name, section in given.other.items()))
+
+
+def _sensor(kind: SensorKind, noise: Noise, section: FilteredSensor) -> Sensor:
+    placed = section.model_dump(include={"mounting", "position"})
+    return Sensor(kind, noise, **placed, filter=Filter(section.low_pass, section.decimate))
 
 
 def _other_sensor(name: str, section: OtherSensor) -> Sensor:
@@ -271,8 +262,7 @@ def _other_sensor(name: str, section: OtherSensor) -> Sensor:
     if len(sigma) != kind.size:
         remedy = f"Give one number, or one for each of {', '.join(kind.axes)}"
         raise InputError(f"got {len(sigma)} numbers for {kind.size} columns", place=f"{place}.sigma", remedy=remedy)
-    fitted = Filter(section.low_pass, section.decimate)
-    return Sensor(kind, White(sigma), mounting=section.mounting, position=section.position, filter=fitted)
+    return _sensor(kind, White(sigma), section)
 
 
 def _torque(study: Study, robot: Robot) -> TorqueSensor | None:

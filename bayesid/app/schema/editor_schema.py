@@ -10,11 +10,11 @@ import inspect
 import re
 from typing import Any
 
-from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core.core_schema import ModelSchema, NullableSchema
 
 from bayesid.app.schema.study_file import Study
+from bayesid.app.schema.value_types import Section
 
 __all__ = ["editor_schema"]
 
@@ -38,8 +38,10 @@ class _FromDocstrings(GenerateJsonSchema):
     def model_schema(self, schema: ModelSchema) -> JsonSchemaValue:
         """Return the schema of a section, with descriptions of it and of its keys."""
         made = super().model_schema(schema)
-        made["description"], described = _documented(schema["cls"])
-        for key, value in made.get("properties", {}).items():
+        section: type[Section] = schema["cls"]
+        made["description"], described = _documented(section)
+        made["properties"] = {key: made["properties"][key] for key in section.key_names()}
+        for key, value in made["properties"].items():
             value.pop("title", None)
             if key in described:
                 value["description"] = described[key]
@@ -57,11 +59,11 @@ class _FromDocstrings(GenerateJsonSchema):
         return made
 
 
-def _documented(section: type[BaseModel]) -> tuple[str, dict[str, str]]:
+def _documented(section: type[Section]) -> tuple[str, dict[str, str]]:
     """Return the description of a section, and those of its keys and of those that it inherits."""
     described: dict[str, str] = {}
     for parent in reversed(section.__mro__):
-        if parent is BaseModel or not issubclass(parent, BaseModel):
+        if not issubclass(parent, Section):
             continue
         _, _, parameters = inspect.cleandoc(parent.__doc__ or "").partition("Parameters\n----------\n")
         for names, text in re.findall(r"^(\S[^:\n]*) : .*\n((?: {4}.*\n?)+)", parameters, flags=re.MULTILINE):

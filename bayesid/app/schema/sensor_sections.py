@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from pydantic import BaseModel, model_validator
+from pydantic import model_validator
 
 from bayesid._io.errors import InputError
 from bayesid.app.schema.value_types import (
@@ -27,14 +27,48 @@ if TYPE_CHECKING:
     from bayesid.simulation.sensors import Noise
 
 
-def _exactly_one(section: BaseModel, keys: Sequence[str]) -> None:
-    given = [key for key in keys if getattr(section, key) is not None]
-    if len(given) != 1:
-        problem = f"{' and '.join(given)} are given together" if given else "the noise is not given"
-        raise InputError(problem, remedy=f"Give exactly one of {', '.join(keys)}")
+Arcseconds = Annotated[Positive, no_less_than(1e-3, "arcsec, not rad?"), no_more_than(36000.0, "Is it in arcsec?")]
 
 
-class RateSensor(Section):
+class FilteredSensor(Section):
+    """Keys of every sensor of the base.
+
+    Parameters
+    ----------
+    low_pass : float, optional
+        Cut-off frequency of a low-pass filter, applied to samples and prediction alike [Hz].
+    decimate : int, optional
+        Decimation factor n, by which every n-th sample is kept, in samples and prediction alike.
+    """
+
+    NOISE: ClassVar[tuple[str, ...]] = ()
+    """Keys of which exactly one gives the noise."""
+
+    low_pass: Positive | None = None
+    decimate: Decimation = 1
+
+    @model_validator(mode="after")
+    def _check_noise(self) -> FilteredSensor:
+        given = [key for key in self.NOISE if getattr(self, key) is not None]
+        if self.NOISE and len(given) != 1:
+            problem = f"{' and '.join(given)} are given together" if given else "the noise is not given"
+            raise InputError(problem, remedy=f"Give exactly one of {', '.join(self.NOISE)}")
+        return self
+
+
+class MountedSensor(FilteredSensor):
+    """Keys of a sensor whose axes may differ from those of the base.
+
+    Parameters
+    ----------
+    mounting : (4,), optional
+        Quaternion from sensor to base axes.
+    """
+
+    mounting: Quaternion = (0.0, 0.0, 0.0, 1.0)
+
+
+class RateSensor(MountedSensor):
     """Section ``[sensors.rate]``, a sensor of the base's angular velocity.
 
     Exactly one of the first three keys gives the noise.
@@ -49,32 +83,18 @@ class RateSensor(Section):
     attitude_arcsec : float
         Accuracy per sample of a star sensor whose attitude was differenced to give the rate [arcsec]; as two samples
         enter, the noise is sqrt(2) times the angle divided by the sample interval.
-    mounting : (4,), optional
-        Quaternion from sensor to base axes.
     bias_sigma : float or (3,), optional
         Prior standard deviation of a constant bias [rad/s]; by default the model has no bias.
-    low_pass : float, optional
-        Cut-off frequency of a low-pass filter, applied to samples and prediction alike [Hz].
-    decimate : int, optional
-        Decimation factor n, by which every n-th sample is kept, in samples and prediction alike.
     """
+
+    NOISE = ("sigma", "angle_random_walk", "attitude_arcsec")
 
     sigma: Annotated[PerAxis, no_more_than(0.1, "rad/s, not arcsec/s or degrees/s?")] | None = None
     angle_random_walk: (
         Annotated[Positive, no_more_than(0.01, "rad/sqrt(s), not deg/sqrt(h)? Multiply that by 2.909e-4")] | None
     ) = None
-    attitude_arcsec: (
-        Annotated[Positive, no_less_than(1e-3, "arcsec, not rad?"), no_more_than(36000.0, "Is it in arcsec?")] | None
-    ) = None
-    mounting: Quaternion = (0.0, 0.0, 0.0, 1.0)
+    attitude_arcsec: Arcseconds | None = None
     bias_sigma: PerAxis | None = None
-    low_pass: Positive | None = None
-    decimate: Decimation = 1
-
-    @model_validator(mode="after")
-    def _check_noise(self) -> RateSensor:
-        _exactly_one(self, ("sigma", "angle_random_walk", "attitude_arcsec"))
-        return self
 
     @property
     def noise(self) -> Noise:
@@ -88,7 +108,7 @@ class RateSensor(Section):
         return StarTracker(self.attitude_arcsec or math.nan)
 
 
-class AccelSensor(Section):
+class AccelSensor(MountedSensor):
     """Section ``[sensors.accel]``, a sensor of the non-gravitational acceleration at one point of the base.
 
     Exactly one of the first two keys gives the noise.
@@ -102,15 +122,11 @@ class AccelSensor(Section):
         frequency it gives the noise per sample. 1 micro-g/sqrt(Hz) is 9.80665e-6 m/s2/sqrt(Hz).
     position : (3,)
         Position from the base origin, base axes [m].
-    mounting : (4,), optional
-        Quaternion from sensor to base axes.
     bias_sigma : float or (3,), optional
         Prior standard deviation of a constant bias [m/s2]; by default the model has no bias.
-    low_pass : float, optional
-        Cut-off frequency of a low-pass filter, applied to samples and prediction alike [Hz].
-    decimate : int, optional
-        Decimation factor n, by which every n-th sample is kept, in samples and prediction alike.
     """
+
+    NOISE = ("sigma", "noise_density")
 
     sigma: Annotated[PerAxis, no_more_than(1.0, "m/s2, not milli-g or micro-g?")] | None = None
     noise_density: (
@@ -118,15 +134,7 @@ class AccelSensor(Section):
         | None
     ) = None
     position: Position
-    mounting: Quaternion = (0.0, 0.0, 0.0, 1.0)
     bias_sigma: PerAxis | None = None
-    low_pass: Positive | None = None
-    decimate: Decimation = 1
-
-    @model_validator(mode="after")
-    def _check_noise(self) -> AccelSensor:
-        _exactly_one(self, ("sigma", "noise_density"))
-        return self
 
     @property
     def noise(self) -> Noise:
@@ -136,7 +144,7 @@ class AccelSensor(Section):
         return White(self.sigma) if self.sigma is not None else NoiseDensity(self.noise_density or math.nan)
 
 
-class AttitudeSensor(Section):
+class AttitudeSensor(FilteredSensor):
     """Section ``[sensors.attitude]``, a star sensor that measures the attitude from base to orbit axes.
 
     Exactly one of the first two keys gives the noise.
@@ -147,23 +155,12 @@ class AttitudeSensor(Section):
         Standard deviation of white noise per sample, as a small rotation in base axes [rad].
     arcsec : float
         Standard deviation of white noise per sample [arcsec].
-    low_pass : float, optional
-        Cut-off frequency of a low-pass filter, applied to samples and prediction alike [Hz].
-    decimate : int, optional
-        Decimation factor n, by which every n-th sample is kept, in samples and prediction alike.
     """
 
-    sigma: Annotated[PerAxis, ANGLE_SIGMA] | None = None
-    arcsec: (
-        Annotated[Positive, no_less_than(1e-3, "arcsec, not rad?"), no_more_than(36000.0, "Is it in arcsec?")] | None
-    ) = None
-    low_pass: Positive | None = None
-    decimate: Decimation = 1
+    NOISE = ("sigma", "arcsec")
 
-    @model_validator(mode="after")
-    def _check_noise(self) -> AttitudeSensor:
-        _exactly_one(self, ("sigma", "arcsec"))
-        return self
+    sigma: Annotated[PerAxis, ANGLE_SIGMA] | None = None
+    arcsec: Arcseconds | None = None
 
     @property
     def noise(self) -> Noise:
@@ -210,7 +207,7 @@ class TorqueSection(Section):
     sigma: Annotated[PerName, no_more_than(1e4, "N m")]
 
 
-class OtherSensor(Section):
+class OtherSensor(MountedSensor):
     """Section ``[sensors.other.NAME]``, a sensor of a kind that a plugin registers by `SensorKind.register`.
 
     Parameters
@@ -219,19 +216,10 @@ class OtherSensor(Section):
         Standard deviation of white noise per sample, of all columns or of each, in the kind's unit.
     position : (3,)
         Position from the base origin, base axes [m].
-    mounting : (4,), optional
-        Quaternion from sensor to base axes.
-    low_pass : float, optional
-        Cut-off frequency of a low-pass filter, applied to samples and prediction alike [Hz].
-    decimate : int, optional
-        Decimation factor n, by which every n-th sample is kept, in samples and prediction alike.
     """
 
     sigma: Positive | tuple[Positive, ...]
     position: Position = (0.0, 0.0, 0.0)
-    mounting: Quaternion = (0.0, 0.0, 0.0, 1.0)
-    low_pass: Positive | None = None
-    decimate: Decimation = 1
 
 
 class SensorsSection(Section):

@@ -9,10 +9,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from bayesid._io.errors import InputError
+from bayesid.app.schema.value_types import Section
 
 # required values by pydantic's type of error; other types use pydantic's message
 _WANTED = {
@@ -43,7 +44,7 @@ def syntax_error(error: tomllib.TOMLDecodeError, file: Path) -> InputError:
     return InputError(f"not valid TOML: {problem}", file=file, place=place, remedy="Correct the syntax there")
 
 
-def explain(error: ValidationError, data: Mapping[str, Any], study: type[BaseModel]) -> InputError:
+def explain(error: ValidationError, data: Mapping[str, Any], study: type[Section]) -> InputError:
     """Return the first error in the user's terms, with the number of further errors in its remedy.
 
     A misspelt key comes first, because it is usually the reason why another key is missing.
@@ -73,12 +74,12 @@ def _path_of(fault: ErrorDetails, data: Any) -> tuple[str | int, ...]:
     return tuple(path)
 
 
-def _one_error(fault: ErrorDetails, data: Mapping[str, Any], study: type[BaseModel]) -> InputError:
+def _one_error(fault: ErrorDetails, data: Mapping[str, Any], study: type[Section]) -> InputError:
     kind = fault["type"]
     path = _path_of(fault, data)
     place = _place(path)
     if kind == "extra_forbidden":
-        known = tuple(_table_at(study, path[:-1]).model_fields)
+        known = _table_at(study, path[:-1]).key_names()
         remedy = f"{suggest(str(path[-1]), known) or ''} Allowed: {', '.join(known)}".lstrip()
         return InputError(f"unknown key '{path[-1]}'", place=place, remedy=remedy)
     if kind == "missing":
@@ -103,7 +104,7 @@ def _place(path: Sequence[str | int]) -> str:
     return text
 
 
-def _table_at(section: type[BaseModel], path: Sequence[str | int]) -> type[BaseModel]:
+def _table_at(section: type[Section], path: Sequence[str | int]) -> type[Section]:
     """Return the class of the table at a path, relative to the class of another table."""
     for part in path:
         if isinstance(part, str) and part in section.model_fields:
@@ -111,8 +112,8 @@ def _table_at(section: type[BaseModel], path: Sequence[str | int]) -> type[BaseM
     return section
 
 
-def _section_in(annotation: Any) -> type[BaseModel] | None:
+def _section_in(annotation: Any) -> type[Section] | None:
     """Return the section class in an annotation such as ``tuple[LoadSection, ...]`` or ``OrbitSection | None``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+    if isinstance(annotation, type) and issubclass(annotation, Section):
         return annotation
     return next(filter(None, map(_section_in, get_args(annotation))), None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 from collections.abc import Iterable, Mapping
@@ -137,3 +138,9 @@ class Section(BaseModel):
     """Table of the study file; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @classmethod
+    def key_names(cls) -> tuple[str, ...]:
+        """Return the keys of the table, its own before those that it shares with others."""
+        names = dict.fromkeys(key for part in cls.__mro__ for key in inspect.get_annotations(part))
+        return tuple(name for name in names if name in cls.model_fields)
