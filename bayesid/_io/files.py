@@ -119,11 +119,8 @@ def _lock(handle: int, folder: Path) -> None:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise InputError(
-            "another run is writing into this folder",
-            file=folder,
-            remedy="Wait until it ends, or choose another output folder",
-        ) from None
+        problem = "another run is writing into this folder"
+        raise InputError(problem, file=folder, remedy="Wait until it ends, or choose another output folder") from None
     except OSError:
         pass
 

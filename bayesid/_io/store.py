@@ -61,11 +61,8 @@ def refuse_other(stated: object, key: str, file: Path, owner: str, content: str)
         If the two keys differ.
     """
     if stated != key:
-        raise InputError(
-            f"it belongs to another {owner}: {content} differ",
-            file=file,
-            remedy="Delete it or choose another output folder",
-        )
+        problem = f"it belongs to another {owner}: {content} differ"
+        raise InputError(problem, file=file, remedy="Delete it or choose another output folder")
 
 
 @dataclass(frozen=True)

@@ -10,10 +10,7 @@ from pathlib import Path
 __all__ = ["keep_compiled"]
 
 # options of JAX that keep every function, as reading even a small one takes less time than compiling it
-SETTINGS = {
-    "jax_persistent_cache_min_compile_time_secs": 0.0,
-    "jax_persistent_cache_min_entry_size_bytes": -1,
-}
+SETTINGS = {"jax_persistent_cache_min_compile_time_secs": 0.0, "jax_persistent_cache_min_entry_size_bytes": -1}
 FOLDER = "jax_compilation_cache_dir"  # name of the option of JAX for the folder
 KEPT_FOR = 30.0 * 86400.0  # time after which what nobody read is removed, such as that of another version [s]
 PATTERNS = ("*.executable", "*-cache", "*-atime")  # names of the files that this package and JAX keep

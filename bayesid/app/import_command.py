@@ -23,8 +23,7 @@ def run(
     output: Output,
     imu: Annotated[str | None, typer.Option(metavar="TOPIC", help="IMU of the base, sensor_msgs/Imu.")] = None,
     attitude: Annotated[
-        str | None,
-        typer.Option(metavar="TOPIC", help="Star sensor, geometry_msgs/QuaternionStamped or PoseStamped."),
+        str | None, typer.Option(metavar="TOPIC", help="Star sensor, geometry_msgs/QuaternionStamped or PoseStamped.")
     ] = None,
     without: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Joint to leave out; repeatable.")] = None,
     velocity: Annotated[

@@ -136,22 +136,16 @@ def goals_of(
     goals: list[Goal] = []
     if precision is not None:
         if not 0.0 < precision < 1.0:
-            raise InputError(
-                f"{precision:g} is not between 0 and 1",
-                place="--wanted",
-                remedy="Give a relative precision: 0.01 is 1 %",
-            )
+            problem = f"{precision:g} is not between 0 and 1"
+            raise InputError(problem, place="--wanted", remedy="Give a relative precision: 0.01 is 1 %")
         goals.append(RelativePrecision(precision))
     for text in deviations:
         name, _, value = text.partition("=")
         bodies = [body.name for body in model.bodies]
         body = next((body for body in bodies if name.startswith(f"{body}.")), None)
         if body is None:
-            raise InputError(
-                f"{text!r} names no body to identify",
-                place="--wanted-sd",
-                remedy=f"Write BODY.QUANTITY=SD, with a body among {', '.join(bodies)}: {bodies[0]}.mass=0.5",
-            )
+            remedy = f"Write BODY.QUANTITY=SD, with a body among {', '.join(bodies)}: {bodies[0]}.mass=0.5"
+            raise InputError(f"{text!r} names no body to identify", place="--wanted-sd", remedy=remedy)
         goals.append(QuantitySd(body, name.removeprefix(f"{body}."), _number(value, text, "--wanted-sd")))
     if region is not None:
         if not region > 0.0:

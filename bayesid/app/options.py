@@ -47,9 +47,6 @@ def executor_at(scheduler: str) -> Executor:
     try:
         executor: Executor = Client(scheduler, timeout=SECONDS).get_executor()
     except (OSError, ValueError) as error:
-        raise InputError(
-            f"no scheduler answers at {scheduler}: {error}",
-            place="--scheduler",
-            remedy="Start one with `dask scheduler`, and workers with `dask worker ADDRESS`",
-        ) from error
+        remedy = "Start one with `dask scheduler`, and workers with `dask worker ADDRESS`"
+        raise InputError(f"no scheduler answers at {scheduler}: {error}", place="--scheduler", remedy=remedy) from error
     return executor

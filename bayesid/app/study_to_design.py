@@ -121,11 +121,8 @@ def _with_rivals(model: Model, section: DesignSection) -> Model:
         raise error.within(place="design.rivals") from None
     for effect in model.effects:
         if effect.label in section.rivals and not effect.parameters:
-            raise InputError(
-                f"effect {effect.label!r} has no unknown size by which it could be told from others",
-                place="design.rivals",
-                remedy="Name effects with parameters",
-            )
+            problem = f"effect {effect.label!r} has no unknown size by which it could be told from others"
+            raise InputError(problem, place="design.rivals", remedy="Name effects with parameters")
     return model
 
 
@@ -155,11 +152,8 @@ def _start(robot: Robot, section: DesignSection) -> Floats:
         index = named_joint(name, robot, f"design.start.{name}")
         joint = robot.joints[index]
         if not joint.lower <= value <= joint.upper:
-            raise InputError(
-                f"{value:g} {joint.unit} is outside the joint's range, {joint.lower:g} to {joint.upper:g}",
-                place=f"design.start.{name}",
-                remedy="Start within the range",
-            )
+            problem = f"{value:g} {joint.unit} is outside the joint's range, {joint.lower:g} to {joint.upper:g}"
+            raise InputError(problem, place=f"design.start.{name}", remedy="Start within the range")
         start[index] = value
     return start
 

@@ -60,10 +60,6 @@ def named_joint(name: str, robot: Robot, place: str, file: Path | None = None) -
     names = [joint.name for joint in robot.joints]
     if name not in names:
         hint = suggest(name, names)
-        raise InputError(
-            f"the robot has no moving joint '{name}'",
-            file=file,
-            place=place,
-            remedy=hint or (f"Choose one of {', '.join(names)}" if names else "Take it out"),
-        )
+        remedy = hint or (f"Choose one of {', '.join(names)}" if names else "Take it out")
+        raise InputError(f"the robot has no moving joint '{name}'", file=file, place=place, remedy=remedy)
     return names.index(name)

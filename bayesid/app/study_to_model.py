@@ -187,12 +187,9 @@ def _refuse_copies(study: Study, manoeuvres: Sequence[Manoeuvre]) -> None:
         if {name.partition(".")[0] for name in manoeuvre.recording.channels} <= {"time", *JOINT_FAMILIES}:
             continue
         if (same := seen.setdefault(file_key(section.file), section.file)) != section.file:
-            raise InputError(
-                f"'{section.file.name}' holds the same as '{same.name}'",
-                file=study.file,
-                place=f"recordings #{number}.file",
-                remedy="Remove one: the same data would count twice",
-            )
+            problem = f"'{section.file.name}' holds the same as '{same.name}'"
+            remedy = "Remove one: the same data would count twice"
+            raise InputError(problem, file=study.file, place=f"recordings #{number}.file", remedy=remedy)
 
 
 def _check_latitudes(study: Study) -> None:
@@ -306,11 +303,8 @@ def _effects(study: Study) -> tuple[Effect, ...]:
     known = [effect.label for effect in effects]
     for label in study.model.priors:
         if label not in known:
-            raise InputError(
-                f"prior of an effect that is not in the model: {label!r}",
-                place="model.priors",
-                remedy=f"Effects in the model: {', '.join(known)}",
-            )
+            problem = f"prior of an effect that is not in the model: {label!r}"
+            raise InputError(problem, place="model.priors", remedy=f"Effects in the model: {', '.join(known)}")
     return tuple(with_prior(effect, study.model.priors.get(effect.label, {})) for effect in effects)
 
 
@@ -319,11 +313,8 @@ def with_prior(effect: Effect, sigma: Mapping[str, float]) -> Effect:
     keys = [parameter.name for parameter in effect.parameters]
     for key in sigma:
         if key not in keys:
-            raise InputError(
-                f"effect {effect.label!r} has no parameter {key!r}",
-                place="model.priors",
-                remedy=f"Parameters: {', '.join(keys)}",
-            )
+            problem = f"effect {effect.label!r} has no parameter {key!r}"
+            raise InputError(problem, place="model.priors", remedy=f"Parameters: {', '.join(keys)}")
     changed = copy.copy(effect)
     changed.parameters = tuple(p._replace(sigma=float(sigma.get(p.name, p.sigma))) for p in effect.parameters)
     return changed

@@ -86,9 +86,6 @@ class _Checked:
         with _blamed(self.file, "execute", (InputError, NotFlown)):
             recording = self.inner.execute(plan)
         if not isinstance(recording, Recording):
-            raise InputError(
-                f"execute returned a {type(recording).__name__}",
-                file=self.file,
-                remedy="Return a bayesid.Recording; Recording.read reads a file",
-            )
+            problem = f"execute returned a {type(recording).__name__}"
+            raise InputError(problem, file=self.file, remedy="Return a bayesid.Recording; Recording.read reads a file")
         return recording

@@ -138,12 +138,7 @@ class BasePredictor:
 
 
 def predict(
-    model: Model,
-    manoeuvre: Manoeuvre,
-    rng: np.random.Generator,
-    *,
-    draws: int = 500,
-    tip_frame: str | None = None,
+    model: Model, manoeuvre: Manoeuvre, rng: np.random.Generator, *, draws: int = 500, tip_frame: str | None = None
 ) -> Prediction:
     """Predict the trajectories of base and end-effector in a manoeuvre under the prior of a model.
 
@@ -187,12 +182,9 @@ def _planned(recording: Recording) -> Recording:
     It has the times of the given recording, or `INSTANTS` even ones where there are no actions.
     """
     if any(np.nan_to_num(recording.channels.get(f"base_force.{axis}", np.zeros(1))).any() for axis in "xyz"):
-        raise InputError(
-            "a known force acts on the base, and moves the centre of mass",
-            file=recording.file or recording.name,
-            place="column base_force.x|y|z",
-            remedy="Predict manoeuvres without thrust",
-        )
+        problem = "a known force acts on the base, and moves the centre of mass"
+        remedy = "Predict manoeuvres without thrust"
+        raise InputError(problem, file=recording.file or recording.name, place="column base_force.x|y|z", remedy=remedy)
     known = {key: recording.channels[key] for key in recording.channels if key.startswith(("base_t", "wheel_m"))}
     time = recording.time if known else np.linspace(0.0, recording.time[-1], INSTANTS)
     if time[0] > 0.0:

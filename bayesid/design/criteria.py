@@ -437,11 +437,8 @@ class Separation(Criterion):
     def _coordinates(self, plan: Plan, label: str) -> list[int]:
         coordinates = list(plan.effect(label))
         if not coordinates:
-            raise InputError(
-                f"the plan's model has no effect {label!r} with parameters",
-                place="design.rivals",
-                remedy="Extend the model by the rivals",
-            )
+            problem = f"the plan's model has no effect {label!r} with parameters"
+            raise InputError(problem, place="design.rivals", remedy="Extend the model by the rivals")
         return coordinates
 
 

@@ -168,11 +168,8 @@ def best_design(designs: Sequence[Design]) -> Design:
     kept = [design for design in designs if all(reached.kept for reached in design.reached)]
     if not kept:
         broken = {item.name for design in designs for item in design.reached if not item.kept}
-        raise InputError(
-            f"no design keeps its limits along all of the manoeuvre: {', '.join(sorted(broken))}",
-            place="design.limits",
-            remedy="Loosen these limits, or allow more time",
-        )
+        problem = f"no design keeps its limits along all of the manoeuvre: {', '.join(sorted(broken))}"
+        raise InputError(problem, place="design.limits", remedy="Loosen these limits, or allow more time")
     return min(kept, key=lambda design: design.predicted.log_det)
 
 

@@ -95,11 +95,8 @@ class Loop:
 
     def __post_init__(self) -> None:
         if self.reviewer is None and any(goal.diagnosed for goal in self.goals):
-            raise InputError(
-                "a probability of a cause is wanted, but the steps are not reviewed",
-                place="goals",
-                remedy="Give a reviewer, such as DiagnosisReview",
-            )
+            problem = "a probability of a cause is wanted, but the steps are not reviewed"
+            raise InputError(problem, place="goals", remedy="Give a reviewer, such as DiagnosisReview")
 
     def run(self, spacecraft: Spacecraft | None, folder: Path, progress: Progress = silent) -> History:
         """Run the loop until its goals are reached, the limit of steps, a wrong model, a no-go, or `NotFlown`.

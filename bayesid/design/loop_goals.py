@@ -142,11 +142,8 @@ class QuantitySd(_Smaller):
 
     def __post_init__(self) -> None:
         if self.quantity not in BODY_QUANTITIES:
-            raise InputError(
-                f"{self.quantity!r} is no quantity of a body",
-                place="wanted sd",
-                remedy=f"Name one of {', '.join(BODY_QUANTITIES)}",
-            )
+            problem = f"{self.quantity!r} is no quantity of a body"
+            raise InputError(problem, place="wanted sd", remedy=f"Name one of {', '.join(BODY_QUANTITIES)}")
         if not 0.0 < self.target < np.inf:
             raise InputError(f"{self.target:g} is no sd", place="wanted sd", remedy="Give a positive number")
 
@@ -163,11 +160,8 @@ class QuantitySd(_Smaller):
     def value(self, knowledge: StepKnowledge) -> float:
         """Return the standard deviation of the draws."""
         if self.body not in knowledge.bodies:
-            raise InputError(
-                f"{self.body!r} is no body to identify",
-                place="wanted sd",
-                remedy=f"Name one of {', '.join(knowledge.bodies)}",
-            )
+            problem = f"{self.body!r} is no body to identify"
+            raise InputError(problem, place="wanted sd", remedy=f"Name one of {', '.join(knowledge.bodies)}")
         return float(knowledge.bodies[self.body].sd[list(BODY_QUANTITIES).index(self.quantity)])
 
 
@@ -226,11 +220,8 @@ class CauseProbability:
     def value(self, knowledge: StepKnowledge) -> float:
         """Return the probability."""
         if self.cause not in knowledge.causes:
-            raise InputError(
-                f"{self.cause!r} is no candidate of the diagnosis",
-                place="wanted cause",
-                remedy=f"Name one of {', '.join(sorted(knowledge.causes))}",
-            )
+            problem = f"{self.cause!r} is no candidate of the diagnosis"
+            raise InputError(problem, place="wanted cause", remedy=f"Name one of {', '.join(sorted(knowledge.causes))}")
         return knowledge.causes[self.cause]
 
     def reached(self, value: float) -> bool:
@@ -240,13 +231,7 @@ class CauseProbability:
 
 def goal_dict(goal: Goal, value: float) -> dict[str, Any]:
     """Return the entry of a goal in loop.json."""
-    return {
-        "goal": goal.text,
-        "value": value,
-        "wanted": goal.target,
-        "unit": goal.unit,
-        "reached": goal.reached(value),
-    }
+    return {"goal": goal.text, "value": value, "wanted": goal.target, "unit": goal.unit, "reached": goal.reached(value)}
 
 
 @dataclass(frozen=True)

@@ -103,10 +103,7 @@ def planned_manoeuvre(
 
 
 def planned_posterior(
-    model: Model,
-    manoeuvres: Sequence[Manoeuvre],
-    z: Floats | None = None,
-    step: float | None = None,
+    model: Model, manoeuvres: Sequence[Manoeuvre], z: Floats | None = None, step: float | None = None
 ) -> Posterior:
     """Return the posterior of planned manoeuvres whose sensors read what a point of the unknowns predicts.
 

@@ -2,9 +2,4 @@
 
 from bayesid.identifiability.base_parameters import Base, BaseParameters, base_parameters, standard_names
 
-__all__ = [
-    "Base",
-    "BaseParameters",
-    "base_parameters",
-    "standard_names",
-]
+__all__ = ["Base", "BaseParameters", "base_parameters", "standard_names"]

@@ -208,11 +208,7 @@ class Draws:
 
 
 def draw(
-    posterior: Posterior,
-    optimum: Optimum,
-    seed: np.random.SeedSequence,
-    effective_samples: float,
-    progress: Progress,
+    posterior: Posterior, optimum: Optimum, seed: np.random.SeedSequence, effective_samples: float, progress: Progress
 ) -> Draws:
     """Draw from a posterior by importance sampling, or by emcee where that is not trusted and there are few unknowns.
 

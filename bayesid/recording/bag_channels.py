@@ -80,11 +80,8 @@ def _joint_family(topic: StampedTopic, names: Sequence[str], field: str, family:
         return {}
     for row, (size, message) in enumerate(zip(sizes, topic.messages, strict=True)):
         if size != len(message.name):
-            raise topic.error(
-                f"{size} values of {field} for {len(message.name)} joints",
-                message=row,
-                remedy="Record one value for each joint in every message",
-            )
+            problem = f"{size} values of {field} for {len(message.name)} joints"
+            raise topic.error(problem, message=row, remedy="Record one value for each joint in every message")
 
     def ordered(message: Any) -> list[float]:
         values: Mapping[str, float] = dict(zip(message.name, getattr(message, field), strict=True))
@@ -110,10 +107,8 @@ def imu_channels(topic: StampedTopic, *, accel: bool) -> Channels:
         channels |= _vector(topic, "linear_acceleration", "accel")
         _refuse_gravity(topic, np.stack([channels[f"accel.{axis}"] for axis in "xyz"], axis=1))
     if not channels:
-        raise topic.error(
-            "its covariances say that it measures neither angular velocity nor acceleration",
-            remedy="Name the topic of an IMU that does",
-        )
+        problem = "its covariances say that it measures neither angular velocity nor acceleration"
+        raise topic.error(problem, remedy="Name the topic of an IMU that does")
     return channels
 
 

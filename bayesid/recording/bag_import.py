@@ -60,10 +60,8 @@ class TimeWindow:
                 f"the window starts at {self.start:g} s, before the bag", remedy="Give --start in seconds from 0 on"
             )
         if self.end is not None and not self.end > self.start:
-            raise InputError(
-                f"the window from {self.start:g} to {self.end:g} s is empty",
-                remedy="Give --end after --start, or a --duration above 0",
-            )
+            problem = f"the window from {self.start:g} to {self.end:g} s is empty"
+            raise InputError(problem, remedy="Give --end after --start, or a --duration above 0")
 
     @staticmethod
     def of_options(start: float, end: float | None, duration: float | None) -> TimeWindow:

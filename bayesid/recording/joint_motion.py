@@ -198,11 +198,8 @@ def check_joints(recording: Recording, robot: Robot) -> None:
             parts.append(f"no position or velocity of joint {', '.join(missing)}")
         if strangers:
             parts.append(f"joint {', '.join(strangers)} is not one of the robot's")
-        raise InputError(
-            "; ".join(parts),
-            file=recording.file or recording.name,
-            remedy=f"Record every moving joint of the robot ({', '.join(known)}), or correct the URDF's path",
-        )
+        remedy = f"Record every moving joint of the robot ({', '.join(known)}), or correct the URDF's path"
+        raise InputError("; ".join(parts), file=recording.file or recording.name, remedy=remedy)
 
 
 def sample_joints(motion: Motion, robot: Robot, time: Sequence[float] | Floats) -> dict[str, Floats]:

@@ -33,12 +33,9 @@ def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:
         if readings.size:
             speed = float(np.median(np.abs(readings)))  # single readings may be garbled
             if speed > FASTEST_BASE:
-                raise InputError(
-                    f"half of the readings are beyond {speed:.3g} rad/s, which is over three turns a second",
-                    file=recording.file or recording.name,
-                    place=f"column {name}",
-                    remedy="Give rates in rad/s, not in arcseconds or degrees per second",
-                )
+                problem = f"half of the readings are beyond {speed:.3g} rad/s, which is over three turns a second"
+                remedy = "Give rates in rad/s, not in arcseconds or degrees per second"
+                raise InputError(problem, file=recording.file or recording.name, place=f"column {name}", remedy=remedy)
 
 
 def _refuse_joints(recording: Recording, robot: Robot) -> None:

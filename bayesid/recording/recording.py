@@ -153,34 +153,24 @@ class Recording:
         """Return the median time between the samples of one channel [s]."""
         times, _ = self.series(name)
         if len(times) < 2:
-            raise InputError(
-                "one sample has no sample interval",
-                file=self.file or self.name,
-                place=f"column '{name}'",
-                remedy="Record more samples",
-            )
+            problem = "one sample has no sample interval"
+            remedy = "Record more samples"
+            raise InputError(problem, file=self.file or self.name, place=f"column '{name}'", remedy=remedy)
         return float(np.median(np.diff(times)))
 
     def _select(self, names: tuple[str, ...]) -> tuple[Array, Array]:
         for name in names:
             if name not in self.channels:
-                raise InputError(
-                    f"there is no column '{name}'",
-                    file=self.file or self.name,
-                    remedy=f"Columns here: {', '.join(self.channels)}",
-                )
+                remedy = f"Columns here: {', '.join(self.channels)}"
+                raise InputError(f"there is no column '{name}'", file=self.file or self.name, remedy=remedy)
         values = np.stack([self.channels[name] for name in names], axis=1)
         missing = np.isnan(values)
         partial = missing.any(axis=1) & ~missing.all(axis=1)
         if partial.any():
             row = int(np.argmax(partial))
             absent = [name for name, gone in zip(names, missing[row], strict=True) if gone]
-            raise self._error(
-                f"the sample is incomplete: {', '.join(absent)} empty, the other axes not",
-                columns=names,
-                row=row,
-                remedy="Fill or empty all axes of a sample",
-            )
+            problem = f"the sample is incomplete: {', '.join(absent)} empty, the other axes not"
+            raise self._error(problem, columns=names, row=row, remedy="Fill or empty all axes of a sample")
         present = ~missing.all(axis=1)
         return self.time[present], values[present]
 
@@ -193,11 +183,8 @@ class Recording:
     def _check_shapes(self) -> None:
         if self.time.ndim != 1 or len(self.time) < MINIMUM_ROWS:
             rows = f"{len(self.time)} rows" if self.time.ndim == 1 else f"time of shape {self.time.shape}"
-            raise InputError(
-                f"{rows}; at least {MINIMUM_ROWS} rows are needed",
-                file=self.file or self.name,
-                remedy="Record for longer or more often",
-            )
+            problem = f"{rows}; at least {MINIMUM_ROWS} rows are needed"
+            raise InputError(problem, file=self.file or self.name, remedy="Record for longer or more often")
         for column, values in self.channels.items():
             if values.shape != self.time.shape:
                 raise self._error(
@@ -221,12 +208,9 @@ class Recording:
         if falls.any():
             row = int(np.argmax(falls)) + 1
             fault = "repeats" if time[row] == time[row - 1] else "is earlier than"
-            raise self._error(
-                f"time {time[row]:.12g} s {fault} {time[row - 1]:.12g} s of {_row(self.file, row - 1)}",
-                columns=column,
-                row=row,
-                remedy="Time must strictly increase; sort the rows and join those with the same time",
-            )
+            problem = f"time {time[row]:.12g} s {fault} {time[row - 1]:.12g} s of {_row(self.file, row - 1)}"
+            remedy = "Time must strictly increase; sort the rows and join those with the same time"
+            raise self._error(problem, columns=column, row=row, remedy=remedy)
         # such a clock was hardly reset: nothing is known of the motion between 0 and the first row
         if time[0] > time[-1] - time[0]:
             raise self._error(
@@ -251,11 +235,8 @@ class Recording:
             family, _, joint = column.partition(".")
             measured = f"position.{joint}" in self.channels or f"velocity.{joint}" in self.channels
             if family in ("acceleration", "torque") and not measured:
-                raise self._error(
-                    f"joint '{joint}' has neither position nor velocity",
-                    columns=[column],
-                    remedy=f"Add position.{joint} or velocity.{joint}",
-                )
+                remedy = f"Add position.{joint} or velocity.{joint}"
+                raise self._error(f"joint '{joint}' has neither position nor velocity", columns=[column], remedy=remedy)
         for family, axes in VECTOR_FAMILIES.items():
             columns = [f"{family}.{axis}" for axis in axes]
             absent = [column for column in columns if column not in self.channels]
@@ -277,12 +258,8 @@ class Recording:
         off = np.abs(norm - 1.0) > NORM_TOLERANCE
         if off.any():
             row = int(np.argmax(off))
-            raise self._error(
-                f"the quaternion's norm is {norm[row]:.6g}, not 1",
-                columns=columns,
-                row=row,
-                remedy="Give unit quaternions in the order x, y, z, w",
-            )
+            problem = f"the quaternion's norm is {norm[row]:.6g}, not 1"
+            raise self._error(problem, columns=columns, row=row, remedy="Give unit quaternions in the order x, y, z, w")
         for column in columns:
             channels[column] /= norm
 
@@ -336,12 +313,8 @@ def _check_names(columns: Sequence[str], file: Path | str) -> None:
                 f"column {number} has no name", file=file, remedy="Name it, or remove a comma at the end of the lines"
             )
         if column in columns[: number - 1]:
-            raise InputError(
-                f"the column appears twice, as columns {columns.index(column) + 1} and {number}",
-                file=file,
-                place=f"column '{column}'",
-                remedy="Remove one",
-            )
+            problem = f"the column appears twice, as columns {columns.index(column) + 1} and {number}"
+            raise InputError(problem, file=file, place=f"column '{column}'", remedy="Remove one")
         if not _is_known(column):
             remedy = (
                 "Separate the columns by commas, and write decimal points"
@@ -370,12 +343,9 @@ def _read_csv(file: Path) -> dict[str, Array]:
     _check_rows(len(rows), file)
     for index, row in enumerate(rows):
         if len(row) != len(header):
-            raise InputError(
-                f"{len(row)} cells, but the header has {len(header)} columns",
-                file=file,
-                place=_row(file, index),
-                remedy="Give one cell per column, empty where there is no sample",
-            )
+            problem = f"{len(row)} cells, but the header has {len(header)} columns"
+            remedy = "Give one cell per column, empty where there is no sample"
+            raise InputError(problem, file=file, place=_row(file, index), remedy=remedy)
     return {
         name: _numbers([row[index].strip() for row in rows], name, file, _parse, missing="")
         for index, name in enumerate(header)

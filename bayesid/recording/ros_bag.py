@@ -145,12 +145,8 @@ def _check_topic(bag: Path, name: str, allowed: Sequence[str], kinds: Mapping[st
             "there is no such topic", file=bag, place=f"topic {name}", remedy=f"{hint}Topics here: {known}"
         )
     if kinds[name] not in allowed:
-        raise InputError(
-            f"its messages are {kinds[name]}",
-            file=bag,
-            place=f"topic {name}",
-            remedy=f"Name a topic of {' or '.join(allowed)}",
-        )
+        problem = f"its messages are {kinds[name]}"
+        raise InputError(problem, file=bag, place=f"topic {name}", remedy=f"Name a topic of {' or '.join(allowed)}")
 
 
 def _stamped(bag: Path, name: str, kind: str, messages: Iterable[tuple[int, Any]]) -> StampedTopic:
@@ -163,10 +159,8 @@ def _stamped(bag: Path, name: str, kind: str, messages: Iterable[tuple[int, Any]
     if not pairs:
         raise topic.error("it has no messages", remedy="Name a topic that was recorded")
     if len(frames) > 1:
-        raise topic.error(
-            f"its headers name several frames: {', '.join(map(repr, frames))}",
-            remedy="Record each sensor on a topic of its own",
-        )
+        problem = f"its headers name several frames: {', '.join(map(repr, frames))}"
+        raise topic.error(problem, remedy="Record each sensor on a topic of its own")
     if (stamps <= 0).any():
         raise topic.error(
             f"the stamp of the header is zero ({int((stamps <= 0).sum())} such messages)",
@@ -177,9 +171,6 @@ def _stamped(bag: Path, name: str, kind: str, messages: Iterable[tuple[int, Any]
     if falls.any():
         row = int(np.argmax(falls)) + 1
         fault = "repeats" if stamps[row] == stamps[row - 1] else "is earlier than"
-        raise topic.error(
-            f"the stamp {fault} the one before it, {format_stamp(stamps[row - 1])} s",
-            message=row,
-            remedy="Record one driver on one clock that runs forwards",
-        )
+        problem = f"the stamp {fault} the one before it, {format_stamp(stamps[row - 1])} s"
+        raise topic.error(problem, message=row, remedy="Record one driver on one clock that runs forwards")
     return topic

@@ -36,8 +36,7 @@ PARAMETERS = 10
 """Number of inertial parameters of a rigid body."""
 
 
-POINT = 1e-12
-"""Square of the radius of gyration below which the mass of a body is in a point [m2]."""
+POINT = 1e-12  # square of the radius of gyration below which the mass of a body is in a point [m2]
 
 
 def _basis() -> Floats:
@@ -94,10 +93,8 @@ class InertialParameters:
 
     def _validate(self) -> None:
         if self.com.shape != (3,) or self.inertia.shape != (3, 3):
-            raise InputError(
-                f"centre of mass and inertia have shapes {self.com.shape} and {self.inertia.shape}",
-                remedy="Give three coordinates and a 3x3 tensor",
-            )
+            problem = f"centre of mass and inertia have shapes {self.com.shape} and {self.inertia.shape}"
+            raise InputError(problem, remedy="Give three coordinates and a 3x3 tensor")
         if not (np.isfinite(self.mass) and np.isfinite(self.com).all() and np.isfinite(self.inertia).all()):
             raise InputError("an inertial parameter is not finite", remedy="Give finite numbers")
         remedy = "No rigid body has these values; correct them"

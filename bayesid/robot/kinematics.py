@@ -133,12 +133,8 @@ class Tip:
             last = [frame.name for frame in frames.values() if frame.parentJoint == frames[name].parentJoint]
             name = last[-1]
         if name not in frames:
-            raise InputError(
-                f"no frame named {name!r}",
-                file=robot.file,
-                place="design.tip_frame",
-                remedy=f"Choose a link or joint of the URDF: {', '.join(frames)}",
-            )
+            remedy = f"Choose a link or joint of the URDF: {', '.join(frames)}"
+            raise InputError(f"no frame named {name!r}", file=robot.file, place="design.tip_frame", remedy=remedy)
         frame = frames[name]
         return cls(name, frame.parentJoint - 2, frame.placement.homogeneous)
 

@@ -119,17 +119,11 @@ class DesignSection(Section):
     @model_validator(mode="after")
     def _check_functions(self) -> DesignSection:
         if self.functions is not None and self.parameterisation == "paper":
-            raise InputError(
-                "the paper's (27) has two parameters per joint and no free functions",
-                place="functions",
-                remedy="Remove it, or choose another parameterisation",
-            )
+            problem = "the paper's (27) has two parameters per joint and no free functions"
+            raise InputError(problem, place="functions", remedy="Remove it, or choose another parameterisation")
         if self.functions is not None and self.parameterisation == "fourier" and self.functions % 2:
-            raise InputError(
-                f"{self.functions} is odd; a Fourier series has sines and cosines",
-                place="functions",
-                remedy="Give an even number",
-            )
+            problem = f"{self.functions} is odd; a Fourier series has sines and cosines"
+            raise InputError(problem, place="functions", remedy="Give an even number")
         return self
 
     @model_validator(mode="after")

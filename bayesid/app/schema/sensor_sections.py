@@ -186,11 +186,8 @@ class EncoderSensor(Section):
 
     def sigma_of(self, family: Literal["position", "velocity", "acceleration"], joint: str) -> float | None:
         """Return the noise per sample of one joint's position, velocity or acceleration, None if not given."""
-        given = {
-            "position": self.sigma,
-            "velocity": self.velocity_sigma,
-            "acceleration": self.acceleration_sigma,
-        }[family]
+        level = {"position": self.sigma, "velocity": self.velocity_sigma, "acceleration": self.acceleration_sigma}
+        given = level[family]
         return given.get(joint) if isinstance(given, Mapping) else given
 
 
@@ -247,13 +244,9 @@ class SensorsSection(Section):
     @model_validator(mode="after")
     def _check_information(self) -> SensorsSection:
         if self.rate is None and self.accel is None and self.attitude is None and not self.other:
-            raise InputError(
-                "no sensor of the base is declared",
-                remedy="Add at least one of [sensors.rate], [sensors.accel], [sensors.attitude]",
-            )
+            problem = "no sensor of the base is declared"
+            raise InputError(problem, remedy="Add at least one of [sensors.rate], [sensors.accel], [sensors.attitude]")
         if self.rate is not None and self.rate.attitude_arcsec is not None and self.attitude is not None:
-            raise InputError(
-                "a rate differenced from the attitude (rate.attitude_arcsec) is not a second sensor",
-                remedy="Declare either [sensors.rate] or [sensors.attitude]",
-            )
+            problem = "a rate differenced from the attitude (rate.attitude_arcsec) is not a second sensor"
+            raise InputError(problem, remedy="Declare either [sensors.rate] or [sensors.attitude]")
         return self

@@ -112,11 +112,8 @@ class Study(Section):
         files = [recording.file for recording in self.recordings]
         for index, file in enumerate(files):
             if file in files[:index]:
-                raise InputError(
-                    f"'{file.name}' is listed twice",
-                    place=f"recordings #{index + 1}.file",
-                    remedy="Remove one: the same data would count twice",
-                )
+                remedy = "Remove one: the same data would count twice"
+                raise InputError(f"'{file.name}' is listed twice", place=f"recordings #{index + 1}.file", remedy=remedy)
             for other in files[:index]:
                 if other.stem == file.stem:
                     raise InputError(

@@ -153,11 +153,8 @@ class UnknownsSection(Section):
         for key, table in tables.items():
             for body in table:
                 if body not in self.bodies:
-                    raise InputError(
-                        f"'{body}' is not among unknowns.bodies",
-                        place=key,
-                        remedy=suggest(body, self.bodies) or "Add it there or remove it here",
-                    )
+                    remedy = suggest(body, self.bodies) or "Add it there or remove it here"
+                    raise InputError(f"'{body}' is not among unknowns.bodies", place=key, remedy=remedy)
         for body, section in self.prior.items():
             check_extended(section, place=f"prior.{body}")
         return self
@@ -193,10 +190,8 @@ class ModelSection(Section):
     @model_validator(mode="after")
     def _check_initial_rate(self) -> ModelSection:
         if self.initial_rate == "zero" and self.initial_rate_sigma is not None:
-            raise InputError(
-                "initial_rate_sigma contradicts initial_rate = 'zero'",
-                remedy="Remove it, or set initial_rate = 'unknown'",
-            )
+            problem = "initial_rate_sigma contradicts initial_rate = 'zero'"
+            raise InputError(problem, remedy="Remove it, or set initial_rate = 'unknown'")
         return self
 
 
@@ -302,10 +297,8 @@ class OrbitSection(Section):
     @classmethod
     def _above_ground(cls, radius: float) -> float:
         if radius < LOWEST_ORBIT:
-            raise InputError(
-                f"{radius:g} m is inside the Earth",
-                remedy="Metres, not kilometres? It is counted from the Earth's centre, not the altitude",
-            )
+            remedy = "Metres, not kilometres? It is counted from the Earth's centre, not the altitude"
+            raise InputError(f"{radius:g} m is inside the Earth", remedy=remedy)
         if radius > HIGHEST_ORBIT:
             raise InputError(f"{radius:g} m is no orbit about the Earth", remedy="Metres, not millimetres?")
         return radius
@@ -314,10 +307,8 @@ class OrbitSection(Section):
     def _perigee_above_ground(self) -> OrbitSection:
         perigee = self.radius * (1.0 - self.eccentricity)
         if perigee < LOWEST_ORBIT:
-            raise InputError(
-                f"the perigee, radius (1 - eccentricity) = {perigee:g} m, is inside the Earth",
-                remedy="With an eccentricity, radius is the semi-major axis",
-            )
+            problem = f"the perigee, radius (1 - eccentricity) = {perigee:g} m, is inside the Earth"
+            raise InputError(problem, remedy="With an eccentricity, radius is the semi-major axis")
         return self
 
 
