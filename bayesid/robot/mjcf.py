@@ -96,12 +96,8 @@ def _refuse_loops(model: Any, mujoco: Any, file: Path) -> None:
     for index in range(model.neq):
         kind = mujoco.mjtEq(model.eq_type[index])
         if kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
-            raise InputError(
-                f"the constraint <{_word(kind)}> is not supported",
-                file=file,
-                place="equality",
-                remedy="Leave a tree of bodies",
-            )
+            problem = f"the constraint <{_word(kind)}> is not supported"
+            raise InputError(problem, file=file, place="equality", remedy="Leave a tree of bodies")
     if model.nflex:
         raise InputError("a flexible body is not supported", file=file, remedy="Leave a tree of rigid bodies")
 
@@ -120,22 +116,15 @@ def _base(model: Any, mujoco: Any, links: list[str], file: Path) -> int:
     ]
     if len(trees) != 1:
         shown = f": {', '.join(links[body] for body in trees)}" if trees else ""
-        raise InputError(
-            f"the world holds {len(trees)} bodies{shown}",
-            file=file,
-            place="worldbody",
-            remedy="Leave one, the base of the robot",
-        )
+        problem = f"the world holds {len(trees)} bodies{shown}"
+        raise InputError(problem, file=file, place="worldbody", remedy="Leave one, the base of the robot")
     (base,) = trees
     first = model.body_jntadr[base]
     kinds = [mujoco.mjtJoint(kind) for kind in model.jnt_type[first : first + model.body_jntnum[base]]]
     if kinds and kinds != [mujoco.mjtJoint.mjJNT_FREE]:
-        raise InputError(
-            f"a {_word(kinds[0])} joins it to the world, where only a free joint can",
-            file=file,
-            place=f"body {links[base]}",
-            remedy="The base flies freely: give it a free joint or none",
-        )
+        problem = f"a {_word(kinds[0])} joins it to the world, where only a free joint can"
+        remedy = "The base flies freely: give it a free joint or none"
+        raise InputError(problem, file=file, place=f"body {links[base]}", remedy=remedy)
     return base
 
 
@@ -153,12 +142,9 @@ def _add_joints(
         kind = mujoco.mjtJoint(model.jnt_type[index])
         turns = kind == mujoco.mjtJoint.mjJNT_HINGE
         if not turns and kind != mujoco.mjtJoint.mjJNT_SLIDE:
-            raise InputError(
-                f"joint type {_word(kind)!r} is not supported",
-                file=file,
-                place=f"joint {joints[index]}",
-                remedy="Give bodies hinges or slides, and only the base a free joint",
-            )
+            problem = f"joint type {_word(kind)!r} is not supported"
+            remedy = "Give bodies hinges or slides, and only the base a free joint"
+            raise InputError(problem, file=file, place=f"joint {joints[index]}", remedy=remedy)
         axis, anchor = model.jnt_axis[index], pin.SE3(np.eye(3), model.jnt_pos[index])
         back = -float(model.qpos0[model.jnt_qposadr[index]])
         start = pin.SE3(pin.exp3(back * axis), np.zeros(3)) if turns else pin.SE3(np.eye(3), back * axis)

@@ -129,21 +129,15 @@ class Robot:
         text: str | bytes = path.read_bytes()
         root = xml_root(text, path)
         if root.tag == "sdf":
-            raise InputError(
-                "this is SDF, which the installed Pinocchio does not read",
-                file=path,
-                remedy="Convert it to URDF or MJCF",
-            )
+            problem = "this is SDF, which the installed Pinocchio does not read"
+            raise InputError(problem, file=path, remedy="Convert it to URDF or MJCF")
         if root.tag == "mujoco":
             text = urdf_of_mjcf(path)
         elif root.tag == "mujocoinclude":
             raise InputError("this is a part of an MJCF", file=path, remedy="Give the file that includes it")
         elif root.tag != "robot":
-            raise InputError(
-                f"the root element is <{root.tag}>",
-                file=path,
-                remedy="Give a URDF, whose root is <robot>, or an MJCF, whose root is <mujoco>",
-            )
+            remedy = "Give a URDF, whose root is <robot>, or an MJCF, whose root is <mujoco>"
+            raise InputError(f"the root element is <{root.tag}>", file=path, remedy=remedy)
         return cls.from_string(text, file=path, nearest_physical=nearest_physical)
 
     @classmethod

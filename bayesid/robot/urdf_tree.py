@@ -29,11 +29,9 @@ MOVING = ("revolute", "continuous", "prismatic")
 BOUNDLESS = 1e9
 """Limit of a joint that has none [rad, m, rad/s, m/s], since a URDF demands a number."""
 
-SOME = 0.01
-"""Largest correction of an inertia, relative to its largest entry, that its digits may excuse."""
-
+SOME = 0.01  # largest correction of an inertia, relative to its largest entry, that its digits may excuse
+# places of a URDF's products and moments of inertia in the tensor
 ENTRIES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
-"""Places of a URDF's products and moments of inertia in the tensor."""
 
 
 def xml_root(data: str | bytes, file: Path | None) -> ET.Element:
@@ -68,11 +66,8 @@ def _refuse_xacro(element: ET.Element, file: Path | None) -> None:
     used = used or next((f'{key}="{text}"' for key, text in element.items() if "${" in text or "$(" in text), None)
     if used:
         source = file.name if file else "FILE"
-        raise InputError(
-            f"this is an unexpanded xacro: it holds {used}",
-            file=file,
-            remedy=f"Expand it first: xacro {source} > robot.urdf",
-        )
+        problem = f"this is an unexpanded xacro: it holds {used}"
+        raise InputError(problem, file=file, remedy=f"Expand it first: xacro {source} > robot.urdf")
 
 
 def prepared_urdf(
@@ -168,12 +163,9 @@ def _without_world(root: ET.Element, file: Path | None, remarks: list[str]) -> N
         remarks.append(f"The link {name} and its {kind} joint are left out: the robot flies freely.")
     for joint, _, child in _joints(root):
         if joint.get("type") == "floating":
-            raise InputError(
-                f"joint type 'floating' is supported only below a root link without mass; it holds {child!r}",
-                file=file,
-                place=f"joint {joint.get('name', '')}",
-                remedy=f"Use one of {', '.join(MOVING)} or fixed; the base needs no joint, since it flies freely",
-            )
+            problem = f"joint type 'floating' is supported only below a root link without mass; it holds {child!r}"
+            remedy = f"Use one of {', '.join(MOVING)} or fixed; the base needs no joint, since it flies freely"
+            raise InputError(problem, file=file, place=f"joint {joint.get('name', '')}", remedy=remedy)
 
 
 def _tree_root(root: ET.Element, file: Path | None) -> str:
@@ -200,11 +192,8 @@ def _tree_root(root: ET.Element, file: Path | None) -> str:
         problem = "the links form a loop without a root" if names else "it holds no link"
         raise InputError(problem, file=file, remedy="Give a tree of links, whose root is the base body")
     if len(tops) > 1:
-        raise InputError(
-            f"{len(tops)} links have no parent: {', '.join(tops)}",
-            file=file,
-            remedy="Give one tree of links, whose root is the base body: join the others to it or remove them",
-        )
+        remedy = "Give one tree of links, whose root is the base body: join the others to it or remove them"
+        raise InputError(f"{len(tops)} links have no parent: {', '.join(tops)}", file=file, remedy=remedy)
     reached, front = {tops[0]}, [tops[0]]
     while front:
         front = [child for _, parent, child in _joints(root) if parent in front]
@@ -295,12 +284,8 @@ def _given_inertial(link: ET.Element, file: Path | None, place: str) -> tuple[fl
         return 0.0, np.zeros(3), np.zeros((3, 3)), 0.0
     mass, tensor = element.find("mass"), element.find("inertia")
     if mass is None or tensor is None:
-        raise InputError(
-            "<inertial> lacks its <mass> or <inertia>",
-            file=file,
-            place=place,
-            remedy="Give both, or leave <inertial> out",
-        )
+        problem = "<inertial> lacks its <mass> or <inertia>"
+        raise InputError(problem, file=file, place=place, remedy="Give both, or leave <inertial> out")
     rotation, com = _pose(element, file, place)
     matrix, halves = np.zeros((3, 3)), np.zeros((3, 3))
     try:
@@ -369,12 +354,9 @@ def _take_inertia_of_rigid_body(
             if parent == name and joint.get("type") == "fixed":
                 turn, shift = _pose(joint, file, "")
                 front.append((child, rotation @ turn, rotation @ shift + position))
-    raise InputError(
-        "mass > 0 fails: neither the root link nor a link fixed to it has a mass",
-        file=file,
-        place=f"link {base}",
-        remedy="The root link is the base body: give it its <inertial>",
-    )
+    problem = "mass > 0 fails: neither the root link nor a link fixed to it has a mass"
+    remedy = "The root link is the base body: give it its <inertial>"
+    raise InputError(problem, file=file, place=f"link {base}", remedy=remedy)
 
 
 def write_inertial(link: ET.Element, inertial: InertialParameters) -> None:

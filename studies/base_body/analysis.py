@@ -11,9 +11,9 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from bayesid.design.designed import sample_times
 
 from bayesid._math.arrays import Floats
+from bayesid.design.design_result import sample_times
 from bayesid.identifiability.local_knowledge import Knowledge, triangular
 from bayesid.inference import Identification
 from bayesid.inference.body_quantities import linearise
