@@ -9,8 +9,7 @@ import numpy as np
 from bayesid._io.words import abridged
 from bayesid.identifiability.advice import WORST, Advice
 from bayesid.identifiability.base_parameters import BaseParameters
-from bayesid.identifiability.normality import NORMAL, Method
-from bayesid.identifiability.parameter_table import ParameterRow
+from bayesid.identifiability.parameter_table import NORMAL, Method, ParameterRow
 from bayesid.identifiability.practical_identifiability import Practical
 from bayesid.inference.contraction import CONTRACTED, PRIOR_ONLY, ContractionVerdict
 from bayesid.inference.predicted_readings import integration_error_at

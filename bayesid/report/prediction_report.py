@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bayesid.design.base_prediction import ATTITUDE, Prediction
-from bayesid.design.pose_region import Region
-from bayesid.design.pose_trajectory import PoseTrajectory
+from bayesid.design.pose_trajectory import PoseTrajectory, Region
 from bayesid.inference.posterior import Posterior
 from bayesid.report import figures
 from bayesid.report.document import Document, Rows

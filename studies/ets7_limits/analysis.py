@@ -15,7 +15,7 @@ from bayesid import Sensor, SensorKind, White
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.design import planned_manoeuvre, planned_posterior
-from bayesid.design.designed import sample_times
+from bayesid.design.design_result import sample_times
 from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.identifiability.local_knowledge import Knowledge, marginalised, triangular
 from bayesid.inference.body_quantities import linearise

@@ -43,7 +43,7 @@ from bayesid.design import (
     planned_posterior,
     predict,
 )
-from bayesid.design.designed import sample_times
+from bayesid.design.design_result import sample_times
 from bayesid.recording.joint_motion import Motion
 from studies.base_body import paper
 from studies.base_body.analysis import POOR

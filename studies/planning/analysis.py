@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from bayesid import Manoeuvre, Model, Recording, Robot
 from bayesid._math.arrays import Floats
 from bayesid.design.base_prediction import BasePredictor
-from bayesid.design.pose_region import Pose
+from bayesid.design.pose_trajectory import Pose
 from bayesid.inference.posterior import Posterior
 from bayesid.report.verdict_record import Share
 from bayesid.robot.body_prior import coordinates_of, draw_inertial

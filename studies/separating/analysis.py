@@ -14,8 +14,8 @@ from bayesid import Effect, Manoeuvre, Model
 from bayesid._math.arrays import Floats
 from bayesid.design import THOROUGH, DOptimal, Problem, Search, Separation, Store, optimise
 from bayesid.design.design_problem import Known
-from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.design.search_starts import adapted_to_family
+from bayesid.design.trajectories import ParameterisedMotion
 from bayesid.inference.unknowns import Unknowns
 from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.effects import ThrusterLeak, WheelMomentum

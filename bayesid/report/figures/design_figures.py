@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 
 from bayesid._math.arrays import Floats
 from bayesid.design import Design
-from bayesid.design.pose_region import Pose, Region
-from bayesid.design.pose_trajectory import PoseTrajectory
+from bayesid.design.pose_trajectory import Pose, PoseTrajectory, Region
 from bayesid.report.figures.figure_style import (
     COLOURS,
     TRUTH,
