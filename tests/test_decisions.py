@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,9 +14,10 @@ from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.verdict import Status, classes_of_equivalents, probable_verdict
+from bayesid.diagnosis.evidence.verdict import Status, classes_of_equivalents, probable_verdict, verdict_sensitivity
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.outcome.candidate_table import candidate_table
+from bayesid.diagnosis.settings import DiagnosisSettings
 from bayesid.simulation.effects.effect import Quantity
 from tests.gram_problem import LinearProblem
 
@@ -94,7 +96,9 @@ def test_what_can_only_be_told_apart_beyond_the_bounds_is_one_class():
     difference = rng.normal(size=(50, 1))
     problem.columns["b"] = problem.columns["a"] + 0.1 * difference
     gram = problem.observed(rng).gram()
-    apart = np.sqrt(gram.conditioned(gram.groups["a"], np.array([1e9]), ["b"]).matrix[0, 0])  # information of b beside a
+    apart = np.sqrt(
+        gram.conditioned(gram.groups["a"], np.array([1e9]), ["b"]).matrix[0, 0]
+    )  # information of b beside a
     for factor, classes in ((0.9, (("a", "b"),)), (1.1, (("a",), ("b",)))):
         pair = [cause("a", factor / apart), cause("b", factor / apart)]
         assert classes_of_equivalents(SetEvidence(gram, pair)) == classes
@@ -112,7 +116,9 @@ def table():
     alarm = FamilyAlarm(EvidenceAlarm.of(evidence, rng), {"rate-noise": np.log(0.2), "variance by axis": np.log(0.5)})
     found = enumerate_sets(evidence)
     everything = SetProbabilities.of(found.sets, (*found.causes, "rate-noise"), found.generics, found.prior)
-    search = SimpleNamespace(base=SimpleNamespace(evidence=evidence), alarm=alarm, probabilities=everything, searches=(), states=())
+    search = SimpleNamespace(
+        base=SimpleNamespace(evidence=evidence), alarm=alarm, probabilities=everything, searches=(), states=()
+    )
     units = ("N", "m")
     effect = SimpleNamespace(
         label="seen",
@@ -136,7 +142,7 @@ def test_the_table_has_every_candidate_once_the_most_probable_first(table):
 
 
 def test_a_row_has_amplitudes_where_they_have_a_name_and_a_limit_above_them(table):
-    rows, search = table
+    rows, _ = table
     seen, rate = rows["seen"], rows[INITIAL_RATE]
     assert [item.unit for item in seen.quantities] == ["N", "m"]  # in the order of the columns
     assert np.abs(seen.mean - [1.5, -2.0]).max() < 1.0
@@ -155,3 +161,24 @@ def test_a_fault_that_was_not_weighed_has_a_p_value_and_no_size(table):
     assert row.p_value_adjusted > row.p_value
     assert row.signal_to_noise == pytest.approx(0.8416, abs=1e-3)  # one-sided
     assert (row.log_bayes_factor, row.quantities, row.power) == (None, (), None)
+
+
+def test_settings_move_the_thresholds_of_a_verdict():
+    shares = stated({("a",): 0.8, ("b",): 0.2})
+    assert probable_verdict(shares, CLASSES, silent=False).status is Status.AMBIGUOUS
+    assert probable_verdict(shares, CLASSES, False, DiagnosisSettings(named_from=0.75)).status is Status.EXPLAINED
+    assert probable_verdict(shares, CLASSES, False, DiagnosisSettings(most_alternatives=1)).status is Status.UNRESOLVED
+    unknown = stated({("a",): 0.6, ("unknown",): 0.4})
+    assert probable_verdict(unknown, CLASSES, False, DiagnosisSettings(unknown_from=0.3)).status is Status.UNKNOWN
+
+
+@pytest.mark.parametrize(("name", "value"), [("named_from", 1.5), ("alarm_level", 0.0), ("most_full_fits", -1)])
+def test_settings_that_decide_nothing_are_refused(name, value):
+    with pytest.raises(ValueError, match=f"{name} must be positive"):
+        DiagnosisSettings(**{name: value})
+
+
+def test_the_sensitivity_names_what_it_varies_and_no_setting_is_among_it():
+    found = verdict_sensitivity(stated({("a",): 0.8}), CLASSES, False, lambda bound, floor: stated({("a",): 0.8}))
+    assert len(found.varied) * 2 - 2 == len(found.others)  # prior numbers both ways, ranges one way
+    assert not set(found.varied) & {setting.name for setting in fields(DiagnosisSettings)}

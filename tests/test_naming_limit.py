@@ -8,7 +8,8 @@ import pytest
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.verdict import NAMED, ProbableVerdict, Status
+from bayesid.diagnosis.evidence.verdict import ProbableVerdict, Status
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 from studies.blind_injections import Trial
 from studies.blind_injections.goals import _relative
 from studies.blind_injections.limits import simulated_naming
@@ -38,7 +39,7 @@ def named(problem: LinearProblem, prior: CausePrior) -> bool:
     weight = np.exp(np.array(log) - max(log))
     left, right = (weight[[name in names for names in sets]].sum() / weight.sum() for name in ("left", "right"))
     best = sets[int(weight.argmax())]
-    return best == ("left",) and left >= NAMED > right
+    return best == ("left",) and left >= DEFAULT_SETTINGS.named_from > right
 
 
 def test_the_share_is_that_of_decisions_on_drawn_data(problem):

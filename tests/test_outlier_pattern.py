@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesid.diagnosis.noise.outlier_pattern import LEVEL, is_event
+from bayesid.diagnosis.noise.outlier_pattern import is_event
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 
 TIMES = [np.arange(0.0, 160.0, 0.5)] * 3
 
@@ -18,7 +19,9 @@ def fallen(rng: np.random.Generator, fraction: float) -> list[np.ndarray]:
 @pytest.mark.parametrize("fraction", [0.003, 0.01, 0.03])
 def test_outliers_that_fall_anywhere_are_no_event(fraction):
     rng, draws = np.random.default_rng(4), 4000
-    assert sum(is_event(fallen(rng, fraction), TIMES) for _ in range(draws)) <= draws * LEVEL * 3.0
+    assert (
+        sum(is_event(fallen(rng, fraction), TIMES) for _ in range(draws)) <= draws * DEFAULT_SETTINGS.event_level * 3.0
+    )
 
 
 def test_what_lasts_is_an_event():

@@ -11,6 +11,7 @@ from bayesid.diagnosis.outcome.gain import Gain
 from bayesid.diagnosis.outcome.torque_reading import TorqueCause, TorqueReading, TorquesNotRead
 from bayesid.diagnosis.result import Diagnosis
 from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.settings import DiagnosisSettings
 
 __all__ = [
     "Candidate",
@@ -18,6 +19,7 @@ __all__ = [
     "CauseSet",
     "Diagnosis",
     "DiagnosisReview",
+    "DiagnosisSettings",
     "DisturbingWrench",
     "Frame",
     "Gain",

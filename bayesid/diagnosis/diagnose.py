@@ -25,6 +25,7 @@ from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.linearisation import Catalogue
 from bayesid.diagnosis.search.misfit import with_misfit
 from bayesid.diagnosis.search.model_search import search_models
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference import Identification, identify
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
@@ -45,6 +46,7 @@ def diagnose(
     effects: Sequence[Effect] | None = None,
     bounds: Mapping[str, Sequence[PhysicalBound]] | None = None,
     prior: CausePrior | None = None,
+    settings: DiagnosisSettings = DEFAULT_SETTINGS,
     knows_latitude: bool = True,
     executor: Executor | None = None,
     progress: Progress = silent,
@@ -66,6 +68,8 @@ def diagnose(
         Largest sizes that the user knows better, by the candidates' labels.
     prior : CausePrior, optional
         Prior of the number of causes, and of something generic.
+    settings : DiagnosisSettings, optional
+        Thresholds by which it decides.
     knows_latitude : bool
         Whether the manoeuvres' arguments of latitude are known.
     executor : concurrent.futures.Executor, optional
@@ -79,7 +83,16 @@ def diagnose(
     """
     with threadpool_limits(limits=1):  # thousands of small factorisations: threads only get in each other's way
         return _diagnose(
-            model, manoeuvres, seed, effects, bounds, prior or CausePrior(), knows_latitude, executor, progress
+            model,
+            manoeuvres,
+            seed,
+            effects,
+            bounds,
+            prior or CausePrior(),
+            settings,
+            knows_latitude,
+            executor,
+            progress,
         )
 
 
@@ -90,6 +103,7 @@ def _diagnose(
     effects: Sequence[Effect] | None,
     stated: Mapping[str, Sequence[PhysicalBound]] | None,
     prior: CausePrior,
+    settings: DiagnosisSettings,
     knows_latitude: bool,
     executor: Executor | None,
     progress: Progress,
@@ -109,22 +123,21 @@ def _diagnose(
     perturbed.compile()
     clock.ends("compile")
     progress(0.1, "fitting the present model")
-    first = fit_present_model(perturbed)
+    first = fit_present_model(perturbed, settings=settings)
     if first.held and (step := step_along_data(posterior)) < posterior.step:
         posterior = Posterior.of(posterior.model, manoeuvres, step=step)
         perturbed = PerturbedModel(posterior, perturbed.frozen)
-        first = fit_present_model(perturbed)
+        first = fit_present_model(perturbed, settings=settings)
     perturbed = perturbed.with_posterior(relinearised(posterior, first.fit.z))
-    present = fit_present_model(perturbed, first.fit.z)
+    present = fit_present_model(perturbed, first.fit.z, settings)
     before = Hypothesis(perturbed, present.fit)
     clock.ends("fit")
-    search = search_models(
-        perturbed, before.fit, Catalogue(tuple(catalogue), limits, prior), rng, progress, bodies_fixed=present.held
-    )
+    considered = Catalogue(tuple(catalogue), limits, prior, settings)
+    search = search_models(perturbed, before.fit, considered, rng, progress, bodies_fixed=present.held)
     progress(0.65, "fitting the most probable causes")
-    search, fitted = with_misfit(search, catalogue)
+    search, fitted = with_misfit(search, catalogue, settings)
     classes = search.classes()
-    sensitivity = verdict_sensitivity(search.probabilities, classes, search.alarm.silent, search.widened)
+    sensitivity = verdict_sensitivity(search.probabilities, classes, search.alarm.silent, search.widened, settings)
     verdict = sensitivity.verdict
     clock.ends("verdict")
     named = list(verdict.causes)
@@ -137,13 +150,13 @@ def _diagnose(
     progress(0.85, "reconstructing the disturbance")
     open_question = verdict.status in (Status.UNKNOWN, Status.UNRESOLVED)
     lacking = Hypothesis(perturbed, without_torque(search.base.fit)) if present.held else before
-    disturbance = disturbing_wrench(lacking, search.base.bank, open_question)
+    disturbance = disturbing_wrench(lacking, search.base.bank, open_question, settings)
     unexplained = disturbing_wrench(after, search.under(named).point.bank, False) if named else disturbance
     table = candidate_table(search, catalogue, rng)
     torques: TorqueReading | TorquesNotRead | None = None
     if whole.torque is not None:
         progress(0.95, "reading the joint torques")
-        torques = torques_beside(verdict, after, whole, prior, rng, limits)
+        torques = torques_beside(verdict, after, whole, prior, rng, limits, settings)
     clock.ends("consequences")
     return Diagnosis(
         before,

@@ -10,13 +10,11 @@ from bayesid._io.files import write_json
 from bayesid.design.loop_goals import Review
 from bayesid.diagnosis.diagnose import diagnose
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.model import Manoeuvre, Model
 
 __all__ = ["DiagnosisReview"]
-
-EXCLUDED = 0.05
-"""Probability of the model as it is below which it is not trusted."""
 
 
 @dataclass(frozen=True)
@@ -31,22 +29,31 @@ class DiagnosisReview:
         Prior of the number of causes, and of something generic.
     knows_latitude : bool
         Whether the manoeuvres' argument of latitude is known.
+    settings : DiagnosisSettings
+        Thresholds by which it decides.
     """
 
     bounds: Mapping[str, Sequence[PhysicalBound]] = field(default_factory=dict)
     prior: CausePrior = CausePrior()  # noqa: RUF009  (immutable)
     knows_latitude: bool = False
+    settings: DiagnosisSettings = DEFAULT_SETTINGS
 
     def review(self, model: Model, manoeuvres: Sequence[Manoeuvre], seed: int, file: Path) -> Review:
         """Diagnose, write the content of diagnosis.json to a file, and return its summary."""
         result = diagnose(
-            model, manoeuvres, seed, bounds=self.bounds, prior=self.prior, knows_latitude=self.knows_latitude
+            model,
+            manoeuvres,
+            seed,
+            bounds=self.bounds,
+            prior=self.prior,
+            settings=self.settings,
+            knows_latitude=self.knows_latitude,
         )
         write_json(file, result.to_dict())
         found = result.probabilities
         return Review(
             result.verdict.status.value,
             tuple(result.verdict.causes),
-            result.alarm.silent or found.nothing >= EXCLUDED,
+            result.alarm.silent or found.nothing >= self.settings.trusted_from,
             {**found.inclusion, "unknown": found.unknown},
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -11,7 +11,7 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.jump_instants import jump_instants
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.evidence.verdict import NAMED, UNKNOWN, ProbableVerdict, Status, VerdictSensitivity
+from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Status, VerdictSensitivity
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
 from bayesid.diagnosis.outcome.candidate_table import Candidate, amplitudes_of, amplitudes_of_others
 from bayesid.diagnosis.outcome.cause_sizes import GroupSize, group_sizes, vector_size
@@ -29,6 +29,7 @@ from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRe
 from bayesid.diagnosis.search.extended_model import extended_posterior, extended_start
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.model_search import ModelSearch
+from bayesid.diagnosis.settings import DiagnosisSettings
 from bayesid.inference import Identification
 from bayesid.inference.body_quantities import quantity
 from bayesid.inference.posterior import Posterior
@@ -40,9 +41,6 @@ __all__ = ["Diagnosis"]
 
 SHOWN = 0.01
 """Probability down to which sets of causes are listed; the most probable one always is."""
-
-WEAK = 0.5
-"""Power below which a candidate could hardly have been seen."""
 
 PAIRS = 10
 """Largest number of pairs of causes that imitate each other in diagnosis.json."""
@@ -118,6 +116,11 @@ class Diagnosis:
         return self.search.base.bodies_fixed
 
     @property
+    def settings(self) -> DiagnosisSettings:
+        """Thresholds by which it decided."""
+        return self.search.settings
+
+    @property
     def evidence(self) -> SetEvidence:
         """Evidence of sets of causes about the present model's fit."""
         return self.search.base.evidence
@@ -159,15 +162,16 @@ class Diagnosis:
 
     @property
     def likely_causes(self) -> tuple[str, ...]:
-        """Causes of `NAMED` probability and more, the most probable of each class; not all may be named."""
+        """Causes probable enough to be named, the most probable of each class; not all may be named."""
         inclusion = self.probabilities.inclusion
-        likely = [members for members in self.classes if self.probabilities.of_any(members) >= NAMED]
+        likely = [members for members in self.classes if self.probabilities.of_any(members) >= self.settings.named_from]
         return tuple(max(members, key=lambda name: inclusion[name]) for members in likely)
 
     @property
     def unseen_candidates(self) -> tuple[Candidate, ...]:
         """Candidates that these manoeuvres could hardly have shown, the least visible first."""
-        weak = [(row.power, row) for row in self.candidates if row.power is not None and row.power < WEAK]
+        least = self.settings.weak_power
+        weak = [(row.power, row) for row in self.candidates if row.power is not None and row.power < least]
         return tuple(row for _, row in sorted(weak, key=lambda entry: entry[0]))
 
     @cached_property
@@ -291,6 +295,8 @@ class Diagnosis:
                 choice: {"status": other.status.value, "causes": list(other.causes)}
                 for choice, other in self.sensitivity.others.items()
             },
+            "sensitivity_varies": list(self.sensitivity.varied),
+            "settings": asdict(self.settings),
             "bounds": {
                 label: {item.unit: {"largest": item.largest, "reason": item.reason} for item in items}
                 for label, items in self.bounds.items()

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis import Diagnosis
-from bayesid.diagnosis.evidence.verdict import NAMED
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 from bayesid.report import Document, format_quantity
 from bayesid.report.figures.figure_style import styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_probability, format_signed
@@ -180,7 +180,8 @@ def _coverage(result: Result) -> Goal:
 def _reverse(result: Result) -> list[Goal]:
     """Goals on the recorded wheel dropped: whether its probability says that it is there, and whether it is named."""
     titles = (
-        f"recorded wheel dropped: a wheel about z has a probability of {NAMED:g} or more on every body",
+        "recorded wheel dropped: a wheel about z has a probability of "
+        f"{DEFAULT_SETTINGS.named_from:g} or more on every body",
         "recorded wheel dropped: the verdict names a wheel on every body",
     )
     if not result.wheels:
@@ -189,7 +190,7 @@ def _reverse(result: Result) -> list[Goal]:
     held = [wheel_probability(item) for item in found]
     named = [any(cause.startswith("wheel-history") for cause in item.verdict.causes) for item in found]
     return [
-        Goal(titles[0], f"at least {min(held):.3f}", Verdict.of(min(held) >= NAMED)),
+        Goal(titles[0], f"at least {min(held):.3f}", Verdict.of(min(held) >= DEFAULT_SETTINGS.named_from)),
         Goal(titles[1], f"{sum(named)} of {len(named)}", Verdict.of(all(named))),
     ]
 

@@ -14,11 +14,9 @@ import numpy as np
 
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 
-__all__ = ["FAMILY_LEVEL", "EvidenceAlarm", "NullTail"]
-
-FAMILY_LEVEL = 0.01
-"""Probability of an alarm where nothing is lacking, all candidates together."""
+__all__ = ["EvidenceAlarm", "NullTail"]
 
 REACH = 20  # draws beyond a value below which its p-value comes from the tail; counting more is good to a fifth
 TAIL = 0.05  # share of the draws that the decay length of the tail is fitted to
@@ -135,6 +133,6 @@ class EvidenceAlarm:
         """Return the logarithms of the local and of the family-wise p-value of each candidate."""
         return {name: (self.each[name].log_p(x), self.largest.log_p(x)) for name, x in self.log_evidence.items()}
 
-    def silent(self, level: float = FAMILY_LEVEL) -> bool:
+    def silent(self, level: float = DEFAULT_SETTINGS.alarm_level) -> bool:
         """Return whether nothing but the declared noise is seen at a family-wise level."""
         return self.log_p_value > np.log(level)

@@ -12,6 +12,7 @@ from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis.evidence.cause_sets import CausePrior, SetProbabilities
 from bayesid.diagnosis.evidence.gram import Gram, independent_directions
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 
 __all__ = [
     "UNKNOWN",
@@ -23,15 +24,6 @@ __all__ = [
     "verdict_sensitivity",
 ]
 
-NAMED = 0.9
-"""Probability of its class from which on a cause is named without rivals."""
-
-COVERED = 0.95
-"""Probability that the alternatives of an ambiguous verdict hold together."""
-
-MOST_ALTERNATIVES = 4
-"""Most alternatives that are named; among more, none is."""
-
 UNKNOWN = "unknown"
 """Name of the generic candidates among the alternatives."""
 
@@ -39,10 +31,6 @@ UNKNOWN = "unknown"
 DECADE = 10.0
 """Factor by which the ranges of the scales are widened, at either end."""
 
-
-SEEN = 1.0
-"""Information on the amplitudes in units of their largest scale, in the most visible direction, from which on the data
-see a difference."""
 
 ROUNDING = 1e-9
 """Fraction of a cause's whole information below which what another leaves of it is rounding."""
@@ -81,7 +69,10 @@ class ProbableVerdict:
 
 
 def probable_verdict(
-    probabilities: SetProbabilities, classes: Sequence[Sequence[str]], silent: bool
+    probabilities: SetProbabilities,
+    classes: Sequence[Sequence[str]],
+    silent: bool,
+    settings: DiagnosisSettings = DEFAULT_SETTINGS,
 ) -> ProbableVerdict:
     """Return the verdict on sets of causes.
 
@@ -103,13 +94,15 @@ def probable_verdict(
         Classes of equivalent causes, which hold every cause of the catalogue once.
     silent : bool
         Whether the alarm is silent.
+    settings : DiagnosisSettings, optional
+        With the thresholds, of which the defaults are named above.
     """
     if silent:
         return ProbableVerdict(Status.ADEQUATE)
-    if probabilities.unknown > 0.5:
+    if probabilities.unknown > settings.unknown_from:
         return ProbableVerdict(Status.UNKNOWN)
     merged = _merged(probabilities, classes)
-    alternatives = _alternatives(merged)
+    alternatives = _alternatives(merged, settings.covered)
     best = next(item for item in merged if UNKNOWN not in item)
     inclusion = probabilities.inclusion
     ordered = [sorted(members, key=lambda name: (-inclusion[name], name)) for members in classes]
@@ -123,8 +116,8 @@ def probable_verdict(
         known = sorted(item - {UNKNOWN}, key=lambda key: (-held[key], key))
         return (*(names[key][0] for key in known), *([UNKNOWN] if UNKNOWN in item else []))
 
-    explained = bool(best) and all(held[key] >= NAMED for key in best)
-    if not explained and (not best or not 2 <= len(alternatives) <= MOST_ALTERNATIVES):
+    explained = bool(best) and all(held[key] >= settings.named_from for key in best)
+    if not explained and (not best or not 2 <= len(alternatives) <= settings.most_alternatives):
         return ProbableVerdict(Status.UNRESOLVED)
     others = () if explained else tuple(named(item) for item in alternatives if item != best)
     mentioned = {name for item in (named(best), *others) for name in item}
@@ -142,12 +135,12 @@ def _merged(probabilities: SetProbabilities, classes: Sequence[Sequence[str]]) -
     return dict(sorted(total.items(), key=lambda pair: (-pair[1], sorted(pair[0]))))
 
 
-def _alternatives(merged: dict[frozenset[str], float]) -> list[frozenset[str]]:
-    """Return the fewest of the most probable sets that hold 0.95 with all that include one of them."""
+def _alternatives(merged: dict[frozenset[str], float], enough: float) -> list[frozenset[str]]:
+    """Return the fewest of the most probable sets that hold enough probability with all that include one of them."""
     chosen: list[frozenset[str]] = []
     covered = 0.0
     left = dict(merged)
-    while left and covered < COVERED:
+    while left and covered < enough:
         item = next(iter(left))
         chosen.append(item)
         within = [other for other in left if other == item or (item and item <= other)]
@@ -164,10 +157,13 @@ class VerdictSensitivity:
     verdict : ProbableVerdict
     others : mapping of str to ProbableVerdict
         Verdicts under the other choices, by a description of the choice.
+    varied : tuple of str
+        What the other choices change; all of `DiagnosisSettings` keep their values.
     """
 
     verdict: ProbableVerdict
     others: Mapping[str, ProbableVerdict]
+    varied: tuple[str, ...] = ("prior.one_more_cause", "prior.generic", "bounds", "floors")
 
     @property
     def changes(self) -> tuple[str, ...]:
@@ -181,6 +177,7 @@ def verdict_sensitivity(
     classes: Sequence[Sequence[str]],
     silent: bool,
     widened: Callable[[float, float], SetProbabilities],
+    settings: DiagnosisSettings = DEFAULT_SETTINGS,
 ) -> VerdictSensitivity:
     """Return the verdict with each prior number halved and doubled, and with scales a decade wider at either end.
 
@@ -195,17 +192,18 @@ def verdict_sensitivity(
         Whether the alarm is silent.
     widened : callable
         Probabilities with the bounds and the floors of all scales multiplied by two factors.
+    settings : DiagnosisSettings, optional
     """
     others = {
-        name: probable_verdict(probabilities.under(changed), classes, silent)
+        name: probable_verdict(probabilities.under(changed), classes, silent, settings)
         for name, changed in _other_priors(probabilities.prior).items()
     }
     for name, factors in {
         "bounds a decade higher": (DECADE, 1.0),
         "floors a decade lower": (1.0, 1.0 / DECADE),
     }.items():
-        others[name] = probable_verdict(widened(*factors), classes, silent)
-    return VerdictSensitivity(probable_verdict(probabilities, classes, silent), others)
+        others[name] = probable_verdict(widened(*factors), classes, silent, settings)
+    return VerdictSensitivity(probable_verdict(probabilities, classes, silent, settings), others)
 
 
 def _other_priors(prior: CausePrior) -> dict[str, CausePrior]:
@@ -219,13 +217,22 @@ def _other_priors(prior: CausePrior) -> dict[str, CausePrior]:
     return found
 
 
-def classes_of_equivalents(evidence: SetEvidence) -> tuple[tuple[str, ...], ...]:
+def classes_of_equivalents(
+    evidence: SetEvidence, seen: float = DEFAULT_SETTINGS.visible_information
+) -> tuple[tuple[str, ...], ...]:
     """Return the causes of the catalogue in classes, each sorted, in the order of their first names.
 
     Two causes are equivalent where neither offers anything visible, at the bounds of its scales, beyond what amplitudes
     of any size of the other can imitate. A joint effect of two causes is not compared with a third. What the data
     cannot see at all is equivalent to nothing, and each such cause is a class of its own. A cause joins a class if it
     is equivalent to every member.
+
+    Parameters
+    ----------
+    evidence : SetEvidence
+    seen : float
+        Information on the amplitudes in units of their largest scale, in the most visible direction, from which on the
+        data see a difference.
     """
     columns, units, directions = {}, {}, {}
     for name in evidence.catalogue:
@@ -233,11 +240,11 @@ def classes_of_equivalents(evidence: SetEvidence) -> tuple[tuple[str, ...], ...]
         columns[name] = np.concatenate([own.columns for own in spectra])
         units[name] = np.concatenate([own.root * own.range.high for own in spectra])
         directions[name] = independent_directions(evidence.gram.matrix[np.ix_(columns[name], columns[name])])
-    visible = {name for name in evidence.catalogue if _largest(evidence.gram, columns[name], units[name]) >= SEEN}
+    visible = {name for name in evidence.catalogue if _largest(evidence.gram, columns[name], units[name]) >= seen}
 
     def imitated(name: str, other: str) -> bool:
         left = _largest(evidence.gram, columns[name], units[name], columns[other], directions[other])
-        return left < max(SEEN, ROUNDING * _largest(evidence.gram, columns[name], units[name]))
+        return left < max(seen, ROUNDING * _largest(evidence.gram, columns[name], units[name]))
 
     classes: list[list[str]] = []
     for name in evidence.catalogue:

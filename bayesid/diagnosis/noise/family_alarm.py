@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bayesid.diagnosis.evidence.evidence_alarm import FAMILY_LEVEL, EvidenceAlarm
+from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.noise.encoder_fault import encoder_test
 from bayesid.diagnosis.noise.noise_tests import noise_tests, variance_tests
 from bayesid.diagnosis.response.perturbed_model import Fit
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 
 __all__ = ["FamilyAlarm"]
 
@@ -31,10 +32,16 @@ class FamilyAlarm:
 
     candidates: EvidenceAlarm
     noise: dict[str, float]
-    level: float = FAMILY_LEVEL
+    level: float = DEFAULT_SETTINGS.alarm_level
 
     @staticmethod
-    def of(evidence: SetEvidence, fit: Fit, rng: np.random.Generator, draws: int = 2000) -> FamilyAlarm:
+    def of(
+        evidence: SetEvidence,
+        fit: Fit,
+        rng: np.random.Generator,
+        draws: int = 2000,
+        level: float = DEFAULT_SETTINGS.alarm_level,
+    ) -> FamilyAlarm:
         """Test the present model: candidates by their evidence, the noise by the residual of the fit.
 
         Parameters
@@ -46,10 +53,12 @@ class FamilyAlarm:
         rng : Generator
         draws : int
             Simulated studies without any cause.
+        level : float
+            Family-wise probability of an alarm where nothing is lacking.
         """
         posterior = fit.posterior
         tests = noise_tests(posterior, fit) | variance_tests(posterior, fit) | encoder_test(posterior)
-        return FamilyAlarm(EvidenceAlarm.of(evidence, rng, draws), tests)
+        return FamilyAlarm(EvidenceAlarm.of(evidence, rng, draws), tests, level)
 
     @property
     def candidates_level(self) -> float:

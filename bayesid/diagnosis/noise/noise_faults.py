@@ -15,6 +15,7 @@ from bayesid.diagnosis.noise.encoder_fault import ENCODER_NOISE, encoder_noise, 
 from bayesid.diagnosis.noise.noise_tests import lattice, leverage
 from bayesid.diagnosis.noise.outlier_pattern import is_event
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference.noise_changes import leaving_out, with_sensors
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_view import ResidualView
@@ -22,9 +23,6 @@ from bayesid.simulation.effects.effect_parameters import Quantity
 from bayesid.simulation.sensors import Coloured, Quantised, Scaled, Sensor, SensorKind
 
 __all__ = ["SUMMARIES", "FittedFault", "noise_fault", "refined"]
-
-OUTLYING = 4.5
-"""Whitened residual from which a sample counts as an outlier."""
 
 LONGEST = 0.05
 """Longest correlation time of coloured noise, in lengths of a recording; beyond it is drift."""
@@ -76,7 +74,9 @@ class FittedFault:
         return SUMMARIES.get(name, SUMMARIES["noise"])
 
 
-def noise_fault(label: str, fit: Fit, least: float = -np.inf) -> FittedFault | None:
+def noise_fault(
+    label: str, fit: Fit, least: float = -np.inf, settings: DiagnosisSettings = DEFAULT_SETTINGS
+) -> FittedFault | None:
     """Estimate a noise fault from the residual of a fit and put it into the fit's posterior; None if it is no such.
 
     Parameters
@@ -85,12 +85,14 @@ def noise_fault(label: str, fit: Fit, least: float = -np.inf) -> FittedFault | N
     fit : Fit
     least : float
         Log likelihood that coloured noise has to gain, by the spectrum of the residual, to be of interest.
+    settings : DiagnosisSettings, optional
+        With the thresholds of outliers.
     """
     name, _, place = label.partition(":")
     if name == "coloured-noise":
         return _coloured(label, SensorKind.of(place), fit, least)
     if name == "outliers":
-        return _outliers(label, SensorKind.of(place), fit)
+        return _outliers(label, SensorKind.of(place), fit, settings)
     if name == "quantisation":
         return _quantisation(label, SensorKind.of(place), fit)
     if name == ENCODER_NOISE:
@@ -247,7 +249,7 @@ def _spread(points: Floats, values: Floats, otherwise: Floats) -> Floats:
     return np.sqrt(np.diag(np.linalg.inv(hessian)))
 
 
-def _outliers(label: str, kind: SensorKind, fit: Fit) -> FittedFault | None:
+def _outliers(label: str, kind: SensorKind, fit: Fit, settings: DiagnosisSettings) -> FittedFault | None:
     slot, whole = fit.posterior.model.channels.of(kind), fit.view.values
     masks = []
     outlying: list[Floats] = []
@@ -256,13 +258,13 @@ def _outliers(label: str, kind: SensorKind, fit: Fit) -> FittedFault | None:
         mask = np.zeros_like(item.outputs)
         own = whole[r, : len(mask), slot]
         scale = max(1.0, float(np.median(np.abs(own[item.outputs[:, slot]])) / 0.6745))
-        mask[:, slot] = item.outputs[:, slot] & (np.abs(own) > OUTLYING * scale)
+        mask[:, slot] = item.outputs[:, slot] & (np.abs(own) > settings.outlying * scale)
         mask |= fit.posterior.data.left_out[r]
         masks.append(mask)
         times = fit.posterior.data.recorded[r].time[item.rows]
         outlying.append(times[mask[:, slot].any(axis=1)])
         measured.append(times[(item.outputs | mask)[:, slot].any(axis=1)])
-    if is_event(outlying, measured):
+    if is_event(outlying, measured, settings.event_level):
         return None
     count, total = sum(map(len, outlying)), sum(map(len, measured))
     fraction = count / max(total, 1)

@@ -10,6 +10,7 @@ from bayesid.diagnosis.noise.encoder_fault import ENCODER_NOISE
 from bayesid.diagnosis.noise.noise_faults import FittedFault, noise_fault, refined
 from bayesid.diagnosis.noise.noise_tests import ON_LATTICE
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.simulation.sensors import SensorKind
@@ -18,9 +19,6 @@ __all__ = ["NoiseModel", "fault_names"]
 
 DECADES = 3.0
 """Decades over which the size of a fault is log-uniform beforehand, and the correlation time of coloured noise."""
-
-HOPELESS, BEHIND = 60.0, 20.0
-"""Nats by which a fault alone, as first estimated and refined, may be behind the best explanation to be weighed."""
 
 SAME = 0.2
 """Difference of the logarithms of two estimates of a fault's size, from different residuals, that leads to one end."""
@@ -72,7 +70,14 @@ class NoiseModel:
         """Logarithm of the evidence of the present model with these faults and no other cause."""
         return self.fit.log_evidence + self.log_charge
 
-    def with_fault(self, label: str, residual: Fit, best: float, known: NoiseModel | None = None) -> NoiseModel | None:
+    def with_fault(
+        self,
+        label: str,
+        residual: Fit,
+        best: float,
+        known: NoiseModel | None = None,
+        settings: DiagnosisSettings = DEFAULT_SETTINGS,
+    ) -> NoiseModel | None:
         """Return the model with one fault more, whose size is estimated from a residual.
 
         It is None if the residual shows no such fault, if the fault beside what the residual's fit holds would be far
@@ -88,9 +93,10 @@ class NoiseModel:
             Log evidence of the best explanation so far.
         known : NoiseModel, optional
             With a fault of this name, estimated from another residual.
+        settings : DiagnosisSettings, optional
         """
-        least = best - self.log_charge - HOPELESS
-        fault = noise_fault(label, residual, least - residual.log_evidence)
+        least = best - self.log_charge - settings.fault_estimate_far_behind
+        fault = noise_fault(label, residual, least - residual.log_evidence, settings)
         if fault is None or (known is not None and _alike(fault, known)):
             return None
         perturbed = self.perturbed.with_posterior(fault.posterior)
@@ -104,7 +110,8 @@ class NoiseModel:
         model = NoiseModel(
             (*self.faults, fault), perturbed, fit, self.log_charge + _log_charge(fault), self.bodies_fixed
         )
-        return None if residual is self.fit and model.log_nothing < best - BEHIND else model
+        far_behind = model.log_nothing < best - settings.fault_alone_far_behind
+        return None if residual is self.fit and far_behind else model
 
 
 def _alike(fault: FittedFault, known: NoiseModel) -> bool:

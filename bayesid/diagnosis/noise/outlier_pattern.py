@@ -9,6 +9,7 @@ import numpy as np
 from scipy import stats
 
 from bayesid._math.arrays import Floats
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 
 __all__ = ["is_event"]
 
@@ -18,11 +19,10 @@ NEIGHBOURS = 3
 TOGETHER = 1
 """Samples of two recordings whose times since the start are so few samples apart coincide."""
 
-LEVEL = 1e-3
-"""Probability of as many pairs by chance, below which outliers are an event."""
 
-
-def is_event(outlying: Sequence[Floats], measured: Sequence[Floats]) -> bool:
+def is_event(
+    outlying: Sequence[Floats], measured: Sequence[Floats], level: float = DEFAULT_SETTINGS.event_level
+) -> bool:
     """Return whether outliers crowd together, or recur at the same time of every recording, more than chance allows.
 
     Garbled readings fall anywhere. Something that lasts, such as a mass that moves, spoils samples next to each other,
@@ -35,6 +35,8 @@ def is_event(outlying: Sequence[Floats], measured: Sequence[Floats]) -> bool:
         Times of the outliers of each recording, increasing [s].
     measured : sequence of (n,) arrays
         Times of all its samples, the outliers among them [s].
+    level : float
+        Probability of as many pairs by chance, below which outliers are an event.
     """
     pairs, chance = 0, 0.0
     interval = max((float(np.median(np.diff(times))) for times in measured if len(times) > 1), default=0.0)
@@ -46,4 +48,4 @@ def is_event(outlying: Sequence[Floats], measured: Sequence[Floats]) -> bool:
         apart = np.abs(first[:, None] - second[None, :])
         pairs += int((apart < (TOGETHER + 0.5) * interval).sum())
         chance += (2 * TOGETHER + 1) * len(first) * len(second) / max(len(its), len(others), 1)
-    return bool(stats.poisson.sf(pairs - 1, chance) < LEVEL)
+    return bool(stats.poisson.sf(pairs - 1, chance) < level)

@@ -12,12 +12,13 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.candidates.catalogue_signatures import group_names
 from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
-from bayesid.diagnosis.evidence.evidence_alarm import FAMILY_LEVEL, EvidenceAlarm
+from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.response.effect_functions import CauseAmplitude, report_of, report_slopes
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.model_search import ModelSearch
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 from bayesid.simulation.effects.effect import Effect, Quantity
 
 __all__ = [
@@ -162,7 +163,7 @@ def cause_power(
     evidence: SetEvidence,
     alarm: EvidenceAlarm,
     rng: np.random.Generator,
-    level: float = FAMILY_LEVEL,
+    level: float = DEFAULT_SETTINGS.alarm_level,
     draws: int = 2000,
 ) -> float:
     """Return the probability that the evidence of a cause exceeds the family-wise threshold when it is at work alone.

@@ -20,15 +20,10 @@ from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.outcome.torque_events import ChosenEvents, EventCandidates, Taken
 from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference.residual_view import by_recording
 
 __all__ = ["DisturbingWrench", "Frame", "TorqueCorrelation", "disturbing_wrench", "torque_correlations"]
-
-DECIDED = 6.0
-"""Advantage in twice the log likelihood that names a frame."""
-
-SHARE = 0.6
-"""Share of what three free axes explain that one fixed direction must explain."""
 
 ROUNDS = 15  # of the alternating least squares
 MOST_CORRELATIONS = 12
@@ -84,7 +79,12 @@ class DisturbingWrench:
         write_text(file, "\n".join(lines) + "\n")
 
 
-def disturbing_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: bool = True) -> DisturbingWrench:
+def disturbing_wrench(
+    hypothesis: Hypothesis,
+    bank: SignatureBank,
+    name_frame: bool = True,
+    settings: DiagnosisSettings = DEFAULT_SETTINGS,
+) -> DisturbingWrench:
     """Reconstruct the disturbance that a fit leaves.
 
     Torque and force have the priors of the generic candidates: cosines in time whose variances fall beyond a corner,
@@ -98,6 +98,8 @@ def disturbing_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: b
         Bank under the hypothesis' noise, with the responses to cosines of torque and force.
     name_frame : bool
         Whether the disturbance itself is the answer: its events and the axes that it is fixed in are looked for.
+    settings : DiagnosisSettings, optional
+        With the thresholds for naming these axes.
     """
     fit = hypothesis.fit
     count = len(fit.posterior.manoeuvres)
@@ -159,7 +161,7 @@ def disturbing_wrench(hypothesis: Hypothesis, bank: SignatureBank, name_frame: b
         turned(force),
         list(torque_sd),
         list(force_sd),
-        _fixed_in(hypothesis, rotations, scale) if name_frame and snr > 0.0 else None,
+        _fixed_in(hypothesis, rotations, scale, settings) if name_frame and snr > 0.0 else None,
         disturbance.log_evidence,
     )
 
@@ -321,7 +323,12 @@ def _responses(hypothesis: Hypothesis, frames: Floats, samples: Floats) -> Float
     return block_diag(*by_recording(fit.posterior, perturbed.respond(push, fit.z, fit.data)))
 
 
-def _fixed_in(hypothesis: Hypothesis, rotations: dict[Frame, tuple[Floats, Floats]], scale: float) -> Frame | None:
+def _fixed_in(
+    hypothesis: Hypothesis,
+    rotations: dict[Frame, tuple[Floats, Floats]],
+    scale: float,
+    settings: DiagnosisSettings,
+) -> Frame | None:
     """Return the frame in which a torque of one direction, with a free course, explains most; None if undecided."""
     fit = hypothesis.fit
     explained = {}
@@ -339,9 +346,8 @@ def _fixed_in(hypothesis: Hypothesis, rotations: dict[Frame, tuple[Floats, Float
         explained[frame] = max(_one_direction(gram, gradient, scale, d) for d in np.eye(3))
     ranked = sorted(explained, key=lambda frame: -explained[frame])
     best, second = ranked[0], ranked[1]
-    if explained[best] < SHARE * whole or explained[best] - explained[second] < DECIDED:
-        return None
-    return best
+    undecided = explained[best] - explained[second] < settings.frame_advantage
+    return None if undecided or explained[best] < settings.frame_share * whole else best
 
 
 def _one_direction(gram: Floats, gradient: Floats, scale: float, direction: Floats) -> float:

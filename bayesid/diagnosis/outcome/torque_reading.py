@@ -28,6 +28,7 @@ from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Status, probable_verdict
 from bayesid.diagnosis.search.extended_model import extended_posterior, extended_start
 from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_view import ResidualView
@@ -106,6 +107,7 @@ def torques_beside(
     prior: CausePrior,
     rng: np.random.Generator,
     bounds: Mapping[str, Sequence[PhysicalBound]] | None = None,
+    settings: DiagnosisSettings = DEFAULT_SETTINGS,
 ) -> TorqueReading | TorquesNotRead:
     """Return what the joint torques say beside a verdict on the motion, see `read_torques`.
 
@@ -116,7 +118,7 @@ def torques_beside(
     if nameless or verdict.status in (Status.UNKNOWN, Status.UNRESOLVED):
         return TorquesNotRead("The motion shows something that has no name, and torques depend on the motion.")
     try:
-        return read_torques(hypothesis, model, prior, rng, bounds)
+        return read_torques(hypothesis, model, prior, rng, bounds, settings)
     except InputError as error:
         return TorquesNotRead(f"{error.problem[0].upper()}{error.problem[1:]}.")
 
@@ -181,6 +183,7 @@ def read_torques(
     prior: CausePrior,
     rng: np.random.Generator,
     bounds: Mapping[str, Sequence[PhysicalBound]] | None = None,
+    settings: DiagnosisSettings = DEFAULT_SETTINGS,
 ) -> TorqueReading:
     """Weigh what acts on the joint torques.
 
@@ -196,6 +199,7 @@ def read_torques(
         For the p-value.
     bounds : mapping of str to sequence of PhysicalBound, optional
         Largest plausible size of each candidate, by default what the effects state.
+    settings : DiagnosisSettings, optional
 
     Raises
     ------
@@ -209,7 +213,8 @@ def read_torques(
     evidence = SetEvidence(SignatureProducts.of(bank.signatures, fitted).gram(), bank.causes)
     alarm = EvidenceAlarm.of(evidence, rng)
     probabilities = enumerate_sets(evidence, prior)
-    verdict = probable_verdict(probabilities, [(effect.label,) for effect in candidates], alarm.silent())
+    silent = alarm.silent(settings.alarm_level)
+    verdict = probable_verdict(probabilities, [(effect.label,) for effect in candidates], silent, settings)
     named = [name for name in verdict.causes if name in evidence.catalogue]
     change: Floats | float = 0.0
     if named:

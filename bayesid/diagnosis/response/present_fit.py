@@ -17,20 +17,15 @@ from scipy.stats import chi2
 from bayesid._math.arrays import Floats
 from bayesid._math.least_squares import levenberg_marquardt
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 
 __all__ = ["PresentFit", "fit_present_model", "strayed", "with_bodies_held"]
-
-IMPROBABLE = 1e-6
-"""Prior probability of bodies as far from their centre as a fit has them, below which they stand in for something."""
 
 TOLERANCE = 1e-6
 """Relative tolerance with which a fit is followed; the last steps are those of `PerturbedModel.fit`."""
 
 EVALUATIONS = 300
 """Largest number of evaluations for that; a load of 37 times its guess takes 80."""
-
-MISFIT = 4.0
-"""Chi-square per sample below which a fit follows the data, whatever it makes of the bodies."""
 
 
 @dataclass(frozen=True)
@@ -48,25 +43,27 @@ class PresentFit:
     held: bool
 
 
-def strayed(fit: Fit) -> bool:
+def strayed(fit: Fit, settings: DiagnosisSettings = DEFAULT_SETTINGS) -> bool:
     """Return whether a fit has driven its bodies to where their prior all but excludes them, and fits badly there."""
     bodies = fit.z[fit.posterior.unknowns.layout.all_bodies]
     if not np.isfinite(fit.cost):
         return True
-    far = len(bodies) > 0 and chi2.sf(float(bodies @ bodies), len(bodies)) < IMPROBABLE
-    return bool(far and fit.chi2 > MISFIT * fit.posterior.samples)
+    far = len(bodies) > 0 and chi2.sf(float(bodies @ bodies), len(bodies)) < settings.bodies_improbable
+    return bool(far and fit.chi2 > settings.misfit * fit.posterior.samples)
 
 
-def fit_present_model(perturbed: PerturbedModel, z: Floats | None = None) -> PresentFit:
+def fit_present_model(
+    perturbed: PerturbedModel, z: Floats | None = None, settings: DiagnosisSettings = DEFAULT_SETTINGS
+) -> PresentFit:
     """Fit the present model, from the start or from a point (size,), and hold its bodies where every fit strays."""
     first = perturbed.fit(z=z)
-    if strayed(first) or not first.converged:
+    if strayed(first, settings) or not first.converged:
         first = min(first, _followed(perturbed, perturbed.start() if z is None else z), key=lambda fit: fit.cost)
-    if not strayed(first):
+    if not strayed(first, settings):
         return PresentFit(first, held=False)
     held = _fit_beside_bodies(perturbed)
     again = perturbed.fit(z=held.z)
-    return PresentFit(held, held=True) if strayed(again) else PresentFit(again, held=False)
+    return PresentFit(held, held=True) if strayed(again, settings) else PresentFit(again, held=False)
 
 
 def bodies_frozen(perturbed: PerturbedModel) -> PerturbedModel:

@@ -24,14 +24,12 @@ from bayesid.diagnosis.noise.noise_model import FittedFault
 from bayesid.diagnosis.response.effect_functions import physical
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.search.linearisation import Linearisation
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.instant import Resonance
 
 __all__ = ["Hypothesis", "fit_hypothesis", "fit_in_amplitudes"]
-
-FAR = 20.0
-"""Difference from the predicted cost beyond which a fit in amplitudes is started anew [nats]."""
 
 MOST_STARTS = 6
 """Most starting points of the fit of a hypothesis."""
@@ -63,7 +61,12 @@ class Hypothesis:
         return (*(effect.candidate for effect in self.fit.effects), *released, *(fault.label for fault in self.faults))
 
 
-def fit_in_amplitudes(point: Linearisation, effects: Sequence[Effect], released: bool = False) -> tuple[Fit, float]:
+def fit_in_amplitudes(
+    point: Linearisation,
+    effects: Sequence[Effect],
+    released: bool = False,
+    restart_from: float = DEFAULT_SETTINGS.restart_from,
+) -> tuple[Fit, float]:
     """Fit causes that are linear in their amplitudes, with all unknowns and the scales that the Gram finds likeliest.
 
     Where the fit does not end where the linear model says, it is started from the prior's centre as well, since the
@@ -77,6 +80,8 @@ def fit_in_amplitudes(point: Linearisation, effects: Sequence[Effect], released:
         The causes, none of which vibrates.
     released : bool
         Whether the initial rates that the study takes to be zero are among the causes.
+    restart_from : float
+        Difference from the predicted cost beyond which the fit is started anew [nats].
 
     Returns
     -------
@@ -109,7 +114,7 @@ def fit_in_amplitudes(point: Linearisation, effects: Sequence[Effect], released:
     frozen = point.perturbed.frozen
     expected = point.predicted_cost - gain
     fit = perturbed.fit(scaled, start, z=z, operating=None if released else point.fit.operating)
-    if abs(fit.cost - expected) > FAR and not point.far:  # far from the data no fit finds them from the centre
+    if abs(fit.cost - expected) > restart_from and not point.far:  # far from the data no fit finds them from the centre
         fresh = perturbed.fit(scaled, [np.zeros_like(own) for own in start])
         fit = fresh if fresh.cost < fit.cost else fit
     if not released:

@@ -23,6 +23,7 @@ from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.response.followed_motion import follow
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.response.present_fit import with_bodies_held
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference.residual_view import rows_of
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.physical_bound import PhysicalBound
@@ -42,11 +43,14 @@ class Catalogue:
         Largest plausible sizes of each candidate, by its label.
     prior : CausePrior
         Of the number of causes, and of something generic.
+    settings : DiagnosisSettings
+        By which the search among them decides.
     """
 
     effects: tuple[Effect, ...]
     bounds: Mapping[str, Sequence[PhysicalBound]]
     prior: CausePrior
+    settings: DiagnosisSettings = DEFAULT_SETTINGS
 
     @property
     def vibrations(self) -> list[str]:

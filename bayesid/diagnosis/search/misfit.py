@@ -14,6 +14,7 @@ from bayesid.diagnosis.noise.structure_tests import structure_tests
 from bayesid.diagnosis.search.extended_model import exactly_fitted
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.model_search import ModelSearch
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.simulation.effects.effect import Effect
 
 __all__ = ["UNNAMED", "log_odds_of_anything", "log_p_of_misfit", "with_misfit"]
@@ -21,14 +22,10 @@ __all__ = ["UNNAMED", "log_odds_of_anything", "log_p_of_misfit", "with_misfit"]
 UNNAMED = "something beside the fitted causes"
 """Generic candidate that has no form: whatever the fitted causes leave."""
 
-MOST_FITS = 4
-"""Most sets that are fitted in full, the most probable first."""
 
-LIKELY = 0.05
-"""Probability from which a set is fitted in full."""
-
-
-def with_misfit(search: ModelSearch, effects: Sequence[Effect]) -> tuple[ModelSearch, dict[frozenset[str], Hypothesis]]:
+def with_misfit(
+    search: ModelSearch, effects: Sequence[Effect], settings: DiagnosisSettings = DEFAULT_SETTINGS
+) -> tuple[ModelSearch, dict[frozenset[str], Hypothesis]]:
     """Fit the most probable sets of causes in full, and weigh that they do not suffice.
 
     The probabilities come from linear signatures. A set that does not follow the data once its effects are simulated
@@ -41,6 +38,7 @@ def with_misfit(search: ModelSearch, effects: Sequence[Effect]) -> tuple[ModelSe
     search : ModelSearch
     effects : sequence of Effect
         Candidates of the catalogue.
+    settings : DiagnosisSettings, optional
 
     Returns
     -------
@@ -55,10 +53,10 @@ def with_misfit(search: ModelSearch, effects: Sequence[Effect]) -> tuple[ModelSe
     found = search.probabilities
     generics = (*found.generics, UNNAMED)
     found = SetProbabilities.of(found.sets, found.causes, generics, found.prior)
-    for _ in range(MOST_FITS):
+    for _ in range(settings.most_full_fits):
         known = (item for item in found.sets if item.causes and item.generic is None)
         best = next((item for item in known if frozenset(item.causes) not in fitted), None)
-        if best is None or best.probability < LIKELY:
+        if best is None or best.probability < settings.fitted_in_full_from:
             break
         under = search.under(best.causes)
         try:

@@ -18,17 +18,9 @@ from bayesid.diagnosis.noise.noise_tests import noise_tests
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.search.linearisation import Catalogue, Linearisation, linearise, linearise_along_data
 from bayesid.diagnosis.search.relinearise import SetSearch, plausible_vibrations, search_sets, with_fitted_vibrations
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 
 __all__ = ["ModelSearch", "search_models"]
-
-MATTERS = 3e-3
-"""Probability from which a set is evaluated anew under other ranges of the scales."""
-
-FAR_BEHIND = 10.0
-"""Nats by which the sets under a fault may be expected to stay behind the best explanation to be weighed."""
-
-SUSPECT = 1e-3
-"""Local p-value of a test of the noise below which the fault is weighed as a cause."""
 
 
 @dataclass(frozen=True)
@@ -44,12 +36,14 @@ class ModelSearch:
         Under the noise as declared first, then under the faults that were weighed.
     probabilities : SetProbabilities
         Of sets of causes, faults of the noise among them.
+    settings : DiagnosisSettings
     """
 
     base: Linearisation
     alarm: FamilyAlarm
     searches: tuple[SetSearch, ...]
     probabilities: SetProbabilities
+    settings: DiagnosisSettings = DEFAULT_SETTINGS
 
     def under(self, causes: Sequence[str]) -> SetSearch:
         """Return the search under the faults of the noise that are among some causes."""
@@ -67,7 +61,7 @@ class ModelSearch:
         bound, floor : float
         """
         found = self.probabilities
-        matter = {name for item in found.sets if item.probability >= MATTERS for name in item.names}
+        matter = {name for item in found.sets if item.probability >= self.settings.matters for name in item.names}
         wider = {
             search.noise.names: SetEvidence(
                 search.point.evidence.gram,
@@ -84,7 +78,7 @@ class ModelSearch:
             search = self.under(item.causes)
             evidence = search.point.evidence
             names = [name for name in item.names if name in evidence.causes]
-            if item.probability >= MATTERS and names:
+            if item.probability >= self.settings.matters and names:
                 forms = [evidence.forms(names)]
                 change = wider[search.noise.names].log_evidence(names, forms) - evidence.log_evidence(names, forms)
                 item = replace(item, log_evidence=item.log_evidence + change)
@@ -93,7 +87,7 @@ class ModelSearch:
 
     def classes(self) -> tuple[tuple[str, ...], ...]:
         """Return the causes in classes of equivalents; a fault of the noise is a class of its own."""
-        classes = classes_of_equivalents(self.searches[0].point.evidence)
+        classes = classes_of_equivalents(self.searches[0].point.evidence, self.settings.visible_information)
         members = {name for names in classes for name in names}
         return (*classes, *((name,) for name in self.probabilities.causes if name not in members))
 
@@ -124,12 +118,12 @@ def search_models(
     progress(0.2, "computing what each candidate would change")
     base = linearise_along_data(perturbed, catalogue) if bodies_fixed else linearise(perturbed, fit, catalogue)
     progress(0.4, "testing the present model")
-    alarm = FamilyAlarm.of(base.evidence, fit, rng)
+    alarm = FamilyAlarm.of(base.evidence, fit, rng, level=catalogue.settings.alarm_level)
     faults = fault_names(perturbed.posterior)
     declared = NoiseModel((), base.perturbed, base.fit, 0.0, base.bodies_fixed)
     if alarm.silent:
         single = SetSearch(declared, base, enumerate_sets(base.evidence, catalogue.prior, largest=1), base.fit)
-        return ModelSearch(base, alarm, (single,), _joined([single], faults))
+        return ModelSearch(base, alarm, (single,), _joined([single], faults), catalogue.settings)
     progress(0.5, "weighing the sets of causes")
     first = search_sets(declared, catalogue, base)
     base = base.without_products()
@@ -143,7 +137,7 @@ def search_models(
             searches = _with_faults(fitted, alarm, catalogue, progress)
         else:
             searches = [fitted if search is likeliest else search for search in searches]
-    return ModelSearch(base, alarm, tuple(searches), _joined(searches, faults))
+    return ModelSearch(base, alarm, tuple(searches), _joined(searches, faults), catalogue.settings)
 
 
 def _joined(searches: Sequence[SetSearch], faults: Sequence[str]) -> SetProbabilities:
@@ -166,6 +160,7 @@ def _with_faults(first: SetSearch, alarm: FamilyAlarm, catalogue: Catalogue, pro
     declared noise. Faults with which the best explanation would stay behind even so are left out; the others are
     weighed with all sets of causes, the most promising first.
     """
+    settings, log_suspect = catalogue.settings, float(np.log(catalogue.settings.suspect_p_value))
     reach = first.highest - first.log_nothing
     models: dict[tuple[str, ...], NoiseModel] = {}
     searches = {first.noise.names: first}
@@ -179,36 +174,36 @@ def _with_faults(first: SetSearch, alarm: FamilyAlarm, catalogue: Catalogue, pro
                 continue
             progress(0.6, f"fitting {label}")
             known = models.get(tuple(sorted((*before.names, label))))
-            model = before.with_fault(label, residual, best().highest, known)
+            model = before.with_fault(label, residual, best().highest, known, settings)
             if model is not None and (known is None or model.log_nothing > known.log_nothing):
                 models[model.names] = model
                 searches.pop(model.names, None)
 
     def weigh() -> None:
         for model in sorted(models.values(), key=lambda model: -model.log_nothing):
-            if model.names in searches or model.log_nothing + reach < best().highest - FAR_BEHIND:
+            if model.names in searches or model.log_nothing + reach < best().highest - settings.fault_far_behind:
                 continue
             progress(0.6, f"weighing the causes beside {' and '.join(model.names)}")
             searches[model.names] = search_sets(model, catalogue)
             give_back_memory()
 
-    fit(first.noise, _suspects(alarm, first))
+    fit(first.noise, _suspects(alarm, first, log_suspect))
     if models:
         loudest = max(models.values(), key=lambda model: model.log_nothing)
-        fit(loudest, [(label, loudest.fit) for label in _seen(loudest.fit)])
+        fit(loudest, [(label, loudest.fit) for label in _seen(loudest.fit, log_suspect)])
     weigh()
     if best() is not first:
-        fit(best().noise, [(label, best().best) for label in _seen(best().best)])
+        fit(best().noise, [(label, best().best) for label in _seen(best().best, log_suspect)])
         weigh()
     return list(searches.values())
 
 
-def _seen(fit: Fit) -> list[str]:
+def _seen(fit: Fit, log_suspect: float) -> list[str]:
     """Return the names of the faults that a residual shows."""
-    return [name for name, log_p in noise_tests(fit.posterior, fit).items() if log_p < np.log(SUSPECT)]
+    return [name for name, log_p in noise_tests(fit.posterior, fit).items() if log_p < log_suspect]
 
 
-def _suspects(alarm: FamilyAlarm, first: SetSearch) -> list[tuple[str, Fit]]:
+def _suspects(alarm: FamilyAlarm, first: SetSearch, log_suspect: float) -> list[tuple[str, Fit]]:
     """Return the faults of the noise to weigh, each with the fit from whose residual its size follows.
 
     What the best set leaves counts first; a fault that only the present model's residual shows may yet explain all of
@@ -217,10 +212,10 @@ def _suspects(alarm: FamilyAlarm, first: SetSearch) -> list[tuple[str, Fit]]:
     time.
     """
     best, base = first.best, first.noise.fit
-    suspects = [(name, best) for name in _seen(best)]
+    suspects = [(name, best) for name in _seen(best, log_suspect)]
     of_best = {name for name, _ in suspects}
     for name, log_p in () if first.noise.bodies_fixed else alarm.noise.items():
-        if log_p < np.log(SUSPECT) and not name.startswith("variance"):
+        if log_p < log_suspect and not name.startswith("variance"):
             again = best is not base and name.startswith("coloured-noise")
             if name not in of_best or again:
                 suspects.append((name, base))

@@ -29,22 +29,6 @@ from bayesid.simulation.effects.mass_shift import MassShift
 
 __all__ = ["SetSearch", "plausible_vibrations", "search_sets", "with_fitted_vibrations"]
 
-AGREES = 0.5
-"""Difference between the cost of a fit and its linear prediction below which the linear evidence stands [nats]."""
-
-ROUNDS = 3
-"""Most linearisations about the best set."""
-
-LARGE = 50.0
-"""Log evidence of a cause beside the others of a fit from which no linear model can leave it out [nats]: that of ten
-standard deviations."""
-
-PLAUSIBLE = 0.01
-"""Probability from which a vibration is tuned and fitted, and with it all others of the catalogue."""
-
-BEHIND = 40.0
-"""Nats behind the best vibration from which the fit of another is not followed to its end."""
-
 
 @dataclass(frozen=True)
 class SetSearch:
@@ -98,15 +82,15 @@ def search_sets(noise: NoiseModel, catalogue: Catalogue, base: Linearisation | N
         point, found = _about_large_causes(point, found, catalogue)
         best = point.fit
     else:
-        for _ in range(ROUNDS):
+        for _ in range(catalogue.settings.most_linearisations):
             chosen, released = _best_known(found, catalogue)
             if not chosen and not released:
                 break
-            fit, expected = fit_in_amplitudes(point, chosen, released)
+            fit, expected = fit_in_amplitudes(point, chosen, released, catalogue.settings.restart_from)
             if not np.isfinite(fit.cost) or fit.cost > best.cost:
                 break
             best = fit
-            if abs(fit.cost - expected) < AGREES:
+            if abs(fit.cost - expected) < catalogue.settings.agrees:
                 break
             point = _with_bursts(linearise(point.perturbed, best, catalogue))
             point, found = _tuned(point, enumerate_sets(point.evidence, catalogue.prior), catalogue)
@@ -138,29 +122,29 @@ def _about_large_causes(
     near: dict[frozenset[str], _Near] = {}
     fitted: set[frozenset[str]] = set()
     point, along = base, found
-    for _ in range(ROUNDS):
+    for _ in range(catalogue.settings.most_linearisations):
         chosen, released = _best_known(found, catalogue)
         names = frozenset([*(effect.label for effect in chosen), *([INITIAL_RATE] if released else [])])
         if not names or names in fitted:
             break
-        fit, _ = fit_in_amplitudes(base, chosen, released)
+        fit, _ = fit_in_amplitudes(base, chosen, released, catalogue.settings.restart_from)
         if not np.isfinite(fit.cost):
             break
         fitted.add(names)
         point = _with_bursts(linearise(base.perturbed, fit, catalogue, far=True))
-        large = _large(point, names)
+        large = _large(point, names, catalogue.settings.cannot_be_left_out)
         near[large] = _Near(point, enumerate_sets(point.evidence, catalogue.prior, beside=large))
         found = _nearest(_Near(base, along), near, point.log_nothing)
     return point, found
 
 
-def _large(point: Linearisation, names: frozenset[str]) -> frozenset[str]:
+def _large(point: Linearisation, names: frozenset[str], least: float) -> frozenset[str]:
     """Return the causes of a fit without which its motion would be another: bodies do not make up for them."""
     evidence = point.with_bodies_fixed().evidence
     rest = {name: names - {name} for name in names}
     whole = evidence.log_evidence(names)
     return frozenset(
-        name for name, others in rest.items() if whole - (evidence.log_evidence(others) if others else 0.0) > LARGE
+        name for name, others in rest.items() if whole - (evidence.log_evidence(others) if others else 0.0) > least
     )
 
 
@@ -214,7 +198,7 @@ def plausible_vibrations(found: SetProbabilities, catalogue: Catalogue) -> dict[
     catalogue : Catalogue
     """
     inclusion = found.inclusion
-    if not any(inclusion[label] > PLAUSIBLE for label in catalogue.vibrations):
+    if not any(inclusion[label] > catalogue.settings.plausible for label in catalogue.vibrations):
         return {}
     return _companies(found, catalogue.vibrations)
 
@@ -249,7 +233,8 @@ def with_fitted_vibrations(search: SetSearch, catalogue: Catalogue) -> SetSearch
         names = tuple(sorted((*others, label)))
         linear[label, names] = each[names] if names in each else point.evidence.log_evidence(names)
     for label, names in sorted(linear, key=lambda key: -linear[key]):
-        hopeless = min((fit.cost for fit in fits.values()), default=np.inf) + BEHIND
+        hopeless = min((fit.cost for fit in fits.values()), default=np.inf)
+        hopeless += catalogue.settings.vibration_far_behind
         try:
             fits[label] = search.fit(names, catalogue.effects, hopeless).fit
         except InputError:  # no motion with this vibration

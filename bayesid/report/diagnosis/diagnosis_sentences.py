@@ -8,7 +8,7 @@ from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Hypothesis, Status, TorqueReading, TorquesNotRead
 from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.candidates.jump_instants import jump_instants
-from bayesid.diagnosis.evidence.verdict import COVERED, NAMED, UNKNOWN
+from bayesid.diagnosis.evidence.verdict import UNKNOWN
 from bayesid.diagnosis.noise.noise_faults import SUMMARIES
 from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
 from bayesid.report.diagnosis.cause_words import NOTHING, amplitude_text, probability_text, set_text
@@ -111,7 +111,8 @@ def verdict_sentence(result: Diagnosis) -> str:
             names = "; or ".join(map(set_text, result.alternatives))
             return (
                 f"Ambiguous: what the simulation leaves comes from {names}. Together these alternatives have a "
-                f"probability of at least {format_percent(COVERED, 2)}, and the recordings do not decide between them."
+                f"probability of at least {format_percent(result.settings.covered, 2)}, and the recordings do not "
+                "decide between them."
             )
         case Status.UNRESOLVED:
             sets = result.probabilities.sets[:SHOWN_SETS]
@@ -140,8 +141,8 @@ def _nearly_certain(result: Diagnosis) -> str:
     one = len(certain) == 1
     return (
         f" Beside it {'the cause' if one else 'the causes'} {joined(certain)} {'has' if one else 'have'} a probability "
-        f"of {format_percent(NAMED, 2)} or more {'and is' if one else 'each and are'} not named, since what has no "
-        "name may imitate a part of any cause."
+        f"of {format_percent(result.settings.named_from, 2)} or more {'and is' if one else 'each and are'} not named, "
+        "since what has no name may imitate a part of any cause."
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from bayesid.diagnosis import Candidate, Diagnosis, Status
-from bayesid.diagnosis.evidence.verdict import COVERED, MOST_ALTERNATIVES, NAMED
 from bayesid.diagnosis.outcome.inseparable_causes import CausePair
 from bayesid.inference.predicted_readings import integration_error_at
 from bayesid.report.diagnosis.cause_words import limit_text
@@ -78,7 +77,7 @@ def add_assumptions(document: Document, result: Diagnosis) -> None:
 
 def method_sentences(result: Diagnosis) -> Iterator[str]:
     """Return how the verdict was reached."""
-    prior, probabilities = result.probabilities.prior, result.probabilities
+    prior, probabilities, settings = result.probabilities.prior, result.probabilities, result.settings
     yield (
         f"An alarm is raised where the loudest of {result.alarm.tests} tests together is as loud as noise alone "
         f"makes it in less than {100.0 * result.alarm.level:g} % of cases, all dependence between the tests included."
@@ -99,9 +98,10 @@ def method_sentences(result: Diagnosis) -> Iterator[str]:
         "the data cannot resolve and the physical bound is equally probable."
     )
     yield (
-        f"Causes are named where the class of each has a probability of {NAMED:g} or more. Otherwise the verdict is "
-        f"ambiguous if two to {MOST_ALTERNATIVES} alternatives hold {format_number(100.0 * COVERED)} %, and unresolved "
-        "if more are needed. It is unknown if candidates that name nothing hold the majority."
+        f"Causes are named where the class of each has a probability of {settings.named_from:g} or more. Otherwise the "
+        f"verdict is ambiguous if two to {settings.most_alternatives} alternatives hold "
+        f"{format_number(100.0 * settings.covered)} %, and unresolved if more are needed. It is unknown if candidates "
+        "that name nothing hold the majority."
     )
     if result.held:
         yield (

@@ -1,0 +1,136 @@
+"""Every number by which a diagnosis decides something, beside the prior of causes and their bounds.
+
+Numbers that only say how finely something is computed, such as nodes, steps and tolerances, stand beside their code.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+__all__ = ["DEFAULT_SETTINGS", "DiagnosisSettings"]
+
+
+@dataclass(frozen=True)
+class DiagnosisSettings:
+    """Thresholds of a diagnosis.
+
+    Attributes
+    ----------
+    alarm_level : float
+        Probability of an alarm where nothing is lacking, all candidates and tests of the noise together. Of a hundred
+        studies that lack nothing, one is not called adequate.
+    named_from : float
+        Probability of its class from which on a cause is named without rivals. With the prior of 0.1 for one cause, at
+        most one study in 73 that lacks nothing names one (`CausePrior`).
+    covered : float
+        Probability that the alternatives of an ambiguous verdict have together.
+    most_alternatives : int
+        Alternatives that are named; where more are needed, none is, since a longer list decides nothing.
+    unknown_from : float
+        Probability of something generic above which the verdict is unknown: the majority.
+    visible_information : float
+        Information on amplitudes at the bound of their scale, in the most visible direction, from which on the data see
+        a difference between two causes: one, where posterior and prior are equally wide.
+    suspect_p_value : float
+        Local p-value of a test of the noise below which the fault is weighed as a cause. Larger than the alarm's, since
+        the fault has its evidence weighed and charged anyway.
+    fault_far_behind : float
+        Nats by which the sets under a fault may be expected to stay behind the best explanation to be weighed; further
+        back they have less than 1 part in 20,000 of its probability.
+    fault_estimate_far_behind : float
+        Nats by which a fault as first estimated, before it is refined, may be behind the best explanation.
+    fault_alone_far_behind : float
+        Nats by which a refined fault without causes may be behind it.
+    outlying : float
+        Whitened residual from which a sample counts as an outlier [standard deviations]; noise has one in 150,000.
+    event_level : float
+        Probability of as many coincident outliers by chance below which they are an event and no fault of the noise.
+    matters : float
+        Probability from which a set is evaluated anew under other ranges of the scales: a third of a per cent.
+    agrees : float
+        Difference between the cost of a fit and its linear prediction below which the linear evidence stands [nats].
+    most_linearisations : int
+        Linearisations about the best set, of which the third hardly changes anything.
+    cannot_be_left_out : float
+        Log evidence of a cause beside the others of a fit from which no linear model can leave it out [nats]: that of
+        ten standard deviations.
+    plausible : float
+        Probability from which a vibration is tuned and fitted, and the instants of a jump are sought.
+    vibration_far_behind : float
+        Nats behind the best vibration from which the fit of another is not followed to its end.
+    restart_from : float
+        Difference from the predicted cost beyond which a fit in amplitudes is started anew from the prior's centre
+        [nats].
+    fitted_in_full_from : float
+        Probability from which a set is fitted in full and judged by what it leaves.
+    most_full_fits : int
+        Sets that are fitted in full, the most probable first.
+    bodies_improbable : float
+        Prior probability of bodies as far from their centre as a fit has them, below which they stand in for something
+        that the model lacks.
+    misfit : float
+        Chi-square per sample below which a fit follows the data, whatever it makes of the bodies.
+    frame_advantage : float
+        Advantage in twice the log likelihood that names the axes in which a disturbance keeps its direction.
+    frame_share : float
+        Share of what three free axes explain that one fixed direction must explain to be named.
+    weak_power : float
+        Power below which a candidate could hardly have been seen.
+    trusted_from : float
+        Probability that nothing is lacking from which on a loop trusts its model in spite of an alarm.
+    """
+
+    alarm_level: float = 0.01
+    named_from: float = 0.9
+    covered: float = 0.95
+    most_alternatives: int = 4
+    unknown_from: float = 0.5
+    visible_information: float = 1.0
+    suspect_p_value: float = 1e-3
+    fault_far_behind: float = 10.0
+    fault_estimate_far_behind: float = 60.0
+    fault_alone_far_behind: float = 20.0
+    outlying: float = 4.5
+    event_level: float = 1e-3
+    matters: float = 3e-3
+    agrees: float = 0.5
+    most_linearisations: int = 3
+    cannot_be_left_out: float = 50.0
+    plausible: float = 0.01
+    vibration_far_behind: float = 40.0
+    restart_from: float = 20.0
+    fitted_in_full_from: float = 0.05
+    most_full_fits: int = 4
+    bodies_improbable: float = 1e-6
+    misfit: float = 4.0
+    frame_advantage: float = 6.0
+    frame_share: float = 0.6
+    weak_power: float = 0.5
+    trusted_from: float = 0.05
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            top = 1.0 if name in _PROBABILITIES else np.inf
+            if not 0.0 < value < top:
+                raise ValueError(f"{name} must be positive and below {top:g}, received {value}")
+
+
+_PROBABILITIES = {
+    "alarm_level",
+    "named_from",
+    "covered",
+    "unknown_from",
+    "suspect_p_value",
+    "event_level",
+    "matters",
+    "plausible",
+    "fitted_in_full_from",
+    "bodies_improbable",
+    "frame_share",
+    "weak_power",
+    "trusted_from",
+}
+
+DEFAULT_SETTINGS = DiagnosisSettings()
