@@ -16,8 +16,8 @@ from bayesid.robot.kinematics import kinematics
 from bayesid.robot.log_cholesky import relative_coordinates
 from bayesid.robot.robot import Load, Robot
 from bayesid.robot.robot_size import RobotSize, beyond_joint, half_edges, link_radius
-from bayesid.simulation.atmosphere import SURGE, largest_density
 from bayesid.simulation.effects import Effect, Parameter, PhysicalBound, Prior, bounds_by_label, create, known_effects
+from bayesid.simulation.effects.environment_effects import SURGE, largest_density
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Model
 from bayesid.simulation.orbit import EARTH_RADIUS, Orbit

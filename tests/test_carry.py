@@ -18,7 +18,7 @@ from bayesid.app.study_to_model import load_model, load_robot
 from bayesid.inference.noise_changes import leaving_out, with_manoeuvres
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, joint_prior
-from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
+from bayesid.inference.predicted_readings import blank_channels, simulate_recordings
 from bayesid.inference.unknowns import Unknowns
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, draw_inertial

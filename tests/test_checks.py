@@ -22,8 +22,8 @@ from bayesid import (
     SensorKind,
     White,
 )
+from bayesid.inference.predicted_readings import simulate_manoeuvre
 from bayesid.inference.recording_check import check_recording
-from bayesid.inference.simulated_recordings import simulate_manoeuvre
 
 SIGMA = 1e-5
 TIME = np.arange(0.0, 140.01, 0.5)  # at rest from 100 s

@@ -11,9 +11,8 @@ import pytest
 from bayesid.inference.collapsed_proposal import CollapsedProposal, collapsed_proposal, wide_coordinates
 from bayesid.inference.ensemble import sample
 from bayesid.inference.mode import Optimum, maximise
-from bayesid.inference.parameterisation import LinearParameterisation
+from bayesid.inference.parameterisation import LinearParameterisation, StudentT
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.proposal import StudentT
 from bayesid.simulation.effects import LinkInertia
 
 pytestmark = pytest.mark.slow

@@ -15,8 +15,7 @@ from bayesid.identifiability.parameter_table import Draws, Method, quantity_of, 
 from bayesid.identifiability.practical_identifiability import covers_all
 from bayesid.identifiability.profile_interval import Target, profile
 from bayesid.inference import maximise
-from bayesid.inference.body_quantities import linearise
-from bayesid.inference.contraction import Contraction, ContractionVerdict, compare
+from bayesid.inference.body_quantities import Contraction, ContractionVerdict, compare, linearise
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion

@@ -13,8 +13,7 @@ import bayesid
 from bayesid import BodyPrior, Excitation, Manoeuvre, Model, Posterior, Robot, Sensor, SensorKind, White
 from bayesid.inference import maximise
 from bayesid.inference.body_quantities import bodies_of
-from bayesid.inference.predicted_readings import integration_error_at
-from bayesid.inference.simulated_recordings import simulate_manoeuvre
+from bayesid.inference.predicted_readings import integration_error_at, simulate_manoeuvre
 from studies.truth.bodies import BRANCHED, SERVICER4
 from studies.truth.mujoco import Hidden, Manoeuvres, Rotor, Sensors, Thrust, write_study
 

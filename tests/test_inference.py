@@ -20,8 +20,7 @@ from bayesid.inference.identification import identify
 from bayesid.inference.importance import importance_sample
 from bayesid.inference.mode import Optimum, fit, maximise
 from bayesid.inference.noise_changes import with_manoeuvres
-from bayesid.inference.parameterisation import LogCholeskyParameterisation
-from bayesid.inference.proposal import StudentT
+from bayesid.inference.parameterisation import LogCholeskyParameterisation, StudentT
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.robot.body_prior import coordinates_of
 from bayesid.simulation.model import Manoeuvre

@@ -18,8 +18,8 @@ import pytest
 from bayesid._math.kept_jit import forget_executables, kept_jit
 from bayesid.app.compilation_cache import keep_compiled
 from bayesid.simulation.effects import AerodynamicDrag, WheelMomentum
-from bayesid.simulation.effects.effect_key import EffectKey
 from bayesid.simulation.sensors import SensorKind
+from bayesid.simulation.simulator import EffectKey
 
 TRACED: list[object] = []
 

@@ -10,8 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from bayesid.inference.linear_responses import LinearResponses
-from bayesid.inference.perturbed_posterior import Perturbation, perturbed, residual_of
+from bayesid.inference.perturbed_posterior import LinearResponses, Perturbation, perturbed, residual_of
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import (
     FlexibleAppendage,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 
-from bayesid._math.log_sum import log_sum, log_sums
+from bayesid._math.arrays import log_sum, log_sums
 
 
 @pytest.mark.parametrize("shape", [(1,), (7,), (3, 4, 5)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bayesid._io.errors import InputError
-from bayesid.inference.recorded_samples import RecordedSamples
+from bayesid.inference.data import RecordedSamples
 from bayesid.recording.joint_motion import Excitation, MeasuredMotion, sample_joints
 from bayesid.recording.plausibility import refuse_impossible_motion
 from bayesid.recording.recording import Recording

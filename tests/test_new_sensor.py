@@ -19,9 +19,14 @@ from bayesid.diagnosis import diagnose
 from bayesid.inference.mode import maximise
 from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.predicted_readings import noise_of, noisy, predicted_readings
+from bayesid.inference.predicted_readings import (
+    blank_channels,
+    noise_of,
+    noisy,
+    predicted_readings,
+    simulate_recordings,
+)
 from bayesid.inference.recording_check import check_recording
-from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
 from bayesid.recording.joint_motion import Excitation, MeasuredMotion, sample_joints
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior

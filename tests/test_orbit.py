@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from bayesid._io.errors import InputError
-from bayesid._math.rotation import rotation
+from bayesid._math.small_matrices import rotation
 from bayesid.robot.composite_tables import link_table
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics

@@ -16,8 +16,8 @@ from bayesid._io.words import abridged, counted, joined, ordinal
 from bayesid.inference import identify
 from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import sensor_fits
 from bayesid.inference.residual_view import ResidualView
-from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.joint_motion import Excitation, sample_joints
 from bayesid.recording.recording import Recording
 from bayesid.report import Document, figures, format_quantity, identification_report

@@ -33,8 +33,8 @@ from bayesid.diagnosis.outcome.disturbance import torque_correlations
 from bayesid.diagnosis.outcome.inseparable_causes import cause_cosines
 from bayesid.diagnosis.outcome.model_change import strongest_recording
 from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes, torque_spectrum
+from bayesid.inference.predicted_readings import sensor_fits
 from bayesid.inference.residual_view import ResidualView
-from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.recording.recording import Recording
 from bayesid.report import diagnosis_report, figures
 from bayesid.report.diagnosis import diagnosis_sentences as sentences

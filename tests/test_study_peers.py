@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bayesid.inference.proposal import StudentT
+from bayesid.inference.parameterisation import StudentT
 from studies.common.monte_carlo import run_trials
 from studies.common.study import Verdict
 from studies.peers.contest import REFERENCE, Recipe, attempt, lines, tasks

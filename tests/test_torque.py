@@ -10,25 +10,23 @@ import pinocchio as pin
 import pytest
 
 from bayesid._io.errors import InputError
+from bayesid.inference.data import RecordedSamples
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.predicted_readings import predicted_readings
-from bayesid.inference.recorded_samples import RecordedSamples
-from bayesid.inference.simulated_recordings import simulate_recordings
+from bayesid.inference.predicted_readings import predicted_readings, simulate_recordings
 from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.inertial_parameters import InertialParameters
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.robot import Robot
-from bayesid.simulation.channels import Channels
 from bayesid.simulation.effects import EncoderOffset, GravityGradient, JointFriction, LinkInertia, TorqueBias
 from bayesid.simulation.instant import Environment
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Sensor, SensorKind, White
+from bayesid.simulation.sensors import Channels, Sensor, SensorKind, White
 from studies.truth import mujoco as mj
 from studies.truth.bodies import moving_joints
 from tests.conftest import ROOT

@@ -14,9 +14,8 @@ from bayesid.inference import identify
 from bayesid.inference.body_quantities import bodies_of
 from bayesid.inference.mode import fit
 from bayesid.inference.noise_changes import relinearised, with_manoeuvres
-from bayesid.inference.parameterisation import LinearParameterisation
+from bayesid.inference.parameterisation import LinearParameterisation, StudentT
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.proposal import StudentT
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, draw_inertial

@@ -1,4 +1,4 @@
-"""Arrays of NumPy as arguments of compiled functions."""
+"""Arrays for JAX that are not compiled."""
 
 from __future__ import annotations
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import jax.numpy as jnp
 from jax import Array
 
-from bayesid._math.hermite import hermite
+from bayesid._math.arrays import Traceable
 
-__all__ = ["resampled"]
+__all__ = ["hermite", "resampled"]
 
 
 def resampled(at: Array, time: Array, values: Array) -> Array:
@@ -53,3 +53,16 @@ def _parabolic_slopes(step: Array, slope: Array) -> Array:
     inner = jnp.concatenate([middle, after[-1:]])
     ending = jnp.concatenate([slope[:1], after])
     return jnp.concatenate([first, jnp.where(follows, inner, ending)])
+
+
+def hermite(
+    left: Traceable, right: Traceable, left_slope: Traceable, right_slope: Traceable, s: Traceable
+) -> Traceable:
+    """Return the cubic at the fraction ``s`` of an interval, given values and slopes at both ends.
+
+    Slopes are derivatives multiplied by the length of the interval.
+    """
+    jump = right - left
+    return left + s * (
+        left_slope + s * (3.0 * jump - 2.0 * left_slope - right_slope + s * (left_slope + right_slope - 2.0 * jump))
+    )

@@ -1,11 +1,64 @@
-"""Algebra of vectors and small matrices, written out because thousands of small calls to LAPACK are slow."""
+"""Vectors, small matrices and rotations that JAX can trace, quaternions as x, y, z, w.
+
+The algebra is written out because thousands of small calls to LAPACK are slow; for other forms of rotations use the
+`Rotation` of JAX or SciPy.
+"""
 
 from __future__ import annotations
 
 import jax.numpy as jnp
 from jax import Array
+from jax.scipy.spatial.transform import Rotation
 
-__all__ = ["cross", "inverse", "inverse_small", "solve_small", "symmetric", "trace_less"]
+__all__ = [
+    "cross",
+    "inertia_of",
+    "inverse",
+    "inverse_small",
+    "quaternion_product",
+    "quaternion_rate",
+    "rotation",
+    "rotation_between",
+    "solve_small",
+    "symmetric",
+    "tilted",
+    "turned",
+]
+
+
+def rotation(quaternion: Array) -> Array:
+    """Return the rotation matrix of a quaternion of any norm, shape (3, 3)."""
+    return Rotation.from_quat(quaternion).as_matrix()
+
+
+def quaternion_product(a: Array, b: Array) -> Array:
+    """Return the product of two quaternions of any norm, which rotates by b and then by a."""
+    vector = a[3] * b[:3] + b[3] * a[:3] + cross(a[:3], b[:3])
+    return jnp.concatenate([vector, (a[3] * b[3] - a[:3] @ b[:3])[None]])
+
+
+def quaternion_rate(quaternion: Array, rate: Array) -> Array:
+    """Return the time derivative of an attitude, given its angular velocity in the moving axes [rad/s]."""
+    return 0.5 * quaternion_product(quaternion, jnp.concatenate([rate, jnp.zeros(1)]))
+
+
+def tilted(quaternion: Array, tilt: Array) -> Array:
+    """Return an attitude rotated by a small rotation vector (3,) in its moving axes [rad]."""
+    small = jnp.concatenate([0.5 * tilt, jnp.ones(1)])
+    return quaternion_product(quaternion, small / jnp.linalg.norm(small))
+
+
+def turned(quaternion: Array, vector: Array) -> Array:
+    """Return an attitude rotated by a rotation vector (3,) in its moving axes [rad], by a series smooth at zero."""
+    square = vector @ vector
+    # `tilted` turns by twice the arctangent of half of what it is given
+    return tilted(quaternion, vector * (1.0 + square / 12.0 + square**2 / 120.0))
+
+
+def rotation_between(first: Array, second: Array) -> Array:
+    """Return the small rotation vector (3,) from the first attitude to the second, in the axes of the first [rad]."""
+    difference = quaternion_product(first * jnp.array([-1.0, -1.0, -1.0, 1.0]), second)
+    return 2.0 * difference[:3] * jnp.sign(difference[3])
 
 
 def solve_small(matrix: Array, right: Array) -> Array:
@@ -29,7 +82,7 @@ def symmetric(six: Array) -> Array:
     return jnp.stack([jnp.stack([xx, xy, xz]), jnp.stack([xy, yy, yz]), jnp.stack([xz, yz, zz])])
 
 
-def trace_less(second: Array) -> Array:
+def inertia_of(second: Array) -> Array:
     """Return the inertia trace(M) 1 - M of a second moment of mass M, shape (3, 3)."""
     return jnp.trace(second) * jnp.eye(3) - second
 

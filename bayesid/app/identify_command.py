@@ -31,7 +31,7 @@ def run(
     from bayesid.app.study_draft import open_places
     from bayesid.app.study_to_model import load_posterior
     from bayesid.inference import identify
-    from bayesid.inference.identified_robot import write_identified
+    from bayesid.inference.posterior_as_prior import write_identified
     from bayesid.inference.posterior_file import write_netcdf
     from bayesid.inference.wrong_units import refuse_wrong_units
     from bayesid.report import identification_report

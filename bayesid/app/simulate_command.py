@@ -30,8 +30,7 @@ def run(
     from bayesid.app.study_to_linearisation import lacking_sensors, planned_manoeuvres
     from bayesid.app.study_to_model import load_manoeuvres, load_model
     from bayesid.inference.posterior import Posterior
-    from bayesid.inference.predicted_readings import integration_error_at
-    from bayesid.inference.simulated_recordings import simulate_recordings
+    from bayesid.inference.predicted_readings import integration_error_at, simulate_recordings
     from bayesid.inference.wrong_units import refuse_wrong_units
     from bayesid.report import simulation_report
 

@@ -26,7 +26,7 @@ from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
 from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.effects import Effect, SensorBias, create, known_effects
-from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model, spread_links
 from bayesid.simulation.orbit import Orbit

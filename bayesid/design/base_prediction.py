@@ -17,11 +17,11 @@ from scipy.spatial.transform import Rotation
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.design.pose_trajectory import PoseTrajectory
+from bayesid.inference.data import first_rate
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.perturbed_posterior import trace
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.recorded_samples import first_rate
-from bayesid.inference.simulated_recordings import blank_channels
+from bayesid.inference.predicted_readings import blank_channels
 from bayesid.recording.recording import Recording
 from bayesid.robot.kinematics import Tip
 from bayesid.robot.robot import Robot

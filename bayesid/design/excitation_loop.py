@@ -36,9 +36,9 @@ from bayesid.design.predicted_posterior import Encoder
 from bayesid.design.search_starts import adapted_to_family
 from bayesid.design.simulated_spacecraft import Spacecraft, plan_recording
 from bayesid.design.trajectory_search import Search, Store
+from bayesid.inference.data import RecordedSamples
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws
-from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.plausibility import refuse_impossible_motion

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from bayesid._math.rotation import rotation, tilted
+from bayesid._math.small_matrices import rotation, tilted
 from bayesid.design.plan import Plan
 from bayesid.design.trajectory import BaseAtStart, Trajectory, base_quantities, trajectory_of
 from bayesid.robot.composite_tables import ENTRIES, Screws, beyond, row_sensitivity, screws

@@ -12,7 +12,7 @@ from bayesid.design.encoder_information import Encoder
 from bayesid.inference.body_quantities import linearise
 from bayesid.inference.noise_changes import relinearised, with_manoeuvres
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
+from bayesid.inference.predicted_readings import blank_channels, simulate_recordings
 from bayesid.recording.joint_motion import MeasuredMotion, Motion, sample_joints
 from bayesid.recording.recording import Recording
 from bayesid.simulation.model import Manoeuvre, Model

@@ -14,7 +14,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.inference.simulated_recordings import simulate_manoeuvre
+from bayesid.inference.predicted_readings import simulate_manoeuvre
 from bayesid.recording.joint_motion import Motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.joint_state import JointState

@@ -32,7 +32,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.simulation.effects import bounds_by_label
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.model import RATE_SIGMA, Manoeuvre, Model
 
 __all__ = ["diagnose", "identify_extended"]

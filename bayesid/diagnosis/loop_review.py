@@ -11,7 +11,7 @@ from bayesid.design.loop_goals import Review
 from bayesid.diagnosis.diagnose import diagnose
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
-from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.model import Manoeuvre, Model
 
 __all__ = ["DiagnosisReview"]

@@ -34,8 +34,8 @@ from bayesid.inference import Identification
 from bayesid.inference.body_quantities import quantity
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.effects.mass_shift import MassShift
-from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 __all__ = ["Diagnosis"]
 

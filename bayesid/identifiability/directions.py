@@ -18,8 +18,7 @@ import numpy as np
 from bayesid._io.words import abridged, joined
 from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
-from bayesid.inference.body_quantities import BODY_QUANTITIES
-from bayesid.inference.contraction import ContractionVerdict
+from bayesid.inference.body_quantities import BODY_QUANTITIES, ContractionVerdict
 from bayesid.inference.identification import Identification
 from bayesid.inference.posterior import Posterior
 

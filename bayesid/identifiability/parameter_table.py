@@ -15,8 +15,13 @@ from bayesid._io.progress import Progress
 from bayesid._math.arrays import Floats
 from bayesid.identifiability.local_knowledge import Knowledge
 from bayesid.identifiability.profile_interval import Profile, Target, profile
-from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of, quantities_at, quantity_slopes_at
-from bayesid.inference.contraction import ContractionVerdict
+from bayesid.inference.body_quantities import (
+    BODY_QUANTITIES,
+    ContractionVerdict,
+    bodies_of,
+    quantities_at,
+    quantity_slopes_at,
+)
 from bayesid.inference.ensemble import sample
 from bayesid.inference.importance import choose_parameterisation, weighted_draws
 from bayesid.inference.mode import Optimum

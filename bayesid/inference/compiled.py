@@ -20,7 +20,7 @@ from bayesid._math.arrays import Floats, Traceable
 from bayesid._math.kept_jit import kept_jit
 from bayesid._math.on_device import on_device
 from bayesid.inference import whitening
-from bayesid.inference.layout import Layout, PriorNumbers
+from bayesid.inference.unknowns import Layout, PriorNumbers
 from bayesid.simulation.dynamics import Grid, LinearMotion
 from bayesid.simulation.instant import Instant, Readings
 from bayesid.simulation.simulator import ModelConstants, Simulator

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from bayesid._math.arrays import Floats
+from bayesid._io.errors import InputError
+from bayesid._math.arrays import Floats, Integers
 from bayesid._math.on_device import on_device
+from bayesid.inference import whitening
 from bayesid.inference.compiled import Arrays
-from bayesid.inference.recorded_samples import RecordedSamples, Series
-from bayesid.inference.whitening import Whitening
+from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
+from bayesid.inference.whitening import NoiseChannel, NoiseModel, Whitening
 from bayesid.recording.actions import Actions
+from bayesid.recording.joint_motion import MeasuredMotion, Motion
+from bayesid.recording.recording import Recording
+from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import Grid
+from bayesid.simulation.effects.joint_friction import STANDSTILL, JointFriction
 from bayesid.simulation.instant import Readings
+from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre, Model
-from bayesid.simulation.sensors import SensorKind
+from bayesid.simulation.sensors import Filter, Sensor, SensorKind
 from bayesid.simulation.time_grid import build_grid, lengthened, pad_grids, rounded
 
-__all__ = ["Data", "attitudes_of", "grids_of", "stacked", "with_whitenings"]
+__all__ = ["Data", "RecordedSamples", "Series", "attitudes_of", "first_rate", "grids_of", "stacked", "with_whitenings"]
 
 
 @dataclass(frozen=True)
@@ -158,3 +165,163 @@ def with_whitenings(arrays: Arrays, whitenings: Sequence[Whitening]) -> Arrays:
         weights[row, : len(item.start), :, : item.weights.shape[2]] = item.weights
         start[row, : len(item.start)] = item.start
     return arrays._replace(weights=on_device(weights), start=on_device(start))
+
+
+FEWEST = 4
+"""Smallest number of samples that a declared sensor must have in a recording."""
+
+Series = tuple[Floats, Floats]
+"""Times (n,) and values (n, axes) of one sensor."""
+
+
+@dataclass(frozen=True)
+class RecordedSamples:
+    """Sensor samples of one recording on one grid of all times at which any sensor was sampled.
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion of the joints.
+    sensors : tuple of Sensor
+    torque_sensor : TorqueSensor or None
+    time : (T,) array
+        Times of the grid [s].
+    series : mapping of SensorKind to Series
+        Recorded times and readings of each sensor.
+    torque : Series
+        Recorded times and torques of the joints that have a torque sensor.
+    torque_rows : tuple of integer arrays
+        Rows of the grid whose torque is used, for each of those joints; a joint with dry friction is left out while it
+        stands still, when its friction is undetermined.
+    """
+
+    motion: Motion
+    sensors: tuple[Sensor, ...]
+    torque_sensor: TorqueSensor | None
+    time: Floats
+    series: Mapping[SensorKind, Series]
+    torque: Series
+    torque_rows: tuple[Integers, ...]
+
+    @classmethod
+    def of(cls, model: Model, manoeuvre: Manoeuvre) -> RecordedSamples:
+        """Return the samples of the sensors of a model in one recording.
+
+        Raises
+        ------
+        InputError
+            If the recording lacks a declared sensor, has too few samples of it, or ends earlier for a joint.
+        """
+        recording = manoeuvre.recording
+        series = {sensor.kind: _series(recording, sensor.kind.value, sensor.kind.axes) for sensor in model.sensors}
+        torque: Series = (np.zeros(0), np.zeros((0, 0)))
+        if model.torque is not None:
+            torque = _series(recording, "torque", model.torque.joints)
+        time = np.unique(np.concatenate([*(times for times, _ in series.values()), torque[0]]))
+        if isinstance(manoeuvre.motion, MeasuredMotion):
+            manoeuvre.motion.check_extent(float(time[-1]), recording.file or recording.name)
+        rows = np.searchsorted(time, torque[0])
+        used = tuple(rows[moving] for moving in _moving(model, manoeuvre.motion, torque[0]))
+        return cls(manoeuvre.motion, model.sensors, model.torque, time, series, torque, used)
+
+    def with_sensors(self, sensors: Sequence[Sensor], torque: TorqueSensor | None) -> RecordedSamples:
+        """Return the same samples with other noise of the sensors."""
+        return replace(self, sensors=tuple(sensors), torque_sensor=torque)
+
+    def rows(self, kind: SensorKind) -> Integers:
+        """Return the rows of the grid at which a sensor was sampled."""
+        return np.searchsorted(self.time, self.series[kind][0])
+
+    def gridded(self, kind: SensorKind) -> Floats:
+        """Return the readings of a sensor on the grid, (T, axes), with its reading at rest where it was not sampled."""
+        values = np.tile(np.array(kind.rest), (len(self.time), 1))
+        values[self.rows(kind)] = self.series[kind][1]
+        return values
+
+    @property
+    def gridded_torque(self) -> Floats:
+        """Torques on the grid, shape (T, n), zero where they were not sampled."""
+        values = np.zeros((len(self.time), self.torque[1].shape[1]))
+        values[np.searchsorted(self.time, self.torque[0])] = self.torque[1]
+        return values
+
+    @property
+    def first_rate(self) -> Floats:
+        """Rate of the base at the start from the first samples, base axes [rad/s]; zero if no rate is measured."""
+        for sensor in self.sensors:
+            if sensor.kind == SensorKind.RATE:
+                return first_rate(sensor, self.series[SensorKind.RATE][1])
+        return np.zeros(3)
+
+    def sigma(self, kind: SensorKind) -> Floats:
+        """Return the standard deviations of the white noise of a sensor, shape (size,)."""
+        sensor = next(sensor for sensor in self.sensors if sensor.kind == kind)
+        return sensor.noise.sigma(float(np.median(np.diff(self.series[kind][0]))))
+
+    def noise_model(self, robot: Robot, seen: SampledMotion) -> NoiseModel:
+        """Return the second moments of the errors.
+
+        Parameters
+        ----------
+        robot : Robot
+            Robot whose dynamics carries the encoders' noise to the sensors.
+        seen : SampledMotion
+            Motion of the base on the grid.
+        """
+        torque_sigma = () if self.torque_sensor is None else self.torque_sensor.sigma
+        channels = [
+            NoiseChannel(float(value), self.rows(sensor.kind), sensor.filter, coloured)
+            for sensor in self.sensors
+            for value, coloured in zip(self.sigma(sensor.kind), _coloured(sensor), strict=True)
+        ]
+        channels += [
+            NoiseChannel(sigma, rows, Filter()) for sigma, rows in zip(torque_sigma, self.torque_rows, strict=True)
+        ]
+        if not isinstance(self.motion, MeasuredMotion) or not robot.joints:
+            empty = np.zeros((0, 3, len(self.time), len(channels)))
+            return NoiseModel(self.time, channels, empty, np.zeros((0, 1, len(self.time), 3, 3)))
+        torques = () if self.torque_sensor is None else self.torque_sensor.columns(robot)
+        sensitivity = joint_sensitivity(robot, self.motion.evaluate(self.time), seen, self.sensors, torques)
+        covariance = self.motion.lag_covariance(self.time, min(max(whitening.WINDOWS), len(self.time) - 1))
+        return NoiseModel(self.time, channels, sensitivity, covariance)
+
+
+def first_rate(sensor: Sensor, values: Floats) -> Floats:
+    """Return the mean of the first three samples (n, 3) of a rate sensor, base axes, as the rate at the start."""
+    return np.asarray(sensor.rotation @ values[:3].mean(axis=0))
+
+
+def _coloured(sensor: Sensor) -> list[tuple[float, float]]:
+    noise = sensor.coloured
+    return [(0.0, 1.0)] * sensor.kind.size if noise is None else [(level, noise.time) for level in noise.sigma]
+
+
+def _moving(model: Model, motion: Motion, time: Floats) -> list[NDArray[np.bool_]]:
+    """Return a mask of the samples of each torque sensor that are used, which leaves out dry friction at standstill."""
+    if model.torque is None:
+        return []
+    state = motion.evaluate(time)
+    rubbing = {effect.place for effect in model.effects if isinstance(effect, JointFriction)}
+    speed = np.abs(state.velocity[:, model.torque.columns(model.robot)])
+    return [
+        speed[:, column] > (STANDSTILL if joint in rubbing else -1.0)
+        for column, joint in enumerate(model.torque.joints)
+    ]
+
+
+def _series(recording: Recording, family: str, axes: Sequence[str]) -> Series:
+    """Return the samples of a declared sensor, and raise an error if columns or samples are missing."""
+    if absent := [axis for axis in axes if f"{family}.{axis}" not in recording.channels]:
+        raise InputError(
+            f"no column {family}.{'|'.join(absent)}, but the study declares the sensor",
+            file=recording.file or recording.name,
+            remedy="Record the sensor or take it out of [sensors]",
+        )
+    time, values = recording.vector(family, tuple(axes))
+    if len(time) < FEWEST:
+        raise InputError(
+            f"only {len(time)} samples of {family}",
+            file=recording.file or recording.name,
+            remedy=f"Record at least {FEWEST}, or take the sensor out of [sensors]",
+        )
+    return time, values

@@ -20,17 +20,15 @@ from jax import Array
 
 from bayesid._math.arrays import Floats
 from bayesid._math.kept_jit import kept_jit
-from bayesid._math.rotation import rotation, tilted
-from bayesid._math.small_matrices import cross
+from bayesid._math.small_matrices import cross, rotation, tilted
 from bayesid.robot.composite_tables import WIDTH, composite_rows
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import kinematics
 from bayesid.robot.robot import Robot
-from bayesid.simulation.channels import Channels
 from bayesid.simulation.dynamics import composite
 from bayesid.simulation.instant import Environment, Instant
 from bayesid.simulation.joint_torques import BaseMotion, Beyond, beyond_joints, joint_torques, no_joints
-from bayesid.simulation.sensors import Sensed, Sensor, SensorKind
+from bayesid.simulation.sensors import Channels, Sensed, Sensor, SensorKind
 from bayesid.simulation.time_grid import lengthened, rounded
 
 __all__ = ["SampledMotion", "joint_sensitivity"]

@@ -16,13 +16,14 @@ from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import (
     BODY_QUANTITIES,
     BodyDraws,
+    Contraction,
     bodies_of,
     body_dict,
+    compare,
     quantity,
     reported_effect,
 )
 from bayesid.inference.collapsed_proposal import collapsed_proposal
-from bayesid.inference.contraction import Contraction, compare
 from bayesid.inference.ensemble import Chains, sample
 from bayesid.inference.importance import Evidence, choose_parameterisation, importance_sample
 from bayesid.inference.mode import Optimum, maximise

@@ -12,8 +12,7 @@ from bayesid._math.arrays import Floats
 from bayesid._math.on_device import on_device
 from bayesid.inference import compiled
 from bayesid.inference.compiled import Numbers, Simulated, Structure
-from bayesid.inference.data import attitudes_of, grids_of
-from bayesid.inference.recorded_samples import RecordedSamples
+from bayesid.inference.data import RecordedSamples, attitudes_of, grids_of
 from bayesid.recording.recording import Recording
 from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.model import Manoeuvre, Model

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from bayesid._math.arrays import Floats
 from bayesid.inference.data import Data, grids_of, with_whitenings
-from bayesid.inference.encoder_whitening import whiten
-from bayesid.inference.posterior import Posterior
+from bayesid.inference.posterior import Posterior, whiten
 from bayesid.inference.whitening import Whitening
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre

@@ -14,20 +14,20 @@ import numpy as np
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid._math.on_device import on_device
-from bayesid.inference import compiled
+from bayesid.inference import compiled, whitening
 from bayesid.inference.compiled import Numbers, Structure
-from bayesid.inference.data import Data, grids_of, stacked
-from bayesid.inference.encoder_whitening import whiten
-from bayesid.inference.integration_step import choose_step
-from bayesid.inference.recorded_samples import RecordedSamples
+from bayesid.inference.data import Data, RecordedSamples, grids_of, stacked
+from bayesid.inference.encoder_noise import SampledMotion
+from bayesid.inference.integration_step import choose_step, simulate_padded
 from bayesid.inference.unknowns import Unknowns
 from bayesid.inference.whitening import Whitening
 from bayesid.recording.joint_motion import MeasuredMotion
+from bayesid.simulation.dynamics import Grid
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.own_effects import check_own_effect
 from bayesid.simulation.simulator import ModelConstants, Simulator
 
-__all__ = ["BATCH", "Posterior"]
+__all__ = ["BATCH", "Posterior", "whiten"]
 
 BATCH = 12
 """Number of points evaluated together; a batch that fits the processor's cache is three times faster than one of 64."""
@@ -244,3 +244,41 @@ def _structure(model: Model, unknowns: Unknowns) -> Structure:
 
 def _numbers(model: Model, unknowns: Unknowns) -> Numbers:
     return jax.tree.map(on_device, Numbers(ModelConstants.of(model), unknowns.numbers))
+
+
+def whiten(
+    model: Model,
+    recorded: Sequence[RecordedSamples],
+    grids: Sequence[Grid],
+    manoeuvres: Sequence[Manoeuvre],
+    unknowns: Unknowns,
+    structure: Structure,
+    numbers: Numbers,
+    z: Floats,
+    windows: Sequence[int | None] | None = None,
+) -> list[Whitening]:
+    """Return the whitening of every recording.
+
+    Parameters
+    ----------
+    z : (size,) array
+        Linearisation point of the robot and its motion.
+    windows : (R,) sequence of int or None, optional
+        Number of earlier blocks to condition on; None takes the smallest number that is accurate.
+
+    Returns
+    -------
+    list of Whitening
+    """
+    robot = model.robot
+    for prior, inertial in zip(model.priors, unknowns.inertials(z), strict=True):
+        robot = robot.with_inertial(prior.name, inertial)
+    simulated = simulate_padded(manoeuvres, structure, numbers, z, grids)
+    rates, attitudes = np.asarray(simulated.rate), np.asarray(simulated.quaternion)
+    result = []
+    for index, (samples, grid) in enumerate(zip(recorded, grids, strict=True)):
+        count = len(samples.time)
+        seen = SampledMotion(attitudes[index, :count], rates[index, :count], grid.sample.environment)
+        window = None if windows is None else windows[index]
+        result.append(whitening.build(samples.noise_model(robot, seen), window))
+    return result

@@ -1,7 +1,9 @@
-"""Readings that a posterior predicts at given coordinates, without or with the sensors' noise."""
+"""Readings that a posterior predicts: bare, with noise as a recording, and beside the measured ones."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,15 +15,26 @@ from bayesid.inference.compiled import Simulated
 from bayesid.inference.data import grids_of
 from bayesid.inference.integration_step import integration_error, simulate_padded
 from bayesid.inference.posterior import Posterior
+from bayesid.recording.joint_motion import Motion, sample_joints
+from bayesid.recording.recording import Recording
+from bayesid.simulation.joint_torques import TorqueSensor
+from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Coloured, Sensor, SensorKind
 
 __all__ = [
     "PredictedReadings",
+    "SensorFit",
+    "TorqueFit",
+    "blank_channels",
     "integration_error_at",
     "noise_of",
     "noisy",
     "predicted_readings",
     "readings_at_start",
+    "sensor_fits",
+    "simulate_manoeuvre",
+    "simulate_recordings",
+    "torque_fits",
 ]
 
 
@@ -119,3 +132,180 @@ def integration_error_at(posterior: Posterior, z: Floats) -> float:
     return integration_error(
         data.model, data.manoeuvres, data.recorded, posterior.structure, posterior.numbers, z, data.step
     )
+
+
+def simulate_recordings(
+    posterior: Posterior, rng: np.random.Generator | None = None, z: Floats | None = None
+) -> list[Recording]:
+    """Simulate the recordings of a posterior, at the same times.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    rng : numpy.random.Generator, optional
+        Source of the sensors' noise; without it there is no noise.
+    z : (size,) array, optional
+        Coordinates at which the recordings are simulated, by default `Posterior.starting_point`.
+    """
+    predictions = predicted_readings(posterior, posterior.starting_point() if z is None else z)
+    recordings = []
+    for index, (manoeuvre, predicted) in enumerate(zip(posterior.manoeuvres, predictions, strict=True)):
+        recording = manoeuvre.recording
+        read = predicted if rng is None else noisy(posterior, index, predicted, rng)
+        rows = np.searchsorted(recording.time, read.time)
+        channels = dict(recording.channels)
+        columns = {kind.columns: values for kind, values in read.channels.items()}
+        if posterior.model.torque is not None:
+            columns[tuple(f"torque.{joint}" for joint in posterior.model.torque.joints)] = read.torque
+        for names, values in columns.items():
+            for name, value in zip(names, values.T, strict=True):
+                full = np.full(len(recording.time), np.nan)
+                full[rows] = value
+                channels[name] = np.where(np.isnan(recording.channels[name]), np.nan, full)
+        recordings.append(Recording(recording.name, None, recording.time, channels))
+    return recordings
+
+
+def simulate_manoeuvre(
+    model: Model,
+    motion: Motion,
+    time: Floats,
+    *,
+    name: str = "manoeuvre",
+    attitude: Floats | None = None,
+    argument_of_latitude: float = 0.0,
+    rng: np.random.Generator | None = None,
+    encoder_sigma: float = 0.0,
+) -> Recording:
+    """Simulate a planned manoeuvre with the bodies of a model at their prior's centre.
+
+    Parameters
+    ----------
+    model : Model
+    motion : Motion
+        Planned motion of the joints.
+    time : (T,) array
+        Sample times of all sensors and joints [s].
+    attitude : (4,) array, optional
+        Quaternion x, y, z, w from base to orbit axes at time 0, by default the identity.
+    argument_of_latitude : float
+        Argument of latitude at time 0 [rad].
+    rng : numpy.random.Generator, optional
+        Source of the noise of sensors and encoders; without it there is no noise.
+    encoder_sigma : float
+        Standard deviation of the noise of the recorded joint positions [rad or m].
+    """
+    joints = sample_joints(motion, model.robot, time)
+    planned = Recording(name, None, time, {**joints, **blank_channels(model.sensors, len(time), model.torque)})
+    start = np.array([0.0, 0.0, 0.0, 1.0]) if attitude is None else np.asarray(attitude, dtype=float)
+    posterior = Posterior.of(model, [Manoeuvre(planned, motion, start, argument_of_latitude=argument_of_latitude)])
+    recording = simulate_recordings(posterior, rng, np.zeros(posterior.size))[0]
+    if rng is None or encoder_sigma == 0.0:
+        return recording
+    noisy = {key: recording.channels[key] + encoder_sigma * rng.normal(size=len(time)) for key in joints}
+    return Recording(name, None, time, {**recording.channels, **noisy})
+
+
+def blank_channels(sensors: Sequence[Sensor], count: int, torque: TorqueSensor | None = None) -> dict[str, Floats]:
+    """Return channels of the sensors at rest, which stand in a recording that is to be simulated."""
+    joints = () if torque is None else torque.joints
+    return {
+        name: np.full(count, value)
+        for sensor in sensors
+        for name, value in zip(sensor.kind.columns, sensor.kind.rest, strict=True)
+    } | {f"torque.{joint}": np.zeros(count) for joint in joints}
+
+
+@dataclass(frozen=True)
+class SensorFit:
+    """Readings of one sensor in one recording, measured and predicted.
+
+    Attributes
+    ----------
+    time, measured, predicted : (n,), (n, k), (n, k) array
+        Times [s] and readings as they are drawn (`SensorKind.shown`), in sensor axes. An attitude is the rotation
+        vector from the first sample, in base axes.
+    residual_time, residual : (m,), (m, k) array
+        Times [s] and whitened residuals, which are independent and of unit variance if the model is right; NaN where
+        an axis has no sample.
+    """
+
+    kind: SensorKind
+    time: Floats
+    measured: Floats
+    predicted: Floats
+    residual_time: Floats
+    residual: Floats
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares of the whitened residuals."""
+        return float(np.nansum(self.residual**2))
+
+    @property
+    def samples(self) -> int:
+        """Number of scalar residuals."""
+        return int(np.isfinite(self.residual).sum())
+
+
+def sensor_fits(posterior: Posterior, z: Floats) -> list[list[SensorFit]]:
+    """Return measured and predicted readings at coordinates ``z`` (n,): a list per recording, an entry per sensor."""
+    predictions, residuals = predicted_readings(posterior, z), posterior.residuals(z)
+    result = []
+    for index, (predicted, whitening) in enumerate(zip(predictions, posterior.whitenings, strict=True)):
+        grid = posterior.data.times(index)
+        whitened = np.where(whitening.outputs, residuals[index, : len(whitening.rows)], np.nan)
+        fits = []
+        for sensor in posterior.model.sensors:
+            time, measured = posterior.data.measured(index, sensor.kind)
+            simulated = predicted.channels[sensor.kind][np.searchsorted(grid, time)]
+            measured, simulated = (sensor.kind.shown(values, measured[0]) for values in (measured, simulated))
+            residual = whitened[:, posterior.model.channels.of(sensor.kind)]
+            kept = np.isfinite(residual).any(axis=1)
+            fits.append(SensorFit(sensor.kind, time, measured, simulated, grid[whitening.rows][kept], residual[kept]))
+        result.append(fits)
+    return result
+
+
+@dataclass(frozen=True)
+class TorqueFit:
+    """Torque of one joint in one recording, measured and predicted.
+
+    Attributes
+    ----------
+    joint, unit : str
+    time, measured, predicted : (n,) array
+        Times [s] and torques [N m], or forces [N] of a prismatic joint.
+    residual_time, residual : (m,) array
+        Times [s] and whitened residuals of the samples that the likelihood uses.
+    """
+
+    joint: str
+    unit: str
+    time: Floats
+    measured: Floats
+    predicted: Floats
+    residual_time: Floats
+    residual: Floats
+
+
+def torque_fits(posterior: Posterior, z: Floats) -> list[list[TorqueFit]]:
+    """Return measured and predicted torques at the coordinates ``z`` (n,): a list per recording, an entry per joint."""
+    sensor, robot = posterior.model.torque, posterior.model.robot
+    if sensor is None:
+        return [[] for _ in posterior.manoeuvres]
+    predictions, residuals = predicted_readings(posterior, z), posterior.residuals(z)
+    first, result = posterior.model.channels.torques.start, []
+    for index, (predicted, whitening) in enumerate(zip(predictions, posterior.whitenings, strict=True)):
+        time, measured = posterior.data.torques(index)
+        grid = posterior.data.times(index)
+        simulated = predicted.torque[np.searchsorted(grid, time)]
+        fits = []
+        for column, joint in enumerate(sensor.joints):
+            used = whitening.outputs[:, first + column]
+            residual = residuals[index, : len(used), first + column][used]
+            unit = "N" if robot.joints[robot.joint_index(joint)].kind == "prismatic" else "N m"
+            rows = grid[whitening.rows][used]
+            fits.append(TorqueFit(joint, unit, time, measured[:, column], simulated[:, column], rows, residual))
+        result.append(fits)
+    return result

@@ -9,8 +9,8 @@ import numpy as np
 
 from bayesid._io.words import counted
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import sensor_fits
 from bayesid.inference.recording_check import RecordingCheck
-from bayesid.inference.sensor_fit import sensor_fits
 from bayesid.report import figures
 from bayesid.report.document import Document
 from bayesid.report.numbers import format_fixed, format_number, format_unit

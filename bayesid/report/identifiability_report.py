@@ -11,7 +11,7 @@ from bayesid.identifiability.advice import WORST, Advice
 from bayesid.identifiability.base_parameters import BaseParameters
 from bayesid.identifiability.parameter_table import NORMAL, Method, ParameterRow
 from bayesid.identifiability.practical_identifiability import Practical
-from bayesid.inference.contraction import CONTRACTED, PRIOR_ONLY, ContractionVerdict
+from bayesid.inference.body_quantities import CONTRACTED, PRIOR_ONLY, ContractionVerdict
 from bayesid.inference.predicted_readings import integration_error_at
 from bayesid.report import figures
 from bayesid.report.document import Document, Rows

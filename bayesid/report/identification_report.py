@@ -10,12 +10,11 @@ import numpy as np
 from bayesid._io.words import counted, joined
 from bayesid._math.arrays import Floats
 from bayesid._math.on_device import on_device
-from bayesid.inference.body_quantities import BODY_QUANTITIES, reported_effect
-from bayesid.inference.contraction import Contraction, ContractionVerdict
+from bayesid.inference.body_quantities import BODY_QUANTITIES, Contraction, ContractionVerdict, reported_effect
 from bayesid.inference.identification import Identification
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.predicted_readings import SensorFit, TorqueFit, sensor_fits, torque_fits
 from bayesid.inference.residual_view import ResidualView
-from bayesid.inference.sensor_fit import SensorFit, TorqueFit, sensor_fits, torque_fits
 from bayesid.report import figures
 from bayesid.report.document import Document, Rows
 from bayesid.report.figures.figure_style import WIDTH

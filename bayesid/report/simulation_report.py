@@ -10,8 +10,7 @@ import numpy as np
 
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.predicted_readings import integration_error_at
-from bayesid.inference.sensor_fit import sensor_fits
+from bayesid.inference.predicted_readings import integration_error_at, sensor_fits
 from bayesid.recording.recording import Recording
 from bayesid.report import figures
 from bayesid.report.document import Document

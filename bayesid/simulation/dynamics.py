@@ -18,10 +18,9 @@ import numpy as np
 from jax import Array
 
 from bayesid._math.arrays import Traceable
-from bayesid._math.hermite import hermite
-from bayesid._math.rotation import quaternion_rate, rotation
+from bayesid._math.resampling import hermite
 from bayesid._math.runge_kutta import runge_kutta_stages, runge_kutta_step, stage_inputs
-from bayesid._math.small_matrices import cross, inverse, solve_small, symmetric, trace_less
+from bayesid._math.small_matrices import cross, inertia_of, inverse, quaternion_rate, rotation, solve_small, symmetric
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.instant import Composite, Environment, Instant, Modes, Wrench
@@ -131,14 +130,14 @@ def composite(row: Array) -> Composite:
     com, com_rate, com_acceleration = (entry[key] / mass for key in ("first", "first_rate", "first_acceleration"))
     second = symmetric(entry["second"]) - mass * jnp.outer(com, com)
     flow = mass * jnp.outer(com, com_rate)
-    inertia = trace_less(second)
+    inertia = inertia_of(second)
     return Composite(
         mass=mass,
         com=com,
         com_rate=com_rate,
         com_acceleration=com_acceleration,
         inertia=inertia,
-        inertia_rate=trace_less(symmetric(entry["second_rate"]) - flow - flow.T),
+        inertia_rate=inertia_of(symmetric(entry["second_rate"]) - flow - flow.T),
         inverse=inverse(inertia),
         second_moment=second,
         spin=entry["spin"] - mass * cross(com, com_rate),

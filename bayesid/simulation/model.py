@@ -13,12 +13,11 @@ from bayesid.recording.joint_motion import Motion
 from bayesid.recording.recording import Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing, check_mixing
 from bayesid.robot.robot import Robot
-from bayesid.simulation.channels import Channels
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.orbit import Orbit
-from bayesid.simulation.sensors import Sensor, SensorKind
+from bayesid.simulation.sensors import Channels, Sensor, SensorKind
 
 __all__ = ["Manoeuvre", "Model"]
 

@@ -18,9 +18,9 @@ from bayesid.recording.joint_motion import Excitation
 from bayesid.robot.robot import Robot
 from bayesid.simulation.dynamics import composite
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.effect_key import EffectKey
 from bayesid.simulation.instant import Environment, Instant, Modes, Readings, Wrench
 from bayesid.simulation.sensors import Sensor
+from bayesid.simulation.simulator import EffectKey
 from bayesid.simulation.time_grid import time_tables
 
 __all__ = ["check_own_effect"]

@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from bayesid._math.hermite import hermite
+from bayesid._math.resampling import hermite
 from bayesid._math.runge_kutta import runge_kutta_step
 from bayesid.simulation.dynamics import Samples, Start, System, TimeTables, composite
 from bayesid.simulation.effects.effect import Effect

@@ -21,8 +21,12 @@ from bayesid.inference.identification import identify
 from bayesid.inference.mode import fit
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.predicted_readings import PredictedReadings, predicted_readings
-from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
+from bayesid.inference.predicted_readings import (
+    PredictedReadings,
+    blank_channels,
+    predicted_readings,
+    simulate_recordings,
+)
 from bayesid.recording.joint_motion import Excitation, sample_joints
 from bayesid.recording.recording import Recording
 from bayesid.robot.inertial_parameters import InertialParameters

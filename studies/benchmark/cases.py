@@ -18,7 +18,7 @@ from bayesid import (
     White,
 )
 from bayesid.design.design_result import sample_times
-from bayesid.inference.simulated_recordings import simulate_manoeuvre
+from bayesid.inference.predicted_readings import simulate_manoeuvre
 from bayesid.simulation.effects import GravityGradient
 from studies.common.ets7 import INTERVAL, RADIUS
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from bayesid import BodyPrior, InertialParameters, Manoeuvre, Model, Posterior, Robot, SensorKind
 from bayesid._math.arrays import Floats
-from bayesid.inference.simulated_recordings import blank_channels, simulate_recordings
+from bayesid.inference.predicted_readings import blank_channels, simulate_recordings
 from bayesid.recording.recording import Recording
 from bayesid.robot.composite_tables import composite_rows
 from bayesid.robot.joint_state import JointState

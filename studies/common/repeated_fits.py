@@ -19,10 +19,9 @@ from bayesid._math.arrays import Floats
 from bayesid.design import planned_manoeuvre, planned_posterior
 from bayesid.design.design_result import sample_times
 from bayesid.design.predicted_posterior import describe
-from bayesid.inference.data import Data, grids_of, stacked
+from bayesid.inference.data import Data, RecordedSamples, grids_of, stacked
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.recorded_samples import RecordedSamples
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.inertial_parameters import mass_com_inertia
 from bayesid.simulation.model import Manoeuvre, Model

@@ -26,8 +26,8 @@ from bayesid.inference import (
     compiled,
     maximise,
 )
-from bayesid.inference.proposal import StudentT
-from bayesid.inference.simulated_recordings import simulate_manoeuvre
+from bayesid.inference.parameterisation import StudentT
+from bayesid.inference.predicted_readings import simulate_manoeuvre
 from studies.benchmark.cases import DURATION, excitation
 from studies.common.ets7 import ACCEL, BASE, ENCODER, INTERVAL, RATE, ets7
 from studies.common.models import ARM_SPREAD, base_model

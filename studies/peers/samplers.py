@@ -29,7 +29,7 @@ from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats
 from bayesid.inference import importance_sample, sample
-from bayesid.inference.proposal import StudentT
+from bayesid.inference.parameterisation import StudentT
 from studies.peers.density import Target
 
 # width of the normal prior that nested sampling starts from, in standard deviations of the Laplace approximation

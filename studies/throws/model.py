@@ -27,7 +27,7 @@ from bayesid import (
     White,
 )
 from bayesid.simulation.effects import Effect, Instant, Parameter, Readings, SensorBias, Situation, Wrench
-from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from studies.throws.data import SMOOTH, WHEEL_COUNT, WHEEL_INERTIA, quiet_noise
 
 STEP = 0.0025  # longest integration step [s], half of the interval between samples

@@ -14,8 +14,8 @@ from bayesid.diagnosis.response.perturbation import tables_of
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.simulation.effects.arm_effects import Payload
 from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.effects.mass_shift import MassShift
-from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 __all__ = ["MOMENT_UNITS", "amplitude_signatures", "catalogue_signatures", "group_names", "moment_spreads"]
 

@@ -12,8 +12,8 @@ from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.residual_view import by_recording
 from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.effects.mass_shift import MassShift
-from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 __all__ = ["jump_signatures", "mass_shift_signatures", "sample_intervals", "shift_instants", "shift_spread"]
 

@@ -27,8 +27,8 @@ from bayesid.diagnosis.evidence.scale_integral import GroupSpectrum, log_evidenc
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup
 from bayesid.diagnosis.search.linearisation import Linearisation
 from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.effects.mass_shift import MassShift
-from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 __all__ = ["plausible_shift", "with_tuned_shift"]
 

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bayesid._math.arrays import Floats
-from bayesid._math.log_sum import log_sum
+from bayesid._math.arrays import Floats, log_sum
 from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
 from bayesid.diagnosis.candidates.vibration_signatures import (
     DAMPING,
@@ -28,7 +27,7 @@ from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.search.linearisation import Linearisation, Remaining
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 
 __all__ = ["with_tuned_tones"]
 

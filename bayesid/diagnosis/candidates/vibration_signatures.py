@@ -13,8 +13,8 @@ from bayesid.diagnosis.evidence.body_evidence import MissingBody, outer_moments
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh
-from bayesid.simulation.effects.physical_bound import PhysicalBound
 
 __all__ = [
     "DAMPING",

@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg as sla
 
-from bayesid._math.arrays import Floats
-from bayesid._math.log_sum import log_sum
+from bayesid._math.arrays import Floats, log_sum
 
 __all__ = ["MissingBody", "outer_moments", "rigid_moments"]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
-from bayesid._math.log_sum import log_sum
+from bayesid._math.arrays import log_sum
 from bayesid._math.threads import in_threads
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence, near_best
 

@@ -19,8 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bayesid._math.arrays import Floats, Integers
-from bayesid._math.log_sum import log_sum, log_sums
+from bayesid._math.arrays import Floats, Integers, log_sum, log_sums
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.scales import (
     AmplitudeGroup,

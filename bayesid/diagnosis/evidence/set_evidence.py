@@ -11,8 +11,7 @@ from itertools import product
 import numpy as np
 from scipy.special import logsumexp
 
-from bayesid._math.arrays import Floats, Integers
-from bayesid._math.log_sum import log_sum, log_sums
+from bayesid._math.arrays import Floats, Integers, log_sum, log_sums
 from bayesid.diagnosis.evidence.gram import Gram, covariance_roots
 from bayesid.diagnosis.evidence.scale_integral import (
     MOST_NODES,

@@ -17,7 +17,7 @@ from bayesid.diagnosis.outcome.candidate_table import Candidate
 from bayesid.diagnosis.response.effect_functions import report_of, report_slopes
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.relinearise import SetSearch
-from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 
 __all__ = ["Z95", "GroupSize", "VectorSize", "group_sizes", "vector_size"]
 

@@ -10,8 +10,7 @@ import numpy as np
 from bayesid._math.arrays import Floats
 from bayesid.diagnosis.outcome.gain import Gain
 from bayesid.diagnosis.search.fitted_set import Hypothesis
-from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of
-from bayesid.inference.contraction import half_range
+from bayesid.inference.body_quantities import BODY_QUANTITIES, bodies_of, half_range
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.residual_view import by_recording
 from bayesid.robot.inertial_parameters import mass_com_inertia

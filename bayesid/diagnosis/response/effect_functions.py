@@ -12,7 +12,7 @@ from jax import Array
 from bayesid._math.arrays import Floats, Traceable, namespace
 from bayesid._math.kept_jit import kept_jit
 from bayesid.simulation.effects.effect import Effect, Quantity
-from bayesid.simulation.effects.effect_key import EffectKey
+from bayesid.simulation.simulator import EffectKey
 
 __all__ = [
     "CauseAmplitude",

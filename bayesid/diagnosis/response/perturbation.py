@@ -24,9 +24,9 @@ from bayesid.inference.perturbed_posterior import Perturbation
 from bayesid.inference.posterior import Posterior
 from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.effect_key import EffectKey
 from bayesid.simulation.instant import Instant, Readings
 from bayesid.simulation.sensors import SensorKind
+from bayesid.simulation.simulator import EffectKey
 
 __all__ = [
     "OperatingTrajectory",

@@ -31,9 +31,9 @@ from bayesid.diagnosis.response.perturbation import (
     perturb,
     tables_of,
 )
-from bayesid.inference.linear_responses import LinearResponses
 from bayesid.inference.perturbed_posterior import (
     Arrays,
+    LinearResponses,
     Perturbation,
     jacobian_of,
     perturbed,

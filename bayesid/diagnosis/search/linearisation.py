@@ -26,7 +26,7 @@ from bayesid.diagnosis.response.present_fit import with_bodies_held
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference.residual_view import rows_of
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 
 __all__ = ["Catalogue", "Linearisation", "Remaining", "linearise", "linearise_along_data"]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from bayesid.diagnosis import Candidate, Diagnosis, TorqueReading
 from bayesid.diagnosis.response.effect_functions import CauseAmplitude
-from bayesid.inference.sensor_fit import sensor_fits
+from bayesid.inference.predicted_readings import sensor_fits
 from bayesid.report import figures
 from bayesid.report.diagnosis.cause_words import NOTHING, SOMETHING, amplitude_text, limit_text, verdict_text
 from bayesid.report.diagnosis.diagnosis_sentences import torque_size
@@ -23,7 +23,7 @@ from bayesid.report.numbers import (
     format_text,
     format_unit,
 )
-from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 
 __all__ = [
     "GLOSSARY",

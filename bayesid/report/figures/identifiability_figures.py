@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from bayesid._math.arrays import Floats
 from bayesid.identifiability.directions import Direction
-from bayesid.inference.contraction import CONTRACTED, PRIOR_ONLY, ContractionVerdict
+from bayesid.inference.body_quantities import CONTRACTED, PRIOR_ONLY, ContractionVerdict
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 
 __all__ = ["direction_widths", "displacements"]

@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
 from bayesid._math.arrays import Floats
-from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, bodies_of, reported_effect
-from bayesid.inference.contraction import half_range
+from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, bodies_of, half_range, reported_effect
 from bayesid.inference.identification import Identification
 from bayesid.report.figures.figure_style import (
     BAND,

@@ -11,8 +11,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from scipy import stats
 
 from bayesid._math.arrays import Floats
+from bayesid.inference.predicted_readings import SensorFit, TorqueFit
 from bayesid.inference.residual_view import ResidualSpectrum, ResidualView
-from bayesid.inference.sensor_fit import SensorFit, TorqueFit
 from bayesid.report.figures.figure_style import (
     BAND,
     COLOURS,

@@ -32,7 +32,7 @@ from bayesid.simulation.effects.environment_effects import (
 from bayesid.simulation.effects.internal_effects import FlexibleAppendage, FuelSlosh, WheelMomentum
 from bayesid.simulation.effects.joint_friction import JointFriction, TorqueBias
 from bayesid.simulation.effects.mass_shift import MassShift
-from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from bayesid.simulation.effects.register import create, known_effects, register
 from bayesid.simulation.effects.wheel_history import WheelHistory
 from bayesid.simulation.instant import Instant, Modes, Readings, Resonance, Wrench

@@ -19,8 +19,7 @@ from bayesid.robot.log_cholesky import LOG_CHOLESKY, upper_cholesky, vector_from
 from bayesid.robot.robot import Robot
 from bayesid.robot.robot_size import RobotSize, link_radius
 from bayesid.simulation.effects.effect import Effect, Situation
-from bayesid.simulation.effects.effect_parameters import Parameter, Quantity
-from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
+from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, Quantity, three_digits
 from bayesid.simulation.effects.placed import Placed
 from bayesid.simulation.effects.register import register
 

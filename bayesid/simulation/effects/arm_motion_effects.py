@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Self
+from typing import NamedTuple, Self, cast
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,17 +13,16 @@ from scipy.interpolate import make_interp_spline
 
 from bayesid._math.arrays import Floats, Traceable, namespace
 from bayesid.recording.joint_motion import Motion
+from bayesid.robot.composite_tables import composite_rows, link_table
 from bayesid.robot.joint_state import JointState
-from bayesid.robot.kinematics import configuration, kinematics
+from bayesid.robot.kinematics import Kinematics, configuration, kinematics
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects.displaced_motion import Displaced, DisplacedMotion
 from bayesid.simulation.effects.effect import Effect, Situation
-from bayesid.simulation.effects.effect_parameters import Parameter, Prior
-from bayesid.simulation.effects.physical_bound import PhysicalBound
+from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, Prior
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.effects.register import register
 
-__all__ = ["EncoderOffset", "JointFlexibility", "JointLatency"]
+__all__ = ["Displaced", "DisplacedMotion", "EncoderOffset", "JointFlexibility", "JointLatency"]
 
 LARGEST_OFFSET, LARGEST_OFFSET_OF_SLIDE = 0.1, 0.05
 """Largest plausible error of a joint's zero [rad, m]; assumed, since the eye would see more."""
@@ -36,6 +35,47 @@ SOFTEST, STRONGEST_DAMPING = 0.1, 0.2
 
 OFFSET_STEP = 0.02
 """Joint offset at which the tables are sampled for a quadratic [rad or m], with an error below 1e-5 at 0.03 rad."""
+
+
+class DisplacedMotion(Effect):
+    """Effect that displaces links against the recorded motion.
+
+    It changes the tables of all bodies that the links carry. The tables of bodies with unknown parameters change in
+    proportion to those parameters and are therefore kept apart from those of the known bodies. The effect on joint
+    torques is left out.
+    """
+
+    @classmethod
+    def instances(cls, model: Situation) -> Sequence[Effect]:
+        """Return the effect wherever it can occur, and nowhere in a model with torque sensors."""
+        return [] if model.torque is not None else super().instances(model)
+
+    def displaced(self, robot: Robot, motion: Motion, time: Floats) -> Displaced:
+        """Return the change of the links' motion at T instants."""
+        raise NotImplementedError
+
+    def table(self, robot: Robot, motion: Motion, time: Floats) -> Floats:
+        """Return the change of the tables of all bodies with the robot's parameters, (T, 28, m)."""
+        change = self.displaced(robot, motion, time)
+        return change.weighted([composite_rows(robot, moved) for moved in change.motions])
+
+    def body_tables(
+        self, robot: Robot, unknown: Sequence[str], motion: Motion, time: Floats
+    ) -> list[tuple[str | None, Floats]]:
+        """Return the changes of the known bodies' table, (T, 28, m), and of each unknown body's, (T, 28, 10 m)."""
+        change = self.displaced(robot, motion, time)
+        known = change.weighted([composite_rows(robot, moved, leave_out=unknown) for moved in change.motions])
+        tables: list[tuple[str | None, Floats]] = [(None, known)]
+        for name in unknown:
+            table = change.weighted([link_table(robot, name, moved) for moved in change.motions])
+            tables.append((None, table.reshape(*table.shape[:2], -1)))
+        return tables
+
+    def body_loads(self, values: Array, inertial: Array) -> Array:
+        """Return the coefficients, then for each unknown body their products with its ten parameters."""
+        coefficients = self.loads(values)
+        products = coefficients[None, :, None] * inertial.reshape(-1, 1, 10)
+        return jnp.concatenate([coefficients, products.ravel()])
 
 
 @register
@@ -268,3 +308,26 @@ def _loaded(robot: Robot) -> pin.Model:
                 pin.Inertia.FromDynamicParameters(link.inertial.vector)
             )
     return model
+
+
+class Displaced(NamedTuple):
+    """Change of the motion of all links, as a weighted sum over motions with m coefficients.
+
+    The change of any body's kinematic table is ``sum_k c_k sum_s weights[k, s] table(motions[s])``, where the c_k are
+    the effect's coefficients (`Effect.loads`).
+
+    Attributes
+    ----------
+    motions : (S,) sequence of Kinematics
+        Motions of the joint frames.
+    weights : (m, S) array
+        Weights of the motions for each coefficient.
+    """
+
+    motions: Sequence[Kinematics]
+    weights: Floats
+
+    def weighted(self, tables: Sequence[Floats]) -> Floats:
+        """Return the weighted sums (T, 28, m, ...) of tables along the motions, each (T, 28, ...)."""
+        xp = namespace(tables[0])
+        return cast("Floats", xp.einsum("ks,std...->tdk...", self.weights, xp.stack(list(tables))))

@@ -21,8 +21,7 @@ from bayesid._math.arrays import Floats
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
-from bayesid.simulation.effects.effect_parameters import Parameter, Quantity
-from bayesid.simulation.effects.physical_bound import PhysicalBound, bounds_of_priors
+from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, Quantity, bounds_of_priors
 from bayesid.simulation.instant import Instant, Modes, Readings, Resonance, Wrench
 from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.orbit import Orbit

@@ -1,8 +1,14 @@
-"""Parameters of an effect, with units and priors on a physical scale."""
+"""Parameters of an effect, with units and priors on a physical scale, and the largest plausible size of amplitudes.
+
+A diagnosis gives all amplitudes of an effect that share a unit one scale, log-uniform between that bound and what the
+data can resolve. The bound limits the scale, not each amplitude. Where it is generous by a factor of two, the evidence
+loses less than a tenth of a nat over four decades; where it is too narrow, a cause is missed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
@@ -10,9 +16,10 @@ import numpy as np
 from jax.scipy.special import erf
 from scipy import special
 
+from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Traceable, namespace
 
-__all__ = ["Parameter", "Prior", "Quantity", "coordinates_of"]
+__all__ = ["Parameter", "PhysicalBound", "Prior", "Quantity", "bounds_of_priors", "coordinates_of", "three_digits"]
 
 SQRT2 = float(np.sqrt(2.0))
 
@@ -90,3 +97,60 @@ def coordinates_of(parameters: Sequence[Parameter], values: Sequence[float]) -> 
         else:
             coordinates.append((value - parameter.mean) / parameter.sigma)
     return np.array(coordinates)
+
+
+SPREADS = 3.0
+"""Prior standard deviations at which the largest size lies where no physical bound is known."""
+
+
+@dataclass(frozen=True)
+class PhysicalBound:
+    """Largest plausible size of the amplitudes of one unit.
+
+    Parameters
+    ----------
+    unit : str
+        Unit of the amplitudes.
+    largest : float
+        Largest plausible magnitude, in that unit.
+    reason : str
+        One sentence on why no more is plausible.
+
+    Raises
+    ------
+    InputError
+        If the size is not a positive number or the reason is empty.
+    """
+
+    unit: str
+    largest: float
+    reason: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "largest", float(self.largest))
+        if not 0.0 < self.largest < np.inf:
+            raise InputError(
+                f"the largest size {self.largest:g} {self.unit} is not a positive number",
+                remedy="Give the largest plausible magnitude",
+            )
+        if not self.reason:
+            raise InputError(
+                f"the largest size {self.largest:g} {self.unit} has no reason",
+                remedy="Say in one sentence why no more is plausible",
+            )
+
+
+def three_digits(value: float) -> str:
+    """Return a number with three digits for a reason, such as ``2790``."""
+    return f"{float(f'{value:.3g}'):g}"
+
+
+def bounds_of_priors(parameters: Sequence[Parameter]) -> tuple[PhysicalBound, ...]:
+    """Return the sizes of amplitudes at three standard deviations of their priors, one bound for each unit."""
+    bounds = []
+    for unit in dict.fromkeys(parameter.unit for parameter in parameters):
+        group = [parameter for parameter in parameters if parameter.unit == unit]
+        ends = [float(abs(parameter.value(np.array([-SPREADS, SPREADS]))).max()) for parameter in group]
+        reason = f"No physical bound is stated; this is the size at {SPREADS:g} standard deviations of the prior."
+        bounds.append(PhysicalBound(unit, max(ends), reason))
+    return tuple(bounds)

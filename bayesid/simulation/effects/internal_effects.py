@@ -13,8 +13,14 @@ from bayesid._math.arrays import Floats
 from bayesid.robot.robot import Robot
 from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.effects.effect import Effect, Situation
-from bayesid.simulation.effects.effect_parameters import Parameter, Prior, Quantity, coordinates_of
-from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
+from bayesid.simulation.effects.effect_parameters import (
+    Parameter,
+    PhysicalBound,
+    Prior,
+    Quantity,
+    coordinates_of,
+    three_digits,
+)
 from bayesid.simulation.effects.register import register
 from bayesid.simulation.instant import Instant, Modes, Resonance
 

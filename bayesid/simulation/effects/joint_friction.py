@@ -11,8 +11,7 @@ from jax import Array
 from bayesid.robot.robot import Robot
 from bayesid.robot.robot_size import beyond_joint
 from bayesid.simulation.effects.effect import Effect, Situation
-from bayesid.simulation.effects.effect_parameters import Parameter
-from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
+from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, three_digits
 from bayesid.simulation.effects.placed import OnJoint
 from bayesid.simulation.effects.register import register
 

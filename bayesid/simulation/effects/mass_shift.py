@@ -16,8 +16,7 @@ from bayesid.robot.composite_tables import ENTRIES, WIDTH
 from bayesid.robot.robot import Robot
 from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.effects.effect import Effect, Situation
-from bayesid.simulation.effects.effect_parameters import Parameter
-from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
+from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, three_digits
 from bayesid.simulation.effects.register import register
 
 __all__ = ["MassShift"]

@@ -18,11 +18,10 @@ import jax.numpy as jnp
 from jax import Array
 
 from bayesid._math.resampling import resampled
-from bayesid._math.rotation import rotation, turned
+from bayesid._math.small_matrices import rotation, turned
 from bayesid.robot.robot_size import RobotSize
 from bayesid.simulation.effects.effect import Effect, Situation
-from bayesid.simulation.effects.effect_parameters import Parameter
-from bayesid.simulation.effects.physical_bound import PhysicalBound, three_digits
+from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound, three_digits
 from bayesid.simulation.effects.register import register
 from bayesid.simulation.instant import Instant, Readings
 from bayesid.simulation.sensors import SensorKind

@@ -13,9 +13,8 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
 from bayesid.robot.robot import Robot
 from bayesid.simulation.effects.effect import Effect, Situation
-from bayesid.simulation.effects.effect_parameters import Parameter
+from bayesid.simulation.effects.effect_parameters import Parameter, PhysicalBound
 from bayesid.simulation.effects.internal_effects import wheel_bound
-from bayesid.simulation.effects.physical_bound import PhysicalBound
 from bayesid.simulation.effects.placed import Placed
 from bayesid.simulation.effects.register import register
 from bayesid.simulation.instant import Instant
