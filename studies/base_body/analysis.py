@@ -380,17 +380,7 @@ class BaseBody:
 
 
 def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = lambda text: None) -> BaseBody:
-    """Run the study.
-
-    Parameters
-    ----------
-    full : bool
-        Whether to add what takes minutes: samples by emcee, measured joints, the heavier arm.
-    seed : int
-        Seed of all random numbers.
-    progress : callable
-        Receives a line on what is being done.
-    """
+    """Run the study; the arguments are options of the command."""
     progress("information of the manoeuvres")
     fast = Information.of(excitation(paper.EXCITATION))
     slowness = slowest(paper.EXCITATION)

@@ -1,4 +1,4 @@
-"""Parts that the reports of several studies share: tables, small sections, and the meanings of terms."""
+"""Parts that the reports of several studies share: tables, and the meanings of terms."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from bayesid.report import Document
 
-__all__ = ["TERMS", "add_number_table", "columns", "glossary", "not_evaluated"]
+__all__ = ["TERMS", "add_number_table", "columns", "glossary"]
 
 # meanings by term, as reports write it
 TERMS = {
@@ -60,10 +60,3 @@ def add_number_table(
         Number of leading columns that hold words.
     """
     document.table(header, rows, caption, ["left"] * words + ["right"] * (len(header) - words))
-
-
-def not_evaluated(document: Document, title: str | None = None) -> None:
-    """Say that a section belongs to the full study alone, under its title where that is not yet written."""
-    if title is not None:
-        document.section(title)
-    document.paragraph("This section was not evaluated: only the full study evaluates it.")

@@ -276,16 +276,10 @@ def run(
 
     Parameters
     ----------
-    full : bool
-        True for three recordings and all cases, in place of two recordings and a base known to 1 %.
-    seed : int
-        Seed of all random numbers.
     duration : float
         Duration of each recording [s].
     names : sequence of str, optional
         Names of the candidates, by default the whole catalogue.
-    progress : callable, optional
-        Receives a fraction and a sentence, anew in every case.
     """
     cases = KNOWN if full else {"1 %": KNOWN["1 %"]}
     return {

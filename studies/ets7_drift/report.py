@@ -23,23 +23,8 @@ from studies.common.ets7 import RADIUS, RAMPS, TIP_SPEED, ets7, tip_speed
 from studies.common.quantities import HEADINGS
 from studies.common.report_parts import columns
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
-from studies.ets7_drift.analysis import (
-    ATTITUDE_SIGMA,
-    CAUSES,
-    DURATION,
-    ENCODER_SIGMA,
-    INTERVAL,
-    KNOWN,
-    MOMENTUM,
-    MOTION,
-    RATE,
-    RATE_SIGMA,
-    Amplitude,
-    Attitude,
-    Case,
-    Step,
-    run,
-)
+from studies.ets7_drift import analysis
+from studies.ets7_drift.analysis import Case
 
 __all__ = ["STUDY", "attitude_figure", "goals_of"]
 
@@ -48,7 +33,7 @@ BETTER = 100.0
 
 FAR = 3.0  # errors of one number that should not be exceeded [standard deviations]
 REACH = 1.96  # half-width of a 95 % band [standard deviations]
-NOISE = float(np.degrees(np.sqrt(3.0) * ATTITUDE_SIGMA))  # expected size of the attitude's noise [degrees]
+NOISE = float(np.degrees(np.sqrt(3.0) * analysis.ATTITUDE_SIGMA))  # expected size of the attitude's noise [degrees]
 
 
 Cases = Mapping[str, Case]  # cases by what is known of the base
@@ -57,7 +42,7 @@ Cases = Mapping[str, Case]  # cases by what is known of the base
 def _report(cases: Cases) -> Report[Cases]:
     known, shown = _shown(cases)
     ramps = " and ".join(f"{start:g} to {stop:g} s" for start, stop in RAMPS)
-    fastest, _ = tip_speed(MOTION, DURATION)
+    fastest, _ = tip_speed(analysis.MOTION, analysis.DURATION)
     rests = np.array([0.0, 100.0])
     quantities = [[name, *astuple(amplitude)] for name, case in cases.items() for amplitude in _quantities(case)]
     return Report(
@@ -69,8 +54,8 @@ def _report(cases: Cases) -> Report[Cases]:
         answer=" ".join(_answer(name, case) for name, case in cases.items()),
         valid="the links are known exactly, where the paper knows them to 5 %, the wheels' momentum is constant and "
         "the noise is white. Recordings are simulated; no flight telemetry of ETS-VII is public.",
-        goals=[goal for name in KNOWN for goal in goals_of(name, cases.get(name))],
-        full=set(cases) == set(KNOWN),
+        goals=[goal for name in analysis.KNOWN for goal in goals_of(name, cases.get(name))],
+        full=set(cases) == set(analysis.KNOWN),
         figure=Picture(
             attitude_figure(shown.attitudes[0]),
             f"Base known to {known}, the first of {len(shown.attitudes)} recordings. Above: the paper's figure 2 with "
@@ -84,23 +69,27 @@ def _report(cases: Cases) -> Report[Cases]:
             manoeuvre=f"Joints 2 to 4 move by 0.264, −0.321 and 0.057 rad out and back, as in flight, over {ramps}; "
             f"its linear ramps are replaced by quintic ones. The tip moves with up to {1e3 * fastest:.0f} mm/s, where "
             f"the flight's rule is {1e3 * TIP_SPEED:.0f} mm/s.",
-            sensors=f"Every {INTERVAL:g} s, noise per sample: rates {format_number(RATE_SIGMA)} rad/s (the paper's "
-            f"star sensor: 2 arcsec), joints {format_number(ENCODER_SIGMA)} rad. The attitude, "
-            f"{format_number(ATTITUDE_SIGMA)} rad, is kept for comparison alone, but for the exact one at the start.",
+            sensors=f"Every {analysis.INTERVAL:g} s, noise per sample: rates {format_number(analysis.RATE_SIGMA)} "
+            f"rad/s (the paper's star sensor: 2 arcsec), joints {format_number(analysis.ENCODER_SIGMA)} rad. The "
+            f"attitude, {format_number(analysis.ATTITUDE_SIGMA)} rad, is kept for comparison alone, but for the exact "
+            "one at the start.",
             known="Orbit, links and joint motion. The present simulation starts at rest and has no effect.",
-            unknown=f"Base body, with a mass known to {' or '.join(KNOWN)}, of which the true base is a draw; hidden: "
-            f"gravity gradient, momentum {format_vector(MOMENTUM)} N m s left in the wheels, and initial rates of "
-            f"{format_number(RATE)} rad/s per axis (assumed, as no values are public).",
-            replicates=f"{len(shown.world.manoeuvres)} recordings of {DURATION:g} s, attitudes and places on orbit "
-            "drawn at random, one base. A single world: rates of right verdicts are in the report on blind injections.",
+            unknown=f"Base body, with a mass known to {' or '.join(analysis.KNOWN)}, of which the true base is a draw; "
+            f"hidden: gravity gradient, momentum {format_vector(analysis.MOMENTUM)} N m s left in the wheels, and "
+            f"initial rates of {format_number(analysis.RATE)} rad/s per axis (assumed, as no values are public).",
+            replicates=f"{len(shown.world.manoeuvres)} recordings of {analysis.DURATION:g} s, attitudes and places on "
+            "orbit drawn at random, one base. A single world: rates of right verdicts are in the report on blind "
+            "injections.",
         ),
         picture=Picture(
-            figures.robot_pose(ets7(), MOTION, rests),
+            figures.robot_pose(ets7(), analysis.MOTION, rests),
             f"ETS-VII with the joints at rest, before the manoeuvre and between its two turns ({rests[1]:g} s).",
         ),
         sections=[_negatives, _evidence],
         statements=_statements(cases),
-        tables=[CsvTable("quantities", ["base known to", *(field.name for field in fields(Amplitude))], quantities)],
+        tables=[
+            CsvTable("quantities", ["base known to", *(field.name for field in fields(analysis.Amplitude))], quantities)
+        ],
     )
 
 
@@ -160,7 +149,7 @@ def goals_of(known: str, case: Case | None) -> list[Goal]:
 def _true(case: Case) -> float:
     """Return the probability of the three true causes and nothing else."""
     sets = case.diagnosis.probabilities.sets
-    return sum(item.probability for item in sets if item.generic is None and set(item.causes) == set(CAUSES))
+    return sum(item.probability for item in sets if item.generic is None and set(item.causes) == set(analysis.CAUSES))
 
 
 def _negatives(document: Document, cases: Cases) -> None:
@@ -181,8 +170,8 @@ def _failures(known: str, case: Case) -> list[str]:
         )
         + f", and the attitude is {format_number(_rms(case, 'fitted'), 2)} degrees off (rms)."
     ]
-    missed = [cause for cause in CAUSES if cause not in verdict.causes]
-    wrong = [cause for cause in verdict.causes if cause not in CAUSES]
+    missed = [cause for cause in analysis.CAUSES if cause not in verdict.causes]
+    wrong = [cause for cause in verdict.causes if cause not in analysis.CAUSES]
     if missed or wrong:
         texts.insert(
             0,
@@ -234,13 +223,13 @@ def _evidence(document: Document, cases: Cases) -> None:
     document.items([f"Base known to {known}: {_fit_sentence(case)}" for known, case in cases.items()])
 
 
-def _quantities(case: Case) -> list[Amplitude]:
+def _quantities(case: Case) -> list[analysis.Amplitude]:
     """Return the amplitudes of the named causes and the parameters of the base beside the truth."""
     after, truth = case.diagnosis.gain.after.bodies, case.world.base
     quantities = [*case.amplitudes]
     for k, title in enumerate(HEADINGS):
         name, unit = title.rstrip("]").split(" [")
-        quantities.append(Amplitude(name, unit, float(truth[k]), float(after.mean[k]), float(after.sd[k])))
+        quantities.append(analysis.Amplitude(name, unit, float(truth[k]), float(after.mean[k]), float(after.sd[k])))
     return quantities
 
 
@@ -261,7 +250,7 @@ def _held_out(case: Case) -> str:
     return f"The log score of recordings left out is {scores[0]} before and {scores[1]} after."
 
 
-def _step_row(step: Step) -> list[str]:
+def _step_row(step: analysis.Step) -> list[str]:
     fit = step.fitted.fit
     return [
         set_text(step.found.causes),
@@ -293,13 +282,13 @@ def _statements(cases: Cases) -> list[Statement]:
         Statement(
             "The simulation without external actions is a rather strong assumption.",
             Finding.CONFIRMED,
-            f"After {DURATION:g} s without the causes an angle is up to {format_number(last, 2)} degrees off.",
+            f"After {analysis.DURATION:g} s without the causes an angle is up to {format_number(last, 2)} degrees off.",
         ),
     ]
 
 
 @styled
-def attitude_figure(attitude: Attitude) -> Figure:
+def attitude_figure(attitude: analysis.Attitude) -> Figure:
     """Draw the paper's figure 2 for one recording, and beneath it the error of the prediction with its band."""
     figure = wide_figure(3.1)
     panels = figure.subplots(2, 3, sharex=True, sharey="row")
@@ -323,7 +312,7 @@ def attitude_figure(attitude: Attitude) -> Figure:
 STUDY = Study(
     "ets7_drift",
     "Name what makes the attitude of ETS-VII drift.",
-    run=run,
+    run=analysis.run,
     report=_report,
     full="three recordings, and a base known to 5 %%",
     seed=1,

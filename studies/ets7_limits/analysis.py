@@ -245,16 +245,12 @@ def run(
     accels: Sequence[str] = tuple(ACCELS),
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
-    """Run the study.
+    """Run the study; arguments that are not described are options of the command.
 
     Parameters
     ----------
-    tables : Path
-        Folder with the tables of `studies.excitation`.
     rates, accels : sequence of str
         Labels of the sensors.
-    progress : callable
-        Receives a line on what is being done.
     """
     motion = designed_motion(tables / "excitation-manoeuvres.csv")
     information = information_of(motion)

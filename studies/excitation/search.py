@@ -346,37 +346,18 @@ def run(
     executor: Executor | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
-    """Run the study.
+    """Run the study; arguments that are not described are options of the command.
 
     Parameters
     ----------
-    full : bool
-        True for all criteria in place of four, for the thorough effort of each search, and to fly all of them.
-    seed : int
-        Seed of all random numbers.
     search : Search, optional
         Effort of each design.
-    starts : int, optional
-        Number of cheap descents by each of `CROWDED` from which the contest begins, too; none where left out.
-    searches : int, optional
-        Number of thorough searches by d-optimality that differ in their seeds, from whose best the contest begins, too.
-        With ``starts`` as well, other robots are searched.
-    repeats : int, optional
-        Number of flights of each design that is flown; 400 in a full run, 100 in a quick one.
     flown : sequence of str
         Designs to fly in a quick run.
     random : int, optional
         Number of random manoeuvres.
     points : int
         Number of free control points of every joint.
-    store : Store, optional
-        Results of searches of an earlier run that was interrupted.
-    trials, workers
-        Folder that keeps the flights, and number of processes that fly.
-    executor : concurrent.futures.Executor, optional
-        Executor of the descents of all searches.
-    progress : callable, optional
-        Receives a line on what is being done.
     """
     search = replace(search or (FULL if full else QUICK), executor=executor)
     repeats = (400 if full else 100) if repeats is None else repeats

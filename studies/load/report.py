@@ -20,23 +20,8 @@ from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE
 from studies.common.quantities import HEADINGS, LABELS, MASS
 from studies.common.report_parts import add_number_table
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
-from studies.load import paper
-from studies.load.loops import (
-    AT_MOST,
-    GOAL,
-    LIMITED,
-    LOAD,
-    SAFE,
-    SPREAD,
-    TRUTH_STEP,
-    Flight,
-    Iteration,
-    excitation,
-    fly_again,
-    fly_loop,
-    iterate,
-    ship,
-)
+from studies.load import loops, paper
+from studies.load.loops import Flight, Iteration
 
 __all__ = ["STUDY", "Result", "run"]
 
@@ -62,25 +47,13 @@ class Result:
 
 
 def run(folder: Path, *, full: bool = False, seed: int = 0, progress: Progress = silent) -> Result:
-    """Run the study.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the loop's files, one for each effort; an interrupted run goes on there.
-    full : bool
-        True for the default effort of each search.
-    seed : int
-        Seed of all random numbers.
-    progress : Progress
-        Receiver of the fraction of the loop that is done.
-    """
+    """Run the study; the arguments are options of the command."""
     folder = folder / ("full" if full else "quick")
     folder.mkdir(parents=True, exist_ok=True)
     search = Search() if full else Search(starts=2, iterations=25)
-    loop = fly_loop(folder, seed=seed, search=search, progress=progress)
-    flights = {"loop": loop, "exact": fly_again(folder, loop, seed=seed)}
-    return Result(iterate(seed=seed, search=search), flights, full)
+    loop = loops.fly_loop(folder, seed=seed, search=search, progress=progress)
+    flights = {"loop": loop, "exact": loops.fly_again(folder, loop, seed=seed)}
+    return Result(loops.iterate(seed=seed, search=search), flights, full)
 
 
 def _goals(result: Result) -> list[Goal]:
@@ -92,8 +65,8 @@ def _goals(result: Result) -> list[Goal]:
             f"{format_percent(mass, 2)} off with a sd of {format_percent(sd, 2)} after {len(flight.bodies)}; mass and "
             f"moments {format_percent(flight.worst(-1)[0], 2)} off at worst"
         )
-        text = f"Load's mass known to {format_percent(GOAL, 2)} within {AT_MOST} manoeuvres, {TITLES[name]}"
-        rows.append(Goal(text, reached, Verdict.of(sd <= GOAL and mass <= GOAL)))
+        text = f"Load's mass known to {format_percent(loops.GOAL, 2)} within {loops.AT_MOST} manoeuvres, {TITLES[name]}"
+        rows.append(Goal(text, reached, Verdict.of(sd <= loops.GOAL and mass <= loops.GOAL)))
     rows.append(
         Goal(
             "The loop flies every step and never ends in no go",
@@ -122,7 +95,7 @@ def _goals(result: Result) -> list[Goal]:
     rows.append(
         Goal(
             "Without noise, relative error at most 10⁻⁶ after two iterations",
-            f"{format_number(error, 2)}, within the flight's rule, MuJoCo's steps {TRUTH_STEP:g} s",
+            f"{format_number(error, 2)}, within the flight's rule, MuJoCo's steps {loops.TRUTH_STEP:g} s",
             Verdict.of(error <= NOISE_FREE),
         )
     )
@@ -133,7 +106,7 @@ def _report(result: Result) -> Report[Result]:
     loop, exact = result.flights["loop"], result.flights["exact"]
     reached, ideal = (format_quantity(flight.bodies[-1].mean[0], flight.bodies[-1].sd[0]) for flight in (loop, exact))
     kept = "kept" if max(loop.used.values()) <= 1.0 else "did not keep"
-    motion = excitation().motion(result.iterations[-1].parameters)
+    motion = loops.excitation().motion(result.iterations[-1].parameters)
     return Report(
         title="A load of 370 kg on ETS-VII",
         subtitle="Section 4.2 of Lampariello and Hirzinger (IDETC 2005)",
@@ -156,19 +129,19 @@ def _report(result: Result) -> Report[Result]:
             "rad.",
             manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s each, d-optimal for the load from "
             "what the steps before told. At most 50 mm/s and 5 degrees per second at the tip, the flight's rule, and "
-            f"{SAFE.base_rotation:g} rad of rotation of the base, each with 99 % probability.",
+            f"{loops.SAFE.base_rotation:g} rad of rotation of the base, each with 99 % probability.",
             sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
             f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant "
             "bias of the accelerometer.",
             known="The base, the orbit, the attitude at the start, and the arm to 5 % of the mass of each link.",
-            unknown=f"The load, with a prior about 10 kg in which its mass may be {np.exp(2.0 * SPREAD):.0f} times "
-            f"larger or smaller within one sd; the rate at the start; the bias within {format_number(BIAS)} m/s²; the "
-            "links.",
-            replicates=f"One loop with one drawn arm; at most {AT_MOST} manoeuvres. Posteriors are normal "
+            unknown=f"The load, with a prior about 10 kg in which its mass may be {np.exp(2.0 * loops.SPREAD):.0f} "
+            f"times larger or smaller within one sd; the rate at the start; the bias within {format_number(BIAS)} "
+            "m/s²; the links.",
+            replicates=f"One loop with one drawn arm; at most {loops.AT_MOST} manoeuvres. Posteriors are normal "
             "approximations.",
         ),
         picture=Picture(
-            figures.robot_pose(ship(paper.TRUTH), motion, np.array([0.0, 0.5 * mission.DURATION])),
+            figures.robot_pose(loops.ship(paper.TRUTH), motion, np.array([0.0, 0.5 * mission.DURATION])),
             "ETS-VII with the load at rest and in the middle of the paper's manoeuvre, which is flown without noise; "
             "the loop's own manoeuvres are not drawn.",
         ),
@@ -181,13 +154,13 @@ def _report(result: Result) -> Report[Result]:
 def _failures(document: Document, result: Result) -> None:
     document.section("Calibration and failures")
     loop = result.flights["loop"]
-    floor = ship().link("link6").inertial.mass * 0.05
+    floor = loops.ship().link("link6").inertial.mass * 0.05
     share = format_percent(floor / paper.TRUTH[MASS], 2)
     left = format_number(float(loop.bodies[-1].sd[MASS]), 2)
     document.paragraph(
-        f"A precision of {format_percent(GOAL, 2)} is out of reach of any manoeuvre with this arm: link 6 and the load "
-        f"move as one body, and 5 % of the link's mass are {format_number(floor, 2)} kg, {share} of the load. After "
-        f"the last manoeuvre {left} kg are left."
+        f"A precision of {format_percent(loops.GOAL, 2)} is out of reach of any manoeuvre with this arm: link 6 and "
+        f"the load move as one body, and 5 % of the link's mass are {format_number(floor, 2)} kg, {share} of the load. "
+        f"After the last manoeuvre {left} kg are left."
     )
     attempts = []
     for number, plan in enumerate(loop.plans, start=1):
@@ -275,14 +248,14 @@ def _tables(result: Result) -> list[CsvTable]:
         for k in range(10)
     ]
     limits = [
-        [name, step + 1, key, row[key], getattr(SAFE, key)]
+        [name, step + 1, key, row[key], getattr(loops.SAFE, key)]
         for name, flight in result.flights.items()
         for step, row in enumerate(flight.largest)
         for key in row
     ]
     without = [[number, *map(float, item.estimate)] for number, item in enumerate(result.iterations, start=1)]
     return [
-        CsvTable("steps", ["arm", "manoeuvre", f"{LOAD}'s quantity", "true", "mean", "sd"], steps),
+        CsvTable("steps", ["arm", "manoeuvre", f"{loops.LOAD}'s quantity", "true", "mean", "sd"], steps),
         CsvTable("limits", ["arm", "manoeuvre", "limit", "largest in MuJoCo", "allowed"], limits),
         CsvTable("without-noise", ["iteration", *HEADINGS], without),
     ]
@@ -300,14 +273,14 @@ def _loop_figure(flights: dict[str, Flight]) -> Figure:
         colour = COLOURS[index]
         left.plot(steps, 100.0 * np.array(sd), "-", color=colour, label=f"sd, {TITLES[name]}")
         left.plot(steps, 100.0 * np.array(error), "o", color=colour, markersize=4, label=f"error, {TITLES[name]}")
-    left.axhline(100.0 * GOAL, color="#888888", linestyle=":")
-    left.text(0.55, 110.0 * GOAL, "wanted", fontsize=8, va="bottom")
+    left.axhline(100.0 * loops.GOAL, color="#888888", linestyle=":")
+    left.text(0.55, 110.0 * loops.GOAL, "wanted", fontsize=8, va="bottom")
     flown = next(iter(flights.values()))
     steps = np.arange(1, len(flown.bodies) + 1)
     left.set(yscale="log", xlabel="manoeuvre", ylabel="error or sd of the mass [%]", xlim=(0.5, steps[-1] + 0.5))
     left.set_xticks(steps)
-    for index, name in enumerate(LIMITED):
-        part = 100.0 * np.array([row[name] for row in flown.largest]) / getattr(SAFE, name)
+    for index, name in enumerate(loops.LIMITED):
+        part = 100.0 * np.array([row[name] for row in flown.largest]) / getattr(loops.SAFE, name)
         right.bar(steps + 0.25 * (index - 1), part, 0.22, color=COLOURS[index + 2], label=LIMIT_TITLES[name])
     right.axhline(100.0, color="black", linewidth=0.8)
     right.set(xlabel="manoeuvre", ylabel="share of the limit [%]", ylim=(0.0, 145.0))

@@ -332,24 +332,12 @@ def run(
     workers: Workers = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
-    """Run the study.
+    """Run the study; arguments that are not described are options of the command.
 
     Parameters
     ----------
     parameters : (n,) array
         Parameters of the identifying manoeuvre, `studies.common.mission.splines`.
-    full : bool
-        True for `SHIPS` ships of each row.
-    seed : int
-        Seed of all random numbers.
-    ships : int, optional
-        Number of ships of each row.
-    trials : path, optional
-        Folder that keeps the trials of every row.
-    workers : int or Executor
-        Number of processes for these trials.
-    progress : callable, optional
-        Receives a line on what is being done.
     """
     ships = (SHIPS if full else FEW) if ships is None else ships
     rows = {

@@ -42,20 +42,7 @@ from studies.base_body import paper
 from studies.common.ets7 import ACCELEROMETER, BASE, BIAS, INTERVAL, ets7
 from studies.common.monte_carlo import Workers, run_trials
 from studies.common.quantities import JUDGED, MASS, inertia_matrix
-from studies.sensors.estimators import (
-    LIKELIHOOD,
-    PIECES,
-    STEP,
-    Estimator,
-    Linear,
-    Solved,
-    Spread,
-    integral,
-    integrated,
-    linearised,
-    raw_posterior,
-    velocity_estimators,
-)
+from studies.sensors import estimators
 from studies.sensors.signals import (
     Differences,
     Draws,
@@ -71,7 +58,7 @@ from studies.sensors.signals import (
     recording_of,
 )
 
-__all__ = ["Balance", "Falsified", "Refits", "Regression", "Scalar", "attenuation", "falsified", "refit_all"]
+__all__ = ["Balance", "Refits", "Regression", "Scalar", "attenuation", "falsified", "refit_all"]
 __all__ += ["regress", "scalars", "solve_balance"]
 
 PERIODS = 2  # number of periods of the cosine
@@ -106,7 +93,7 @@ def scalars(draws: int, rng: np.random.Generator, samples: int = 2401) -> list[S
         Number of samples, so large that sums are integrals.
     """
     phase = 2.0 * np.pi * PERIODS * np.linspace(0.0, 1.0, samples)
-    rule = integral(phase)
+    rule = estimators.integral(phase)
     noise = rng.standard_normal((draws, samples))
     results = []
     for name, shape, closed, bias in (
@@ -134,32 +121,16 @@ def scalars(draws: int, rng: np.random.Generator, samples: int = 2401) -> list[S
     return results
 
 
-@dataclass(frozen=True)
-class Falsified:
-    """Relative errors of the ten quantities without any noise."""
-
-    bias: Floats  # (10,): errors due to a constant error `BIAS` of the accelerometer on each axis
-    # (10,): errors due to integrating samples by the trapezoidal rule and comparing them with the exact velocity; zero
-    # where the accelerometer is not integrated
-    rule: Floats
-
-
-def falsified(flight: Flight, linear: Linear, noise: Noise) -> dict[str, Falsified]:
-    """Return the errors that a bias and the rule of integration cause in every use of the accelerometer."""
-    still, rule = np.zeros_like(flight.rate), integral(flight.time)
-    # the acceleration errors whose trapezoidal integral is that of the rule
-    missed = np.linalg.lstsq(rule, rule @ flight.accel - (flight.velocity[1:] - flight.velocity[0]))[0]
-    exact = np.zeros((1, 3, *flight.position.shape))
-    errors = [linear.residual(still[None], accel[None], exact) for accel in (still + BIAS, missed)]
-    results = {}
-    for name, estimator in velocity_estimators(linear, noise).items():
-        bias, quadrature = (estimator.solve(residual)[0][0] / np.abs(paper.TRUTH) for residual in errors)
-        results[name] = Falsified(bias, quadrature if name.startswith("velocity") else 0.0 * quadrature)
-    return results
+def falsified(flight: Flight, linear: estimators.Linear, noise: Noise) -> dict[str, Floats]:
+    """Return the relative errors (10,) that a bias of `BIAS` on each axis causes in every use of the accelerometer."""
+    still, exact = np.zeros_like(flight.rate), np.zeros((1, 3, *flight.position.shape))
+    residual = linear.residual(still[None], still[None] + BIAS, exact)
+    uses = estimators.velocity_estimators(linear, noise)
+    return {name: estimator.solve(residual)[0][0] / np.abs(paper.TRUTH) for name, estimator in uses.items()}
 
 
 # treatments of joints, rates and accelerations alike
-TREATED: tuple[Treatment, ...] = (Differences(), LowPass(), PIECES, Wiener())
+TREATED: tuple[Treatment, ...] = (Differences(), LowPass(), estimators.PIECES, Wiener())
 
 
 class Balance:
@@ -295,8 +266,8 @@ class SampledJoints:
 class Refits:
     """Nonlinear fits of N sets of noise, and the linear estimates from the same sets."""
 
-    nonlinear: Spread
-    linear: Spread
+    nonlinear: estimators.Spread
+    linear: estimators.Spread
 
     @property
     def difference(self) -> Floats:
@@ -339,50 +310,50 @@ def refit_all(
     results: dict[str, dict[str, Refits]] = {level: {} for level in chosen if plan}
     for level, procedure in dict.fromkeys(plan):
         made = [trial for task, trial in zip(plan, trials, strict=True) if task == (level, procedure)]
-        both = (Spread.of(_joined([trial[name] for trial in made])) for name in ("nonlinear", "linear"))
+        both = (estimators.Spread.of(_joined([trial[name] for trial in made])) for name in ("nonlinear", "linear"))
         results[level][procedure] = Refits(*both)
     return results
 
 
-def _joined(solved: Sequence[Solved]) -> Solved:
+def _joined(solved: Sequence[estimators.Solved]) -> estimators.Solved:
     errors, stated, chi2 = (np.concatenate(parts) for parts in zip(*solved, strict=True))
     return errors, stated, chi2
 
 
-def refit(task: tuple[str, str], rng: np.random.Generator) -> dict[str, Solved]:
+def refit(task: tuple[str, str], rng: np.random.Generator) -> dict[str, estimators.Solved]:
     """Fit one set of noise by a procedure at a level of noise, nonlinearly and to first order.
 
     Fits start from the truth: the question is where the optimum lies, not whether it is reached.
     """
     level, procedure = task
     noise = levels(fly())[level]
-    fit = _likelihood if procedure == LIKELIHOOD else _paper
+    fit = _likelihood if procedure == estimators.LIKELIHOOD else _paper
     return fit(Draws.of(fly(), 1, rng), noise, rng)
 
 
-def _likelihood(draws: Draws, noise: Noise, rng: np.random.Generator) -> dict[str, Solved]:
+def _likelihood(draws: Draws, noise: Noise, rng: np.random.Generator) -> dict[str, estimators.Solved]:
     """Fit as the package does."""
-    measured, linear = draws.measured_motion(noise), linearised()
+    measured, linear = draws.measured_motion(noise), estimators.linearised()
     manoeuvre = Manoeuvre(draws.recording(noise), measured)
-    posterior = Posterior.of(model_of(noise, biased=False), [manoeuvre], step=STEP, flat_prior=True)
+    posterior = Posterior.of(model_of(noise, biased=False), [manoeuvre], step=estimators.STEP, flat_prior=True)
     refined, optimum = maximise(posterior, rng, np.zeros(posterior.size))
     chi2 = optimum.chi2 / (refined.samples - refined.size)
     errors = linear.residual(draws.raw("rate", noise), draws.raw("accel", noise), draws.joints(Wiener(), noise))
     return {
         "nonlinear": _solved(Knowledge.at(refined, optimum.z), 1.0, chi2),
-        "linear": Estimator(linear, linear.whitening(noise, measured)).solve(errors),
+        "linear": estimators.Estimator(linear, linear.whitening(noise, measured)).solve(errors),
     }
 
 
-def _paper(draws: Draws, noise: Noise, rng: np.random.Generator) -> dict[str, Solved]:
+def _paper(draws: Draws, noise: Noise, rng: np.random.Generator) -> dict[str, estimators.Solved]:
     """Fit as the paper does: signals treated, accelerations integrated, squares of SI units added."""
-    flight, linear = draws.flight, linearised()
+    flight, linear = draws.flight, estimators.linearised()
     rate, accel = (draws.treated(LowPass(), family, noise)[:, 0] for family in ("rate", "accel"))
-    joints = draws.joints(PIECES, noise)
+    joints = draws.joints(estimators.PIECES, noise)
     moved = SampledJoints(np.stack(motion().evaluate(flight.time)) + joints[0])
     recording = recording_of(flight.time, flight.rate + rate[0], flight.accel + accel[0])
-    posterior = raw_posterior(recording, moved, biased=False)
-    weight = integrated(flight.time, None)
+    posterior = estimators.raw_posterior(recording, moved, biased=False)
+    weight = estimators.integrated(flight.time, None)
     scalars = weight.shape[1]  # the posterior's other rows are padding
 
     def residual(z: Floats) -> Floats:
@@ -396,12 +367,12 @@ def _paper(draws: Draws, noise: Noise, rng: np.random.Generator) -> dict[str, So
     solution = least_squares(residual, np.zeros(posterior.size), jacobian, method="lm", x_scale="jac")
     variance = 2.0 * solution.cost / (len(weight) - posterior.size)
     knowledge = Knowledge(*linearise(posterior, solution.x), jacobian(solution.x))
-    equal_weights = Estimator(linear, weight, declared=False)
+    equal_weights = estimators.Estimator(linear, weight, declared=False)
     return {
         "nonlinear": _solved(knowledge, np.sqrt(variance), variance),
         "linear": equal_weights.solve(linear.residual(rate, accel, joints)),
     }
 
 
-def _solved(knowledge: Knowledge, sigma: float, chi2: float) -> Solved:
+def _solved(knowledge: Knowledge, sigma: float, chi2: float) -> estimators.Solved:
     return (knowledge.values - paper.TRUTH)[None], sigma * knowledge.sd[None], np.array([chi2])

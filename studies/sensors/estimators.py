@@ -24,23 +24,7 @@ from bayesid.recording.joint_motion import Motion
 from bayesid.simulation.sensors import Filter
 from studies.base_body import paper
 from studies.common.quantities import MOMENTS
-from studies.sensors.signals import (
-    Differences,
-    Draws,
-    LowPass,
-    Noise,
-    Polynomial,
-    SavitzkyGolay,
-    SmoothingSpline,
-    Treatment,
-    Wiener,
-    fly,
-    junctions,
-    model_of,
-    motion,
-    near_junctions,
-    recording_of,
-)
+from studies.sensors import signals
 
 __all__ = ["EQUAL", "EXACT", "LIKELIHOOD", "PAPER", "PIECES", "STEP", "Estimator", "Linear", "Solved", "Spread"]
 __all__ += ["TREATMENTS", "WEIGHTED", "WHOLE", "WITHOUT_JUNCTIONS", "as_read", "constant", "integral", "integrated"]
@@ -55,7 +39,7 @@ LAGS = 32  # largest number of samples over which the joints' errors are correla
 
 def raw_posterior(recording: Recording, moved: Motion, *, biased: bool) -> Posterior:
     """Return a posterior without prior whose residuals are in SI units, since all sensors have a sigma of one."""
-    model = model_of(Noise(1.0, 1.0, 0.0), biased=biased)
+    model = signals.model_of(signals.Noise(1.0, 1.0, 0.0), biased=biased)
     return Posterior.of(model, [Manoeuvre(recording, moved)], step=STEP, flat_prior=True)
 
 
@@ -78,7 +62,9 @@ class Linear:
         moved = np.einsum("nktj,jktc->ntc", joints, self.joints, optimize=True)
         return (np.concatenate([rate, accel], axis=-1) - moved).reshape(len(moved), -1)
 
-    def whitening(self, noise: Noise, measured: MeasuredMotion, left_out: NDArray[np.bool_] | None = None) -> Floats:
+    def whitening(
+        self, noise: signals.Noise, measured: MeasuredMotion, left_out: NDArray[np.bool_] | None = None
+    ) -> Floats:
         """Return the package's whitening as a matrix on residuals, some samples left out, shape (m, 6 T)."""
         count = len(self.time)
         rows = np.arange(count) if left_out is None else np.flatnonzero(~left_out)
@@ -98,8 +84,8 @@ class Linear:
 @cache
 def linearised() -> Linear:
     """Return the derivatives along the manoeuvre as it is flown."""
-    flight, planned = fly(), motion()
-    posterior = raw_posterior(recording_of(flight.time, flight.rate, flight.accel), planned, biased=True)
+    flight, planned = signals.fly(), signals.motion()
+    posterior = raw_posterior(signals.recording_of(flight.time, flight.rate, flight.accel), planned, biased=True)
     z, count = np.zeros(posterior.size), len(flight.time)
     environment = jax.tree.map(lambda x: np.asarray(x)[0, :count], posterior.data.arrays.grid.sample.environment)
     attitude = np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))  # there is no star sensor to which it matters
@@ -151,13 +137,13 @@ def integral(time: Floats) -> Floats:
     return np.cumsum(0.5 * step[:, None] * (samples[1:] + samples[:-1]), axis=0)
 
 
-def as_read(time: Floats, noise: Noise | None) -> Floats:
+def as_read(time: Floats, noise: signals.Noise | None) -> Floats:
     """Return weights of rates and accelerations by their noise, or equal ones in SI units without a noise."""
     rate, accel = (1.0, 1.0) if noise is None else (1.0 / noise.rate, 1.0 / noise.accel)
     return _both(rate * np.eye(len(time)), accel * np.eye(len(time)))
 
 
-def integrated(time: Floats, noise: Noise | None) -> Floats:
+def integrated(time: Floats, noise: signals.Noise | None) -> Floats:
     """Return weights of rates and velocities by their noise as if it were white, or equal ones as in (21) without one.
 
     The noise of the velocity is the root mean square of the accelerometer's integrated noise.
@@ -169,7 +155,7 @@ def integrated(time: Floats, noise: Noise | None) -> Floats:
     return _both(np.eye(len(time)) / noise.rate, rule / spread)
 
 
-def integrated_whole(time: Floats, noise: Noise) -> Floats:
+def integrated_whole(time: Floats, noise: signals.Noise) -> Floats:
     """Return weights of rates by their noise and of velocities by their full covariance."""
     rule = integral(time)
     factor = np.linalg.cholesky(rule @ rule.T)
@@ -190,17 +176,17 @@ def _both(rate: Floats, accel: Floats) -> Floats:
     return np.concatenate([np.kron(rate, np.eye(3, 6)), np.kron(accel, np.eye(3, 6, 3))])
 
 
-PIECES = Polynomial(junctions())  # polynomials over the pieces of (27) between its junctions
+PIECES = signals.Polynomial(signals.junctions())  # polynomials over the pieces of (27) between its junctions
 
 # treatments of joints, and but for the first of rates
-TREATMENTS: tuple[Treatment, ...] = (
-    Differences(),
-    LowPass(),
-    SavitzkyGolay(),
-    Polynomial(),
+TREATMENTS: tuple[signals.Treatment, ...] = (
+    signals.Differences(),
+    signals.LowPass(),
+    signals.SavitzkyGolay(),
+    signals.Polynomial(),
     PIECES,
-    SmoothingSpline(),
-    Wiener(),
+    signals.SmoothingSpline(),
+    signals.Wiener(),
 )
 
 EXACT = "exact"  # joints that are known exactly
@@ -269,7 +255,7 @@ class Spread:
         return max(chosen, key=lambda index: float(self.rms[index]))
 
 
-def joints(linear: Linear, draws: Draws, noise: Noise) -> dict[str, Spread]:
+def joints(linear: Linear, draws: signals.Draws, noise: signals.Noise) -> dict[str, Spread]:
     """Treat the joints in every way; rates and accelerations as read and weighted by their sensors' noise."""
     plain = Estimator(linear, as_read(linear.time, noise))
     rate, accel = draws.raw("rate", noise), draws.raw("accel", noise)
@@ -279,22 +265,22 @@ def joints(linear: Linear, draws: Draws, noise: Noise) -> dict[str, Spread]:
         spreads[treatment.title] = Spread.of(plain.solve(residual))
     # the last residual is that of the package's smoother
     measured = draws.measured_motion(noise)
-    for name, left_out in ((LIKELIHOOD, None), (WITHOUT_JUNCTIONS, near_junctions(linear.time))):
+    for name, left_out in ((LIKELIHOOD, None), (WITHOUT_JUNCTIONS, signals.near_junctions(linear.time))):
         whitened = Estimator(linear, linear.whitening(noise, measured, left_out))
         spreads[name] = Spread.of(whitened.solve(residual))
     return spreads
 
 
-def rates(linear: Linear, draws: Draws, noise: Noise) -> dict[str, Spread]:
+def rates(linear: Linear, draws: signals.Draws, noise: signals.Noise) -> dict[str, Spread]:
     """Treat the rates in every way; joints smoothed by the package, accelerations as read."""
     plain = Estimator(linear, as_read(linear.time, noise))
-    moved, accel = draws.joints(Wiener(), noise), draws.raw("accel", noise)
+    moved, accel = draws.joints(signals.Wiener(), noise), draws.raw("accel", noise)
     errors = {"none": draws.raw("rate", noise)}
     errors |= {treatment.title: draws.treated(treatment, "rate", noise)[:, 0] for treatment in TREATMENTS[1:]}
     return {name: Spread.of(plain.solve(linear.residual(rate, accel, moved))) for name, rate in errors.items()}
 
 
-def velocity_estimators(linear: Linear, noise: Noise) -> dict[str, Estimator]:
+def velocity_estimators(linear: Linear, noise: signals.Noise) -> dict[str, Estimator]:
     """Return the uses of the accelerometer, as it reads and integrated."""
     time = linear.time
     read, weighted = as_read(time, noise), integrated(time, noise)
@@ -310,11 +296,11 @@ def velocity_estimators(linear: Linear, noise: Noise) -> dict[str, Estimator]:
     }
 
 
-def accelerometers(linear: Linear, draws: Draws, noise: Noise) -> dict[str, Spread]:
+def accelerometers(linear: Linear, draws: signals.Draws, noise: signals.Noise) -> dict[str, Spread]:
     """Use the accelerometer in every way with exact joints; and the paper's procedure with everything measured."""
     residual = linear.residual(draws.raw("rate", noise), draws.raw("accel", noise), draws.exact_joints())
     uses = velocity_estimators(linear, noise)
     spreads = {name: Spread.of(estimator.solve(residual)) for name, estimator in uses.items()}
-    rate, accel = (draws.treated(LowPass(), family, noise)[:, 0] for family in ("rate", "accel"))
+    rate, accel = (draws.treated(signals.LowPass(), family, noise)[:, 0] for family in ("rate", "accel"))
     residual = linear.residual(rate, accel, draws.joints(PIECES, noise))
     return spreads | {PAPER: Spread.of(uses[EQUAL].solve(residual))}

@@ -15,23 +15,10 @@ from studies.common.ets7 import ACCELEROMETER, INTERVAL, TIP_SPEED, ets7, tip_sp
 from studies.common.quantities import JUDGED, MASS
 from studies.common.report_parts import columns
 from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
+from studies.sensors import tables
 from studies.sensors.estimators import EQUAL, EXACT, LIKELIHOOD, PAPER, WEIGHTED, WHOLE, WITHOUT_JUNCTIONS, Spread
 from studies.sensors.result import REALISTIC, Effort, Result, run
 from studies.sensors.signals import motion
-from studies.sensors.tables import (
-    diverging,
-    equal_rms,
-    estimate_rows,
-    honesty_of,
-    level_figure,
-    linear_rows,
-    percent,
-    refit_rows,
-    rms_of,
-    rms_pair,
-    treatment_figure,
-    treatment_rows,
-)
 
 __all__ = ["STUDY", "Effort", "Result", "run"]
 
@@ -63,7 +50,7 @@ def _report(result: Result) -> Report[Result]:
         goals=_goals(result),
         full=bool(result.refits),
         figure=Picture(
-            level_figure(result),
+            tables.level_figure(result),
             "Root mean square error of mass and worst moment after one manoeuvre, by level of noise, over "
             f"{result.effort.draws} sets of noise (bars: Monte-Carlo error). The last names state star sensor, "
             "accelerometer [m/s²] and encoder [rad]. Grey: the 2 % of the paper.",
@@ -89,14 +76,16 @@ def _report(result: Result) -> Report[Result]:
         sections=[_negatives, _evidence],
         statements=_statements(result),
         tables=[
-            CsvTable("estimates", ["treated", "noise", "treatment", "quantity", *SPREAD], estimate_rows(result)),
+            CsvTable("estimates", ["treated", "noise", "treatment", "quantity", *SPREAD], tables.estimate_rows(result)),
             CsvTable(
-                "linear", ["noise", "treatment", "quantity", "bias", "bias error", "closed form"], linear_rows(result)
+                "linear",
+                ["noise", "treatment", "quantity", "bias", "bias error", "closed form"],
+                tables.linear_rows(result),
             ),
             CsvTable(
                 "fits",
                 ["noise", "estimator", "fits", "diverged", "median error of mass", "linear", "largest difference [sd]"],
-                refit_rows(result),
+                tables.refit_rows(result),
             ),
         ],
         beside="Beside this report, relative to the truth: every estimator at every level, for joints, rates and "
@@ -121,11 +110,11 @@ def _both(spread: Spread) -> float:
 def _answer(result: Result) -> str:
     level = _first(result)
     best = result.joints[level][LIKELIHOOD]
-    mass, moment = equal_rms(result, level, PAPER)
+    mass, moment = tables.equal_rms(result, level, PAPER)
     return (
-        f"With noise of {level} one manoeuvre gives the mass to {rms_of(best, MASS)} % and the worst moment to "
-        f"{rms_of(best, best.worst())} % by the package's likelihood, and to {mass} % and {moment} % by the paper's "
-        "procedure; the paper expects 2 %."
+        f"With noise of {level} one manoeuvre gives the mass to {tables.rms_of(best, MASS)} % and the worst moment to "
+        f"{tables.rms_of(best, best.worst())} % by the package's likelihood, and to {mass} % and {moment} % by the "
+        "paper's procedure; the paper expects 2 %."
     )
 
 
@@ -139,7 +128,7 @@ def _goals(result: Result) -> list[Goal]:
     return [
         Goal(
             f"at {level} one manoeuvre gives mass and moments to {format_percent(PLANE)}, as the paper expects",
-            f"{rms_pair(likelihood[level])} %",
+            f"{tables.rms_pair(likelihood[level])} %",
             Verdict.of(_both(likelihood[level]) <= PLANE),
         ),
         Goal(
@@ -198,14 +187,14 @@ def _negatives(document: Document, result: Result) -> None:
     texts = [
         "The package's likelihood itself: near the junctions of (27), where the joints' third derivative jumps, a jump "
         "that the samples do not show biases its smoother. Actual over stated errors are "
-        f"{honesty_of(result.joints[standard][LIKELIHOOD])} at {format_text(standard)}, and "
-        f"{honesty_of(result.joints[standard][WITHOUT_JUNCTIONS])} if those samples are left out.",
+        f"{tables.honesty_of(result.joints[standard][LIKELIHOOD])} at {format_text(standard)}, and "
+        f"{tables.honesty_of(result.joints[standard][WITHOUT_JUNCTIONS])} if those samples are left out.",
         *(_failing(result, name) for name, spreads in result.joints.items() if not _is_honest(_ratios(spreads))),
         "Integrated as in (21), with velocities taken for white and equal weights, the accelerometer makes the worst "
-        f"moment {percent(0.01 * ratio, 0.01 * error)} times as uncertain, and a constant bias of 10⁻⁴ m/s² changes "
-        f"the mass by {format_percent(abs(float(falsified[EQUAL].bias[MASS])), 2)} (as it reads: "
-        f"{format_percent(abs(float(falsified[WEIGHTED].bias[MASS])), 2)}). With one unknown, in closed form, the "
-        f"variance is 3 times that of the accelerations (here {format_fixed(result.scalars[0].matrices ** 2, 2)}).",
+        f"moment {tables.percent(0.01 * ratio, 0.01 * error)} times as uncertain, and a constant bias of 10⁻⁴ m/s² "
+        f"changes the mass by {format_percent(abs(float(falsified[EQUAL][MASS])), 2)} (as it reads: "
+        f"{format_percent(abs(float(falsified[WEIGHTED][MASS])), 2)}). With one unknown, in closed form, the variance "
+        f"is 3 times that of the accelerations (here {format_fixed(result.scalars[0].matrices ** 2, 2)}).",
     ]
     if result.regressions:
         texts.append(_linear(result))
@@ -240,7 +229,7 @@ def _refits(result: Result) -> str:
         for refits in (procedures[PAPER],)
     ]
     gap = max(float(procedures[LIKELIHOOD].difference[JUDGED].max()) for procedures in result.refits.values())
-    rough = [format_text(level) for level in result.refits if diverging(result, level)]
+    rough = [format_text(level) for level in result.refits if tables.diverging(result, level)]
     consequence = f", so that its errors at {joined(rough)} are orders of magnitude only" if rough else ""
     return (
         f"Nonlinear fits: by the paper's procedure {'; '.join(diverged)} diverge{consequence}. By the likelihood they "
@@ -252,16 +241,16 @@ def _failing(result: Result, level: str) -> str:
     """Return what is seen of the cause at a level where the likelihood does not state its errors rightly."""
     spread, exact = result.joints[level][LIKELIHOOD], result.joints[level][EXACT]
     text = (
-        f"At {format_text(level)} the likelihood's errors are {honesty_of(spread)} times what it states, with a "
+        f"At {format_text(level)} the likelihood's errors are {tables.honesty_of(spread)} times what it states, with a "
         f"chi-square per degree of freedom of {format_fixed(float(spread.chi2.mean()), 2)}."
     )
     if not _is_honest(exact.honesty[JUDGED]):
         return f"{text} They are not stated rightly with exact joints either; the cause is not known."
     share = float((exact.rms[JUDGED] / spread.rms[JUDGED]).max())
     return (
-        f"{text} With exact joints the ratio is {honesty_of(exact)} and the errors are {format_percent(share, 1)} of "
-        "these at most: what is not stated rightly is the noise of the encoders, as it is carried over by the "
-        "smoother. Why the smoother states it so is not known."
+        f"{text} With exact joints the ratio is {tables.honesty_of(exact)} and the errors are "
+        f"{format_percent(share, 1)} of these at most: what is not stated rightly is the noise of the encoders, as it "
+        "is carried over by the smoother. Why the smoother states it so is not known."
     )
 
 
@@ -278,8 +267,8 @@ def _evidence(document: Document, result: Result) -> None:
         [
             [
                 format_text(level),
-                *(rms_pair(result.joints[level][name]) for name in names),
-                *("; ".join(equal_rms(result, level, name)) for name in (EQUAL, PAPER)),
+                *(tables.rms_pair(result.joints[level][name]) for name in names),
+                *("; ".join(tables.equal_rms(result, level, name)) for name in (EQUAL, PAPER)),
             ]
             for level in result.levels
         ],
@@ -290,14 +279,14 @@ def _evidence(document: Document, result: Result) -> None:
     standard = _standard(result)
     document.table(
         ["treatment of the joints", "mass: bias", "sd", "moment: bias", "sd", "actual / stated"],
-        treatment_rows(result, standard),
+        tables.treatment_rows(result, standard),
         f"Treatments of the joints at {format_text(standard)}, base sensors as read [%]. Actual over stated errors are "
         "the range over mass and moments; one is honest.",
         columns("lrrrrr"),
     )
     shown = {name: result.joints[name] for name in SHOWN if name in result.joints}
     document.figure(
-        treatment_figure({format_text(name): spreads for name, spreads in shown.items()}),
+        tables.treatment_figure({format_text(name): spreads for name, spreads in shown.items()}),
         "Bias (dot; the thick bar is its Monte-Carlo error) and standard deviation (thin bar) of the mass and of the "
         "worst moment, by treatment of the joints.",
     )
@@ -314,8 +303,8 @@ def _statements(result: Result) -> list[Statement]:
         Statement(
             "An error similar to 2 % can be expected in three dimensions after the same procedure.",
             Finding.CONFIRMED if _both(procedure) <= PLANE else Finding.REFUTED,
-            f"As the sigma is read here, one manoeuvre leaves {equal_rms(result, level, PAPER)[1]} % in the worst "
-            f"moment by the paper's procedure. {_averaged(result.joints[level][EXACT], likelihood)}",
+            f"As the sigma is read here, one manoeuvre leaves {tables.equal_rms(result, level, PAPER)[1]} % in the "
+            f"worst moment by the paper's procedure. {_averaged(result.joints[level][EXACT], likelihood)}",
         ),
         Statement(
             "The accelerometer's signal must be integrated.",
@@ -325,8 +314,8 @@ def _statements(result: Result) -> list[Statement]:
         Statement(
             "Differentiating the joints twice can be improved by filtering.",
             Finding.CONFIRMED if len(honest) and not _is_honest(raw.honesty[JUDGED]) else Finding.REFUTED,
-            f"At {format_text(standard)} central differences are {honesty_of(raw)} times as wrong as they state; "
-            f"honest {'is' if len(honest) == 1 else 'are'} {joined(honest) or 'none'}.",
+            f"At {format_text(standard)} central differences are {tables.honesty_of(raw)} times as wrong as they "
+            f"state; honest {'is' if len(honest) == 1 else 'are'} {joined(honest) or 'none'}.",
         ),
         Statement(
             "The precision of the sensors is very important.",

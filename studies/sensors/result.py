@@ -8,21 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bayesid._math.arrays import Floats
 from studies.common.monte_carlo import Workers
-from studies.sensors import estimators
-from studies.sensors.checks import (
-    Falsified,
-    Refits,
-    Regression,
-    Scalar,
-    attenuation,
-    falsified,
-    refit_all,
-    regress,
-    scalars,
-)
+from studies.sensors import checks, estimators
+from studies.sensors.checks import falsified, scalars
 from studies.sensors.estimators import LIKELIHOOD, PAPER, Spread, linearised
 from studies.sensors.signals import Draws, Flight, Noise, fly, levels
 
@@ -56,14 +46,13 @@ class Result:
     joints: Mapping[str, Mapping[str, Spread]]
     rates: Mapping[str, Mapping[str, Spread]]
     accelerometers: Mapping[str, Mapping[str, Spread]]
-    falsified: Mapping[str, Falsified]  # errors without noise by use of the accelerometer
-    scalars: Sequence[Scalar]  # problems with one unknown
-    regressions: Mapping[str, Mapping[str, Regression]]  # estimates of the linear method
+    falsified: Mapping[str, Floats]  # errors without noise by use of the accelerometer
+    scalars: Sequence[checks.Scalar]  # problems with one unknown
+    regressions: Mapping[str, Mapping[str, checks.Regression]]  # estimates of the linear method
     # errors of the linear method with central differences, in closed form
-    predicted: Mapping[str, NDArray[np.floating]]
-    refits: Mapping[str, Mapping[str, Refits]]  # nonlinear fits by procedure; empty where the effort has none
+    predicted: Mapping[str, Floats]
+    refits: Mapping[str, Mapping[str, checks.Refits]]  # nonlinear fits by procedure; empty where the effort has none
     effort: Effort  # amount of what was computed
-    seconds: float  # time that the computation took [s]
 
 
 SMALL = Effort(draws=8, levels=("0.04 deg/s", REALISTIC))  # takes a minute
@@ -79,20 +68,12 @@ def run(
     workers: Workers = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
-    """Run the study: fly, treat and estimate.
+    """Run the study: fly, treat and estimate; arguments that are not described are options of the command.
 
     Parameters
     ----------
-    full : bool
-        Whether to take all levels of noise, enough draws, and nonlinear fits.
-    seed : int
-        Seed of all random numbers.
     effort : Effort, optional
         Effort in place of what ``full`` says.
-    trials, workers
-        File and number of processes of the nonlinear fits; see `studies.common.monte_carlo.run_trials`.
-    progress : callable
-        Receives a line on what is being done.
     """
     effort = effort or (FULL if full else SMALL)
     began = time.perf_counter()
@@ -112,9 +93,9 @@ def run(
     regressed = [name for name in REGRESSED if name in chosen]
     progress(f"linear method, {time.perf_counter() - began:.0f} s")
     elsewhere = draws.over(free)
-    regressions = {name: regress(elsewhere, chosen[name]) for name in regressed}
+    regressions = {name: checks.regress(elsewhere, chosen[name]) for name in regressed}
     fits = {LIKELIHOOD: effort.likelihood_fits, PAPER: effort.paper_fits}
-    refits = refit_all(regressed, fits, seed, trials, workers, lambda text: progress(f"nonlinear fits: {text}"))
+    refits = checks.refit_all(regressed, fits, seed, trials, workers, lambda text: progress(f"nonlinear fits: {text}"))
     standard = chosen.get(REALISTIC, next(iter(chosen.values())))
     return Result(
         flight,
@@ -125,8 +106,7 @@ def run(
         falsified=falsified(flight, linear, standard),
         scalars=scalars(10 * effort.draws, np.random.default_rng(int(scalar_seed))),
         regressions=regressions,
-        predicted={name: attenuation(free, chosen[name]) for name in regressed},
+        predicted={name: checks.attenuation(free, chosen[name]) for name in regressed},
         refits=refits,
         effort=effort,
-        seconds=time.perf_counter() - began,
     )

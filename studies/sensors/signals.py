@@ -15,7 +15,6 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 from scipy import signal
-from scipy.integrate import cumulative_simpson
 from scipy.interpolate import make_smoothing_spline
 
 from bayesid import MeasuredMotion, Model, Recording, SensorKind
@@ -37,8 +36,7 @@ __all__ += ["Treatment", "Wiener", "fly", "junctions", "levels", "model_of", "mo
 # of the joints' positions jumps at a junction.
 NEAR = 2.0
 
-# step of the independent simulator, and between the accelerations that are integrated to the true velocity [s]
-FINE = 0.1
+FINE = 0.1  # step of the independent simulator, and of the differences that give the change of the rate [s]
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,6 @@ class Flight:
     rate: Floats
     accel: Floats
     rate_change: Floats  # (T, 3): derivative of the rate [rad/s2]
-    velocity: Floats  # (T, 3): integral of ``accel`` over time, from its values at every `FINE` [m/s]
 
 
 def motion() -> Excitation:
@@ -75,9 +72,8 @@ def fly(*, gradient: bool = True) -> Flight:
     fine = FINE * np.arange(round(planned.duration / FINE) + 1)
     run = flight.fly(ets7(), planned, fine, step=FINE, orbit=flight.ORBIT if gradient else None)
     every = round(INTERVAL / FINE)
-    velocity = cumulative_simpson(run.accel, dx=FINE, axis=0, initial=0.0)
     change = np.gradient(run.rate, FINE, axis=0, edge_order=2)
-    columns = (fine, run.position, run.rate, run.accel, change, velocity)
+    columns = (fine, run.position, run.rate, run.accel, change)
     return Flight(*(np.array(column[::every]) for column in columns))
 
 

@@ -102,18 +102,15 @@ def estimate_rows(result: Result) -> Iterator[tuple[object, ...]]:
         for level, spreads in levels.items():
             for name, spread in spreads.items():
                 stated = np.sqrt((spread.stated**2).mean(axis=0))
-                columns = (
-                    spread.bias,
-                    spread.bias_error,
-                    spread.sd,
-                    spread.sd_error,
-                    spread.rms,
-                    spread.rms_error,
-                    stated,
-                    spread.honesty,
-                )
+                measured = (spread.bias, spread.bias_error, spread.sd, spread.sd_error, spread.rms, spread.rms_error)
                 for k, key in enumerate(BODY_QUANTITIES):
-                    yield what, level, name, key, *(f"{column[k]:.4g}" for column in columns)
+                    yield (
+                        what,
+                        level,
+                        name,
+                        key,
+                        *(f"{column[k]:.4g}" for column in (*measured, stated, spread.honesty)),
+                    )
 
 
 def linear_rows(result: Result) -> Iterator[tuple[object, ...]]:
@@ -162,17 +159,9 @@ def level_figure(result: Result) -> Figure:
 
 
 @styled
-def treatment_figure(tables: Mapping[str, Mapping[str, Spread]], without: Sequence[str] = ()) -> Figure:
-    """Draw bias, thick, and standard deviation, thin, of mass and moments by treatment, one panel for each level.
-
-    Parameters
-    ----------
-    tables : mapping
-        Estimates by level, then by treatment, with the same treatments at each level.
-    without : sequence of str
-        Treatments that are left out, since they would spoil the scale.
-    """
-    names = [name for name in next(iter(tables.values())) if name not in without]
+def treatment_figure(tables: Mapping[str, Mapping[str, Spread]]) -> Figure:
+    """Draw bias, thick, and sd, thin, of mass and moments by treatment, one panel for each level of noise."""
+    names = list(next(iter(tables.values())))
     figure = wide_figure(0.72 + 0.125 * len(names))
     panels = figure.subplots(1, len(tables), sharey=True, squeeze=False)[0]
     for axes, (level, spreads) in zip(panels, tables.items(), strict=True):

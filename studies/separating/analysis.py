@@ -405,26 +405,14 @@ def run(
     trials: Path | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
-    """Run the study.
+    """Run the study; arguments that are not described are options of the command.
 
     Parameters
     ----------
-    full : bool
-        True for the thorough effort of each search and `FLIGHTS` sets of flights for each truth.
-    seed : int
-        Seed of all random numbers.
     points : int
         Number of free control points of every joint.
     search : Search, optional
         Effort of each design.
-    flights : int, optional
-        Number of sets of flights for each truth.
-    store : Store, optional
-        Store that keeps the results of the searches.
-    trials : path, optional
-        File that keeps the flights.
-    progress : callable, optional
-        Receives a line on what is being done.
     """
     search = search or (FULL if full else QUICK)
     flights = (FLIGHTS if full else 40) if flights is None else flights

@@ -18,19 +18,8 @@ from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, ets
 from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.report_parts import columns
 from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
-from studies.separating.analysis import (
-    DRIFT,
-    FLIGHTS,
-    FULL,
-    QUICK,
-    RIVALS,
-    SPREAD,
-    STAGES,
-    TRUTHS,
-    Realised,
-    Result,
-    run,
-)
+from studies.separating import analysis
+from studies.separating.analysis import Result
 
 __all__ = ["STUDY", "factor_figure", "goals"]
 
@@ -41,14 +30,14 @@ LAST = "first, separating"  # stage with the separating manoeuvre
 
 # words for what is hidden
 HIDDEN = {
-    "wheel-momentum": f"wheels with {format_vector(TRUTHS['wheel-momentum'])} N m s",
-    "thruster-leak": f"leak of {format_vector(1e3 * TRUTHS['thruster-leak'])} mN m",
+    "wheel-momentum": f"wheels with {format_vector(analysis.TRUTHS['wheel-momentum'])} N m s",
+    "thruster-leak": f"leak of {format_vector(1e3 * analysis.TRUTHS['thruster-leak'])} mN m",
 }
 
 NAMES = {"wheel-momentum": "wheel momentum", "thruster-leak": "leak"}  # short names of the two causes
 
 
-def _preferred(item: Realised, stage: str) -> Share:
+def _preferred(item: analysis.Realised, stage: str) -> Share:
     """Return in how many of the flights the true cause is preferred with a probability of 0.9 or more."""
     values = item.factors[stage]
     return Share(int((values > RIVALRY).sum()), len(values))
@@ -78,9 +67,9 @@ def goals(result: Result) -> tuple[Goal, ...]:
         text = f"Hidden {NAMES[item.truth]}: ln B over the rival above {RIVALRY} in {format_percent(SURE)} of flights"
         share = _preferred(item, LAST)
         rows.append(Goal(text, f"{share}, mean {format_fixed(values.mean(), 1)}", _decided(share)))
-        text = f"Hidden {NAMES[item.truth]}: {FLIGHTS} sets of flights"
-        rows.append(Goal(text, f"{len(values)} made", Verdict.of(len(values) >= FLIGHTS)))
-    for truth in RIVALS:
+        text = f"Hidden {NAMES[item.truth]}: {analysis.FLIGHTS} sets of flights"
+        rows.append(Goal(text, f"{len(values)} made", Verdict.of(len(values) >= analysis.FLIGHTS)))
+    for truth in analysis.RIVALS:
         share = _shown(result, truth, LAST)
         percent = format_percent(SURE)
         text = (
@@ -102,7 +91,7 @@ def goals(result: Result) -> tuple[Goal, ...]:
         abs(item.factors[stage].mean() - result.expected[item.truth, stage].log_factor)
         / (item.factors[stage].std(ddof=1) / np.sqrt(len(item.factors[stage])))
         for item in result.realised
-        for stage in STAGES
+        for stage in analysis.STAGES
     ]
     reached = f"{format_fixed(max(far), 1)} at most, {len(far)} means"
     rows.append(Goal("Mean ln B within 3 standard errors of the expected", reached, Verdict.of(max(far) <= 3.0)))
@@ -128,7 +117,8 @@ def _report(result: Result) -> Report[Result]:
         "manoeuvre that is designed to separate them decide which it is?",
         answer=f"With the separating manoeuvre {' and '.join(parts)}.",
         valid="one of the two acts and nothing else, with the same size in both manoeuvres; the base is known to "
-        f"{format_percent(2.0 * SPREAD)} of its mass and drifts by a degree in a minute. The design knows that rate.",
+        f"{format_percent(2.0 * analysis.SPREAD)} of its mass and drifts by a degree in a minute. The design knows "
+        "that rate.",
         goals=goals(result),
         full=result.full,
         figure=Picture(
@@ -146,9 +136,9 @@ def _report(result: Result) -> Report[Result]:
             f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant "
             "bias of the accelerometer.",
             known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link.",
-            unknown=f"The base within {format_percent(2.0 * SPREAD)} of its mass, the rate {format_vector(DRIFT)} "
-            f"rad/s at the start, the bias within {format_number(BIAS)} m/s², the links; and the cause, within 1 N m s "
-            "of wheels, or 0.5 mN and 0.5 mN m of leak, per axis.",
+            unknown=f"The base within {format_percent(2.0 * analysis.SPREAD)} of its mass, the rate "
+            f"{format_vector(analysis.DRIFT)} rad/s at the start, the bias within {format_number(BIAS)} m/s², the "
+            "links; and the cause, within 1 N m s of wheels, or 0.5 mN and 0.5 mN m of leak, per axis.",
             replicates=f"{len(result.realised[0].detected)} sets of flights for each cause, each with an arm, a bias "
             f"and noise of its own; {result.search.starts} starts for each design. Evidences are linearised about the "
             "plan.",
@@ -253,16 +243,16 @@ def factor_figure(result: Result) -> Figure:
     """Draw every log Bayes factor beside its expectation."""
     figure = wide_figure(2.7)
     for axes, item in zip(figure.subplots(1, len(result.realised), sharey=True), result.realised, strict=True):
-        place = np.arange(len(STAGES))
-        expected = [result.expected[item.truth, stage] for stage in STAGES]
+        place = np.arange(len(analysis.STAGES))
+        expected = [result.expected[item.truth, stage] for stage in analysis.STAGES]
         means, sds = [each.log_factor for each in expected], [each.sd for each in expected]
         bars: dict[str, Any] = {"fmt": "s", "color": COLOURS[1], "markersize": 4, "capsize": 3}
         axes.errorbar(place - 0.15, means, sds, label="expected", **bars)
-        realised = np.stack([item.factors[stage] for stage in STAGES])
+        realised = np.stack([item.factors[stage] for stage in analysis.STAGES])
         shift = np.linspace(0.05, 0.3, realised.shape[1])
         axes.plot((place[:, None] + shift).ravel(), realised.ravel(), ".", color=COLOURS[0], label="realised")
         axes.axhline(RIVALRY, color="#888888", linewidth=0.8)
-        axes.set_xticks(place, [stage.replace(", ", ",\n") for stage in STAGES])
+        axes.set_xticks(place, [stage.replace(", ", ",\n") for stage in analysis.STAGES])
         axes.set(title=f"hidden: {HIDDEN[item.truth]}", xlim=(-0.5, place[-1] + 0.5))
         axes.set_yscale("symlog", linthresh=1.0)
         axes.set_yticks(TICKS, [f"{tick:g}".replace("-", "−") for tick in TICKS])
@@ -275,8 +265,8 @@ def factor_figure(result: Result) -> Figure:
 @styled
 def _direction_figure(result: Result) -> Figure:
     figure = wide_figure(2.3)
-    for axes, truth in zip(figure.subplots(1, 2, sharey=True), RIVALS, strict=True):
-        for index, stage in enumerate(STAGES):
+    for axes, truth in zip(figure.subplots(1, 2, sharey=True), analysis.RIVALS, strict=True):
+        for index, stage in enumerate(analysis.STAGES):
             values = np.sort([item.log_factor for item in result.directions[truth, stage]])
             share = np.arange(1, len(values) + 1) / len(values)
             axes.plot(values, share, label=stage, **curve_style(index))
@@ -285,14 +275,16 @@ def _direction_figure(result: Result) -> Figure:
         axes.set_xscale("symlog", linthresh=1.0)
         axes.set_xticks(TICKS, [f"{tick:g}".replace("-", "−") for tick in TICKS])
     figure.axes[0].set_ylabel("share of directions")
-    shared_legend(figure, figure.axes[0], len(STAGES))
+    shared_legend(figure, figure.axes[0], len(analysis.STAGES))
     return figure
 
 
 def _run(full: bool, seed: int, store: Path | None, **options: Any) -> Result:
     """Run the study, the results of its searches kept in a file where one is given."""
-    kept = None if store is None else Store.open(store, f"separating {seed} {FULL if full else QUICK}")
-    return run(full=full, seed=seed, store=kept, **options)
+    kept = (
+        None if store is None else Store.open(store, f"separating {seed} {analysis.FULL if full else analysis.QUICK}")
+    )
+    return analysis.run(full=full, seed=seed, store=kept, **options)
 
 
 STUDY = Study(
@@ -300,7 +292,7 @@ STUDY = Study(
     "Tell apart what a first manoeuvre confuses.",
     run=_run,
     report=_report,
-    full=f"the thorough effort of each search, {FLIGHTS} sets of flights for each cause",
+    full=f"the thorough effort of each search, {analysis.FLIGHTS} sets of flights for each cause",
     seed=1,
     extra={
         "--store": {"type": Path, "help": "file that keeps the results of the searches, for an interrupted run"},

@@ -348,22 +348,14 @@ def run(
     repeats: int = 40,
     progress: Callable[[str], None] = lambda text: None,
 ) -> Result:
-    """Run the study.
+    """Run the study; arguments that are not described are options of the command.
 
     Parameters
     ----------
-    full : bool
-        True to sample the posteriors too, and to check the coverage.
-    seed : int
-        Seed of all random numbers.
     duration : float
         Duration of each manoeuvre [s].
     effective_samples : float
         Effective sample size of each identification.
-    repeats : int
-        Number of systems of the coverage check, and of recordings of the contest of methods.
-    progress : callable, optional
-        Receives a line on what is being done.
     """
     truth, drawings = true_robot(), drawn(true_robot(), seed)
     progress("manoeuvres")
