@@ -11,7 +11,7 @@ from studies.common.study import Command
 
 STUDIES = sorted(file.parent.name for file in (Path(__file__).resolve().parents[1] / "studies").glob("*/__main__.py"))
 PLAIN = Command("load", "Identify a load.")
-RICH = Command("load", "Identify a load.", full="more", seed=3, extra={"--made": {"action": "store_true"}})
+RICH = Command("load", "Identify a load.", full="more", seed=3, extra={"--quiet": {"action": "store_true"}})
 
 
 def test_a_report_goes_to_its_file_or_into_a_folder(tmp_path, monkeypatch):
@@ -26,9 +26,9 @@ def test_a_report_goes_to_its_file_or_into_a_folder(tmp_path, monkeypatch):
 
 def test_options_are_those_that_a_study_has(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    options = RICH.parse(["--full", "--seed", "5", "--made"])
+    options = RICH.parse(["--full", "--seed", "5", "--quiet"])
     assert options.full
-    assert options.made
+    assert options.quiet
     assert options.seed == 5
     assert RICH.parse([]).seed == 3
     with pytest.raises(SystemExit):

@@ -184,7 +184,7 @@ def test_linear_method_is_exact_without_noise(free):
 
 def test_linear_method_is_attenuated_as_predicted(free):
     noise = levels(free)["0.04 deg/s"]
-    errors = regress(Draws.of(free, 6, np.random.default_rng(4)), noise, (Differences(),))["differences"].errors
+    errors = regress(Draws.of(free, 6, np.random.default_rng(4)), noise, (Differences(),))["differences"]
     predicted = attenuation(free, noise)
     assert predicted[0] < -0.5
     np.testing.assert_allclose(errors.mean(axis=0)[JUDGED], predicted[JUDGED], atol=0.02)

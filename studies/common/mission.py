@@ -18,6 +18,7 @@ from bayesid._math.arrays import Floats
 from bayesid.design import BSplines, Criterion, Limits, Plan, Problem, Tip, TrajectoryFamily
 from bayesid.design.design_result import sample_times
 from bayesid.recording.joint_motion import Motion
+from bayesid.report.numbers import format_number
 from bayesid.robot.body_prior import draw_inertial
 from bayesid.simulation.model import spread_links
 from studies.common import flight
@@ -39,7 +40,18 @@ from studies.common.ets7 import (
 from studies.common.models import ARM_SPREAD, NOISE, base_model
 from studies.truth.mujoco import Truth
 
-__all__ = ["DURATION", "ENCODERS", "POINTS", "REACH", "ROWS", "TRUTH_STEP", "base_unknown", "flight_manoeuvre", "fly"]
+__all__ = [
+    "DURATION",
+    "ENCODERS",
+    "POINTS",
+    "REACH",
+    "ROWS",
+    "SENSORS",
+    "TRUTH_STEP",
+    "base_unknown",
+    "flight_manoeuvre",
+    "fly",
+]
 __all__ += ["problem", "recorded", "ship", "splines", "start", "true_arm"]
 
 DURATION = 120.0  # length of every manoeuvre [s]
@@ -54,6 +66,13 @@ ENCODERS = {0: ENCODER}  # noise of the encoders as designs want it: of position
 ROWS = {"arm known to 5 %": ARM_SPREAD, "arm known exactly": 0.0}
 
 TRUTH_STEP = 0.5  # integration step of MuJoCo [s]; rates then differ by 5e-12 rad/s from those with a fifth of it
+
+
+# the sensors in words, for the setup of a report
+SENSORS = (
+    f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with {format_number(ACCEL)} m/s² and "
+    f"encoders with {format_number(ENCODER)} rad of white noise"
+)
 
 
 @cache

@@ -33,9 +33,6 @@ BETTER = 100.0
 
 FAR = 3.0  # errors of one number that should not be exceeded [standard deviations]
 REACH = 1.96  # half-width of a 95 % band [standard deviations]
-NOISE = float(np.degrees(np.sqrt(3.0) * analysis.ATTITUDE_SIGMA))  # expected size of the attitude's noise [degrees]
-
-
 Cases = Mapping[str, Case]  # cases by what is known of the base
 
 

@@ -16,7 +16,7 @@ from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent
 from studies.common import mission
-from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, ets7
+from studies.common.ets7 import BIAS, START, ets7
 from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.quantities import HEADINGS, LABELS
 from studies.common.report_parts import add_number_table
@@ -182,9 +182,7 @@ def _report(result: Result) -> Report[Result]:
             manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s, at the speed that the flight's rule "
             f"allows. The paper's optimum had to be made smaller, to {format_percent(shrink['printed'], 2)} of its "
             f"amplitudes, and its poor neighbour to {format_percent(shrink['poor'], 2)}.",
-            sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
-            f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; the encoders' "
-            "noise is part of every criterion.",
+            sensors=f"{mission.SENSORS}; the encoders' noise is part of every criterion.",
             known="The gravity gradient, the attitude at the start, and the arm to 5 % of the mass of each link.",
             unknown="The base (mass known to a factor of e²), the rate at the start, the accelerometer's bias within "
             f"{format_number(BIAS)} m/s², and the links, which are marginalised.",

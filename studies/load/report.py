@@ -16,7 +16,7 @@ from bayesid.report import Document, figures, format_quantity
 from bayesid.report.figures.figure_style import AFTER, BEFORE, COLOURS, shared_legend, styled, wide_figure
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_signed
 from studies.common import mission
-from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE
+from studies.common.ets7 import BIAS
 from studies.common.quantities import HEADINGS, LABELS, MASS
 from studies.common.report_parts import add_number_table
 from studies.common.study import CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
@@ -130,9 +130,7 @@ def _report(result: Result) -> Report[Result]:
             manoeuvre=f"Quintic splines of all six joints, {mission.DURATION:g} s each, d-optimal for the load from "
             "what the steps before told. At most 50 mm/s and 5 degrees per second at the tip, the flight's rule, and "
             f"{loops.SAFE.base_rotation:g} rad of rotation of the base, each with 99 % probability.",
-            sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
-            f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant "
-            "bias of the accelerometer.",
+            sensors=f"{mission.SENSORS}; a constant bias of the accelerometer.",
             known="The base, the orbit, the attitude at the start, and the arm to 5 % of the mass of each link.",
             unknown=f"The load, with a prior about 10 kg in which its mass may be {np.exp(2.0 * loops.SPREAD):.0f} "
             f"times larger or smaller within one sd; the rate at the start; the bias within {format_number(BIAS)} "

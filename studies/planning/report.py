@@ -15,7 +15,7 @@ from bayesid.report.figures.figure_style import AFTER, BEFORE, shared_legend, st
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
 from bayesid.report.verdict_record import Share
 from studies.common import mission
-from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, TIP_RATE, TIP_SPEED, ets7
+from studies.common.ets7 import BIAS, START, TIP_RATE, TIP_SPEED, ets7
 from studies.common.figures import robot_outline
 from studies.common.provenance import MODELS
 from studies.common.report_parts import add_number_table
@@ -96,9 +96,7 @@ def _report(result: Result) -> Report[Result]:
             "50 mm/s and 5 degrees per second. Planned: quintics from rest to rest in the same time, with joint "
             f"excursions of {format_vector(EXCURSION, 2)} rad at first, at "
             f"{format_number(1e3 * result.course.largest('tip_speed'))} mm/s at most.",
-            sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
-            f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant "
-            "bias of the accelerometer.",
+            sensors=f"{mission.SENSORS}; a constant bias of the accelerometer.",
             known="The orbit and its gravity gradient, the attitude at the start, and the ship as it was published.",
             unknown="The base and the links within these widths, the rate at the start, the bias within "
             f"{format_number(BIAS)} m/s².",

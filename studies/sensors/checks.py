@@ -41,7 +41,7 @@ from bayesid.robot.regressors import balance_regressor
 from studies.base_body import paper
 from studies.common.ets7 import ACCELEROMETER, BASE, BIAS, INTERVAL, ets7
 from studies.common.monte_carlo import Workers, run_trials
-from studies.common.quantities import JUDGED, MASS, inertia_matrix
+from studies.common.quantities import JUDGED
 from studies.sensors import estimators
 from studies.sensors.signals import (
     Differences,
@@ -58,7 +58,7 @@ from studies.sensors.signals import (
     recording_of,
 )
 
-__all__ = ["Balance", "Refits", "Regression", "Scalar", "attenuation", "falsified", "refit_all"]
+__all__ = ["Balance", "Refits", "Scalar", "attenuation", "falsified", "refit_all"]
 __all__ += ["regress", "scalars", "solve_balance"]
 
 PERIODS = 2  # number of periods of the cosine
@@ -171,15 +171,7 @@ def _balance(
     return balance_regressor(base, rate, change, origin), balance_regressor(arm, rate, change, origin)
 
 
-@dataclass(frozen=True)
-class Regression:
-    """Estimates of (19) from N sets of noise."""
-
-    errors: Floats  # (N, 10): errors relative to the true quantities
-    unphysical: int  # number of estimates that no rigid body can have
-
-
-def regress(draws: Draws, noise: Noise, treatments: Sequence[Treatment] = TREATED) -> dict[str, Regression]:
+def regress(draws: Draws, noise: Noise, treatments: Sequence[Treatment] = TREATED) -> dict[str, Floats]:
     """Solve (19) by least squares in SI units, every signal treated alike; first and last sample left out.
 
     Parameters
@@ -193,8 +185,8 @@ def regress(draws: Draws, noise: Noise, treatments: Sequence[Treatment] = TREATE
 
     Returns
     -------
-    dict of str to Regression
-        Estimates by the title of the treatment.
+    dict of str to (N, 10) array
+        Errors relative to the true quantities, by the title of the treatment.
     """
     flight = draws.flight
     truth = np.stack(motion().evaluate(flight.time))
@@ -210,8 +202,7 @@ def regress(draws: Draws, noise: Noise, treatments: Sequence[Treatment] = TREATE
             ]
         )
         quantities = np.stack([mass_com_inertia(p) for p in estimates])
-        unphysical = [_physical(values) for values in quantities].count(False)
-        results[treatment.title] = Regression((quantities - paper.TRUTH) / np.abs(paper.TRUTH), unphysical)
+        results[treatment.title] = (quantities - paper.TRUTH) / np.abs(paper.TRUTH)
     return results
 
 
@@ -239,11 +230,6 @@ def solve_balance(base: Floats, arm: Floats) -> Floats:
     design = base[1:-1].reshape(-1, 10)
     scale = np.linalg.norm(design, axis=0)
     return np.asarray(np.linalg.lstsq(design / scale, -arm[1:-1].ravel())[0] / scale)
-
-
-def _physical(quantities: Floats) -> bool:
-    moments = np.linalg.eigvalsh(inertia_matrix(quantities))
-    return bool(quantities[MASS] > 0.0 and moments[0] > 0.0 and moments[2] < moments[0] + moments[1])
 
 
 @dataclass(frozen=True)

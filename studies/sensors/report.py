@@ -204,13 +204,13 @@ def _negatives(document: Document, result: Result) -> None:
 
 def _linear(result: Result) -> str:
     level, regressions = next(iter(result.regressions.items()))
-    name, best = min(regressions.items(), key=lambda item: float((item[1].errors[:, MASS] ** 2).mean()))
+    name, best = min(regressions.items(), key=lambda item: float((item[1][:, MASS] ** 2).mean()))
     raw, closed, least = (
         format_percent(float(value), digits)
         for value, digits in (
-            (regressions["differences"].errors[:, MASS].mean(), 3),
+            (regressions["differences"][:, MASS].mean(), 3),
             (result.predicted[level][MASS], 3),
-            (best.errors[:, MASS].mean(), 2),
+            (best[:, MASS].mean(), 2),
         )
     )
     return (

@@ -48,7 +48,7 @@ class Result:
     accelerometers: Mapping[str, Mapping[str, Spread]]
     falsified: Mapping[str, Floats]  # errors without noise by use of the accelerometer
     scalars: Sequence[checks.Scalar]  # problems with one unknown
-    regressions: Mapping[str, Mapping[str, checks.Regression]]  # estimates of the linear method
+    regressions: Mapping[str, Mapping[str, Floats]]  # estimates of the linear method
     # errors of the linear method with central differences, in closed form
     predicted: Mapping[str, Floats]
     refits: Mapping[str, Mapping[str, checks.Refits]]  # nonlinear fits by procedure; empty where the effort has none

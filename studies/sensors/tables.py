@@ -116,12 +116,12 @@ def estimate_rows(result: Result) -> Iterator[tuple[object, ...]]:
 def linear_rows(result: Result) -> Iterator[tuple[object, ...]]:
     """Yield noise, treatment, quantity, then bias, its Monte-Carlo error and the closed form, of the linear method."""
     for level, regressions in result.regressions.items():
-        for name, regression in regressions.items():
-            mean, sd = regression.errors.mean(axis=0), regression.errors.std(axis=0, ddof=1)
+        for name, errors in regressions.items():
+            mean, sd = errors.mean(axis=0), errors.std(axis=0, ddof=1)
             closed = result.predicted[level] if name == "differences" else None
             for k in JUDGED:
                 exact = "" if closed is None else f"{closed[k]:.4g}"
-                error = sd[k] / np.sqrt(len(regression.errors))
+                error = sd[k] / np.sqrt(len(errors))
                 yield level, name, list(BODY_QUANTITIES)[k], f"{mean[k]:.4g}", f"{error:.2g}", exact
 
 

@@ -14,7 +14,7 @@ from bayesid.report.figures.figure_style import COLOURS, curve_style, shared_leg
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_vector
 from bayesid.report.verdict_record import Share
 from studies.common import mission
-from studies.common.ets7 import ACCEL, BIAS, ENCODER, INTERVAL, RATE, START, ets7
+from studies.common.ets7 import BIAS, START, ets7
 from studies.common.figures import manoeuvre_figure, robot_outline
 from studies.common.report_parts import columns
 from studies.common.study import TRIALS, CsvTable, Finding, Goal, Picture, Report, Setup, Statement, Study, Verdict
@@ -132,9 +132,7 @@ def _report(result: Result) -> Report[Result]:
             "start.",
             manoeuvre=f"{mission.DURATION:g} s each: first the flight's own, then quintic splines of all joints, at "
             f"the 50 mm/s and 5 degrees per second of the flight's rule.{_left_out(result)}",
-            sensors=f"Every {INTERVAL:g} s rates with {format_number(RATE)} rad/s, accelerations with "
-            f"{format_number(ACCEL)} m/s² and encoders with {format_number(ENCODER)} rad of white noise; a constant "
-            "bias of the accelerometer.",
+            sensors=f"{mission.SENSORS}; a constant bias of the accelerometer.",
             known="Gravity gradient, attitude at the start, and the arm to 5 % of the mass of each link.",
             unknown=f"The base within {format_percent(2.0 * analysis.SPREAD)} of its mass, the rate "
             f"{format_vector(analysis.DRIFT)} rad/s at the start, the bias within {format_number(BIAS)} m/s², the "
