@@ -31,24 +31,12 @@ MISFIT = 3.0
 
 @dataclass(frozen=True)
 class LinearisationPoint:
-    """Posterior with the mode at which it is linearised.
+    """Posterior with the mode at which it is linearised."""
 
-    Attributes
-    ----------
-    basis : Basis
-        Basis of the posterior, a fit or a prediction.
-    statement : str
-        Description of the basis in sentences.
-    posterior : Posterior
-        Posterior with its noise linearised at the mode.
-    optimum : Optimum
-        Mode of the posterior.
-    """
-
-    basis: Basis
-    statement: str
-    posterior: Posterior
-    optimum: Optimum
+    basis: Basis  # basis of the posterior, a fit or a prediction
+    statement: str  # description of the basis in sentences
+    posterior: Posterior  # posterior with its noise linearised at the mode
+    optimum: Optimum  # mode of the posterior
 
 
 def missing_part(study: Study) -> str:

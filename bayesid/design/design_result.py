@@ -36,24 +36,13 @@ DRAWS = 200  # number of draws of the prior for the risk of breaking a limit, en
 
 @dataclass(frozen=True)
 class Risk:
-    """Risk of breaking a limit under the present uncertainty of the robot.
+    """Risk of breaking a limit under the present uncertainty of the robot."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the limit.
-    limit : float
-        Bound of the limited quantity, in the unit.
-    quantile : float
-        Value that the quantity stays below along the whole manoeuvre with probability `CERTAIN`, in the unit.
-    unit : str
-        Unit of the quantity.
-    """
-
-    name: str
-    limit: float
+    name: str  # name of the limit
+    limit: float  # bound of the limited quantity, in the unit
+    # value that the quantity stays below along the whole manoeuvre with probability `CERTAIN`, in the unit
     quantile: float
-    unit: str
+    unit: str  # unit of the quantity
 
     @property
     def go(self) -> bool:
@@ -63,42 +52,18 @@ class Risk:
 
 @dataclass(frozen=True)
 class Design:
-    """Designed manoeuvre.
+    """Designed manoeuvre."""
 
-    Attributes
-    ----------
-    name : str
-        Name of the manoeuvre, which is also the stem of its file.
-    criterion : str
-        Name of the criterion by which it was designed.
-    problem : Problem
-        Design problem.
-    parameters : (n,) array
-        Parameters of the motion in its family.
-    found : Found
-        Outcome of the search.
-    costs : mapping of str to float
-        Values of all criteria of the problem, by name.
-    posterior : Posterior
-        Posterior of the manoeuvre as it would be recorded without noise.
-    predicted : Predicted
-        Predicted posterior of the bodies to identify.
-    reached : sequence of Reached
-        Largest values of all limited quantities.
-    risks : sequence of Risk
-        Risks of the limits that depend on the inertial parameters.
-    """
-
-    name: str
-    criterion: str
-    problem: Problem
-    parameters: Floats
-    found: Found
-    costs: Mapping[str, float]
-    posterior: Posterior
-    predicted: Predicted
-    reached: Sequence[Reached]
-    risks: Sequence[Risk]
+    name: str  # name of the manoeuvre, which is also the stem of its file
+    criterion: str  # name of the criterion by which it was designed
+    problem: Problem  # design problem
+    parameters: Floats  # (n,) parameters of the motion in its family
+    found: Found  # outcome of the search
+    costs: Mapping[str, float]  # values of all criteria of the problem, by name
+    posterior: Posterior  # posterior of the manoeuvre as it would be recorded without noise
+    predicted: Predicted  # predicted posterior of the bodies to identify
+    reached: Sequence[Reached]  # largest values of all limited quantities
+    risks: Sequence[Risk]  # risks of the limits that depend on the inertial parameters
 
     @property
     def designed_by(self) -> Criterion | None:

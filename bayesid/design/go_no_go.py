@@ -27,24 +27,12 @@ SMALLEST = 0.05  # smallest factor by which one attempt tightens a limit, so tha
 
 @dataclass(frozen=True)
 class Attempt:
-    """One design on the way to a plan that may be flown.
+    """One design on the way to a plan that may be flown."""
 
-    Attributes
-    ----------
-    limits : Limits
-        Limits under which the manoeuvre was designed.
-    found : Found
-        Outcome of the search.
-    risks : sequence of Risk
-        Risks against the limits of the problem.
-    reached : sequence of Reached
-        Largest values at the prior's centre, against the limits of the problem.
-    """
-
-    limits: Limits
-    found: Found
-    risks: Sequence[Risk]
-    reached: Sequence[Reached]
+    limits: Limits  # limits under which the manoeuvre was designed
+    found: Found  # outcome of the search
+    risks: Sequence[Risk]  # risks against the limits of the problem
+    reached: Sequence[Reached]  # largest values at the prior's centre, against the limits of the problem
 
     @property
     def go(self) -> bool:

@@ -32,28 +32,15 @@ DRAWS = 300  # number of draws of what is known from which the region of the end
 
 @dataclass(frozen=True)
 class StepKnowledge:
-    """What a loop knows after a step.
+    """What a loop knows after a step."""
 
-    Attributes
-    ----------
-    model : Model
-        Model whose prior is the posterior after the step.
-    bodies : mapping of str to BodyDraws
-        Draws of the quantities of the bodies to identify.
-    flown : Manoeuvre
-        Manoeuvre of the step.
-    causes : mapping of str to float
-        Probability that a cause of the catalogue, or ``"unknown"``, is at work in what was recorded so far; empty
-        where the recordings are not diagnosed.
-    seed : int
-        Seed of the random numbers that a goal needs.
-    """
-
-    model: Model
-    bodies: Mapping[str, BodyDraws]
-    flown: Manoeuvre
+    model: Model  # model whose prior is the posterior after the step
+    bodies: Mapping[str, BodyDraws]  # draws of the quantities of the bodies to identify
+    flown: Manoeuvre  # manoeuvre of the step
+    # probability that a cause of the catalogue, or ``"unknown"``, is at work in what was recorded so far; empty where
+    # the recordings are not diagnosed
     causes: Mapping[str, float]
-    seed: int
+    seed: int  # seed of the random numbers that a goal needs
 
 
 class Goal(Protocol):
@@ -236,24 +223,12 @@ def goal_dict(goal: Goal, value: float) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Review:
-    """What the recordings so far say of the model.
+    """What the recordings so far say of the model."""
 
-    Attributes
-    ----------
-    status : str
-        Status of the verdict, such as ``adequate`` or ``explained``.
-    causes : tuple of str
-        Causes that the verdict names.
-    trusted : bool
-        Whether the model may be right, so that it makes sense to identify it further.
-    probabilities : mapping of str to float
-        Probability of every cause of the catalogue, and of ``"unknown"``.
-    """
-
-    status: str
-    causes: tuple[str, ...]
-    trusted: bool
-    probabilities: Mapping[str, float]
+    status: str  # status of the verdict, such as ``adequate`` or ``explained``
+    causes: tuple[str, ...]  # causes that the verdict names
+    trusted: bool  # whether the model may be right, so that it makes sense to identify it further
+    probabilities: Mapping[str, float]  # probability of every cause of the catalogue, and of ``"unknown"``
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of loop.json."""

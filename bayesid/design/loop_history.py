@@ -22,26 +22,14 @@ STAGES = ("plan", "recording", "identification")
 
 @dataclass
 class History:
-    """History of a loop, step by step.
+    """History of a loop, step by step."""
 
-    Attributes
-    ----------
-    folder : Path
-        Folder of the loop's files.
-    key : str
-        SHA-256 of robot, sensors, prior, manoeuvre, limits, search and seed.
-    status : str
-        Status ``running``, ``waiting`` (for a recording), ``reached``, ``at-most``, ``no-go`` or ``wrong-model``.
-    stages : tuple of str
-        Names of the stages of each step.
-    steps : list of dict
-        Entries of the stages, one dictionary per step, and what was noted of it.
-    """
-
-    folder: Path
-    key: str
+    folder: Path  # folder of the loop's files
+    key: str  # SHA-256 of robot, sensors, prior, manoeuvre, limits, search and seed
+    # status ``running``, ``waiting`` (for a recording), ``reached``, ``at-most``, ``no-go`` or ``wrong-model``
     status: str = "running"
-    stages: tuple[str, ...] = STAGES
+    stages: tuple[str, ...] = STAGES  # names of the stages of each step
+    # entries of the stages, one dictionary per step, and what was noted of it
     steps: list[dict[str, Any]] = field(default_factory=list)
 
     @classmethod

@@ -22,24 +22,12 @@ __all__ = ["Encoder", "Predicted", "describe", "planned_manoeuvre", "planned_pos
 
 @dataclass(frozen=True)
 class Predicted:
-    """Predicted posterior of the bodies to identify, the Laplace approximation at a linearisation point.
+    """Predicted posterior of the bodies to identify, the Laplace approximation at a linearisation point."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the n quantities, as in identification.json.
-    mean : (n,) array
-        Values of the quantities at the linearisation point, in SI units.
-    covariance : (n, n) array
-        Covariance of the quantities, in SI units.
-    relative : (n, n) array
-        Covariance of the bodies' log-Cholesky coordinates, which are relative [1].
-    """
-
-    names: tuple[str, ...]
-    mean: Floats
-    covariance: Floats
-    relative: Floats
+    names: tuple[str, ...]  # names of the n quantities, as in identification.json
+    mean: Floats  # (n,) values of the quantities at the linearisation point, in SI units
+    covariance: Floats  # (n, n) covariance of the quantities, in SI units
+    relative: Floats  # (n, n) covariance of the bodies' log-Cholesky coordinates, which are relative [1]
 
     @property
     def sd(self) -> Floats:

@@ -28,21 +28,11 @@ SPARE = 0.999  # fraction of a bound at which such a limit is to end
 
 @dataclass(frozen=True)
 class Refined:
-    """Best motion of a descent that keeps the limits.
+    """Best motion of a descent that keeps the limits."""
 
-    Attributes
-    ----------
-    parameters : (n,) array
-        Parameters of the motion.
-    cost : float
-        Its cost; infinite where none keeps the limits.
-    evaluations : int
-        Number of evaluations of the cost.
-    """
-
-    parameters: Floats
-    cost: float
-    evaluations: int
+    parameters: Floats  # (n,) parameters of the motion
+    cost: float  # its cost; infinite where none keeps the limits
+    evaluations: int  # number of evaluations of the cost
 
 
 class Shared:

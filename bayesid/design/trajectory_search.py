@@ -75,24 +75,12 @@ THOROUGH = Search(exchanges=36, loosened=3.0)
 
 @dataclass(frozen=True)
 class Found:
-    """Outcome of a search.
+    """Outcome of a search."""
 
-    Attributes
-    ----------
-    parameters : (n,) array
-        Parameters of the best motion.
-    cost : float
-        Cost of the best motion.
-    costs : tuple of float
-        Costs of the descents that were followed to the end, the best first.
-    evaluations : int
-        Number of evaluations of the cost over all starts.
-    """
-
-    parameters: Floats
-    cost: float
-    costs: tuple[float, ...]
-    evaluations: int
+    parameters: Floats  # (n,) parameters of the best motion
+    cost: float  # cost of the best motion
+    costs: tuple[float, ...]  # costs of the descents that were followed to the end, the best first
+    evaluations: int  # number of evaluations of the cost over all starts
 
 
 @threadpool_limits.wrap(limits=1)  # sums of several threads are rounded by chance

@@ -54,34 +54,19 @@ PARTS = (0.35, 0.45, 0.55, 0.65)
 
 @dataclass(frozen=True)
 class Advice:
-    """Predicted effect of one candidate.
+    """Predicted effect of one candidate."""
 
-    Attributes
-    ----------
-    name, text : str
-        Name and description of the candidate.
-    directions : tuple of float
-        Ratios of posterior to prior standard deviation in the presently worst directions.
-    parameter : str
-        Name of the presently worst known quantity.
-    sd : float
-        Standard deviation that the quantity would have, in its unit.
-    shrinkage : float
-        Shrinkage that the quantity would have, one minus the ratio of posterior to prior standard deviation.
-    information : float
-        Information gained on all quantities beyond what is known now [nats].
-    reason : str
-        Reason why the candidate was not evaluated; empty if it was.
-    """
-
+    # name and description of the candidate
     name: str
     text: str
+    # ratios of posterior to prior standard deviation in the presently worst directions
     directions: tuple[float, ...] = ()
-    parameter: str = ""
-    sd: float = np.nan
+    parameter: str = ""  # name of the presently worst known quantity
+    sd: float = np.nan  # standard deviation that the quantity would have, in its unit
+    # shrinkage that the quantity would have, one minus the ratio of posterior to prior standard deviation
     shrinkage: float = np.nan
-    information: float = np.nan
-    reason: str = ""
+    information: float = np.nan  # information gained on all quantities beyond what is known now [nats]
+    reason: str = ""  # reason why the candidate was not evaluated; empty if it was
 
     def to_dict(self) -> dict[str, Any]:
         """Return the advice as it stands in identifiability.json."""
@@ -159,20 +144,11 @@ class NotEvaluated(Exception):  # noqa: N818 - a verdict, not an error
 
 @dataclass(frozen=True)
 class AddedMeasurement:
-    """One candidate for a measurement, a motion or knowledge to add to an experiment.
+    """One candidate for a measurement, a motion or knowledge to add to an experiment."""
 
-    Attributes
-    ----------
-    name : str
-        Short, unique name.
-    text : str
-        Description with the candidate's figures.
-    change : callable
-        Function that returns the changed experiment; it raises `NotEvaluated` where the candidate does not apply.
-    """
-
-    name: str
-    text: str
+    name: str  # short, unique name
+    text: str  # description with the candidate's figures
+    # function that returns the changed experiment; it raises `NotEvaluated` where the candidate does not apply
     change: Callable[[Experiment], Experiment]
 
 

@@ -36,28 +36,16 @@ NOUNS = {"mass": "mass", "com": "centre of mass", "inertia": "inertia"}
 
 @dataclass(frozen=True)
 class Direction:
-    """One combination of the bodies' quantities, and what is known of it.
+    """One combination of the bodies' quantities, and what is known of it."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Names of the n quantities.
-    weights : (n,) array
-        Weights of the quantities in the combination, scaled so that the largest product of a weight and the prior
-        standard deviation of its quantity is one; the combination is therefore a pure number.
-    displacement : (n,) array
-        Change of every quantity, in its unit, when the combination changes by one posterior standard deviation.
-    prior_sd : float
-        Prior standard deviation of the combination [1].
-    sd : float
-        Posterior standard deviation of the combination [1].
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # names of the n quantities
+    # (n,) weights of the quantities in the combination, scaled so that the largest product of a weight and the prior
+    # standard deviation of its quantity is one; the combination is therefore a pure number
     weights: Floats
+    # (n,) change of every quantity, in its unit, when the combination changes by one posterior standard deviation
     displacement: Floats
-    prior_sd: float
-    sd: float
+    prior_sd: float  # prior standard deviation of the combination [1]
+    sd: float  # posterior standard deviation of the combination [1]
 
     @property
     def shrinkage(self) -> float:

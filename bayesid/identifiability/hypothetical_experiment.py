@@ -34,27 +34,14 @@ ABSENT, FINEST = 1e6, 0.1
 
 @dataclass(frozen=True)
 class Experiment:
-    """Properties of an experiment that a candidate may change.
+    """Properties of an experiment that a candidate may change."""
 
-    Attributes
-    ----------
-    manoeuvres : tuple of Manoeuvre
-        Manoeuvres of the experiment.
-    sensors : tuple of Sensor
-        Sensors that are present.
-    torque : TorqueSensor, optional
-        Torque sensor of the joints, None where there is none.
-    weighed : tuple of (str, float)
-        Names of bodies whose mass is known beyond the prior, with the relative standard deviations of their masses.
-    times : int
-        Number of times that every manoeuvre is flown.
-    """
-
-    manoeuvres: tuple[Manoeuvre, ...]
-    sensors: tuple[Sensor, ...]
-    torque: TorqueSensor | None = None
+    manoeuvres: tuple[Manoeuvre, ...]  # manoeuvres of the experiment
+    sensors: tuple[Sensor, ...]  # sensors that are present
+    torque: TorqueSensor | None = None  # torque sensor of the joints, None where there is none
+    # names of bodies whose mass is known beyond the prior, with the relative standard deviations of their masses
     weighed: tuple[tuple[str, float], ...] = ()
-    times: int = 1
+    times: int = 1  # number of times that every manoeuvre is flown
 
 
 class InformationPredictor:

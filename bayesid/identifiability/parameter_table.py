@@ -50,36 +50,22 @@ STEPS, LARGEST = 2000, 40
 
 @dataclass(frozen=True)
 class ParameterRow:
-    """What is known of one quantity.
+    """What is known of one quantity."""
 
-    Attributes
-    ----------
-    name, unit : str
-        Name and unit of the quantity.
-    mean, sd, prior_sd : float
-        Mean, posterior and prior standard deviation of the normal approximation, in the unit.
-    conditional_sd : float
-        Posterior standard deviation if all other quantities of the bodies were known, in the unit.
-    correlated_with : tuple of (str, float)
-        Names and correlations of the quantities most strongly correlated with this one, the strongest first.
-    sampled : (float, float) or None
-        Mean and standard deviation of the draws; None where the draws may not be trusted.
-    normal : bool or None
-        True where the posterior is nearly normal, None where that is not known.
-    profile : Profile or None
-        Profile of the quantity, None where it was not computed.
-    """
-
+    # name and unit of the quantity
     name: str
     unit: str
+    # mean, posterior and prior standard deviation of the normal approximation, in the unit
     mean: float
     sd: float
     prior_sd: float
-    conditional_sd: float
+    conditional_sd: float  # posterior standard deviation if all other quantities of the bodies were known, in the unit
+    # names and correlations of the quantities most strongly correlated with this one, the strongest first
     correlated_with: tuple[tuple[str, float], ...]
+    # mean and standard deviation of the draws; None where the draws may not be trusted
     sampled: tuple[float, float] | None
-    normal: bool | None
-    profile: Profile | None = None
+    normal: bool | None  # True where the posterior is nearly normal, None where that is not known
+    profile: Profile | None = None  # profile of the quantity, None where it was not computed
 
     @property
     def shrinkage(self) -> float:
@@ -177,28 +163,15 @@ class Method(Enum):
 
 @dataclass(frozen=True)
 class Draws:
-    """Weighted draws of the bodies' quantities.
+    """Weighted draws of the bodies' quantities."""
 
-    Attributes
-    ----------
-    method : Method
-        Method that produced the draws.
-    values : (m, n) array
-        Draws of the n quantities, in their units.
-    weights : (m,) array
-        Weights of the draws, whose sum is one.
-    trusted : bool
-        True if Pareto k-hat (importance sampling), or R-hat and the number of effective samples (emcee), are good
-        enough to use the draws.
-    pareto_k : float
-        Pareto k-hat of importance sampling, even where emcee produced the draws.
-    """
-
-    method: Method
-    values: Floats
-    weights: Floats
+    method: Method  # method that produced the draws
+    values: Floats  # (m, n) draws of the n quantities, in their units
+    weights: Floats  # (m,) weights of the draws, whose sum is one
+    # True if Pareto k-hat (importance sampling), or R-hat and the number of effective samples (emcee), are good enough
+    # to use the draws
     trusted: bool
-    pareto_k: float
+    pareto_k: float  # Pareto k-hat of importance sampling, even where emcee produced the draws
 
     @property
     def covariance(self) -> Floats:

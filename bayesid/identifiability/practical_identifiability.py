@@ -29,39 +29,17 @@ class Basis(Enum):
 
 @dataclass(frozen=True)
 class Practical:
-    """Result of `practical`.
+    """Result of `practical`."""
 
-    Attributes
-    ----------
-    basis : Basis
-        Basis of the statements.
-    posterior : Posterior
-        Posterior that was examined.
-    optimum : Optimum
-        Mode of the posterior.
-    knowledge : Knowledge
-        Posterior and prior knowledge, linearised at the mode.
-    directions : tuple of Direction
-        Directions from the worst known to the best.
-    words : tuple of str
-        Description of each direction.
-    parameters : tuple of ParameterRow
-        Table of what is known of each quantity.
-    draws : Draws
-        Draws from the posterior.
-    advice : tuple of Advice
-        Advice on what to measure, the most informative first.
-    """
-
-    basis: Basis
-    posterior: Posterior
-    optimum: Optimum
-    knowledge: Knowledge
-    directions: tuple[Direction, ...]
-    words: tuple[str, ...]
-    parameters: tuple[ParameterRow, ...]
-    draws: Draws
-    advice: tuple[Advice, ...]
+    basis: Basis  # basis of the statements
+    posterior: Posterior  # posterior that was examined
+    optimum: Optimum  # mode of the posterior
+    knowledge: Knowledge  # posterior and prior knowledge, linearised at the mode
+    directions: tuple[Direction, ...]  # directions from the worst known to the best
+    words: tuple[str, ...]  # description of each direction
+    parameters: tuple[ParameterRow, ...]  # table of what is known of each quantity
+    draws: Draws  # draws from the posterior
+    advice: tuple[Advice, ...]  # advice on what to measure, the most informative first
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entries of identifiability.json that concern the posterior."""

@@ -131,26 +131,17 @@ class BagTopics:
 
 @dataclass(frozen=True)
 class ImportedTopic:
-    """What became of a topic.
+    """What became of a topic."""
 
-    Attributes
-    ----------
-    name, kind, frame : str
-        Name, type and frame of the topic.
-    columns : tuple of str
-        Columns of the recording that hold it.
-    messages, used : int
-        Number of messages in the bag, and of those in the recording.
-    interval, longest_gap : float
-        Median and longest time between the used messages [s].
-    """
-
+    # name, type and frame of the topic
     name: str
     kind: str
     frame: str
-    columns: tuple[str, ...]
+    columns: tuple[str, ...]  # columns of the recording that hold it
+    # number of messages in the bag, and of those in the recording
     messages: int
     used: int
+    # median and longest time between the used messages [s]
     interval: float
     longest_gap: float
 

@@ -18,20 +18,11 @@ HIGHER = 0.3
 
 
 class Jump(NamedTuple):
-    """Jump of a derivative of a position, of normal size and at an instant known to lie in one of some steps.
+    """Jump of a derivative of a position, of normal size and at an instant known to lie in one of some steps."""
 
-    Attributes
-    ----------
-    first : int
-        Number of the first of the steps, which lie between two nodes each and follow one another.
-    derivative : int
-        2 for the acceleration, 3 for the jerk.
-    variances : tuple of tuples of float
-        Variance of the jump times the probability of each of the equal parts of each step, in scaled time.
-    """
-
-    first: int
-    derivative: int
+    first: int  # number of the first of the steps, which lie between two nodes each and follow one another
+    derivative: int  # 2 for the acceleration, 3 for the jerk
+    # variance of the jump times the probability of each of the equal parts of each step, in scaled time
     variances: tuple[tuple[float, ...], ...]
 
     @property

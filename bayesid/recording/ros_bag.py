@@ -22,29 +22,17 @@ __all__ = ["StampedTopic", "format_stamp", "read_topics"]
 
 @dataclass(frozen=True)
 class StampedTopic:
-    """Messages of one topic in the order of their stamps.
+    """Messages of one topic in the order of their stamps."""
 
-    Attributes
-    ----------
-    bag : Path
-        Bag that was read.
-    name, kind : str
-        Name of the topic and type of its messages, such as ``"sensor_msgs/Imu"``.
-    frame : str
-        Frame that the headers name.
-    stamps, arrivals : (n,) arrays of int
-        Stamps of the headers and times at which the messages were recorded [ns].
-    messages : tuple
-        Messages, whose fields are those of the type.
-    """
-
-    bag: Path
+    bag: Path  # bag that was read
+    # name of the topic and type of its messages, such as ``"sensor_msgs/Imu"``
     name: str
     kind: str
-    frame: str
+    frame: str  # frame that the headers name
+    # (n,) stamps of the headers and times at which the messages were recorded [ns]
     stamps: Integers
     arrivals: Integers
-    messages: tuple[Any, ...]
+    messages: tuple[Any, ...]  # messages, whose fields are those of the type
 
     def error(self, problem: str, *, message: int | None = None, remedy: str) -> InputError:
         """Return an error in the topic, or in one of its messages, counted from 0."""

@@ -75,29 +75,18 @@ class Robot:
     """A free-flying robot.
 
     Build one with `Robot.from_urdf`; every change returns a new robot.
-
-    Attributes
-    ----------
-    name : str
-    links : mapping of str to Link
-        Bodies that may have mass, loads included, with the base first.
-    joints : tuple of Joint
-        Moving joints in Pinocchio's order.
-    model : pinocchio.Model
-        Kinematic tree with a free-flyer base and no gravity. Its inertias are those of the URDF; the present parameters
-        are those in `links`.
-    remarks : tuple of str
-        What the file left open or got wrong, and how it was read.
     """
 
     name: str
     file: Path | None
     urdf: str
-    links: Mapping[str, Link]
-    joints: tuple[Joint, ...]
+    links: Mapping[str, Link]  # bodies that may have mass, loads included, with the base first
+    joints: tuple[Joint, ...]  # moving joints in Pinocchio's order
     loads: tuple[str, ...]
+    # Kinematic tree with a free-flyer base and no gravity. Its inertias are those of the URDF; the present parameters
+    # are those in `links`.
     model: pin.Model
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # what the file left open or got wrong, and how it was read
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the content for another process, to which a read-only mapping cannot be sent."""

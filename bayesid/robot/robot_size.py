@@ -76,18 +76,10 @@ class RobotSize:
 
 
 class BeyondJoint(NamedTuple):
-    """Bodies that a joint carries.
+    """Bodies that a joint carries."""
 
-    Attributes
-    ----------
-    mass : float
-        Their mass [kg].
-    inertia : float
-        Their largest moment of inertia about the joint in any posture [kg m2].
-    """
-
-    mass: float
-    inertia: float
+    mass: float  # their mass [kg]
+    inertia: float  # their largest moment of inertia about the joint in any posture [kg m2]
 
 
 def beyond_joint(robot: Robot, joint: int) -> BeyondJoint:
