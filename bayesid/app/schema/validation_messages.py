@@ -47,9 +47,11 @@ def syntax_error(error: tomllib.TOMLDecodeError, file: Path) -> InputError:
 def explain(error: ValidationError, data: Mapping[str, Any], study: type[Section]) -> InputError:
     """Return the first error in the user's terms, with the number of further errors in its remedy.
 
-    A misspelt key comes first, because it is usually the reason why another key is missing.
+    A misspelt key comes first, because it is usually the reason why another key is missing, then what stands first in
+    the file.
     """
-    faults = sorted(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden")
+    found = error.errors(include_url=False)
+    faults = sorted(found, key=lambda fault: (fault["type"] != "extra_forbidden", _order(fault, data)))
     first = _one_error(faults[0], data, study)
     # an error in one number that stands for three axes counts once
     others = len({_path_of(fault, data) for fault in faults}) - 1
@@ -57,6 +59,16 @@ def explain(error: ValidationError, data: Mapping[str, Any], study: type[Section
         return first
     remedy = f"{first.remedy or ''} ({others} more error{'s' if others > 1 else ''} in this file)".lstrip()
     return InputError(first.problem, place=first.place, remedy=remedy)
+
+
+def _order(fault: ErrorDetails, data: Any) -> tuple[int, ...]:
+    """Return the place of a fault in the file, by the order of its keys; what is missing comes last."""
+    order: list[int] = []
+    for part in _path_of(fault, data):
+        keys = list(data) if isinstance(data, Mapping) else range(len(data))
+        order.append(keys.index(part) if part in keys else len(keys))
+        data = data[part] if part in keys else {}
+    return tuple(order)
 
 
 def _path_of(fault: ErrorDetails, data: Any) -> tuple[str | int, ...]:
