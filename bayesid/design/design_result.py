@@ -277,6 +277,15 @@ def risks(problem: Problem, parameters: Floats, rng: np.random.Generator, draws:
     """Return the risks of all limits that depend on the inertial parameters, with 99 % quantiles over their prior.
 
     The base starts at rest. The uncertainty of the initial rate is left out, because the manoeuvre does not cause it.
+
+    Parameters
+    ----------
+    problem : Problem
+    parameters : (n,) array
+        Motion in its family.
+    rng : numpy.random.Generator
+    draws : int
+        Number of draws of the prior.
     """
     limits = [limit for limit in problem.applied if limit.depends]
     largest = problem.largest(parameters, problem.draws(draws, rng), limits)

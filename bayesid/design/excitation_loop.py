@@ -270,6 +270,14 @@ def flown(plan: Plan, recording: Recording, encoder: Encoder) -> Manoeuvre:
 
     The initial attitude is that of the plan, or what a star sensor of the model reads at time 0. The initial positions
     of joints that are recorded by speed alone are those of the plan.
+
+    Parameters
+    ----------
+    plan : Plan
+    recording : Recording
+        Recording with all joints and sensors.
+    encoder : Encoder
+        Noise of the encoders.
     """
     attitude, sigma = plan.attitude, plan.attitude_sigma
     star = plan.model.sensor(SensorKind.ATTITUDE)

@@ -108,6 +108,13 @@ def smooth_largest(limit: Limit, trajectory: Trajectory, bound: Array | float) -
     """Return smooth upper bounds of the largest values divided by the bound; at most one keeps the limit.
 
     There is one bound for each of several parts of the manoeuvre, so that an optimiser sees all peaks at once.
+
+    Parameters
+    ----------
+    limit : Limit
+    trajectory : Trajectory
+    bound : float
+        In the limit's unit.
     """
     values = limit.quantity(trajectory) / bound
     count = min(PARTS, len(values))

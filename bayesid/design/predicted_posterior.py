@@ -130,7 +130,16 @@ def predict(posterior: Posterior) -> Predicted:
 
 
 def describe(posterior: Posterior, z: Floats, coordinates: Floats) -> Predicted:
-    """Return the reported quantities at ``z`` with the covariance that follows from that of the coordinates."""
+    """Return the reported quantities at ``z`` with the covariance that follows from that of the coordinates.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    z : (n,) array
+        Linearisation point.
+    coordinates : (n, n) array
+        Covariance of the coordinates.
+    """
     names, values, slope = linearise(posterior, z)
     widths = np.asarray(posterior.unknowns.widths)[posterior.unknowns.body_indices()]
     count = widths.shape[1]

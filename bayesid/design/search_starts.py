@@ -71,7 +71,15 @@ def random_start(problem: Problem, rng: np.random.Generator) -> Floats:
 
 
 def exchanged(problem: Problem, motions: Sequence[Floats], rng: np.random.Generator) -> Floats:
-    """Return one of the motions with the courses of one or few joints taken from another one or from a random start."""
+    """Return one of the motions with the courses of one or few joints taken from another one or from a random start.
+
+    Parameters
+    ----------
+    problem : Problem
+    motions : sequence of (n,) arrays
+        Parameters of the motions.
+    rng : numpy.random.Generator
+    """
     chosen = motions[int(rng.integers(len(motions)))]
     other = motions[int(rng.integers(len(motions)))] if rng.random() < FROM_ANOTHER else random_start(problem, rng)
     groups = problem.plan.family.groups
@@ -94,7 +102,16 @@ def within_limits(problem: Problem, parameters: Floats, bound: float = 1.0) -> b
 
 
 def repaired(problem: Problem, parameters: Floats, bound: float = 1.0 - 1e-3) -> Floats:
-    """Return parameters that keep the limits, by descent from given ones; the same parameters where none is broken."""
+    """Return parameters that keep the limits, by descent from given ones; the same parameters where none is broken.
+
+    Parameters
+    ----------
+    problem : Problem
+    parameters : (n,) array
+        Motion in its family.
+    bound : float
+        Fraction of the limits to keep.
+    """
     family = problem.plan.family
 
     def excess(x: Floats) -> tuple[float, Floats]:

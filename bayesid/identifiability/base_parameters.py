@@ -146,7 +146,15 @@ def equilibrated(matrix: Floats) -> tuple[Floats, Floats]:
 
 
 def spanning(matrix: Floats, order: Sequence[int]) -> list[int]:
-    """Return the indices of the columns, taken in the given order, that the columns before them do not span."""
+    """Return the indices of the columns, taken in the given order, that the columns before them do not span.
+
+    Parameters
+    ----------
+    matrix : (m, n) array
+        Columns of about unit length.
+    order : sequence of int
+        Indices of the columns to consider, the preferred first.
+    """
     basis = np.zeros((len(matrix), 0))
     chosen: list[int] = []
     for index in order:
@@ -161,6 +169,12 @@ def spanning(matrix: Floats, order: Sequence[int]) -> list[int]:
 
 def checked_rank(matrix: Floats, rank: int) -> tuple[float, float]:
     """Check a rank, and return the last singular value kept and the first dropped, relative to the largest.
+
+    Parameters
+    ----------
+    matrix : (m, n) array
+        Columns of about unit length.
+    rank : int
 
     Raises
     ------
@@ -185,6 +199,13 @@ def checked_rank(matrix: Floats, rank: int) -> tuple[float, float]:
 
 def regrouping(matrix: Floats, independent: Sequence[int], dependent: Sequence[int]) -> Floats:
     """Solve ``matrix[:, dependent] = matrix[:, independent] beta`` with one refinement, and set rounding to zero.
+
+    Parameters
+    ----------
+    matrix : (m, n) array
+        Columns of about unit length.
+    independent, dependent : sequence of int
+        Indices of the columns.
 
     Raises
     ------

@@ -160,7 +160,16 @@ def describe(direction: Direction, values: Floats, prior_sd: Floats, whole: bool
 
 
 def subject(direction: Direction, values: Floats, prior_sd: Floats, whole: bool = True) -> str:
-    """Name the quantities that a direction moves."""
+    """Name the quantities that a direction moves.
+
+    Parameters
+    ----------
+    direction : Direction
+    values, prior_sd : (n,) array
+        Values and prior standard deviations of its quantities, each in its unit.
+    whole : bool
+        True if the quantities are those of all bodies that are not known exactly.
+    """
     moved = direction.displacement / prior_sd
     bodies = list(dict.fromkeys(name.split(".")[0] for name in direction.names))
     owner = np.array([bodies.index(name.split(".")[0]) for name in direction.names])

@@ -132,6 +132,22 @@ def profiled(
     """Return the rows with profiles of at most ``most`` quantities, the least normal ones.
 
     Where the draws may not be trusted, the worst known of the learnt quantities are profiled.
+
+    Parameters
+    ----------
+    posterior : Posterior
+    optimum : Optimum
+        Mode of the posterior.
+    parameters : list of ParameterRow
+        Rows of all quantities.
+    draws : Draws
+        Draws from the posterior.
+    knowledge : Knowledge
+        Linearisation at the mode.
+    most : int
+        Largest number of profiles.
+    progress : Progress
+        Receiver of the fraction done.
     """
     errors = shape_errors(draws, knowledge)
     if not draws.trusted:  # the profile of an unlearnt quantity is the prior
@@ -232,7 +248,16 @@ def shape_errors(draws: Draws, knowledge: Knowledge) -> Floats:
 
 
 def weighted_quantile(values: Floats, weights: Floats, level: float) -> Floats:
-    """Return the quantiles (n,) of weighted draws (m, n) at a probability ``level``."""
+    """Return the quantiles (n,) of weighted draws (m, n) at a probability ``level``.
+
+    Parameters
+    ----------
+    values : (m, n) array
+    weights : (m,) array
+        Weights whose sum is one.
+    level : float
+        Probability.
+    """
     order = np.argsort(values, axis=0)
     below = np.cumsum(weights[order], axis=0) - 0.5 * weights[order]
     columns = range(values.shape[1])

@@ -55,7 +55,16 @@ _UPPER = ((0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2))
 
 
 def link_table(robot: Robot, name: str, motion: Kinematics) -> Floats:
-    """Return the coefficients of one link's ten parameters at T instants of a motion, shape (T, 28, 10)."""
+    """Return the coefficients of one link's ten parameters at T instants of a motion, shape (T, 28, 10).
+
+    Parameters
+    ----------
+    robot : Robot
+    name : str
+        Link or load.
+    motion : Kinematics
+        Motion of the joint frames at T instants.
+    """
     link = robot.link(name)
     pose, rate, acceleration = (change @ link.placement for change in joint_motion(motion, link.joint))
     table = _moments(pose, rate, acceleration, BASIS)
@@ -95,7 +104,16 @@ def rows_of_moments(composite: Traceable, flow: Traceable, surge: Traceable) -> 
 
 
 def composite_rows(robot: Robot, motion: Kinematics, leave_out: Container[str] = ()) -> Floats:
-    """Return the sum of the rows of all links with mass except those left out, shape (T, 28)."""
+    """Return the sum of the rows of all links with mass except those left out, shape (T, 28).
+
+    Parameters
+    ----------
+    robot : Robot
+    motion : Kinematics
+        Motion of the joint frames at T instants.
+    leave_out : container of str
+        Names of links.
+    """
     carried: dict[int, Floats] = {}
     for name, link in robot.links.items():
         if name not in leave_out and link.inertial.mass > 0.0:

@@ -29,6 +29,12 @@ def kinematics(robot: Robot, state: JointState) -> Kinematics:
 
     The pose of each joint is that of its parent, times a constant placement, times the exponential of its axis (Lynch &
     Park 2017, section 4.1); the derivatives follow by the product rule. Placements, axes and tree are Pinocchio's.
+
+    Parameters
+    ----------
+    robot : Robot
+    state : JointState
+        State of all joints at T instants [rad or m].
     """
     xp = namespace(state.position)
     frames: list[tuple[Any, ...]] = []

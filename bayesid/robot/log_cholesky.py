@@ -136,7 +136,15 @@ def relative_coordinates(centre: InertialParameters, inertial: InertialParameter
 
 
 def log_cholesky_coordinates(centre: Floats, bodies: Floats) -> Floats:
-    """Return the log-Cholesky coordinates of pseudo-inertias (n, 4, 4) relative to one (4, 4), shape (n, 10)."""
+    """Return the log-Cholesky coordinates of pseudo-inertias (n, 4, 4) relative to one (4, 4), shape (n, 10).
+
+    Parameters
+    ----------
+    centre : (4, 4) array
+        Pseudo-inertia of the centre.
+    bodies : (n, 4, 4) array
+        Pseudo-inertias [kg m2, kg m, kg].
+    """
     factors = np.linalg.cholesky(bodies[:, ::-1, ::-1])[:, ::-1, ::-1]
     shape = np.linalg.solve(upper_cholesky(centre), factors)
     alpha = np.log(shape[:, 3, 3])
