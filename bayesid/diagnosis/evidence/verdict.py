@@ -27,13 +27,8 @@ __all__ = [
 UNKNOWN = "unknown"
 """Name of the generic candidates among the alternatives."""
 
-
-DECADE = 10.0
-"""Factor by which the ranges of the scales are widened, at either end."""
-
-
-ROUNDING = 1e-9
-"""Fraction of a cause's whole information below which what another leaves of it is rounding."""
+DECADE = 10.0  # factor by which the ranges of the scales are widened, at either end
+ROUNDING = 1e-9  # share of a cause's whole information below which what another leaves of it is rounding
 
 
 class Status(Enum):
@@ -107,16 +102,16 @@ def probable_verdict(
     inclusion = probabilities.inclusion
     ordered = [sorted(members, key=lambda name: (-inclusion[name], name)) for members in classes]
     names = {members[0]: ordered[index] for index, members in enumerate(map(sorted, classes))}
-    held = dict.fromkeys(names, 0.0)
+    at_work = dict.fromkeys(names, 0.0)
     for item, probability in merged.items():
         for key in item - {UNKNOWN}:
-            held[key] += probability
+            at_work[key] += probability
 
     def named(item: frozenset[str]) -> tuple[str, ...]:
-        known = sorted(item - {UNKNOWN}, key=lambda key: (-held[key], key))
+        known = sorted(item - {UNKNOWN}, key=lambda key: (-at_work[key], key))
         return (*(names[key][0] for key in known), *([UNKNOWN] if UNKNOWN in item else []))
 
-    explained = bool(best) and all(held[key] >= settings.named_from for key in best)
+    explained = bool(best) and all(at_work[key] >= settings.named_from for key in best)
     if not explained and (not best or not 2 <= len(alternatives) <= settings.most_alternatives):
         return ProbableVerdict(Status.UNRESOLVED)
     others = () if explained else tuple(named(item) for item in alternatives if item != best)

@@ -94,12 +94,14 @@ def candidate_table(search: ModelSearch, effects: Sequence[Effect], rng: np.rand
         amplitude: _Amplitudes = ((), np.zeros(0), np.zeros(0), np.zeros(0))
         if name in quantities and not cause.fixed:
             amplitude = _amplitudes(name, groups, evidence, quantities[name])
+        local, adjusted = np.exp(p_values[name]).tolist()
         rows.append(
             Candidate(
                 name,
                 inclusion[name],
                 evidence.gram.signal_to_noise(*groups),
-                *np.exp(p_values[name]).tolist(),
+                local,
+                adjusted,
                 alarm.candidates.log_evidence[name],
                 *amplitude,
                 cause_power(name, evidence, alarm.candidates, rng, alarm.candidates_level, POWER_DRAWS),
