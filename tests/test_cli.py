@@ -205,7 +205,7 @@ BAD = {
     "a verdict that is no effect": (
         "study",
         lambda text: text.replace('"gravity-gradient"', '"gravity-gradient", "rate-noise"'),
-        ["model.effects #2", "rate-noise", "Give a larger sensors.rate.sigma"],
+        ["model.effects #2", "rate-noise", "State it under [model.noise]"],
     ),
     "effect without what it needs": (
         "study",

@@ -16,8 +16,8 @@ from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
 from bayesid.diagnosis.candidates.generic_signatures import CORNERS, WAVES
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.noise.noise_faults import noise_fault
-from bayesid.diagnosis.noise.noise_tests import chi2_log_sf
+from bayesid.diagnosis.noise import Outliers
+from bayesid.diagnosis.noise.noise_fault import chi2_log_sf
 from bayesid.diagnosis.outcome.gain import measure_gain
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.search.extended_model import extended_start
@@ -26,6 +26,7 @@ from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create
 from bayesid.simulation.model import Manoeuvre
+from bayesid.simulation.sensors import SensorKind
 from studies.truth import hidden_causes
 from studies.truth.basilisk import BasiliskHidden, Slosh, write_basilisk_study
 from tests.hidden import diagnosed, shortened
@@ -266,4 +267,4 @@ def test_an_event_is_no_outlier(tmp_path):
     study = Study.load(CASES["shifting-mass"].make(tmp_path, 246))
     model = load_model(study)
     fit = PerturbedModel(Posterior.of(model, load_manoeuvres(study, model.robot))).fit()
-    assert noise_fault("outliers:accel", fit) is None
+    assert Outliers(SensorKind.ACCEL).measured(fit) is None

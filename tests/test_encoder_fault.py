@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from bayesid.diagnosis.noise.encoder_fault import ENCODER_NOISE, encoder_test, noise_of, with_encoder_noise
+from bayesid.diagnosis.noise.encoder_fault import encoder_noise, noise_of, with_encoder_noise
 from bayesid.inference.noise_changes import leaving_out, relinearised, with_sensors
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
@@ -91,10 +91,10 @@ def test_a_posterior_has_the_noise_of_its_joints(planar_case):
 
     z = posterior.starting_point()
     noisy, quiet = with_joints(3.0 * SIGMA), with_joints(SIGMA)
-    assert encoder_test(noisy)[ENCODER_NOISE] < -20.0
-    assert encoder_test(quiet)[ENCODER_NOISE] > np.log(1e-4)
+    assert encoder_noise(noisy).log_p < -20.0
+    assert encoder_noise(quiet).log_p > np.log(1e-4)
     again = with_encoder_noise(noisy, 3.0, z)
-    assert encoder_test(again)[ENCODER_NOISE] > np.log(1e-4)
+    assert encoder_noise(again).log_p > np.log(1e-4)
 
 
 def test_samples_that_are_left_out_stay_so_with_other_noise(planar_case):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bayesid.diagnosis.noise.outlier_pattern import is_event
+from bayesid.diagnosis.noise.sensor_faults import is_event
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 
 TIMES = [np.arange(0.0, 160.0, 0.5)] * 3

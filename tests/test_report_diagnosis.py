@@ -27,6 +27,8 @@ from bayesid.diagnosis import (
     diagnose,
 )
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
+from bayesid.diagnosis.noise import UnderstatedNoise
+from bayesid.diagnosis.noise.noise_fault import FittedFault
 from bayesid.diagnosis.outcome.candidate_table import CauseAmplitude, amplitudes_of
 from bayesid.diagnosis.outcome.cause_sizes import VectorSize, vector_size
 from bayesid.diagnosis.outcome.disturbance import torque_correlations
@@ -695,10 +697,11 @@ def test_the_forest_shows_what_was_given_and_both_fits(biased):
 
 def test_what_is_no_effect_is_put_elsewhere_into_the_model(biased):
     verdict = ProbableVerdict(Status.EXPLAINED, ("initial-rate", "rate-noise"))
-    after = replace(biased.after, faults=(SimpleNamespace(label="rate-noise"),))
+    fault = FittedFault(UnderstatedNoise(SensorKind.RATE), np.array([2.5]), np.array([0.1]), biased.posterior)
+    after = replace(biased.after, faults=(fault,))
     result = replace(biased, after=after, sensitivity=replace(biased.sensitivity, verdict=verdict))
     assert action_sentence(result) == (
-        "Let the initial rates be unknown, state sensors.rate.sigma as large as the noise with rate-noise and use the "
+        'Let the initial rates be unknown, state under [model.noise] "rate-noise" = { factor = 2.5 } and use the '
         "values fitted with them."
     )
 

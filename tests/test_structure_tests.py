@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bayesid.diagnosis.noise.structure_tests import log_p_of_a_period, log_p_of_an_event
+from bayesid.diagnosis.noise.family_alarm import log_p_of_a_period, log_p_of_an_event
 
 
 def _noise(rng: np.random.Generator, recordings: int = 3) -> list[tuple[np.ndarray, np.ndarray]]:

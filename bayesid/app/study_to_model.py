@@ -131,6 +131,10 @@ def load_model(study: Study) -> Model:
             mixing=mixing,
             torque=_torque(study, robot),
         )
+        if study.model.noise:
+            from bayesid.app.study_to_noise import with_stated_noise
+
+            model = with_stated_noise(study, model)
         _check_levers(model)
         if study.design is not None:
             criteria_of(study.design)
@@ -177,7 +181,11 @@ def load_manoeuvres(study: Study, robot: Robot) -> list[Manoeuvre]:
     _check_latitudes(study)
     manoeuvres = [load_manoeuvre(study, section, robot) for section in study.recordings]
     _refuse_copies(study, manoeuvres)
-    return manoeuvres
+    if not study.model.noise:
+        return manoeuvres
+    from bayesid.app.study_to_noise import without_stated_faults
+
+    return without_stated_faults(study, load_model(study), manoeuvres)
 
 
 def _refuse_copies(study: Study, manoeuvres: Sequence[Manoeuvre]) -> None:
@@ -273,15 +281,17 @@ def _torque(study: Study, robot: Robot) -> TorqueSensor | None:
 
 def _effect(label: str, place: str) -> Effect:
     """Return the effect of a label; a verdict may also name what a study states elsewhere."""
-    name, _, sensor = label.partition(":")
-    if name == "initial-rate":
+    if label == "initial-rate":
         raise InputError(f"{label!r} is no effect", place=place, remedy='Set initial_rate = "unknown" in its place')
-    if name in ("outliers", "quantisation") or name.endswith("-noise"):
-        key = f"sensors.{sensor or name.removesuffix('-noise')}.sigma"
-        raise InputError(f"{label!r} is a fault of the noise", place=place, remedy=f"Give a larger {key} in its place")
     try:
         return create(label)
     except InputError as error:
+        from bayesid.diagnosis.noise import noise_faults  # here, since only a wrong label needs it
+
+        if fault := noise_faults().get(label):
+            keys = ", ".join(f"{quantity.name} = ..." for quantity in fault.quantities)
+            remedy = f'State it under [model.noise] as "{label}" = {{ {keys} }}'
+            raise InputError(f"{label!r} is a fault of the noise", place=place, remedy=remedy) from None
         raise error.within(place=place) from None
 
 

@@ -16,7 +16,7 @@ from bayesid.simulation.joint_torques import TorqueSensor
 from bayesid.simulation.model import Manoeuvre
 from bayesid.simulation.sensors import Sensor
 
-__all__ = ["leaving_out", "relinearised", "with_manoeuvres", "with_sensors"]
+__all__ = ["leaving_out", "relinearised", "with_manoeuvres", "with_sensors", "without_left_out"]
 
 
 def relinearised(posterior: Posterior, z: Floats) -> Posterior:
@@ -63,6 +63,19 @@ def leaving_out(posterior: Posterior, masks: Sequence[NDArray[np.bool_]]) -> Pos
     data = _renoised(posterior.data, _without(posterior.whitenings, masks))
     gone = tuple(np.logical_or(mask, old) for mask, old in zip(masks, posterior.data.left_out, strict=True))
     return replace(posterior, data=replace(data, left_out=gone))
+
+
+def without_left_out(posterior: Posterior) -> list[Manoeuvre]:
+    """Return the manoeuvres of a posterior without the samples that its likelihood leaves out."""
+    manoeuvres = []
+    for index, manoeuvre in enumerate(posterior.manoeuvres):
+        recording = manoeuvre.recording
+        channels = dict(recording.channels)
+        for kind, times in posterior.data.left_out_times(index).items():
+            gone = np.isin(recording.time, times)
+            channels |= {column: np.where(gone, np.nan, channels[column]) for column in kind.columns}
+        manoeuvres.append(replace(manoeuvre, recording=replace(recording, channels=channels)))
+    return manoeuvres
 
 
 def with_manoeuvres(posterior: Posterior, manoeuvres: Sequence[Manoeuvre]) -> Posterior:

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 
 from bayesid._io.errors import InputError
-from bayesid.diagnosis.noise.encoder_fault import ENCODER_NOISE
-from bayesid.diagnosis.noise.noise_faults import SUMMARIES
+from bayesid.diagnosis.noise import noise_faults
 from bayesid.report.numbers import format_number, format_text, format_unit
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.robot import Robot
@@ -26,7 +25,7 @@ __all__ = ["CatalogueEntry", "catalogue", "entry_of", "example_model"]
 WIDTH = 100  # width of the text in characters
 EXAMPLE = "ets7"  # robot of the package for which sizes are given where there is no study
 
-FAULT_OF_NOISE = "It is sought in the residual, from which its size follows too; no study file can put it into a model"
+FAULT_OF_NOISE = "It is sought in the residual, from which its size follows too; a study states it under [model.noise]."
 
 
 @dataclass(frozen=True)
@@ -207,31 +206,17 @@ def _needs(kind: type[Effect]) -> tuple[str, ...]:
 
 def _entries_of_noise() -> list[CatalogueEntry]:
     """Return the entries of what a diagnosis names and no effect describes: faults of noise, a turning start."""
-    factor = ("factor [1]: by which the noise exceeds the declared",)
-    named = {
-        "initial-rate": ("x, y, z [rad/s]: normal, in every recording anew",),
-        "rate-noise": factor,
-        "accel-noise": factor,
-        "attitude-noise": factor,
-        ENCODER_NOISE: factor,
-        "coloured-noise:SENSOR": ("sigma [unit of the sensor], time [s]: of the correlation",),
-        "outliers:SENSOR": ("fraction [1]: of the samples",),
-        "quantisation:SENSOR": ("step [unit of the sensor]",),
-    }
+    start = CatalogueEntry(
+        name="initial-rate",
+        summary="The base was already turning when the recording began; the model lets it start from rest.",
+        parameters=("x, y, z [rad/s]: normal, in every recording anew",),
+        needs=('initial_rate = "zero" in [model]',),
+    )
+    faults = {fault.entry: fault for fault in noise_faults().values()}
     return [
-        CatalogueEntry(
-            name=name,
-            summary=SUMMARIES.get(name.partition(":")[0], SUMMARIES["noise"]),
-            separated_by="" if name == "initial-rate" else f"{FAULT_OF_NOISE}.",
-            parameters=parameters,
-            needs=('initial_rate = "zero" in [model]',) if name == "initial-rate" else _sensor_needed(name),
-        )
-        for name, parameters in named.items()
+        start,
+        *(
+            CatalogueEntry(name, fault.summary, FAULT_OF_NOISE, (fault.parameters,), needs=(fault.needs,))
+            for name, fault in faults.items()
+        ),
     ]
-
-
-def _sensor_needed(name: str) -> tuple[str, ...]:
-    sensor = name.partition("-")[0]
-    if name == ENCODER_NOISE:
-        return ("sigma in [sensors.encoder]",)
-    return ("the section of the sensor, such as [sensors.rate]",) if ":" in name else (f"[sensors.{sensor}]",)

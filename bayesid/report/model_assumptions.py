@@ -13,7 +13,7 @@ from bayesid.report.document import Document, Rows
 from bayesid.report.numbers import format_fixed, format_number, format_percent, format_range, format_unit, format_vector
 from bayesid.robot.inertial_parameters import PARAMETERS
 from bayesid.simulation.model import Model
-from bayesid.simulation.sensors import Filter, Sensor, SensorKind
+from bayesid.simulation.sensors import Filter, Quantised, Sensor, SensorKind
 
 __all__ = ["add_joints", "model_sentences", "planning_sentences"]
 
@@ -117,6 +117,14 @@ def _sensor_sentence(posterior: Posterior, sensor: Sensor) -> str:
         float(sigma) for index in range(len(posterior.manoeuvres)) for sigma in posterior.data.sigma(index, sensor.kind)
     )
     parts = [f"Sensor {sensor.kind.value}: white noise of {width} {format_unit(sensor.kind.unit)} per sample and axis"]
+    if sensor.coloured is not None:
+        level, unit = format_range(sensor.coloured.sigma), format_unit(sensor.kind.unit)
+        parts.append(f"coloured noise of {level} {unit} and {format_number(sensor.coloured.time)} s beside it")
+    if isinstance(sensor.noise, Quantised):
+        step = f"{format_range(sensor.noise.step)} {format_unit(sensor.kind.unit)}"
+        parts.append(f"rounding to a step of {step} included in it")
+    if sensor.outliers:
+        parts.append(f"outliers, up to about {format_percent(sensor.outliers)} of the readings, left out")
     if sensor.kind is SensorKind.ACCEL:
         parts.append(f"mounted at {format_vector(np.asarray(sensor.position, dtype=float))} m in the base frame")
     if not np.allclose(sensor.rotation, np.eye(3)):

@@ -334,6 +334,8 @@ class Sensor:
         Filter of the samples, by default none.
     coloured : Coloured, optional
         Correlated noise in addition to the white noise.
+    outliers : float
+        Fraction of the readings that are lost or garbled, and are left out.
     """
 
     kind: SensorKind
@@ -342,6 +344,7 @@ class Sensor:
     position: ArrayLike = (0.0, 0.0, 0.0)
     filter: Filter = field(default_factory=Filter)
     coloured: Coloured | None = None
+    outliers: float = 0.0
 
     @property
     def rotation(self) -> Floats:

@@ -17,6 +17,7 @@ from bayesid.app.schema.value_types import (
     Names,
     NonNegative,
     Number,
+    PerComponent,
     PerName,
     Position,
     Positive,
@@ -179,6 +180,10 @@ class ModelSection(Section):
         Python files of the user that register effects, sensors or criteria of design.
     priors : table of effect to table of key to float, optional
         Prior standard deviations in place of an effect's defaults, in the unit of the key.
+    noise : table of fault to table of key to float, optional
+        Faults of the noise, with the names and keys that a diagnosis reports: ``"rate-noise" = { factor = 2.0 }``,
+        ``"coloured-noise:accel" = { sigma = 1e-5, time = 3.0 }``, ``"outliers:rate" = { fraction = 0.01 }``,
+        ``"quantisation:rate" = { step = 1e-6 }``, ``"encoder-noise" = { factor = 2.0 }``. A list has a value per axis.
     """
 
     effects: Names = ()
@@ -186,6 +191,7 @@ class ModelSection(Section):
     initial_rate_sigma: Annotated[Positive, no_more_than(100.0, "Is it in rad/s?")] | None = None
     plugins: tuple[File, ...] = ()
     priors: Mapping[Name, Table] = Field(default_factory=dict)
+    noise: Mapping[Name, Mapping[Name, PerComponent]] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _check_initial_rate(self) -> ModelSection:

@@ -128,6 +128,11 @@ PerName = Annotated[
     Discriminator(lambda value: "table" if isinstance(value, Mapping) else "number"),
 ]
 
+PerComponent = Annotated[
+    Annotated[Positive, Tag("number")] | Annotated[tuple[Positive, ...], Tag("list")],
+    Discriminator(lambda value: "list" if isinstance(value, (list, tuple)) else "number"),
+]
+
 # validator of angles, which are at most one turn [rad]
 FULL_TURN = no_more_than(2.0 * math.pi, "Radians, not degrees?")
 # validator of the noise of angles, which no sensor exceeds [rad]

@@ -10,29 +10,33 @@ from typing import NamedTuple
 import numpy as np
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.noise.noise_tests import chi2_log_sf
+from bayesid.diagnosis.noise.noise_fault import (
+    FitResidual,
+    FittedFault,
+    NoiseFault,
+    Sizes,
+    chi2_log_sf,
+    number_of,
+    register_fault,
+)
+from bayesid.diagnosis.response.perturbed_model import Fit
+from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference.noise_changes import leaving_out, relinearised, with_manoeuvres
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.smoothing import JointSamples
+from bayesid.simulation.effects.effect_parameters import Quantity
+from bayesid.simulation.model import Manoeuvre, Model
 
-__all__ = ["ENCODER_NOISE", "EncoderNoise", "encoder_noise", "encoder_test", "noise_of", "with_encoder_noise"]
-
-ENCODER_NOISE = "encoder-noise"
-"""Name of the fault in the catalogue."""
+__all__ = ["EncoderFault", "EncoderNoise", "encoder_noise", "noise_of", "with_encoder_noise"]
 
 ORDERS = {6: 0.166, 8: 0.141, 10: 0.133}
 """Orders of the differences that leave noise and no motion, with the degrees of freedom of the median of their squares
 per difference, from 6,000 draws of 480 samples: consecutive ones are correlated."""
 
-MEDIAN = 0.454936
-"""Median of chi-square with one degree of freedom."""
-
-EVEN = 0.02
-"""Relative difference of sampling steps up to which they count as even."""
-
-FEWEST = 15.0
-"""Degrees of freedom of a series of samples below which it is not used."""
+MEDIAN = 0.454936  # of chi-square with one degree of freedom
+EVEN = 0.02  # relative difference of sampling steps up to which they count as even
+FEWEST = 15.0  # degrees of freedom of a series of samples below which it is not used
 
 
 class EncoderNoise(NamedTuple):
@@ -54,13 +58,6 @@ class EncoderNoise(NamedTuple):
         return 0.5 * self.degrees * float(self.ratio * (1.0 - factor**-2) - 2.0 * np.log(factor))
 
 
-def encoder_noise(posterior: Posterior) -> EncoderNoise | None:
-    """Estimate the noise of all encoders of a posterior by one factor (`noise_of`)."""
-    motions = [item.motion for item in posterior.manoeuvres if isinstance(item.motion, MeasuredMotion)]
-    series = [(one, joint.jump_intervals) for motion in motions for joint in motion.joints for one in joint.series]
-    return noise_of([one for one, _ in series], jumps=[intervals for _, intervals in series])
-
-
 def noise_of(
     series: Sequence[JointSamples], fewest: float = FEWEST, jumps: Sequence[Floats] | None = None
 ) -> EncoderNoise | None:
@@ -74,13 +71,13 @@ def noise_of(
     ``fewest`` are not used.
     """
     jumps = [np.zeros((0, 2))] * len(series) if jumps is None else jumps
-    every = [_of(one, one.sigma, own) for one, own in zip(series, jumps, strict=True) if one.sigma is not None]
-    found = [own for own in every if own.degrees >= fewest]
-    if not found:
+    every = [_of(one, one.sigma, gaps) for one, gaps in zip(series, jumps, strict=True) if one.sigma is not None]
+    used = [one for one in every if one.degrees >= fewest]
+    if not used:
         return None
     # the median of many has 2 / pi of the degrees of freedom of the mean
-    degrees = sum(own.degrees for own in found) * (1.0 if len(found) == 1 else 2.0 / np.pi)
-    return EncoderNoise(float(np.median([own.ratio for own in found])), degrees)
+    degrees = sum(one.degrees for one in used) * (1.0 if len(used) == 1 else 2.0 / np.pi)
+    return EncoderNoise(float(np.median([one.ratio for one in used])), degrees)
 
 
 def _of(samples: JointSamples, sigma: float, jumps: Floats) -> EncoderNoise:
@@ -103,10 +100,51 @@ def _of(samples: JointSamples, sigma: float, jumps: Floats) -> EncoderNoise:
     return best
 
 
-def encoder_test(posterior: Posterior) -> dict[str, float]:
-    """Return the logarithm of the p-value of all encoders being noisier than declared; nothing where none is."""
-    found = encoder_noise(posterior)
-    return {} if found is None else {ENCODER_NOISE: found.log_p}
+@register_fault
+class EncoderFault(NoiseFault):
+    """Noise of all encoders that is larger than declared by one factor."""
+
+    name = "encoder-noise"
+    summary = "The encoders are noisier than their data sheet: every sample's error is larger by one factor."
+    parameters = "factor [1]: by which the noise exceeds the declared"
+    needs = "sigma in [sensors.encoder]"
+    in_residual = False
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """Factor on sigma."""
+        return (Quantity("factor", "1"),)
+
+    def occurs(self, posterior: Posterior) -> bool:
+        """Return whether the motion of any joint is measured."""
+        return any(isinstance(item.motion, MeasuredMotion) for item in posterior.manoeuvres)
+
+    def log_p(self, residual: FitResidual) -> float | None:
+        """Return the logarithm of the p-value of the declared noise of all encoders; None where none is declared."""
+        seen = encoder_noise(residual.fit.posterior)
+        return None if seen is None else seen.log_p
+
+    def measured(
+        self, fit: Fit, least: float = -np.inf, settings: DiagnosisSettings = DEFAULT_SETTINGS
+    ) -> FittedFault | None:
+        """Return the factor that the samples' differences show, the joints' motion smoothed anew."""
+        seen = encoder_noise(fit.posterior)
+        if seen is None:
+            return None
+        factor, relative = float(np.sqrt(seen.ratio)), float(np.sqrt(0.5 / seen.degrees))
+        posterior, size = with_encoder_noise(fit.posterior, factor, fit.z), np.array([factor])
+        return FittedFault(self, size, size * relative, posterior, seen.log_gain(factor))
+
+    def in_data(self, model: Model, manoeuvres: Sequence[Manoeuvre], sizes: Sizes) -> list[Manoeuvre]:
+        """Return recordings whose joints' motion is smoothed with the declared noise times the factor."""
+        return _smoothed(manoeuvres, number_of(sizes[0]))
+
+
+def _smoothed(manoeuvres: Sequence[Manoeuvre], factor: float) -> list[Manoeuvre]:
+    return [
+        replace(item, motion=item.motion.with_noise(factor)) if isinstance(item.motion, MeasuredMotion) else item
+        for item in manoeuvres
+    ]
 
 
 def with_encoder_noise(posterior: Posterior, factor: float, z: Floats) -> Posterior:
@@ -121,9 +159,12 @@ def with_encoder_noise(posterior: Posterior, factor: float, z: Floats) -> Poster
     z : (size,) array
         Linearisation point of the encoders' noise.
     """
-    manoeuvres = [
-        replace(item, motion=item.motion.with_noise(factor)) if isinstance(item.motion, MeasuredMotion) else item
-        for item in posterior.manoeuvres
-    ]
-    again = with_manoeuvres(posterior, manoeuvres)
+    again = with_manoeuvres(posterior, _smoothed(posterior.manoeuvres, factor))
     return relinearised(leaving_out(again, posterior.data.left_out), z)
+
+
+def encoder_noise(posterior: Posterior) -> EncoderNoise | None:
+    """Return the noise of all encoders of a posterior by one factor (`noise_of`)."""
+    motions = [item.motion for item in posterior.manoeuvres if isinstance(item.motion, MeasuredMotion)]
+    series = [(one, joint.jump_intervals) for motion in motions for joint in motion.joints for one in joint.series]
+    return noise_of([one for one, _ in series], jumps=[intervals for _, intervals in series])

@@ -18,10 +18,10 @@ from bayesid._math.arrays import Floats
 from bayesid.diagnosis.response.perturbed_model import CLOSE
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.inference.mode import fit
+from bayesid.inference.noise_changes import without_left_out
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.joint_torques import TorqueSensor
-from bayesid.simulation.model import Manoeuvre
 
 __all__ = ["exactly_fitted", "extended_posterior", "extended_start"]
 
@@ -53,8 +53,7 @@ def extended_posterior(
         model = model.extend(effect)
     if hypothesis.perturbed.frozen.size:
         model = replace(model, rate_sigma=0.0)
-    manoeuvres = [_without(manoeuvre, fit.posterior, index) for index, manoeuvre in enumerate(fit.posterior.manoeuvres)]
-    return Posterior.of(model, manoeuvres)
+    return Posterior.of(model, without_left_out(fit.posterior))
 
 
 def extended_start(hypothesis: Hypothesis, posterior: Posterior) -> Floats:
@@ -88,18 +87,3 @@ def exactly_fitted(hypothesis: Hypothesis) -> Hypothesis:
     columns = posterior.jacobian(mode)[: exact.residual.size]
     own, *added = np.split(columns, ends[:-1], axis=1)
     return replace(hypothesis, fit=replace(exact, own=own, added=tuple(added)))
-
-
-def _without(manoeuvre: Manoeuvre, posterior: Posterior, index: int) -> Manoeuvre:
-    """Return a manoeuvre without the samples that a hypothesis counts as outliers."""
-    gone = posterior.data.left_out_times(index)
-    if not gone:
-        return manoeuvre
-    channels = dict(manoeuvre.recording.channels)
-    for kind, times in gone.items():
-        rows = np.isin(manoeuvre.recording.time, times)
-        for axis in ("x", "y", "z", "w"):
-            key = f"{kind.value}.{axis}"
-            if key in channels:
-                channels[key] = np.where(rows, np.nan, channels[key])
-    return replace(manoeuvre, recording=replace(manoeuvre.recording, channels=channels))

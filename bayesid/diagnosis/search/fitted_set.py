@@ -20,7 +20,7 @@ from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.candidates.vibration_signatures import coupling_matrix, slosh_entries
 from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
 from bayesid.diagnosis.evidence.gram import GaussianBlock
-from bayesid.diagnosis.noise.noise_model import FittedFault
+from bayesid.diagnosis.noise.noise_fault import FittedFault
 from bayesid.diagnosis.response.effect_functions import physical
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.search.linearisation import Linearisation

@@ -9,8 +9,8 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
-from bayesid.diagnosis.noise.noise_tests import noise_tests
-from bayesid.diagnosis.noise.structure_tests import structure_tests
+from bayesid.diagnosis.noise.family_alarm import noise_tests, structure_tests
+from bayesid.diagnosis.noise.noise_fault import FitResidual
 from bayesid.diagnosis.search.extended_model import exactly_fitted
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.model_search import ModelSearch
@@ -83,7 +83,7 @@ def _without_motion(found: SetProbabilities, refuted: CauseSet) -> SetProbabilit
 
 def log_p_of_misfit(hypothesis: Hypothesis) -> float:
     """Return the logarithm of the p-value of the loudest test of the residual, for the number of tests."""
-    tests = noise_tests(hypothesis.fit.posterior, hypothesis.fit) | structure_tests(hypothesis.fit)
+    tests = noise_tests(FitResidual(hypothesis.fit)) | structure_tests(hypothesis.fit)
     return min(0.0, min(tests.values()) + float(np.log(len(tests))))
 
 

@@ -12,9 +12,10 @@ from bayesid._math.memory import give_back_memory
 from bayesid.diagnosis.evidence.cause_sets import SetProbabilities, enumerate_sets
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import classes_of_equivalents
-from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
-from bayesid.diagnosis.noise.noise_model import NoiseModel, fault_names
-from bayesid.diagnosis.noise.noise_tests import noise_tests
+from bayesid.diagnosis.noise import noise_faults
+from bayesid.diagnosis.noise.family_alarm import FamilyAlarm, noise_tests
+from bayesid.diagnosis.noise.noise_fault import FitResidual
+from bayesid.diagnosis.noise.noise_model import NoiseModel
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.search.linearisation import Catalogue, Linearisation, linearise, linearise_along_data
 from bayesid.diagnosis.search.relinearise import SetSearch, plausible_vibrations, search_sets, with_fitted_vibrations
@@ -119,7 +120,8 @@ def search_models(
     base = linearise_along_data(perturbed, catalogue) if bodies_fixed else linearise(perturbed, fit, catalogue)
     progress(0.4, "testing the present model")
     alarm = FamilyAlarm.of(base.evidence, fit, rng, level=catalogue.settings.alarm_level)
-    faults = fault_names(perturbed.posterior)
+    every = noise_faults(fit.view.kinds).values()
+    faults = [fault.label for fault in every if fault.occurs(perturbed.posterior)]
     declared = NoiseModel((), base.perturbed, base.fit, 0.0, base.bodies_fixed)
     if alarm.silent:
         single = SetSearch(declared, base, enumerate_sets(base.evidence, catalogue.prior, largest=1), base.fit)
@@ -200,23 +202,24 @@ def _with_faults(first: SetSearch, alarm: FamilyAlarm, catalogue: Catalogue, pro
 
 def _seen(fit: Fit, log_suspect: float) -> list[str]:
     """Return the names of the faults that a residual shows."""
-    return [name for name, log_p in noise_tests(fit.posterior, fit).items() if log_p < log_suspect]
+    return [name for name, log_p in noise_tests(FitResidual(fit)).items() if log_p < log_suspect]
 
 
 def _suspects(alarm: FamilyAlarm, first: SetSearch, log_suspect: float) -> list[tuple[str, Fit]]:
     """Return the faults of the noise to weigh, each with the fit from whose residual its size follows.
 
     What the best set leaves counts first; a fault that only the present model's residual shows may yet explain all of
-    it by itself, unless there is no such residual because the present model's fit diverged. Coloured noise is weighed
-    from both: causes that vary with time take its slow part, and what is left of it seems to have a short correlation
-    time.
+    it by itself, unless there is no such residual because the present model's fit diverged. A slow fault is weighed
+    from both: causes that vary with time take its slow part, and what is left of coloured noise seems to have a short
+    correlation time.
     """
     best, base = first.best, first.noise.fit
     suspects = [(name, best) for name in _seen(best, log_suspect)]
     of_best = {name for name, _ in suspects}
+    faults = noise_faults(base.view.kinds)
     for name, log_p in () if first.noise.bodies_fixed else alarm.noise.items():
-        if log_p < log_suspect and not name.startswith("variance"):
-            again = best is not base and name.startswith("coloured-noise")
+        if log_p < log_suspect and name in faults:
+            again = best is not base and faults[name].slow
             if name not in of_best or again:
                 suspects.append((name, base))
     return suspects

@@ -25,7 +25,6 @@ from bayesid.report.numbers import (
     format_range,
     format_unit,
 )
-from bayesid.simulation.sensors import Coloured
 
 __all__ = ["add_decision", "conditions_text", "decision_entries", "probability_rows"]
 
@@ -159,8 +158,8 @@ def conditions_text(hypothesis: Hypothesis) -> str:
         widths = [prior.spread for prior in nuisance]
         width = format_percent(widths[0]) if len(set(widths)) == 1 else f"{format_range(widths)} of their values"
         links = f"links uncertain by {width}"
-    coloured = [sensor.kind.value for sensor in posterior.model.sensors if isinstance(sensor.noise, Coloured)]
-    noise = f"noise of {', '.join(coloured)} coloured as named" if coloured else "noise white"
+    coloured = [sensor.kind.value for sensor in posterior.model.sensors if sensor.coloured is not None]
+    noise = f"noise of {', '.join(coloured)} coloured" if coloured else "noise white"
     if hypothesis.faults:
         noise += f", with {', '.join(fault.label for fault in hypothesis.faults)}"
     known = "geometry exact"

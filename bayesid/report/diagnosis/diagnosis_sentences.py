@@ -9,7 +9,7 @@ from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Hypothesis, St
 from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
 from bayesid.diagnosis.candidates.jump_instants import jump_instants
 from bayesid.diagnosis.evidence.verdict import UNKNOWN
-from bayesid.diagnosis.noise.noise_faults import SUMMARIES
+from bayesid.diagnosis.noise import noise_faults
 from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
 from bayesid.report.diagnosis.cause_words import NOTHING, amplitude_text, probability_text, set_text
 from bayesid.report.numbers import (
@@ -64,13 +64,8 @@ SEPARATE_UNKNOWN = (
 )
 """Advice where no cause of the catalogue is at work."""
 
-ADVICE = {
-    "initial-rate": "It is there before the arm moves: record a rest before the motion.",
-    "noise": "It is present at rest: record the sensor with the arm at rest.",
-    "outliers": "They are single samples: look at the readings themselves, and record at rest.",
-    "quantisation": "The readings lie on a lattice: record at rest, and compare with the resolution in the data sheet.",
-}
-"""Manoeuvre that would bring a cause out that is no effect, by its name or a part of it."""
+BEFORE_MOTION = "It is there before the arm moves: record a rest before the motion."
+"""Advice on a base that turns when a recording begins."""
 
 ANYTHING = "Repeat with other amplitudes, other speeds and the base in another attitude."
 """Advice on a cause of which nothing is known."""
@@ -197,7 +192,8 @@ def cause_summary(hypothesis: Hypothesis, label: str) -> str:
             return effect.summary
     if label == "initial-rate":
         return RELEASED
-    return next((text for key, text in reversed(SUMMARIES.items()) if key in label), "")
+    fault = noise_faults().get(label)
+    return "" if fault is None else fault.summary
 
 
 def gain_sentence(result: Diagnosis) -> str:
@@ -288,15 +284,14 @@ def action_sentence(result: Diagnosis) -> str:
 def _addition(result: Diagnosis) -> str:
     """Return how to put the named causes into the model: effects, faults of the noise, and a base that turned."""
     causes = result.verdict.causes
-    faults = [fault.label for fault in result.after.faults]
+    faults = [fault for fault in result.after.faults if fault.label in causes]
     steps = []
     if effects := [effect.entry for effect in result.after.fit.effects if effect.candidate in causes]:
         steps.append(f"add {joined(effects)} to the model's effects")
     if INITIAL_RATE in causes:
         steps.append("let the initial rates be unknown")
-    if named := [name for name in causes if name in faults]:
-        keys = [f"sensors.{name.partition(':')[2] or name.removesuffix('-noise')}.sigma" for name in named]
-        steps.append(f"state {joined(keys)} as large as the noise with {joined(named)}")
+    if faults:
+        steps.append(f"state under [model.noise] {joined([fault.statement for fault in faults])}")
     steps.append(f"use the values fitted with {'it' if len(causes) == 1 else 'them'}")
     text = f"{joined(steps)}."
     return text[0].upper() + text[1:]
@@ -312,7 +307,9 @@ def advice_sentences(result: Diagnosis) -> Iterator[str]:
 
 def advice(name: str) -> str:
     """Return the manoeuvre that would bring a cause out, as a sentence; of an effect its class states it."""
-    bare = name.partition(":")[0]
-    effect = known_effects().get(bare)
-    said = effect.separated_by if effect else next((text for key, text in ADVICE.items() if key in bare), "")
-    return said or ANYTHING
+    if name == INITIAL_RATE:
+        return BEFORE_MOTION
+    if fault := noise_faults().get(name):
+        return fault.advice
+    effect = known_effects().get(name.partition(":")[0])
+    return (effect.separated_by if effect else "") or ANYTHING
