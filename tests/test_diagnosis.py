@@ -20,7 +20,7 @@ from bayesid.diagnosis.noise import Outliers
 from bayesid.diagnosis.noise.noise_fault import chi2_log_sf
 from bayesid.diagnosis.outcome.gain import measure_gain
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
-from bayesid.diagnosis.search.extended_model import extended_start
+from bayesid.diagnosis.search.fitted_set import extended_start
 from bayesid.diagnosis.search.linearisation import Remaining
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior

@@ -26,8 +26,7 @@ from bayesid.diagnosis.outcome.model_change import (
     strongest_recording,
 )
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead
-from bayesid.diagnosis.search.extended_model import extended_posterior, extended_start
-from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis, extended_posterior, extended_start
 from bayesid.diagnosis.search.model_search import ModelSearch
 from bayesid.diagnosis.settings import DiagnosisSettings
 from bayesid.inference import Identification

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bayesid import Manoeuvre, Model, Posterior, Recording
 from bayesid._io.progress import Progress, silent
 from bayesid.diagnosis import Diagnosis, Hypothesis, candidates, diagnose
-from bayesid.diagnosis.search.extended_model import extended_posterior, extended_start
+from bayesid.diagnosis.search.fitted_set import extended_posterior, extended_start
 from bayesid.inference.mode import fit
 from bayesid.inference.noise_changes import with_manoeuvres
 from bayesid.simulation.effects import Effect

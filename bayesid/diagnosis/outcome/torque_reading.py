@@ -26,8 +26,7 @@ from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Status, probable_verdict
-from bayesid.diagnosis.search.extended_model import extended_posterior, extended_start
-from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis, extended_posterior, extended_start
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.inference.mode import fit
 from bayesid.inference.posterior import Posterior

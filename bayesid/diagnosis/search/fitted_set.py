@@ -1,6 +1,9 @@
 """Fit of a named set of causes: in their amplitudes, as the Gram sees them, or with the catalogue's effects.
 
-Both fits start from what the Gram says of the causes; the first keeps its scales, the second their priors.
+Both fits start from what the Gram says of the causes; the first keeps its scales, the second their priors. They perturb
+one compiled simulation along the motion of the last fit. What an unknown of the model changes in a perturbation through
+the motion is left out of their derivatives, which moves their end where a cause is as large as a wheel that turns the
+base by radians. The extended model's own simulation has all derivatives.
 """
 
 from __future__ import annotations
@@ -8,7 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import pairwise, product
 
 import jax.numpy as jnp
 import numpy as np
@@ -22,17 +25,31 @@ from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
 from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.noise.noise_fault import FittedFault
 from bayesid.diagnosis.response.effect_functions import physical
-from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
+from bayesid.diagnosis.response.perturbed_model import CLOSE, Fit, PerturbedModel
 from bayesid.diagnosis.search.linearisation import Linearisation
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS
+from bayesid.inference.mode import fit as fit_mode
+from bayesid.inference.noise_changes import without_left_out
+from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.mass_shift import MassShift
 from bayesid.simulation.instant import Resonance
+from bayesid.simulation.joint_torques import TorqueSensor
 
-__all__ = ["Hypothesis", "fit_hypothesis", "fit_in_amplitudes"]
+__all__ = [
+    "Hypothesis",
+    "exactly_fitted",
+    "extended_posterior",
+    "extended_start",
+    "fit_hypothesis",
+    "fit_in_amplitudes",
+]
 
 MOST_STARTS = 6
 """Most starting points of the fit of a hypothesis."""
+
+ROUNDS = 6
+"""Simulations after which motion and perturbations agree at given unknowns."""
 
 LIGHTEST = 0.25
 """Smallest share of a mode's mass that the compliance of the base is taken to leave at the start of a fit."""
@@ -259,3 +276,63 @@ def _amplitudes(label: str, point: Linearisation, names: Sequence[str]) -> Float
     forms = point.evidence.forms(free)
     groups = point.evidence.causes[label].variants[forms[label]].groups
     return np.concatenate([posterior.mean[posterior.amplitudes[label, group.name]] for group in groups])
+
+
+def extended_posterior(
+    hypothesis: Hypothesis, *, torque: TorqueSensor | None = None, added: Sequence[Effect] = ()
+) -> Posterior:
+    """Build the posterior of a hypothesis, its effects in the simulation itself.
+
+    Parameters
+    ----------
+    hypothesis : Hypothesis
+    torque : TorqueSensor, optional
+        Sensors of the joints' torques, which a hypothesis of a diagnosis has not.
+    added : sequence of Effect
+        Further effects, whose coordinates are the last.
+
+    Raises
+    ------
+    InputError
+        If one of its effects is not carried into the torques.
+    """
+    fit = hypothesis.fit
+    model = replace(fit.posterior.model, torque=torque)
+    for effect in (*(effect.tuned(fit.values(index)) for index, effect in enumerate(fit.effects)), *added):
+        model = model.extend(effect)
+    if hypothesis.perturbed.frozen.size:
+        model = replace(model, rate_sigma=0.0)
+    return Posterior.of(model, without_left_out(fit.posterior))
+
+
+def extended_start(hypothesis: Hypothesis, posterior: Posterior) -> Floats:
+    """Mode of a hypothesis in the coordinates of its own posterior."""
+    fit = hypothesis.fit
+    z = np.delete(fit.z, hypothesis.perturbed.frozen)
+    return np.concatenate([z, *fit.coordinates]) if posterior.size else np.zeros(0)
+
+
+def exactly_fitted(hypothesis: Hypothesis) -> Hypothesis:
+    """Return a hypothesis at the mode of its own simulation, or as it is where that is worse or does not exist."""
+    found = hypothesis.fit
+    try:
+        posterior = extended_posterior(hypothesis)
+    except InputError:  # no motion at the prior's centre of the extended model
+        return hypothesis
+    if posterior.residual_shape != found.posterior.residual_shape:  # outliers left out: derivatives have other rows
+        return hypothesis
+    mode = fit_mode(posterior, extended_start(hypothesis, posterior)).z
+    free = len(found.own_coordinates)
+    ends = np.cumsum([free, *(own.size for own in found.coordinates)])
+    coordinates = [mode[first:last] for first, last in pairwise(ends)]
+    z = found.z.copy()
+    z[np.setdiff1d(np.arange(len(z)), found.frozen)] = mode[:free]
+    perturbed, operating = hypothesis.perturbed, found.operating
+    for _ in range(ROUNDS):
+        exact = perturbed.fit(found.effects, coordinates, z=z, operating=operating, iterations=0)
+        operating = perturbed.operating(z, perturbed.pushes(found.effects, coordinates, operating, vibrations=False))
+    if exact.cost > found.cost + CLOSE:
+        return hypothesis
+    columns = posterior.jacobian(mode)[: exact.residual.size]
+    own, *added = np.split(columns, ends[:-1], axis=1)
+    return replace(hypothesis, fit=replace(exact, own=own, added=tuple(added)))

@@ -11,8 +11,7 @@ from bayesid._io.errors import InputError
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.noise.family_alarm import noise_tests, structure_tests
 from bayesid.diagnosis.noise.noise_fault import FitResidual
-from bayesid.diagnosis.search.extended_model import exactly_fitted
-from bayesid.diagnosis.search.fitted_set import Hypothesis
+from bayesid.diagnosis.search.fitted_set import Hypothesis, exactly_fitted
 from bayesid.diagnosis.search.model_search import ModelSearch
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 from bayesid.simulation.effects.effect import Effect

@@ -1,0 +1,201 @@
+"""Every fault of the noise is measured from a residual, goes into a model as stated, and is then no longer seen."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from bayesid._io.errors import InputError
+from bayesid.app.study_to_noise import with_stated_noise, without_stated_faults
+from bayesid.diagnosis.noise import SensorFault, noise_faults, register_fault
+from bayesid.diagnosis.noise import noise_fault as registry
+from bayesid.diagnosis.noise.family_alarm import noise_tests
+from bayesid.diagnosis.noise.noise_fault import FitResidual, FittedFault
+from bayesid.diagnosis.noise.noise_model import NoiseModel
+from bayesid.diagnosis.response.perturbed_model import PerturbedModel
+from bayesid.inference.posterior import Posterior
+from bayesid.simulation.effects.effect_parameters import Quantity
+from bayesid.simulation.sensors import Scaled, SensorKind
+from tests.conftest import SIGMA
+
+SUSPECT = np.log(1e-3)
+
+
+def garbled(posterior, change):
+    """The manoeuvre of the small case with changed readings of the accelerometer, (n, 3)."""
+    (manoeuvre,) = posterior.manoeuvres
+    names = [f"accel.{axis}" for axis in "xyz"]
+    changed = change(np.stack([manoeuvre.recording.channels[name] for name in names], axis=1))
+    channels = {**manoeuvre.recording.channels, **dict(zip(names, changed.T, strict=True))}
+    return [replace(manoeuvre, recording=replace(manoeuvre.recording, channels=channels))]
+
+
+def stated(text):
+    """What a study says under [model.noise]."""
+    return SimpleNamespace(model=SimpleNamespace(noise=tomllib.loads(text)))
+
+
+def noisier(values, rng):
+    return values + 2.0 * SIGMA * rng.normal(size=values.shape)
+
+
+def coloured(values, rng):
+    wander = np.zeros_like(values)
+    for row in range(1, len(values)):
+        wander[row] = 0.85 * wander[row - 1] + 1.5 * SIGMA * rng.normal(size=3)
+    return values + wander
+
+
+def with_outliers(values, rng):
+    values = values.copy()
+    values[[9, 33, 61], [0, 1, 2]] += 40.0 * SIGMA
+    return values
+
+
+def rounded(values, rng):
+    return 4.0 * SIGMA * np.round(values / (4.0 * SIGMA))
+
+
+@pytest.mark.parametrize(
+    ("label", "spoil"),
+    [
+        ("accel-noise", noisier),
+        ("quantisation:accel", rounded),
+        pytest.param("coloured-noise:accel", coloured, marks=pytest.mark.slow),
+        pytest.param("outliers:accel", with_outliers, marks=pytest.mark.slow),
+    ],
+)
+def test_what_a_diagnosis_measures_a_study_states(label, spoil, planar_case):
+    whole, rng = planar_case.posterior, np.random.default_rng(3)
+    manoeuvres = garbled(whole, lambda values: spoil(values, rng))
+    fit = PerturbedModel(Posterior.of(whole.model, manoeuvres, step=whole.step)).fit()
+    assert noise_tests(FitResidual(fit))[label] < SUSPECT
+    study = stated(noise_faults()[label].measured(fit).statement)
+    model = with_stated_noise(study, whole.model)
+    kept = without_stated_faults(study, model, manoeuvres)
+    again = PerturbedModel(Posterior.of(model, kept, step=whole.step)).fit()
+    assert noise_tests(FitResidual(again)).get(label, 0.0) > SUSPECT
+
+
+def test_the_noise_of_the_encoders_is_stated_as_a_factor(planar_case):
+    whole = planar_case.posterior
+    (kept,) = without_stated_faults(stated('"encoder-noise" = { factor = 2.0 }'), whole.model, whole.manoeuvres)
+    pairs = zip(kept.motion.joints, whole.manoeuvres[0].motion.joints, strict=True)
+    assert all(after.series[0].sigma == pytest.approx(2.0 * before.series[0].sigma) for after, before in pairs)
+
+
+def test_sizes_may_differ_between_axes(planar_case):
+    study = stated('"accel-noise" = { factor = [1.0, 2.0, 3.0] }')
+    sensor = with_stated_noise(study, planar_case.posterior.model).sensor(SensorKind.ACCEL)
+    np.testing.assert_allclose(sensor.noise.sigma(1.0), SIGMA * np.array([1.0, 2.0, 3.0]))
+
+
+@pytest.mark.parametrize(
+    ("line", "problem", "remedy"),
+    [
+        ('"rate-nois" = { factor = 2.0 }', "unknown fault of the noise 'rate-nois'", "rate-noise"),
+        ('"attitude-noise" = { factor = 2.0 }', "unknown fault of the noise 'attitude-noise'", "Choose from"),
+        ('"coloured-noise:rate" = { sigma = 1e-5 }', "got sigma", "Give sigma and time"),
+        ('"coloured-noise:rate" = { sigma = 1e-5, time = [1.0, 2.0] }', "got {", "Give a number"),
+        ('"accel-noise" = { factor = [1.0, 2.0] }', "got {", "or one for each axis"),
+        ('"outliers:rate" = { fraction = 1.5 }', "got a fraction of 1.5", "below 1"),
+    ],
+)
+def test_what_cannot_be_stated_is_refused_with_a_remedy(line, problem, remedy, planar_case):
+    with pytest.raises(InputError) as error:
+        with_stated_noise(stated(line), planar_case.posterior.model)
+    assert error.value.problem.startswith(problem)
+    assert remedy in error.value.remedy
+    assert error.value.place.startswith("model.noise.")
+
+
+def test_a_model_that_is_off_loses_no_readings(planar_case):
+    """More readings than the fraction allows stand out: a study that misses an effect is no matter of outliers."""
+    whole = planar_case.posterior
+    spread = [2, 9, 17, 24, 33, 41, 48, 55, 62, 70]
+
+    def off(values):
+        values = values.copy()
+        values[spread] += 40.0 * SIGMA
+        return values
+
+    manoeuvres = garbled(whole, off)
+    study = stated('"outliers:accel" = { fraction = 0.01 }')
+    (kept,) = without_stated_faults(study, with_stated_noise(study, whole.model), manoeuvres)
+    assert np.isfinite(kept.recording.channels["accel.x"]).all()
+
+
+@pytest.fixture
+def stuck(monkeypatch):
+    """A fault of one's own in one class: readings that repeat the one before."""
+    monkeypatch.setattr(registry, "_REGISTER", dict(registry._REGISTER))
+
+    @register_fault
+    class StuckReadings(SensorFault):
+        name = "stuck"
+        summary = "Some readings are those before them."
+        parameters = "share [1]: of the samples"
+
+        @property
+        def quantities(self):
+            return (Quantity("share", "1"),)
+
+        def log_p_of(self, residual, posterior):
+            repeats = self._repeats(posterior)
+            return float(stats.binom.logsf(repeats.sum() - 1, repeats.size, 1e-6)) if repeats.any() else 0.0
+
+        def measured(self, fit, *_):
+            repeats = self._repeats(fit.posterior)
+            if not repeats.any():
+                return None
+            share = repeats.mean()
+            sd = np.sqrt(share * (1.0 - share) / repeats.size)
+            return FittedFault(self, np.array([share]), np.array([sd]), self.in_noise(fit, [share]), 100.0)
+
+        def changed(self, sensor, sizes):
+            return replace(sensor, noise=Scaled(sensor.noise, (float(1.0 + sizes[0]),) * self.kind.size))
+
+        def _repeats(self, posterior):
+            return (np.diff(posterior.data.measured(0, self.kind)[1], axis=0) == 0.0).all(axis=1)
+
+    return StuckReadings
+
+
+def test_a_fault_of_ones_own_is_one_class(stuck, planar_case):
+    """It is tested, weighed and named beside the others, listed in the catalogue, and stated in a study."""
+    from bayesid.report.effect_catalogue import catalogue
+
+    whole = planar_case.posterior
+    assert "stuck:accel" in noise_faults(whole.model.channels.kinds)
+    assert "stuck:SENSOR" in [entry.name for entry in catalogue()]
+
+    def repeat(values):
+        values = values.copy()
+        values[20:22] = values[19]
+        return values
+
+    perturbed = PerturbedModel(Posterior.of(whole.model, garbled(whole, repeat), step=whole.step))
+    fit = perturbed.fit()
+    tests = noise_tests(FitResidual(fit))
+    assert min(tests, key=tests.get) == "stuck:accel"
+    found = NoiseModel((), perturbed, fit).with_fault("stuck:accel", fit, fit.log_evidence)
+    assert found.names == ("stuck:accel",)
+    (fault,) = found.faults
+    assert fault.mean == pytest.approx(2.0 / 80.0)
+    assert found.log_nothing > fit.log_evidence
+    assert found.has(fault)
+    model = with_stated_noise(stated(fault.statement), whole.model)
+    np.testing.assert_allclose(model.sensor(SensorKind.ACCEL).noise.sigma(1.0), 1.025 * SIGMA)
+
+
+def test_two_faults_of_one_name_are_refused(stuck):
+    with pytest.raises(InputError, match="two faults of the noise are named 'stuck'"):
+
+        @register_fault
+        class Another(SensorFault):
+            name = "stuck"
