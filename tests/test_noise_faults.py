@@ -11,17 +11,24 @@ import pytest
 from scipy import stats
 
 from bayesid._io.errors import InputError
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model, load_posterior
 from bayesid.app.study_to_noise import with_stated_noise, without_stated_faults
+from bayesid.diagnosis import Status, diagnose
 from bayesid.diagnosis.noise import SensorFault, noise_faults, register_fault
 from bayesid.diagnosis.noise import noise_fault as registry
 from bayesid.diagnosis.noise.family_alarm import noise_tests
 from bayesid.diagnosis.noise.noise_fault import FitResidual, FittedFault
 from bayesid.diagnosis.noise.noise_model import NoiseModel
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
+from bayesid.inference import identify
 from bayesid.inference.posterior import Posterior
+from bayesid.report.diagnosis.decision_page import conditions_text
+from bayesid.report.model_assumptions import model_sentences
+from bayesid.simulation.effects import create
 from bayesid.simulation.effects.effect_parameters import Quantity
 from bayesid.simulation.sensors import Scaled, SensorKind
-from tests.conftest import SIGMA
+from tests.conftest import PLANAR, SIGMA
 
 SUSPECT = np.log(1e-3)
 
@@ -128,6 +135,60 @@ def test_a_model_that_is_off_loses_no_readings(planar_case):
     study = stated('"outliers:accel" = { fraction = 0.01 }')
     (kept,) = without_stated_faults(study, with_stated_noise(study, whole.model), manoeuvres)
     assert np.isfinite(kept.recording.channels["accel.x"]).all()
+
+
+STUDY = """
+title = "Noise as a diagnosis found it"
+[robot]
+urdf = "{urdf}"
+[orbit]
+radius = 6.878e6
+[sensors.rate]
+sigma = 1e-5
+[sensors.accel]
+sigma = 1e-5
+position = [0.1, -0.15, 0.3]
+[sensors.encoder]
+sigma = 1e-6
+[[recordings]]
+file = "one.csv"
+attitude = [0.0, 0.0, 0.0, 1.0]
+[unknowns]
+bodies = ["base_link"]
+spread = 0.3
+[model]
+effects = ["gravity-gradient"]
+"""
+
+
+@pytest.mark.slow
+def test_what_is_named_is_stated_and_then_nothing_is_missing(tmp_path, noisy, planar_case):
+    """Coloured noise: `diagnose` names it; with its line in the study it finds nothing more, and `identify` runs."""
+    recording, rng = noisy(np.random.default_rng(2)), np.random.default_rng(3)
+    names = [f"accel.{axis}" for axis in "xyz"]
+    readings = coloured(np.stack([recording.channels[name] for name in names], axis=1), rng)
+    channels = {**recording.channels, **dict(zip(names, readings.T, strict=True))}
+    replace(recording, channels=channels).write(tmp_path / "one.csv")
+    file = tmp_path / "study.toml"
+
+    def diagnosed():
+        study = Study.load(file)
+        model = load_model(study)
+        effects = [create("accel-bias").attach(model.robot)]
+        return study, diagnose(model, load_manoeuvres(study, model.robot), effects=effects)
+
+    file.write_text(STUDY.format(urdf=PLANAR))
+    _, found = diagnosed()
+    assert found.verdict.causes == ("coloured-noise:accel",)
+    (fault,) = found.after.faults
+    file.write_text(f"{STUDY.format(urdf=PLANAR)}[model.noise]\n{fault.statement}\n")
+    study, again = diagnosed()
+    assert again.verdict.status is Status.ADEQUATE
+    assert "coloured" in conditions_text(again.before)
+    result = identify(load_posterior(study), seed=1, effective_samples=200)
+    mass = result.bodies["base_link"]
+    assert abs(mass.mean[0] - planar_case.truth.mass) < 5.0 * mass.sd[0]
+    assert "coloured noise of" in " ".join(model_sentences(result.posterior, 0.0))
 
 
 @pytest.fixture

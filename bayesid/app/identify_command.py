@@ -57,7 +57,10 @@ def run(
             origin = report_origin(study, "identify", seed, output=output, samples=samples)
             identification_report(result, study.title, [], folder / "report.pdf", origin=origin)
             clock.ends("report")
-            write_json(folder / "identification.json", result.to_dict() | {"seconds": clock.seconds})
+            write_json(
+                folder / "identification.json",
+                result.to_dict() | {"noise": study.model.noise, "seconds": clock.seconds},
+            )
         kept.unlink(missing_ok=True)
     yield from _summary(result)
     yield f"Wrote {output / 'report.pdf'}."
