@@ -33,6 +33,7 @@ BETTER = 100.0
 
 FAR = 3.0  # errors of one number that should not be exceeded [standard deviations]
 REACH = 1.96  # half-width of a 95 % band [standard deviations]
+
 Cases = Mapping[str, Case]  # cases by what is known of the base
 
 
