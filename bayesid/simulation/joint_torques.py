@@ -18,6 +18,7 @@ from jax import Array
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Traceable
+from bayesid._math.small_matrices import symmetric
 from bayesid.robot.composite_tables import ENTRIES, WIDTH, composite_rows
 from bayesid.robot.joint_state import JointState
 from bayesid.robot.kinematics import Kinematics
@@ -153,10 +154,8 @@ def joint_torques(
 def _pulled(row: Array, com: Array, gravity_gradient_tensor: Array) -> Array:
     """Return the force and torque about the base origin that the gravity gradient about ``com`` exerts."""
     mass, first = row[ENTRIES["mass"]], row[ENTRIES["first"]]
-    xx, yy, zz, xy, xz, yz = row[ENTRIES["second"]]
-    second = jnp.stack([jnp.stack([xx, xy, xz]), jnp.stack([xy, yy, yz]), jnp.stack([xz, yz, zz])])
     # integral of r (G r)' over the mass, whose antisymmetric part is the torque
-    spread = second @ gravity_gradient_tensor
+    spread = symmetric(row[ENTRIES["second"]]) @ gravity_gradient_tensor
     torque = jnp.stack([spread[1, 2] - spread[2, 1], spread[2, 0] - spread[0, 2], spread[0, 1] - spread[1, 0]])
     return jnp.concatenate(
         [gravity_gradient_tensor @ (first - mass * com), torque - jnp.cross(first, gravity_gradient_tensor @ com)]

@@ -231,8 +231,7 @@ def _reading(
             force = jax.vmap(jax.vmap(effect.specific_force, (None, 0, 0)), (axis, 0, 0))
             added = added + force(values, sample, lever) @ given.rotation[index]
         parts.append(added)
-    torques = jnp.zeros((*readings.time.shape, 0))
-    return jnp.concatenate([*parts, torques], axis=-1)
+    return jnp.concatenate(parts, axis=-1)
 
 
 _evaluate = kept_jit(static=2)(_hooks)
