@@ -59,6 +59,8 @@ class BagWriter:
                 made.add("/star", "geometry_msgs/msg/QuaternionStamped", time, {"quaternion": quaternion}, "orbit")
                 pose = {"pose": ((1.0, 2.0, 3.0), quaternion)}
                 made.add("/pose", "geometry_msgs/msg/PoseStamped", time, pose, "orbit")
+                for topic, (kind, fields) in other_attitudes(quaternion).items():
+                    made.add(topic, kind, time, fields, "orbit")
         for message in made.messages:
             message.delay = float(rng.uniform(0.1, 0.2))
         return made
@@ -108,15 +110,39 @@ class Maker:
             return list(value)
         if key in ("quaternion", "orientation"):
             return self._quaternion(value)
+        if key == "child_frame_id":
+            return value
+        if key == "twist":
+            zero = self.types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
+            twist = self.types["geometry_msgs/msg/Twist"](linear=zero, angular=zero)
+            return self.types["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=np.zeros(36))
+        if key == "transform":
+            shift = self.types["geometry_msgs/msg/Vector3"](*map(float, value[0]))
+            return self.types["geometry_msgs/msg/Transform"](translation=shift, rotation=self._quaternion(value[1]))
         if key == "pose":
             point = self.types["geometry_msgs/msg/Point"](*map(float, value[0]))
-            return self.types["geometry_msgs/msg/Pose"](position=point, orientation=self._quaternion(value[1]))
+            pose = self.types["geometry_msgs/msg/Pose"](position=point, orientation=self._quaternion(value[1]))
+            if kind == "geometry_msgs/msg/PoseStamped":
+                return pose
+            return self.types["geometry_msgs/msg/PoseWithCovariance"](pose=pose, covariance=np.zeros(36))
         if key in ("angular_velocity", "linear_acceleration"):
             return self.types["geometry_msgs/msg/Vector3"](*map(float, value))
         return np.array(value, dtype=float)
 
     def _quaternion(self, value: Sequence[float]) -> Any:
         return self.types["geometry_msgs/msg/Quaternion"](*map(float, value))
+
+
+def other_attitudes(quaternion: Sequence[float]) -> dict[str, tuple[str, dict[str, Any]]]:
+    """The same attitude in messages of other types, by their topics."""
+    placed = ((1.0, 2.0, 3.0), quaternion)
+    filtered = {**imu((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), "orientation": quaternion}
+    return {
+        "/transform": ("geometry_msgs/msg/TransformStamped", {"child_frame_id": "base", "transform": placed}),
+        "/covariance": ("geometry_msgs/msg/PoseWithCovarianceStamped", {"pose": placed}),
+        "/odometry": ("nav_msgs/msg/Odometry", {"child_frame_id": "base", "pose": placed, "twist": None}),
+        "/filtered": ("sensor_msgs/msg/Imu", filtered),
+    }
 
 
 def imu(rate: Sequence[float], accel: Sequence[float]) -> dict[str, Any]:

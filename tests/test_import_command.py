@@ -63,8 +63,13 @@ def run(*arguments: object) -> tuple[int, str]:
     return result.exit_code, re.sub(r"\s+", " ", result.output)
 
 
-@pytest.mark.parametrize("attitude", ["/star", "/pose"])
-@pytest.mark.parametrize("kind", FORMATS)
+@pytest.mark.parametrize(
+    ("kind", "attitude"),
+    [
+        *((kind, topic) for kind in FORMATS for topic in ("/star", "/pose")),
+        *(("mcap", topic) for topic in ("/transform", "/covariance", "/odometry", "/filtered")),
+    ],
+)
 def test_a_recording_comes_back_with_its_times_and_gaps(flown, writer, tmp_path, kind, attitude):
     bag = writer.write(tmp_path, kind)
     status, output = run(bag, *TOPICS, "--attitude", attitude, "--output", tmp_path / "out")
@@ -196,6 +201,47 @@ def test_joints_without_positions_are_recorded_by_speed(writer, tmp_path):
 def with_gripper(writer: BagWriter) -> None:
     for message in writer.on("/joint_states")[1::3]:
         message.fields = dict(message.fields, name=["gripper"], position=[0.1])
+        message.frame = "gripper"
+
+
+def test_joints_of_two_publishers_keep_their_own_stamps(flown, writer, tmp_path):
+    with_gripper(writer)
+    status, output = run(writer.write(tmp_path, "mcap"), *TOPICS, "--output", tmp_path / "out")
+    assert status == 0, output
+    read = Recording.read(tmp_path / "out" / "flight.csv")
+    assert sorted(read.joints) == ["gripper", "joint1", "joint2", "joint3", "joint4"]
+    times = flown.series("position.joint1")[0]
+    of_gripper = np.arange(len(times)) % 3 == 1
+    np.testing.assert_allclose(read.series("position.joint1")[0], times[~of_gripper], atol=1e-8)
+    np.testing.assert_allclose(read.series("position.gripper")[0], times[of_gripper], atol=1e-8)
+
+
+def test_joints_of_two_topics_are_one_recording(flown, writer, tmp_path):
+    for message in writer.on("/joint_states"):
+        for topic, wanted in (("/left", ("joint1", "joint2")), ("/right", ("joint3", "joint4"))):
+            own = [name in wanted for name in message.fields["name"]]
+            fields = {
+                **message.fields,
+                "name": [n for n, take in zip(message.fields["name"], own, strict=True) if take],
+            }
+            fields["position"] = message.fields["position"][own]
+            writer.add(topic, message.kind, message.time, fields, topic)
+    bag = writer.write(tmp_path, "mcap")
+    status, output = run(bag, "--joints", "/left", "--joints", "/right", "--imu", "/imu", "--output", tmp_path / "out")
+    assert status == 0, output
+    read = Recording.read(tmp_path / "out" / "flight.csv")
+    for joint in flown.joints:
+        np.testing.assert_allclose(read.series(f"position.{joint}")[1], flown.series(f"position.{joint}")[1], rtol=1e-9)
+    status, output = run(bag, *TOPICS, "--joints", "/left", "--output", tmp_path / "both")
+    assert status == 2
+    assert "topic /left: the joint 'joint2' is in /joint_states too" in output
+
+
+def test_a_bag_named_with_a_dot_keeps_its_name(writer, tmp_path):
+    for name in ("run_0.1", "run_0.2"):
+        status, output = run(writer.write(tmp_path, "sqlite3", name), *TOPICS, "--output", tmp_path / "out")
+        assert status == 0, output
+    assert sorted(item.name for item in (tmp_path / "out").glob("*.csv")) == ["run_0.1.csv", "run_0.2.csv"]
 
 
 def test_a_joint_that_only_some_messages_hold_can_be_left_out(writer, tmp_path):
@@ -255,8 +301,27 @@ def slightly_other_clock(writer: BagWriter) -> None:
 
 
 def repeated_stamp(writer: BagWriter) -> None:
-    messages = writer.on("/joint_states")
+    messages = writer.on("/imu")
     messages[8].stamp = 1_700_000_000_250_000_000 + round(messages[7].time * 1e9)
+    messages[7].delay, messages[8].delay = 0.15, 0.15
+
+
+def recorded_twice(writer: BagWriter) -> None:
+    writer.messages.append(writer.on("/imu")[8])
+
+
+def swapped(writer: BagWriter) -> None:
+    messages = writer.on("/imu")
+    messages[8].delay = messages[9].time - messages[8].time + messages[9].delay + 0.01
+
+
+def first_stamps_zero(writer: BagWriter) -> None:
+    for message in writer.on("/imu")[:2]:
+        message.stamp = 0
+
+
+def garbled_stamp(writer: BagWriter) -> None:
+    writer.on("/imu")[20].stamp = 1_900_000_000_000_000_000
 
 
 def clock_set_back(writer: BagWriter) -> None:
@@ -280,6 +345,13 @@ def joint_twice(writer: BagWriter) -> None:
     writer.on("/joint_states")[6].fields["name"] = ["joint1", "joint1", "joint2", "joint3"]
 
 
+def half_lost(writer: BagWriter) -> None:
+    for message in writer.on("/joint_states")[::2]:
+        message.fields["position"] = np.where(
+            [name == "joint2" for name in message.fields["name"]], np.nan, message.fields["position"]
+        )
+
+
 def moved_frame(writer: BagWriter) -> None:
     writer.on("/imu")[-1].frame = "other_imu"
 
@@ -301,22 +373,51 @@ def imu_elsewhere(writer: BagWriter) -> None:
 
 
 @pytest.mark.parametrize(
+    ("spoil", "topic", "lost", "words"),
+    [
+        (repeated_stamp, "/imu", 8, "1 message (its stamp repeats that of another message)"),
+        (recorded_twice, "/imu", None, "1 message (recorded twice)"),
+        (swapped, "/imu", None, "Put in the order of their stamps: 1."),
+        (first_stamps_zero, "/imu", None, "2 messages (the stamp of the header is zero)"),
+        (garbled_stamp, "/imu", 20, "s later than those around it"),
+        (not_a_number, "/joint_states", 3, "1 message (position of joint2 is nan, not finite)"),
+        (infinite_rate, "/imu", 5, "1 message (angular_velocity is 0, inf, 0, not finite)"),
+        (short_position, "/joint_states", 6, "1 message (2 values of position for 4 joints)"),
+        (joint_twice, "/joint_states", 6, "1 message (joint 'joint1' appears twice)"),
+    ],
+)
+def test_single_faulty_messages_are_left_out_and_counted(flown, writer, tmp_path, spoil, topic, lost, words):
+    clean = writer.write(tmp_path, "mcap", "clean")
+    run(clean, *TOPICS, "--output", tmp_path / "out")
+    spoil(writer)
+    status, output = run(writer.write(tmp_path, "mcap"), *TOPICS, "--output", tmp_path / "out")
+    assert status == 0, output
+    assert words in output
+    column = "rate.x" if topic == "/imu" else "position.joint1"
+    known, read = (Recording.read(tmp_path / "out" / f"{name}.csv").series(column) for name in ("clean", "flight"))
+    places = np.arange(len(known[0]))
+    kept = places >= 2 if spoil is first_stamps_zero else places != lost
+    for there, here in zip(known, read, strict=True):
+        np.testing.assert_allclose(here, there[kept], rtol=1e-9, atol=1e-9)
+    # a window that the fault lies outside does not see it
+    status, output = run(tmp_path / "flight", *TOPICS, "--start", 9.0, "--output", tmp_path / "later")
+    assert status == 0, output
+    assert "Left out" not in output
+    assert "in the order" not in output
+
+
+@pytest.mark.parametrize(
     ("spoil", "words"),
     [
         (in_g, ("/imu", "gravity in g", "m/s2")),
         (zero_stamps, ("/imu", "message 1", "stamp of the header is zero", "136 such messages")),
         (other_clock, ("/imu", "behind those of /joint_states", "one clock")),
         (slightly_other_clock, ("/imu", "2.7", "ahead of those of /joint_states")),
-        (repeated_stamp, ("/joint_states", "message 9", "repeats", "1700000002.000000000")),
-        (clock_set_back, ("/joint_states", "message 41", "is earlier than")),
-        (not_a_number, ("/joint_states", "message 4", "nan", "joint1")),
-        (infinite_rate, ("/imu", "message 6", "angular_velocity", "inf")),
-        (short_position, ("/joint_states", "message 7", "2 values of position for 4 joints")),
-        (joint_twice, ("/joint_states", "message 7", "'joint1' appears twice")),
-        (with_gripper, ("/joint_states", "message 1", "joint 'gripper' is in 38 of 113", "--without gripper")),
+        (clock_set_back, ("/joint_states", "faulty messages of 113", "--most-faulty")),
+        (half_lost, ("/joint_states", "message 1", "joint2 is nan", "57 faulty messages of 113", "--most-faulty")),
         (moved_frame, ("/imu", "'imu_link', 'other_imu'")),
         (measures_nothing, ("/imu", "neither angular velocity nor acceleration")),
-        (no_unit_quaternion, ("/star", "message 3", "norm is 0")),
+        (no_unit_quaternion, ("/star", "message 3", "norm is 0", "1 faulty messages of 31")),
         (imu_elsewhere, ("/imu", "no time in common with /joint_states")),
     ],
 )

@@ -19,11 +19,16 @@ __all__ = ["run"]
 
 def run(
     bag: Annotated[Path, typer.Argument(metavar="BAG", help="File .bag of ROS 1, or folder of ROS 2.")],
-    joints: Annotated[str, typer.Option(metavar="TOPIC", help="Joints, sensor_msgs/JointState.")],
+    joints: Annotated[list[str], typer.Option(metavar="TOPIC", help="Joints, sensor_msgs/JointState; repeatable.")],
     output: Output,
     imu: Annotated[str | None, typer.Option(metavar="TOPIC", help="IMU of the base, sensor_msgs/Imu.")] = None,
     attitude: Annotated[
-        str | None, typer.Option(metavar="TOPIC", help="Star sensor, geometry_msgs/QuaternionStamped or PoseStamped.")
+        str | None,
+        typer.Option(
+            metavar="TOPIC",
+            help="Star tracker, geometry_msgs/QuaternionStamped, PoseStamped, PoseWithCovarianceStamped or "
+            "TransformStamped, nav_msgs/Odometry or sensor_msgs/Imu.",
+        ),
     ] = None,
     without: Annotated[list[str] | None, typer.Option(metavar="JOINT", help="Joint to leave out; repeatable.")] = None,
     velocity: Annotated[
@@ -36,6 +41,9 @@ def run(
     duration: Annotated[
         float | None, typer.Option(metavar="S", help="Length from the start, instead of --end.")
     ] = None,
+    most_faulty: Annotated[
+        float, typer.Option(metavar="FRACTION", help="Largest share of a topic's messages to leave out as faulty.")
+    ] = 0.02,
 ) -> Iterator[str]:
     """Make a recording from a bag of ROS 1 or ROS 2: NAME.csv, and NAME.import.json on where it comes from."""
     from bayesid._io.files import complete_folder, write_json
@@ -43,7 +51,7 @@ def run(
     from bayesid.recording.ros_bag import format_stamp
 
     window = TimeWindow.of_options(start, end, duration)
-    wanted = BagTopics(joints, imu, attitude, tuple(without or ()), velocity, effort, accel, window)
+    wanted = BagTopics(tuple(joints), imu, attitude, tuple(without or ()), velocity, effort, accel, window, most_faulty)
     imported = import_bag(bag, wanted)
     recording = imported.recording
     file = output / f"{recording.name}.csv"
@@ -63,9 +71,16 @@ def run(
     for topic in imported.topics:
         yield (
             f"{topic.name}: {topic.used} of {topic.messages} messages, every {topic.interval:.4g} s, "
-            f"longest gap {topic.longest_gap:.4g} s. {_meaning(topic)}"
+            f"longest gap {topic.longest_gap:.4g} s. {_faults(topic)}{_meaning(topic)}"
         )
     yield f"Wrote {file}."
+
+
+def _faults(topic: ImportedTopic) -> str:
+    """Return what was left out of a topic and put in order, in one sentence, or nothing."""
+    parts = [f"{count} {'message' if count == 1 else 'messages'} ({text})" for text, count in topic.left_out.items()]
+    text = f"Left out: {'; '.join(parts)}. " if parts else ""
+    return f"{text}Put in the order of their stamps: {topic.reordered}. " if topic.reordered else text
 
 
 def _meaning(topic: ImportedTopic) -> str:

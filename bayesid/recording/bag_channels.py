@@ -3,20 +3,39 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from bayesid._math.arrays import Floats
+from bayesid._math.arrays import Floats, Integers
 from bayesid.recording.recording import NORM_TOLERANCE
 from bayesid.recording.ros_bag import StampedTopic
 
-__all__ = ["ATTITUDES", "IMU", "JOINTS", "attitude_channels", "imu_channels", "joint_channels", "of_joints"]
+__all__ = [
+    "ATTITUDES",
+    "IMU",
+    "JOINTS",
+    "Channels",
+    "attitude_channels",
+    "attitude_fault",
+    "imu_channels",
+    "imu_fault",
+    "joint_channels",
+    "joint_fault",
+    "joint_names",
+]
 
 JOINTS = ("sensor_msgs/JointState",)
 IMU = ("sensor_msgs/Imu",)
-ATTITUDES = ("geometry_msgs/QuaternionStamped", "geometry_msgs/PoseStamped")
+ATTITUDES = (
+    "geometry_msgs/QuaternionStamped",
+    "geometry_msgs/PoseStamped",
+    "geometry_msgs/PoseWithCovarianceStamped",
+    "geometry_msgs/TransformStamped",
+    "nav_msgs/Odometry",
+    "sensor_msgs/Imu",
+)
 
 GRAVITY = 9.80665  # standard gravity, the specific force of what rests on the ground [m/s2]
 # relative difference of a median magnitude from that of gravity up to which it is gravity: no robot that is free
@@ -24,42 +43,68 @@ GRAVITY = 9.80665  # standard gravity, the specific force of what rests on the g
 NEAR = 0.05
 NOT_MEASURED = -1.0  # first element of a covariance by which an IMU says that it does not measure the quantity
 
-Channels = dict[str, Floats]
+Channels = dict[str, tuple[Integers, Floats]]
+"""Stamps [ns] and values of each channel, shapes (n,)."""
 
 
-def of_joints(topic: StampedTopic, without: Sequence[str]) -> tuple[StampedTopic, tuple[str, ...]]:
-    """Return the messages that hold joints, and the names of these, without those that are not wanted.
+def joint_fault(message: Any) -> str | None:
+    """Return what is wrong with a message of joints: one named twice, values that are missing or not finite."""
+    twice = [name for name, count in Counter(message.name).items() if count > 1]
+    if twice:
+        return f"joint {twice[0]!r} appears twice"
+    for family in ("position", "velocity", "effort"):
+        values = getattr(message, family)
+        if len(values) not in (0, len(message.name)):
+            return f"{len(values)} values of {family} for {len(message.name)} joints"
+        for name, value in zip(message.name, values, strict=False):
+            if family == "position" and not np.isfinite(value):
+                return f"{family} of {name} is {value:g}, not finite"
+    return None
+
+
+def joint_names(topics: Sequence[StampedTopic], without: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of the joints of all topics, less those that are not wanted.
+
+    Parameters
+    ----------
+    topics : sequence of StampedTopic
+    without : sequence of str
+        Joints to leave out.
 
     Raises
     ------
     InputError
-        If a joint is in some messages only or twice in one, or a joint that is not wanted is in none.
+        If a joint to leave out is in no topic, none is left, or one is in several topics.
     """
-    for row, message in enumerate(topic.messages):
-        twice = [name for name, count in Counter(message.name).items() if count > 1]
-        if twice:
-            raise topic.error(f"joint {twice[0]!r} appears twice", message=row, remedy="Give every joint its own name")
-    known = list(dict.fromkeys(name for message in topic.messages for name in message.name))
+    of_topic = [dict.fromkeys(name for message in topic.messages for name in message.name) for topic in topics]
+    known = list(dict.fromkeys(name for names in of_topic for name in names))
     for name in without:
         if name not in known:
-            raise topic.error(f"there is no joint {name!r} to leave out", remedy=f"Joints here: {', '.join(known)}")
+            raise topics[0].error(f"there is no joint {name!r} to leave out", remedy=f"Joints here: {', '.join(known)}")
     names = tuple(name for name in known if name not in without)
     if not names:
-        raise topic.error("no joint is left", remedy="Name a topic that holds the robot's joints")
-    held = topic.kept([not set(names).isdisjoint(message.name) for message in topic.messages])
-    counts = Counter(name for message in held.messages for name in message.name)
-    rarest = min(names, key=lambda name: counts[name])
-    if counts[rarest] < len(held.messages):
-        raise held.error(
-            f"joint {rarest!r} is in {counts[rarest]} of {len(held.messages)} messages only, here it is not",
-            message=[rarest in message.name for message in held.messages].index(False),
-            remedy=f"Record a topic that holds all joints at once, or leave it out: --without {rarest}",
-        )
-    return held, names
+        raise topics[0].error("no joint is left", remedy="Name a topic that holds the robot's joints")
+    for name in names:
+        holders = [topic for topic, own in zip(topics, of_topic, strict=True) if name in own]
+        if len(holders) > 1:
+            raise holders[1].error(
+                f"the joint {name!r} is in {holders[0].name} too",
+                remedy=f"Name one of these topics, or leave the joint out: --without {name}",
+            )
+    return names
 
 
 def joint_channels(topic: StampedTopic, names: Sequence[str], *, velocity: bool, effort: bool) -> Channels:
-    """Return the positions of joints, their velocities where there are none or they are wanted, and wanted efforts."""
+    """Return the joints of a topic, each at the stamps of the messages that hold it.
+
+    Parameters
+    ----------
+    topic : StampedTopic
+    names : sequence of str
+        Joints that are wanted.
+    velocity, effort : bool
+        Whether to take velocities beside positions, and efforts; velocities are taken where there are no positions.
+    """
     channels = _joint_family(topic, names, "position", "position")
     if velocity or not channels:
         channels |= _joint_family(topic, names, "velocity", "velocity")
@@ -75,20 +120,16 @@ def joint_channels(topic: StampedTopic, names: Sequence[str], *, velocity: bool,
 
 def _joint_family(topic: StampedTopic, names: Sequence[str], field: str, family: str) -> Channels:
     """Return a field of all messages by joint, or nothing where no message holds the field."""
-    sizes = [len(getattr(message, field)) for message in topic.messages]
-    if not any(sizes):
-        return {}
-    for row, (size, message) in enumerate(zip(sizes, topic.messages, strict=True)):
-        if size != len(message.name):
-            problem = f"{size} values of {field} for {len(message.name)} joints"
-            raise topic.error(problem, message=row, remedy="Record one value for each joint in every message")
-
-    def ordered(message: Any) -> list[float]:
-        values: Mapping[str, float] = dict(zip(message.name, getattr(message, field), strict=True))
-        return [values[name] for name in names]
-
-    values = topic.numbers(ordered, f"{field} of {', '.join(names)}")
-    return {f"{family}.{name}": values[:, column] for column, name in enumerate(names)}
+    samples: dict[str, list[tuple[int, float]]] = {}
+    for stamp, message in zip(topic.stamps, topic.messages, strict=True):
+        for name, value in zip(message.name, getattr(message, field), strict=False):
+            if name in names and np.isfinite(value):
+                samples.setdefault(f"{family}.{name}", []).append((int(stamp), float(value)))
+    found = {}
+    for channel, pairs in samples.items():
+        stamps, rows = np.unique([stamp for stamp, _ in pairs], return_index=True)
+        found[channel] = stamps, np.array([value for _, value in pairs])[rows]
+    return found
 
 
 def imu_channels(topic: StampedTopic, *, accel: bool) -> Channels:
@@ -105,20 +146,30 @@ def imu_channels(topic: StampedTopic, *, accel: bool) -> Channels:
         channels |= _vector(topic, "angular_velocity", "rate")
     if accel and first.linear_acceleration_covariance[0] != NOT_MEASURED:
         channels |= _vector(topic, "linear_acceleration", "accel")
-        _refuse_gravity(topic, np.stack([channels[f"accel.{axis}"] for axis in "xyz"], axis=1))
+        _refuse_gravity(topic, np.stack([channels[f"accel.{axis}"][1] for axis in "xyz"], axis=1))
     if not channels:
         problem = "its covariances say that it measures neither angular velocity nor acceleration"
         raise topic.error(problem, remedy="Name the topic of an IMU that does")
     return channels
 
 
-def _vector(topic: StampedTopic, field: str, family: str) -> Channels:
-    def components(message: Any) -> list[float]:
-        vector = getattr(message, field)
-        return [vector.x, vector.y, vector.z]
+def imu_fault(message: Any) -> str | None:
+    """Return what is wrong with a message of an IMU: a vector that is not finite."""
+    for name in ("angular_velocity", "linear_acceleration"):
+        values = _components(message, name)
+        if not np.isfinite(values).all():
+            return f"{name} is {', '.join(f'{value:g}' for value in values)}, not finite"
+    return None
 
-    values = topic.numbers(components, field)
-    return {f"{family}.{axis}": values[:, column] for column, axis in enumerate("xyz")}
+
+def _components(message: Any, name: str) -> list[float]:
+    vector = getattr(message, name)
+    return [vector.x, vector.y, vector.z]
+
+
+def _vector(topic: StampedTopic, name: str, family: str) -> Channels:
+    values = np.array([_components(message, name) for message in topic.messages])
+    return {f"{family}.{axis}": (topic.stamps, values[:, column]) for column, axis in enumerate("xyz")}
 
 
 def _refuse_gravity(topic: StampedTopic, acceleration: Floats) -> None:
@@ -132,25 +183,33 @@ def _refuse_gravity(topic: StampedTopic, acceleration: Floats) -> None:
     )
 
 
+def attitude_fault(message: Any) -> str | None:
+    """Return what is wrong with a message that holds an attitude: a quaternion that is none."""
+    norm = float(np.linalg.norm(_quaternion(message)))
+    return None if abs(norm - 1.0) <= NORM_TOLERANCE else f"the quaternion's norm is {norm:.6g}, not 1"
+
+
 def attitude_channels(topic: StampedTopic) -> Channels:
     """Return the quaternions of a topic.
 
     Raises
     ------
     InputError
-        If a quaternion's norm is not one.
+        If they are those of an IMU that says that it does not measure its attitude.
     """
-
-    def components(message: Any) -> list[float]:
-        quaternion = message.quaternion if hasattr(message, "quaternion") else message.pose.orientation
-        return [quaternion.x, quaternion.y, quaternion.z, quaternion.w]
-
-    values = topic.numbers(components, "the quaternion")
-    norm = np.linalg.norm(values, axis=1)
-    off = np.abs(norm - 1.0) > NORM_TOLERANCE
-    if off.any():
-        row = int(np.argmax(off))
+    first = topic.messages[0]
+    if getattr(first, "orientation_covariance", (0.0,))[0] == NOT_MEASURED:
         raise topic.error(
-            f"the quaternion's norm is {norm[row]:.6g}, not 1", message=row, remedy="Record unit quaternions"
+            "its covariance says that it does not measure the orientation",
+            remedy="Name the topic of a sensor that does",
         )
-    return {f"attitude.{axis}": values[:, column] for column, axis in enumerate("xyzw")}
+    values = np.array([_quaternion(message) for message in topic.messages])
+    return {f"attitude.{axis}": (topic.stamps, values[:, column]) for column, axis in enumerate("xyzw")}
+
+
+def _quaternion(message: Any) -> list[float]:
+    """Return x, y, z, w of a message of one of `ATTITUDES`."""
+    inner = getattr(message, "pose", None) or getattr(message, "transform", None) or message
+    inner = getattr(inner, "pose", inner)  # of a pose with covariance
+    found = next(getattr(inner, name) for name in ("quaternion", "orientation", "rotation") if hasattr(inner, name))
+    return [found.x, found.y, found.z, found.w]

@@ -2,32 +2,41 @@
 
 Time is that of the headers' stamps, from the first message of the joints. Every message keeps its own time and none is
 interpolated, so that gaps stay gaps. Readings of the base before the first and after the last message of the joints are
-left out, since nothing is known of the motion there. The topics of a bag must be stamped by one clock.
+left out, since nothing is known of the motion there. Single faulty messages are left out and counted. The topics of a
+bag must be stamped by one clock.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from bayesid._io.errors import InputError
-from bayesid._math.arrays import Floats
 from bayesid.recording.bag_channels import (
     ATTITUDES,
     IMU,
     JOINTS,
+    Channels,
     attitude_channels,
+    attitude_fault,
     imu_channels,
+    imu_fault,
     joint_channels,
-    of_joints,
+    joint_fault,
+    joint_names,
 )
 from bayesid.recording.recording import Recording
 from bayesid.recording.ros_bag import StampedTopic, read_topics
 
 __all__ = ["BagTopics", "ImportedBag", "ImportedTopic", "TimeWindow", "import_bag", "refuse_mixed_clocks"]
+
+# share of a topic's messages that are left out without asking
+MOST_FAULTY = 0.02
 
 # difference of the stamps of two topics, against their arrival, from which on their clocks are others [s]; a slow
 # telemetry stamps its samples once in a second
@@ -70,26 +79,31 @@ class TimeWindow:
             raise InputError("both --end and --duration are given", remedy="Give one of them")
         return TimeWindow(start, start + duration if duration is not None else end)
 
-    def of(self, topics: Mapping[str, StampedTopic]) -> dict[str, StampedTopic]:
-        """Return the messages of topics in the window.
+    def of(self, topics: Sequence[StampedTopic]) -> tuple[int, int]:
+        """Return the first and last stamp of the window [ns].
 
         Raises
         ------
         InputError
-            If a topic has none.
+            If a topic has no message in it.
         """
-        first = min(int(topic.stamps[0]) for topic in topics.values())
-        last = max(int(topic.stamps[-1]) for topic in topics.values())
+        stamps = [topic.stamps[topic.stamps > 0] for topic in topics]
+        if not all(map(len, stamps)):
+            topic = topics[[len(own) for own in stamps].index(0)]
+            problem = f"the stamp of the header is zero ({len(topic.messages)} such messages)"
+            remedy = "Have the driver stamp its messages; the time of arrival is no substitute"
+            raise topic.error(problem, message=0, remedy=remedy)
+        first = min(int(own.min()) for own in stamps)
+        last = max(int(own.max()) for own in stamps)
         low = first + round(1e9 * self.start)
         high = last if self.end is None else first + round(1e9 * self.end)
-        found = {name: topic.kept([low <= stamp <= high for stamp in topic.stamps]) for name, topic in topics.items()}
-        for name, topic in found.items():
-            if not topic.messages:
-                raise topics[name].error(
+        for topic, own in zip(topics, stamps, strict=True):
+            if not ((own >= low) & (own <= high)).any():
+                raise topic.error(
                     f"it has no message from {self.start:g} to {(high - first) / 1e9:g} s",
                     remedy=f"Choose a window within the bag, which lasts {(last - first) / 1e9:.6g} s",
                 )
-        return found
+        return low, high
 
 
 @dataclass(frozen=True)
@@ -98,8 +112,8 @@ class BagTopics:
 
     Parameters
     ----------
-    joints : str
-        Topic of the joints.
+    joints : sequence of str
+        Topics of the joints; each joint keeps the stamps of its own messages.
     imu, attitude : str, optional
         Topics of the base's sensors, at least one of them.
     without : sequence of str, optional
@@ -110,9 +124,11 @@ class BagTopics:
         Whether to take the accelerations of the IMU.
     window : TimeWindow
         Which part of the bag to take.
+    most_faulty : float
+        Largest share of a topic's messages that may be left out as faulty.
     """
 
-    joints: str
+    joints: Sequence[str]
     imu: str | None = None
     attitude: str | None = None
     without: Sequence[str] = ()
@@ -120,11 +136,15 @@ class BagTopics:
     effort: bool = False
     accel: bool = True
     window: TimeWindow = field(default_factory=TimeWindow)
+    most_faulty: float = MOST_FAULTY
 
     def __post_init__(self) -> None:
-        named = [topic for topic in (self.joints, self.imu, self.attitude) if topic is not None]
-        if len(named) < 2:
+        if self.imu is None and self.attitude is None:
             raise InputError("no sensor of the base is named", remedy="Give --imu TOPIC, --attitude TOPIC or both")
+        named = [*self.joints, *({self.imu, self.attitude} - {None})]  # an IMU may tell its attitude, too
+        if not 0.0 <= self.most_faulty < 1.0:
+            problem = f"the largest share of faulty messages is {self.most_faulty:g}"
+            raise InputError(problem, place="--most-faulty", remedy="Give a fraction from 0 to below 1")
         if len(set(named)) < len(named):
             raise InputError(f"one topic is named twice: {', '.join(named)}", remedy="Name a topic for each sensor")
 
@@ -144,6 +164,8 @@ class ImportedTopic:
     # median and longest time between the used messages [s]
     interval: float
     longest_gap: float
+    left_out: Mapping[str, int]  # number of messages left out, by what is wrong with them
+    reordered: int  # number of messages that were recorded after one of a later stamp
 
 
 @dataclass(frozen=True)
@@ -162,58 +184,75 @@ def import_bag(bag: Path, wanted: BagTopics) -> ImportedBag:
     ------
     InputError
         If the bag or a topic cannot be read, the topics are stamped by different clocks, a topic has no message in the
-        window, a value is not finite, a joint is in some messages only, or the IMU feels gravity.
+        window, too many messages of one are faulty, a joint is in two topics, or the IMU feels gravity.
     """
-    kinds = {wanted.joints: JOINTS, wanted.imu: IMU, wanted.attitude: ATTITUDES}
-    whole = read_topics(bag, {name: allowed for name, allowed in kinds.items() if name is not None})
-    refuse_mixed_clocks(list(whole.values()))
-    read = wanted.window.of(whole)
-    joints, names = of_joints(read[wanted.joints], wanted.without)
-    found = [(joints, joint_channels(joints, names, velocity=wanted.velocity, effort=wanted.effort))]
-    if wanted.imu is not None:
-        imu = _during(joints, read[wanted.imu])
-        found.append((imu, imu_channels(imu, accel=wanted.accel)))
-    if wanted.attitude is not None:
-        attitude = _during(joints, read[wanted.attitude])
-        found.append((attitude, attitude_channels(attitude)))
-    topics = tuple(_described(topic, channels, len(whole[topic.name].messages)) for topic, channels in found)
-    return ImportedBag(_recording(bag, found), int(joints.stamps[0]), topics)
+    kinds = dict.fromkeys(wanted.joints, JOINTS)
+    for name, allowed in ((wanted.attitude, ATTITUDES), (wanted.imu, IMU)):
+        kinds |= {} if name is None else {name: allowed}
+    whole = read_topics(bag, kinds)
+    between = wanted.window.of(list(whole.values()))
+
+    def sound(name: str, fault: Callable[[Any], str | None]) -> StampedTopic:
+        return whole[name].sound(fault, wanted.most_faulty, between)
+
+    arms = [sound(name, joint_fault) for name in wanted.joints]
+    names = joint_names(arms, wanted.without)
+    found: list[tuple[StampedTopic, Channels, str]] = []
+    for topic in arms:
+        used = topic.kept([not set(names).isdisjoint(message.name) for message in topic.messages])
+        found.append((used, joint_channels(used, names, velocity=wanted.velocity, effort=wanted.effort), ""))
+    joints = [stamps for _, channels, _ in found for stamps, _ in channels.values()]
+    known = max(int(stamps[0]) for stamps in joints), min(int(stamps[-1]) for stamps in joints)
+    base = [
+        *([] if wanted.imu is None else [(sound(wanted.imu, imu_fault), partial(imu_channels, accel=wanted.accel))]),
+        *([] if wanted.attitude is None else [(sound(wanted.attitude, attitude_fault), attitude_channels)]),
+    ]
+    refuse_mixed_clocks([*arms, *(topic for topic, _ in base)])
+    for topic, channels_of in base:
+        inside = _during(arms[0], topic, known)
+        found.append((inside, channels_of(inside), inside.frame()))
+    topics = tuple(
+        _described(topic, channels, frame, len(whole[topic.name].messages)) for topic, channels, frame in found
+    )
+    return ImportedBag(*_recording(bag, [channels for _, channels, _ in found]), topics)
 
 
-def _during(joints: StampedTopic, topic: StampedTopic) -> StampedTopic:
-    """Return the messages of a topic from the first to the last of the joints."""
-    inside = topic.kept([joints.stamps[0] <= stamp <= joints.stamps[-1] for stamp in topic.stamps])
+def _during(joints: StampedTopic, topic: StampedTopic, known: tuple[int, int]) -> StampedTopic:
+    """Return the messages of a topic while all joints are known."""
+    inside = topic.kept((topic.stamps >= known[0]) & (topic.stamps <= known[1]))
     if not inside.messages:
         raise topic.error(f"it has no message during those of {joints.name}", remedy="Record both at the same time")
     return inside
 
 
-def _recording(bag: Path, found: Sequence[tuple[StampedTopic, Mapping[str, Floats]]]) -> Recording:
-    """Return a recording with one row for every stamp; a channel without a message then has no sample."""
-    stamps = np.unique(np.concatenate([topic.stamps for topic, _ in found]))
+def _recording(bag: Path, found: Sequence[Channels]) -> tuple[Recording, int]:
+    """Return a recording with one row for every stamp, and its first stamp; what has no message there has no sample."""
+    stamps = np.unique(np.concatenate([own for channels in found for own, _ in channels.values()]))
     columns = {}
-    for topic, channels in found:
-        rows = np.searchsorted(stamps, topic.stamps)
-        for name, values in channels.items():
+    for channels in found:
+        for name, (own, values) in channels.items():
             columns[name] = np.full(len(stamps), np.nan)
-            columns[name][rows] = values
+            columns[name][np.searchsorted(stamps, own)] = values
+    name = bag.name if bag.is_dir() else bag.stem
     try:
-        return Recording(bag.stem, None, (stamps - stamps[0]) / 1e9, columns)
+        return Recording(name, None, (stamps - stamps[0]) / 1e9, columns), int(stamps[0])
     except InputError as error:
         raise InputError(error.problem, file=bag, place=error.place, remedy=error.remedy) from None
 
 
-def _described(topic: StampedTopic, channels: Mapping[str, Floats], messages: int) -> ImportedTopic:
-    steps = np.diff(topic.stamps) / 1e9 if len(topic.stamps) > 1 else np.zeros(1)
+def _described(topic: StampedTopic, channels: Channels, frame: str, messages: int) -> ImportedTopic:
+    steps = [np.diff(np.unique(stamps)) / 1e9 for stamps, _ in channels.values() if len(stamps) > 1] or [np.zeros(1)]
     return ImportedTopic(
         name=topic.name,
         kind=topic.kind,
-        frame=topic.frame,
+        frame=frame,
         columns=tuple(channels),
         messages=messages,
         used=len(topic.messages),
-        interval=float(np.median(steps)),
-        longest_gap=float(steps.max()),
+        interval=float(np.median(np.concatenate(steps))),
+        longest_gap=float(max(own.max() for own in steps)),
+        left_out=topic.left_out,
+        reordered=topic.reordered,
     )
 
 

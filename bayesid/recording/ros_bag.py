@@ -2,37 +2,62 @@
 
 A bag is a file ``.bag`` of ROS 1, or a folder or file of ROS 2 with the storage sqlite3 or MCAP. The time of a message
 is the stamp in its header, which its sensor's driver gave it; when it arrived where it was recorded says nothing of the
-motion.
+motion. Single messages that cannot be right are left out and counted (`StampedTopic.sound`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from bisect import bisect_right
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bayesid._io.errors import InputError
-from bayesid._math.arrays import Floats, Integers
+from bayesid._math.arrays import Integers
 
 __all__ = ["StampedTopic", "format_stamp", "read_topics"]
 
 
+# distance of a stamp from those of its neighbours from which it is no mere exchange of the order [ns]
+FAR = 10**9
+
+
 @dataclass(frozen=True)
 class StampedTopic:
-    """Messages of one topic in the order of their stamps."""
+    """Messages of one topic.
 
-    bag: Path  # bag that was read
-    # name of the topic and type of its messages, such as ``"sensor_msgs/Imu"``
+    Attributes
+    ----------
+    bag : Path
+        Bag that was read.
+    name, kind : str
+        Name of the topic and type of its messages, such as ``"sensor_msgs/Imu"``.
+    stamps, arrivals : (n,) arrays of int
+        Stamps of the headers and times at which the messages were recorded [ns].
+    messages : tuple
+        Messages, whose fields are those of the type.
+    contents : tuple of bytes
+        The messages as recorded, by which repetitions are known.
+    left_out : mapping of str to int
+        Number of messages left out, by what is wrong with them.
+    reordered : int
+        Number of messages whose stamp was earlier than that of one recorded before them.
+    """
+
+    bag: Path
     name: str
     kind: str
-    frame: str  # frame that the headers name
-    # (n,) stamps of the headers and times at which the messages were recorded [ns]
     stamps: Integers
     arrivals: Integers
-    messages: tuple[Any, ...]  # messages, whose fields are those of the type
+    messages: tuple[Any, ...]
+    contents: tuple[bytes, ...]
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    reordered: int = 0
 
     def error(self, problem: str, *, message: int | None = None, remedy: str) -> InputError:
         """Return an error in the topic, or in one of its messages, counted from 0."""
@@ -43,27 +68,115 @@ class StampedTopic:
             )
         return InputError(problem, file=self.bag, place=place, remedy=remedy)
 
-    def numbers(self, read: Callable[[Any], Sequence[float]], meaning: str) -> Floats:
-        """Return numbers of every message, shape (n, k), and refuse any that is not finite."""
-        values = np.array([read(message) for message in self.messages], dtype=float)
-        lost = ~np.isfinite(values).all(axis=1)
-        if lost.any():
-            row = int(np.argmax(lost))
-            shown = ", ".join(f"{value:g}" for value in values[row])
-            raise self.error(
-                f"{meaning} is {shown}, not finite ({int(lost.sum())} such messages)",
-                message=row,
-                remedy="Record the topic without such messages; where a sensor has no sample, none should be sent",
-            )
-        return values
+    def frame(self) -> str:
+        """Return the frame that the headers name.
 
-    def kept(self, wanted: Sequence[bool]) -> StampedTopic:
-        """Return the topic with some of its messages."""
-        mask = np.array(wanted, dtype=bool)
-        messages = tuple(message for message, keep in zip(self.messages, wanted, strict=True) if keep)
-        return StampedTopic(
-            self.bag, self.name, self.kind, self.frame, self.stamps[mask], self.arrivals[mask], messages
+        Raises
+        ------
+        InputError
+            If they name several.
+        """
+        frames = list(dict.fromkeys(message.header.frame_id for message in self.messages))
+        if len(frames) > 1:
+            raise self.error(
+                f"its headers name several frames: {', '.join(map(repr, frames))}",
+                remedy="Record each sensor on a topic of its own",
+            )
+        return str(frames[0])
+
+    def kept(self, wanted: Sequence[bool] | NDArray[np.bool_]) -> StampedTopic:
+        """Return the topic with some of its messages, given by a truth value for each."""
+        return self.ordered(np.flatnonzero(np.asarray(wanted, dtype=bool)))
+
+    def ordered(self, rows: Integers) -> StampedTopic:
+        """Return the topic with some of its messages, given by their places, shape (m,)."""
+        messages, contents = (tuple(each[row] for row in rows) for each in (self.messages, self.contents))
+        return replace(
+            self, stamps=self.stamps[rows], arrivals=self.arrivals[rows], messages=messages, contents=contents
         )
+
+    def sound(self, fault: Callable[[Any], str | None], share: float, between: tuple[int, int]) -> StampedTopic:
+        """Return the messages by which a recording can be made, in the order of their stamps.
+
+        A message recorded twice counts once. A message is left out if its stamp is zero, far from those of its
+        neighbours, or that of another message, or if its content is faulty.
+
+        Parameters
+        ----------
+        fault : callable
+            Returns what is wrong with the content of a message, or None.
+        share : float
+            Largest share of the messages that may be left out.
+        between : tuple of int
+            First and last stamp that matter [ns]; what lies outside is not looked at.
+
+        Raises
+        ------
+        InputError
+            If more messages are faulty; it names the first.
+        """
+        stamps, faults = _trusted_stamps(self.stamps)
+        inside = (stamps >= between[0]) & (stamps <= between[1])
+        seen: dict[bytes, int] = {}
+        last: dict[tuple[int, tuple[str, ...]], int] = {}
+        offset = np.median((stamps - self.arrivals)[inside]) if inside.any() else 0.0
+        repeated = np.zeros(len(stamps), dtype=bool)
+        for row in np.flatnonzero(inside):
+            repeated[row] = seen.setdefault(self.contents[row], row) != row
+            faults[row] = faults[row] or fault(self.messages[row])
+            if repeated[row] or faults[row]:
+                continue
+            key = int(stamps[row]), tuple(getattr(self.messages[row], "name", ()))
+            other = last.setdefault(key, row)
+            if other != row:  # that message has a wrong stamp whose delay is less usual
+                delays = [abs(stamps[each] - self.arrivals[each] - offset) for each in (other, row)]
+                wrong, last[key] = (other, row) if delays[0] > delays[1] else (row, other)
+                faults[wrong] = "its stamp repeats that of another message"
+        counted = inside & ~repeated
+        bad = np.array([bool(text) for text in faults]) & counted
+        if bad.sum() > share * counted.sum():
+            row = int(np.argmax(bad))
+            raise self.error(
+                f"{faults[row]} ({bad.sum()} faulty messages of {counted.sum()}, {share:.3g} of them may be)",
+                message=row,
+                remedy="Record the topic without such messages, choose another part of the bag by --start and --end, "
+                "or leave more of them out by --most-faulty",
+            )
+        rows = np.flatnonzero(counted & ~bad)
+        rows = rows[np.argsort(stamps[rows], kind="stable")]
+        back = int((np.diff(rows) < 0).sum())
+        counts = Counter(str(faults[row]) for row in np.flatnonzero(bad))
+        if repeated.any():
+            counts["recorded twice"] = int((repeated & inside).sum())
+        return replace(self.ordered(rows), left_out=dict(counts), reordered=back)
+
+
+def _trusted_stamps(stamps: Integers) -> tuple[Integers, list[str | None]]:
+    """Return stamps [ns] in which those that cannot be are replaced by a neighbour's, and what is wrong with each.
+
+    The stamps that can be are the longest run of them that does not fall (Schensted 1961), and what is near it.
+    """
+    faults: list[str | None] = [None if stamp > 0 else "the stamp of the header is zero" for stamp in stamps]
+    ends: list[int] = []
+    places: list[int] = []
+    before = np.full(len(stamps), -1)
+    for row in np.flatnonzero(stamps > 0):
+        place = bisect_right(ends, int(stamps[row]))
+        before[row] = places[place - 1] if place else -1
+        ends[place : place + 1], places[place : place + 1] = [int(stamps[row])], [int(row)]
+    run = [places[-1]] if places else []
+    while run and before[run[-1]] >= 0:
+        run.append(int(before[run[-1]]))
+    trusted = np.array(run[::-1], dtype=int)
+    if not len(trusted):
+        return stamps, faults
+    around = np.clip(np.searchsorted(trusted, np.arange(len(stamps))), 0, len(trusted) - 1)
+    near = stamps[trusted[around]]
+    apart = np.abs(stamps - near)
+    for row in np.flatnonzero((apart > FAR) & (stamps > 0)):
+        relation = "earlier" if stamps[row] < near[row] else "later"
+        faults[row] = f"its stamp is {apart[row] / 1e9:.6g} s {relation} than those around it"
+    return np.where([text is None for text in faults], stamps, near), faults
 
 
 def read_topics(bag: Path, wanted: Mapping[str, Sequence[str]]) -> dict[str, StampedTopic]:
@@ -79,8 +192,7 @@ def read_topics(bag: Path, wanted: Mapping[str, Sequence[str]]) -> dict[str, Sta
     Raises
     ------
     InputError
-        If rosbags is not installed, the bag cannot be read, a topic is absent, empty or of another type, or its stamps
-        are missing, repeat or run back.
+        If rosbags is not installed, the bag cannot be read, or a topic is absent, empty or of another type.
     """
     try:
         from rosbags.highlevel import AnyReader
@@ -99,10 +211,11 @@ def read_topics(bag: Path, wanted: Mapping[str, Sequence[str]]) -> dict[str, Sta
             kinds = {name: _plain(info.msgtype or "several types") for name, info in reader.topics.items()}
             for name, allowed in wanted.items():
                 _check_topic(bag, name, allowed, kinds)
-            raw: dict[str, list[tuple[int, Any]]] = {name: [] for name in wanted}
+            raw: dict[str, list[tuple[int, Any, bytes]]] = {name: [] for name in wanted}
             chosen = [connection for connection in reader.connections if connection.topic in wanted]
             for connection, arrival, data in reader.messages(chosen):
-                raw[connection.topic].append((arrival, reader.deserialize(data, connection.msgtype)))
+                message = reader.deserialize(data, connection.msgtype)
+                raw[connection.topic].append((arrival, message, bytes(data)))
     except InputError:
         raise
     except Exception as error:  # the library and what it builds on raise errors of many kinds for a damaged file
@@ -137,28 +250,12 @@ def _check_topic(bag: Path, name: str, allowed: Sequence[str], kinds: Mapping[st
         raise InputError(problem, file=bag, place=f"topic {name}", remedy=f"Name a topic of {' or '.join(allowed)}")
 
 
-def _stamped(bag: Path, name: str, kind: str, messages: Iterable[tuple[int, Any]]) -> StampedTopic:
-    pairs = list(messages)
-    headers = [message.header for _, message in pairs]
+def _stamped(bag: Path, name: str, kind: str, read: Sequence[tuple[int, Any, bytes]]) -> StampedTopic:
+    headers = [message.header for _, message, _ in read]
     stamps = np.array([header.stamp.sec * 10**9 + header.stamp.nanosec for header in headers], dtype=np.int64)
-    arrivals = np.array([arrival for arrival, _ in pairs], dtype=np.int64)
-    frames = list(dict.fromkeys(header.frame_id for header in headers))
-    topic = StampedTopic(bag, name, kind, ", ".join(frames), stamps, arrivals, tuple(message for _, message in pairs))
-    if not pairs:
+    arrivals = np.array([arrival for arrival, _, _ in read], dtype=np.int64)
+    messages, contents = (tuple(each[place] for each in read) for place in (1, 2))
+    topic = StampedTopic(bag, name, kind, stamps, arrivals, messages, contents)
+    if not read:
         raise topic.error("it has no messages", remedy="Name a topic that was recorded")
-    if len(frames) > 1:
-        problem = f"its headers name several frames: {', '.join(map(repr, frames))}"
-        raise topic.error(problem, remedy="Record each sensor on a topic of its own")
-    if (stamps <= 0).any():
-        raise topic.error(
-            f"the stamp of the header is zero ({int((stamps <= 0).sum())} such messages)",
-            message=int(np.argmax(stamps <= 0)),
-            remedy="Have the driver stamp its messages; the time of arrival is no substitute",
-        )
-    falls = np.diff(stamps) <= 0
-    if falls.any():
-        row = int(np.argmax(falls)) + 1
-        fault = "repeats" if stamps[row] == stamps[row - 1] else "is earlier than"
-        problem = f"the stamp {fault} the one before it, {format_stamp(stamps[row - 1])} s"
-        raise topic.error(problem, message=row, remedy="Record one driver on one clock that runs forwards")
     return topic
