@@ -117,13 +117,15 @@ VARIANTS = {
 
 @pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS)
 @pytest.mark.filterwarnings("ignore:compiler attribute 'settotalmass':UserWarning")
-def test_mass_matrix_and_limits_are_those_of_mujoco(tmp_path, changes):
+def test_mass_matrix_and_limits_are_those_of_mujoco(tmp_path, monkeypatch, changes):
+    monkeypatch.chdir(tmp_path)  # where MuJoCo writes its warnings
     text = CHASER
     for old, new in changes:
         assert old in text
         text = text.replace(old, new)
     file = written(tmp_path, text)
     robot = Robot.from_urdf(file)
+    assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
     truth = mujoco.MjModel.from_xml_path(str(file))
     data = mujoco.MjData(truth)
     names = [joint.name for joint in robot.joints]

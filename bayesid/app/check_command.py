@@ -55,5 +55,7 @@ def _check_dict(check: RecordingCheck) -> dict[str, Any]:
     content = asdict(check)
     for sensor in content["sensors"]:
         sensor["kind"] = sensor["kind"].value
+    for suspect in content["suspects"]:
+        suspect["kind"] = suspect["kind"].value
     content["warnings"] = list(check.warnings)
     return content

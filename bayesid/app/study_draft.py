@@ -15,7 +15,7 @@ from bayesid._math.arrays import Floats
 from bayesid.app.schema import Study
 from bayesid.diagnosis.noise.encoder_fault import noise_of
 from bayesid.recording.joint_motion import check_joints
-from bayesid.recording.plausibility import refuse_impossible_motion
+from bayesid.recording.plausibility import refuse_impossible_motion, unwrapped
 from bayesid.recording.recording import Recording
 from bayesid.recording.smoothing import JointSamples, smooth
 from bayesid.robot.robot import Joint, Robot
@@ -65,6 +65,7 @@ def draft_study(
         If a recording lacks a joint, holds an unknown one, or moves one beyond all limits, or if no sensor of the base
         is in all of them.
     """
+    recordings = [unwrapped(recording, robot) for recording in recordings]
     for recording in recordings:
         check_joints(recording, robot)
         refuse_impossible_motion(recording, robot)

@@ -20,7 +20,7 @@ from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.inference.posterior import Posterior
 from bayesid.inference.posterior_as_prior import InertialDraws, JointPrior, joint_prior
 from bayesid.recording.joint_motion import MeasuredMotion
-from bayesid.recording.plausibility import refuse_impossible_motion
+from bayesid.recording.plausibility import refuse_impossible_motion, unwrapped
 from bayesid.recording.recording import JOINT_FAMILIES, Recording
 from bayesid.robot.body_prior import BodyPrior, Mixing
 from bayesid.robot.robot import Load, Robot
@@ -217,7 +217,7 @@ def _check_latitudes(study: Study) -> None:
 
 def load_manoeuvre(study: Study, section: RecordingSection, robot: Robot) -> Manoeuvre:
     """Read one recording of a study, and return it as a manoeuvre with smoothed joint motion."""
-    recording = Recording.read(section.file)
+    recording = unwrapped(Recording.read(section.file), robot)
     refuse_impossible_motion(recording, robot)  # before they are smoothed and simulated
     for name in section.start:
         number = study.recordings.index(section) + 1

@@ -12,6 +12,7 @@ from bayesid.inference.posterior import Posterior
 from bayesid.inference.predicted_readings import PredictedReadings, readings_at_start
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import JOINT_FAMILIES, Recording
+from bayesid.recording.suspect_readings import SuspectReadings, suspect_readings
 from bayesid.robot.robot import Robot
 from bayesid.simulation.model import Manoeuvre, Model
 from bayesid.simulation.sensors import Sensor, SensorKind
@@ -129,6 +130,8 @@ class RecordingCheck:
         Columns of sensors that hold one number alone, while others of their sensor change.
     unused : tuple of str
         Sensors that are recorded and not declared.
+    suspects : tuple of SuspectReadings
+        Readings that no sensor gives.
     """
 
     name: str
@@ -139,11 +142,13 @@ class RecordingCheck:
     rate_is_differenced: bool
     stuck: tuple[str, ...] = ()
     unused: tuple[str, ...] = ()
+    suspects: tuple[SuspectReadings, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Sentences on properties of the recording that need attention."""
-        sentences = [
+        sentences = [f"{suspect}" for suspect in self.suspects]
+        sentences += [
             f"Joint {joint.name} moves by {joint.highest - joint.lowest:.2g} {joint.unit} only."
             for joint in self.joints
             if joint.still
@@ -194,6 +199,7 @@ def check_recording(posterior: Posterior, index: int) -> RecordingCheck:
         rate_is_differenced=_is_differenced(manoeuvre, model),
         stuck=_stuck(recording, model),
         unused=_unused(recording, model),
+        suspects=tuple(suspect_readings(recording)),
     )
 
 

@@ -1,6 +1,8 @@
-"""Refusal of recorded motion that no robot can have made."""
+"""Recorded motion that no robot can have made is refused; the angles of endless joints are unwrapped."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,12 +11,15 @@ from bayesid._math.arrays import Floats
 from bayesid.recording.recording import Recording
 from bayesid.robot.robot import Robot
 
-__all__ = ["refuse_impossible_motion"]
+__all__ = ["refuse_impossible_motion", "unwrapped"]
 
 FASTEST = 5.0  # speed of a joint relative to its limit that none reaches
 READING_ERROR = 0.01  # largest change of a reading by the noise and the steps of a coarse encoder [rad or m]
 SPAN = 1.0  # time in which a joint in wrong units moves by much more than that error even where its limit is low [s]
 FASTEST_BASE = 20.0  # angular speed of the base that no free-flying robot keeps up, some three turns a second [rad/s]
+TURN = 2.0 * np.pi  # by which an angle jumps where its reading begins anew [rad]
+NEAR_TURN = 0.5  # difference from a turn by which a joint may move from one sample to the next beside the jump [rad]
+GARBLED = 0.01  # share of the samples up to which those outside the limits are garbled, not in another unit
 RATE = ("rate.x", "rate.y", "rate.z")  # columns of the angular velocity of the base
 
 
@@ -38,6 +43,45 @@ def refuse_impossible_motion(recording: Recording, robot: Robot) -> None:
                 raise InputError(problem, file=recording.file or recording.name, place=f"column {name}", remedy=remedy)
 
 
+def unwrapped(recording: Recording, robot: Robot) -> Recording:
+    """Return a recording in which the angles of continuous joints do not jump by whole turns.
+
+    The reading of an endless joint begins anew after a turn, at pi or two pi. A limited joint's does not: such jumps
+    of one are refused.
+
+    Parameters
+    ----------
+    recording : Recording
+    robot : Robot
+
+    Raises
+    ------
+    InputError
+        If the reading of a limited joint jumps by a turn.
+    """
+    channels = {}
+    for joint in robot.joints:
+        name = f"position.{joint.name}"
+        if joint.unit != "rad" or name not in recording.channels:
+            continue
+        time, position = recording.series(name)
+        jumps = np.abs(np.abs(np.diff(position)) - TURN) < NEAR_TURN
+        if not jumps.any() or np.ptp(position) > TURN + NEAR_TURN:
+            continue
+        if joint.kind != "continuous":
+            raise InputError(
+                f"the angle jumps by a turn at time {time[int(np.argmax(jumps)) + 1]:g} s, as a reading does that "
+                f"begins anew ({int(jumps.sum())} such jumps)",
+                file=recording.file or recording.name,
+                place=f"column {name}",
+                remedy="Unwrap it (numpy.unwrap), or make the joint continuous in the URDF if it has no stops",
+            )
+        values = recording.channels[name].copy()
+        values[np.isfinite(values)] = np.unwrap(position)
+        channels[name] = values
+    return replace(recording, channels={**recording.channels, **channels}) if channels else recording
+
+
 def _refuse_joints(recording: Recording, robot: Robot) -> None:
     for joint in robot.joints:
         name = f"position.{joint.name}"
@@ -53,7 +97,9 @@ def _refuse_joints(recording: Recording, robot: Robot) -> None:
         )
         file = recording.file or recording.name
         if outside.any():
-            row = int(np.argmax(outside))
+            row, count = int(np.argmax(outside)), int(outside.sum())
+            if count <= GARBLED * len(outside):
+                remedy = f"{count} of {len(outside)} samples are garbled: empty their cells"
             raise InputError(
                 f"{position[row]:g} {joint.unit} at time {time[row]:g} s is outside the joint's limits "
                 f"[{joint.lower:g}, {joint.upper:g}]",

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,6 +22,7 @@ from numpy.typing import ArrayLike
 from bayesid._io.errors import InputError
 from bayesid._io.files import complete_file
 from bayesid._math.arrays import Floats
+from bayesid.recording.time_column import calendar_seconds, refuse_other_units, typed_seconds
 
 __all__ = ["JOINT_FAMILIES", "VECTOR_FAMILIES", "Recording", "declare_family"]
 
@@ -211,6 +213,7 @@ class Recording:
             problem = f"time {time[row]:.12g} s {fault} {time[row - 1]:.12g} s of {_row(self.file, row - 1)}"
             remedy = "Time must strictly increase; sort the rows and join those with the same time"
             raise self._error(problem, columns=column, row=row, remedy=remedy)
+        refuse_other_units(time, self.file or self.name)
         # such a clock was hardly reset: nothing is known of the motion between 0 and the first row
         if time[0] > time[-1] - time[0]:
             raise self._error(
@@ -267,6 +270,7 @@ class Recording:
 _FORMATS = "Use .csv or .parquet"
 _NO_SAMPLE = "Leave the cell empty where there is no sample"
 _DECIMAL = "Write numbers with a decimal point, and leave the cell empty where there is no sample"
+_TIMES = "Give times as numbers, in seconds from 0, or as calendar times like 2030-05-01T12:00:00.250Z"
 _ONE_HEADER = "Begin with the samples in the second line: a row of units or a second header is not read"
 
 
@@ -346,9 +350,11 @@ def _read_csv(file: Path) -> dict[str, Array]:
             problem = f"{len(row)} cells, but the header has {len(header)} columns"
             remedy = "Give one cell per column, empty where there is no sample"
             raise InputError(problem, file=file, place=_row(file, index), remedy=remedy)
+    columns = {name: [row[index].strip() for row in rows] for index, name in enumerate(header)}
+    calendar = calendar_seconds(columns["time"]) if not np.isfinite(_parse(columns["time"][0])) else None
     return {
-        name: _numbers([row[index].strip() for row in rows], name, file, _parse, missing="")
-        for index, name in enumerate(header)
+        name: calendar if name == "time" and calendar is not None else _numbers(cells, name, file, _parse, missing="")
+        for name, cells in columns.items()
     }
 
 
@@ -364,10 +370,31 @@ def _read_parquet(file: Path) -> dict[str, Array]:
         raise InputError(f"not a Parquet file: {error}", file=file, remedy="Write it anew") from error
     _check_names(table.column_names, file)
     _check_rows(table.num_rows, file)
+    columns = dict(zip(table.column_names, table.columns, strict=True))
+    times = typed_seconds(columns["time"], file)
+    if times is None and pa.types.is_string(columns["time"].type) and not columns["time"].null_count:
+        times = calendar_seconds(columns["time"].to_pylist())
     return {
-        name: _numbers(column.to_pylist(), name, file, _number, missing=None)
-        for name, column in zip(table.column_names, table.columns, strict=True)
+        name: times if name == "time" and times is not None else _typed(column, name, file)
+        for name, column in columns.items()
     }
+
+
+def _typed(column: Any, name: str, file: Path) -> Array:
+    """Return the numbers of a column of Parquet, and refuse one of another type."""
+    import pyarrow as pa
+
+    kind = column.type
+    if pa.types.is_decimal(kind):
+        column = column.cast(pa.float64())
+    elif not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)):
+        raise InputError(
+            f"its type is {kind}, not a number",
+            file=file,
+            place=f"column '{name}'",
+            remedy=_TIMES if name == "time" else "Write it as floating-point numbers in SI units, null for no sample",
+        )
+    return _numbers(column.to_pylist(), name, file, _number, missing=None)
 
 
 def _check_rows(rows: int, file: Path) -> None:
@@ -397,7 +424,7 @@ def _numbers(cells: Sequence[object], column: str, file: Path, convert: Callable
         row = int(np.argmax(bad))
         problem = "the time is missing" if absent[row] else f"{cells[row]!r} is not a finite number"
         if column == "time":
-            remedy = _ONE_HEADER if row == 0 and not absent[row] else "Give every row a time"
+            remedy = f"{_TIMES}. {_ONE_HEADER}" if row == 0 and not absent[row] else "Give every row a time"
         else:
             remedy = _NO_SAMPLE if str(cells[row]).lower().strip("+-") in ("nan", "inf", "infinity") else _DECIMAL
         raise InputError(problem, file=file, place=f"column '{column}', {_row(file, row)}", remedy=remedy)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import warnings
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -37,8 +39,7 @@ def urdf_of_mjcf(file: Path) -> str:
     import mujoco
 
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of attributes that MuJoCo will drop, which it still honours
+        with _quiet(mujoco):
             spec = mujoco.MjSpec.from_file(str(file))
             _drop_visuals(spec, mujoco)
             model = spec.compile()
@@ -65,6 +66,19 @@ def urdf_of_mjcf(file: Path) -> str:
             raise error.within(file=file, place=f"body {links[body]}") from None
     ET.indent(robot)
     return ET.tostring(robot, encoding="unicode") + "\n"
+
+
+@contextmanager
+def _quiet(mujoco: Any) -> Iterator[None]:
+    """Let MuJoCo keep its warnings of attributes that it will drop: it would also write them to a file of its own."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: None)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 def _drop_visuals(spec: Any, mujoco: Any) -> None:
