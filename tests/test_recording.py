@@ -2,6 +2,8 @@
 
 import pickle
 import re
+from datetime import datetime, timedelta
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
@@ -232,8 +234,13 @@ ONES = [1.0] * ROWS
 WRONG_PARQUET = {
     "duplicate": ([TIMES, ONES, ONES], ["time", "position.a", "position.a"], ["'position.a'", "twice"]),
     "unknown": ([TIMES, ONES], ["time", "acel.x"], ["Did you mean 'accel.x'?"]),
-    "text": ([TIMES, ["a"] * ROWS], ["time", "position.a"], ["column 'position.a', row 1: 'a' is not a finite number"]),
-    "truth": ([TIMES, [True] * ROWS], ["time", "position.a"], ["True is not a finite number"]),
+    "text": ([TIMES, ["a"] * ROWS], ["time", "position.a"], ["column 'position.a': its type is string, not a number"]),
+    "truth": ([TIMES, [True] * ROWS], ["time", "position.a"], ["its type is bool, not a number"]),
+    "clock": (
+        [["12:00:00"] * ROWS, ONES],
+        ["time", "position.a"],
+        ["column 'time': its type is string", "2030-05"],
+    ),
     "nan": ([TIMES, [*ONES[1:], np.nan]], ["time", "position.a"], ["column 'position.a', row 10: nan is not a finite"]),
     "no time stamp": ([[None, *TIMES[1:]], ONES], ["time", "position.a"], ["column 'time', row 1", "is missing"]),
     "no samples": ([TIMES, [None] * ROWS], ["time", "position.a"], ["column 'position.a'", "no samples"]),
@@ -251,6 +258,46 @@ def test_a_wrong_parquet_is_named_with_place_value_and_remedy(tmp_path, columns,
     assert str(caught.value).startswith(f"{path}: ")
     for fragment in fragments:
         assert fragment in str(caught.value)
+
+
+MOMENTS = [datetime(2030, 5, 1, 12, 0, 0, 250000) + timedelta(seconds=time) for time in TIMES]
+TYPED = {
+    "timestamp": pa.array(MOMENTS, pa.timestamp("ns", tz="UTC")),
+    "duration": pa.array([round(1e9 * time) for time in TIMES], pa.duration("ns")),
+    "decimal": pa.array([Decimal(str(time)) for time in TIMES], pa.decimal128(20, 9)),
+    "text": pa.array([moment.isoformat() + "Z" for moment in MOMENTS]),
+    "integers": pa.array(range(ROWS), pa.int16()),
+}
+
+
+@pytest.mark.parametrize("kind", TYPED)
+def test_times_whose_meaning_is_certain_are_read(tmp_path, kind):
+    pq.write_table(pa.table([TYPED[kind], pa.array(ONES)], names=["time", "position.a"]), tmp_path / "t.parquet")
+    expected = np.arange(ROWS) if kind == "integers" else TIMES
+    np.testing.assert_allclose(Recording.read(tmp_path / "t.parquet").time, expected, atol=1e-12)
+
+
+def test_calendar_times_of_a_csv_are_counted_from_the_first(tmp_path):
+    lines = [f"{moment.isoformat()}+02:00,1" for moment in MOMENTS]
+    (tmp_path / "t.csv").write_text("\n".join(["time,position.a", *lines]))
+    np.testing.assert_allclose(Recording.read(tmp_path / "t.csv").time, TIMES, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        (1e3 * 0.1 * np.arange(ROWS), ("100 s apart", "milliseconds", "divide the times by 1000")),
+        (1e6 * 0.1 * np.arange(ROWS), ("100000 s apart", "microseconds", "divide the times by 1e+06")),
+        (1e9 * 0.1 * np.arange(ROWS), ("1e+08 s apart", "nanoseconds", "divide the times by 1e+09")),
+        (1.7e9 + 0.1 * np.arange(ROWS), ("count of seconds since 1970", "subtract the first time")),
+        (1.7e12 + 100.0 * np.arange(ROWS), ("count of milliseconds since 1970", "divide by 1000")),
+        (1.7e18 + 1e8 * np.arange(ROWS), ("count of nanoseconds since 1970", "divide by 1e+09")),
+    ],
+)
+def test_times_in_another_unit_are_refused_by_its_name(times, words):
+    with pytest.raises(InputError) as caught:
+        Recording("flight", None, times, {"position.a": np.ones(ROWS)})
+    assert all(word in str(caught.value) for word in ("column 'time'", *words)), caught.value
 
 
 def test_text_is_not_parquet(tmp_path):

@@ -68,7 +68,7 @@ class SuspectReadings:
         shown = f"{self.value[0]:g}" if len(set(self.value)) == 1 else ", ".join(f"{value:g}" for value in self.value)
         where = f"{self.samples} samples from {self.start:.6g} to {self.end:.6g} s"
         if self.kind is Suspicion.FILLED:
-            return f"{name}: {where} are exactly {shown}, far from the others: empty their cells if they are fill values."
+            return f"{name}: {where} are exactly {shown}, far from the others: empty them if they are fill values."
         return f"{name}: {where} are exactly {shown}: was it off? Empty their cells or begin the recording later."
 
 
@@ -107,9 +107,8 @@ def _of_columns(recording: Recording, columns: tuple[str, ...]) -> Iterator[Susp
         return
     steps = np.linalg.norm(np.diff(values, axis=0), axis=1)
     for row, length in zip(first, lengths, strict=True):
-        before, after = (steps[place] if 0 <= place < len(steps) else np.inf for place in (row - 1, row + length - 1))
-        edges = [jump for jump in (before, after) if np.isfinite(jump)]
-        if length > 1 and edges and min(edges) > JUMP * _nearby(steps, row, length) > 0.0:
+        jump = min(steps[place] if 0 <= place < len(steps) else 0.0 for place in (row - 1, row + length - 1))
+        if length > 1 and jump > JUMP * _nearby(steps, row, length) > 0.0:
             kind = Suspicion.FILLED
         elif length > max(FEWEST, LONGEST * len(time)) and not columns[0].startswith("position"):  # joints may rest
             kind = Suspicion.CONSTANT
