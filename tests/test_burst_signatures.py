@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bayesid.diagnosis.candidates.burst_signatures import LENGTH, STRONGEST, burst_signatures
+from bayesid.diagnosis.candidates.generic_cause import LENGTH, STRONGEST, burst_signatures
 from bayesid.simulation.sensors import SensorKind
 
 TIMES, CHANNELS = 30, 6

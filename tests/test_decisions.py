@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
+from bayesid.diagnosis.candidates.initial_rate import InitialRate
 from bayesid.diagnosis.evidence.cause_sets import CausePrior, CauseSet, SetProbabilities, enumerate_sets
 from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
 from bayesid.diagnosis.evidence.gram import Gram
@@ -20,6 +20,8 @@ from bayesid.diagnosis.outcome.candidate_table import candidate_table
 from bayesid.diagnosis.settings import DiagnosisSettings
 from bayesid.simulation.effects.effect import Quantity
 from tests.gram_problem import LinearProblem
+
+INITIAL_RATE = InitialRate.name
 
 
 def stated(shares: dict[tuple[str, ...], float]) -> SetProbabilities:
@@ -122,7 +124,7 @@ def table():
     units = ("N", "m")
     effect = SimpleNamespace(
         label="seen",
-        modes_count=0,
+        cause_kind="linear",
         amplitude_units=units,
         amplitude_quantities=tuple(Quantity(f"of {unit}", unit) for unit in units[::-1]),
     )

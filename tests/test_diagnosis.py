@@ -14,14 +14,14 @@ import pytest
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, Status, candidates, diagnose
-from bayesid.diagnosis.candidates.generic_signatures import CORNERS, WAVES
+from bayesid.diagnosis.candidates.generic_cause import CORNERS, WAVES
+from bayesid.diagnosis.candidates.linear_model import Remaining
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.noise import Outliers
 from bayesid.diagnosis.noise.noise_fault import chi2_log_sf
 from bayesid.diagnosis.outcome.gain import measure_gain
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.diagnosis.search.fitted_set import extended_start
-from bayesid.diagnosis.search.linearisation import Remaining
 from bayesid.inference.noise_changes import relinearised
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from bayesid._io.errors import InputError
+from bayesid.diagnosis.candidates.cause_kind import kind_of
 from bayesid.recording.joint_motion import Motion
 from bayesid.robot.body_prior import BodyPrior
 from bayesid.robot.joint_state import JointState
@@ -438,6 +439,32 @@ def check_is_body(effect: Effect, hook: str) -> None:
     np.testing.assert_allclose(linear @ matrix, loads, atol=1e-9 * np.abs(loads).max())
 
 
+def check_is_added_body(effect: Effect, hook: str) -> None:
+    """The amplitudes are mass, first moment and second moments of a body."""
+    units = [quantity.unit for quantity in effect.amplitude_quantities]
+    assert units == ["kg", *["kg m"] * 3, *["kg m2"] * 6]
+
+
+def check_cause_kind(effect: Effect, hook: str) -> None:
+    """The kind is registered, and can weigh the effect."""
+    kind_of(effect).check(effect)
+    assert kind_of(effect).name == effect.cause_kind
+
+
+def check_reach_of_swing(effect: Effect, hook: str) -> None:
+    """No place of the mass is farther from the base origin along an axis."""
+    places = [parameter for parameter in effect.parameters if parameter.name.startswith("position.")]
+    ends = [abs(float(parameter.value(np.asarray(side)))) for parameter in places for side in (-8.0, 8.0)]
+    assert effect.reach_of_swing == pytest.approx(max(ends))
+
+
+def check_in_study(effect: Effect, hook: str) -> None:
+    """What is resolved over the longest recording has the same name; recorded wheels leave no unseen one."""
+    assert effect.in_study(None, False) is effect
+    assert effect.in_study(100.0, False).label == effect.label
+    assert effect.in_study(100.0, True) is None
+
+
 CHECKS: dict[str, Callable[[Effect, str], None]] = {
     **dict.fromkeys(CALLS, check_values),
     "name": check_name,
@@ -471,8 +498,12 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "per_recording": check_per_recording,
     "is_body": check_is_body,
     "body_tables": check_body_tables,
+    "is_added_body": check_is_added_body,
+    "cause_kind": check_cause_kind,
+    "reach_of_swing": check_reach_of_swing,
+    "in_study": check_in_study,
 }
-FRAMEWORK = {"uses", "uses_latitude", "constants", "bound", "amplitude_units"}
+FRAMEWORK = {"uses", "uses_latitude", "constants", "bound", "amplitude_units", "instants", "at", "members"}
 """What the simulation asks of an effect and no effect overrides."""
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from bayesid._io.errors import InputError
 from bayesid.diagnosis import Status, diagnose
-from bayesid.diagnosis.candidates.mass_shift_signatures import sample_intervals
+from bayesid.diagnosis.candidates.instant_cause import sample_intervals
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.inference.posterior import Posterior
 from bayesid.recording.joint_motion import MeasuredMotion

@@ -10,7 +10,7 @@ from bayesid._io.errors import InputError
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import CauseSet, Status, diagnose
-from bayesid.diagnosis.candidates.candidate_effects import candidates
+from bayesid.diagnosis.candidates.cause_kind import candidates
 from bayesid.diagnosis.evidence.cause_sets import SetProbabilities
 from bayesid.diagnosis.search.misfit import UNNAMED, log_odds_of_anything, log_p_of_misfit, with_misfit
 from bayesid.diagnosis.search.relinearise import SetSearch

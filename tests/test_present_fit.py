@@ -18,9 +18,8 @@ from bayesid import (
     White,
 )
 from bayesid.diagnosis import Status, diagnose
-from bayesid.diagnosis.response.followed_motion import follow, step_along_data, without_torque
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
-from bayesid.diagnosis.response.present_fit import fit_present_model, strayed
+from bayesid.diagnosis.response.present_fit import fit_present_model, follow, step_along_data, strayed, without_torque
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects import create
 from studies.truth import mujoco as mj

@@ -11,11 +11,10 @@ import pytest
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import candidates
-from bayesid.diagnosis.candidates.catalogue_signatures import catalogue_signatures
-from bayesid.diagnosis.candidates.mass_shift_signatures import mass_shift_signatures, shift_instants
-from bayesid.diagnosis.candidates.signature_bank import Signatures
-from bayesid.diagnosis.candidates.signature_products import SignatureProducts
-from bayesid.diagnosis.candidates.vibration_signatures import PAIRS, slosh_entries
+from bayesid.diagnosis.candidates.instant_cause import MassShiftCause, grid_instants
+from bayesid.diagnosis.candidates.linear_cause import LinearCause
+from bayesid.diagnosis.candidates.linear_model import SignatureProducts, Signatures
+from bayesid.diagnosis.candidates.vibration_cause import PAIRS, slosh_entries
 from bayesid.diagnosis.evidence.body_evidence import MissingBody, outer_moments, rigid_moments
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
@@ -64,7 +63,7 @@ def check_columns(null, labels):
     linear = [effect.in_amplitudes() for effect in chosen]
     expected, first = in_simulation(perturbed, fit, linear, 1e-3), 0
     for effect, simple in zip(chosen, linear, strict=True):
-        bank = catalogue_signatures(perturbed, fit, [effect], bounds)
+        bank = LinearCause().signatures(perturbed, fit, [effect], bounds)
         found = np.concatenate([item.columns for item in bank.signatures], axis=1)
         sigma = np.array([parameter.sigma for parameter in simple.parameters])
         own = expected[:, first : first + len(sigma)] / sigma
@@ -94,9 +93,9 @@ def test_all_signatures_are_what_the_simulation_does(null):
 @pytest.mark.slow
 def test_signatures_of_a_jump_are_what_the_simulation_does(null):
     perturbed, fit, effects, bounds = null
-    bank = mass_shift_signatures(perturbed, fit, effects, bounds)
+    bank = MassShiftCause().signatures(perturbed, fit, MassShiftCause().of(effects), bounds)
     end = float(np.asarray(fit.operating.node.environment.time)[0].max())
-    instant = float(shift_instants(end)[7])
+    instant = float(grid_instants(end)[7])
     recordings = len(perturbed.posterior.manoeuvres)
     shift = MassShift([instant] + [np.inf] * (recordings - 1)).attach(perturbed.posterior.model.robot)
     expected = in_simulation(perturbed, fit, [shift], 1e-2)
@@ -209,7 +208,7 @@ def test_evidence_of_the_gram_is_that_of_the_extended_model(null):
     perturbed, fit, effects, bounds = null
     wanted = {name for own in SETS for name in own}
     chosen = [effect for effect in effects if effect.label in wanted]
-    bank = catalogue_signatures(perturbed, fit, chosen, bounds)
+    bank = LinearCause().signatures(perturbed, fit, chosen, bounds)
     gram = SignatureProducts.of(bank.signatures, fit).gram()
     scales = {name: 4.0 / np.sqrt(np.diag(gram.matrix)[own].max()) for name, own in gram.groups.items()}
     causes = [

@@ -9,7 +9,7 @@ import pytest
 
 from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
-from bayesid.diagnosis.candidates.generic_signatures import generic_signatures
+from bayesid.diagnosis.candidates.generic_cause import generic_signatures
 from bayesid.diagnosis.outcome.disturbance import Frame, disturbing_wrench
 from bayesid.diagnosis.outcome.torque_events import EventCandidates, Taken
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel

@@ -1,6 +1,6 @@
 """What the simulation gets wrong: candidates, their signatures, the probability of every set of causes, the gain."""
 
-from bayesid.diagnosis.candidates.candidate_effects import candidates
+from bayesid.diagnosis.candidates.cause_kind import candidates
 from bayesid.diagnosis.diagnose import diagnose, identify_extended
 from bayesid.diagnosis.evidence.cause_sets import CausePrior, CauseSet, SetProbabilities
 from bayesid.diagnosis.evidence.verdict import ProbableVerdict, Status

@@ -10,16 +10,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from bayesid._io.progress import PhaseClock, Progress, silent
-from bayesid.diagnosis.candidates.candidate_effects import candidates
+from bayesid.diagnosis.candidates.cause_kind import candidates
 from bayesid.diagnosis.evidence.cause_sets import CausePrior
 from bayesid.diagnosis.evidence.verdict import Status, verdict_sensitivity
 from bayesid.diagnosis.outcome.candidate_table import candidate_table
 from bayesid.diagnosis.outcome.disturbance import disturbing_wrench
 from bayesid.diagnosis.outcome.gain import measure_gain
 from bayesid.diagnosis.outcome.torque_reading import TorqueReading, TorquesNotRead, torque_candidates, torques_beside
-from bayesid.diagnosis.response.followed_motion import step_along_data, without_torque
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
-from bayesid.diagnosis.response.present_fit import fit_present_model
+from bayesid.diagnosis.response.present_fit import fit_present_model, step_along_data, without_torque
 from bayesid.diagnosis.result import Diagnosis
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.linearisation import Catalogue

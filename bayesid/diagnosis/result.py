@@ -8,12 +8,11 @@ from functools import cached_property
 from typing import Any
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.candidates.jump_instants import jump_instants
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict, Status, VerdictSensitivity
 from bayesid.diagnosis.noise.family_alarm import FamilyAlarm
-from bayesid.diagnosis.outcome.candidate_table import Candidate, amplitudes_of, amplitudes_of_others
+from bayesid.diagnosis.outcome.candidate_table import Candidate, amplitudes_of, amplitudes_of_others, instants_of
 from bayesid.diagnosis.outcome.cause_sizes import GroupSize, group_sizes, vector_size
 from bayesid.diagnosis.outcome.disturbance import DisturbingWrench, TorqueCorrelation, torque_correlations
 from bayesid.diagnosis.outcome.gain import Gain
@@ -34,7 +33,6 @@ from bayesid.inference.body_quantities import quantity
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import PhysicalBound
-from bayesid.simulation.effects.mass_shift import MassShift
 
 __all__ = ["Diagnosis"]
 
@@ -379,9 +377,8 @@ def _fitted(result: Diagnosis, name: str) -> dict[str, Any]:
 
     Of a cause with amplitudes in each recording the first recording's have plain keys.
     """
-    found = amplitudes_of(result.after, name) + amplitudes_of_others(result.after, name)
-    if name == MassShift.name:
-        found += jump_instants(result.after)
+    after = result.after
+    found = amplitudes_of(after, name) + amplitudes_of_others(after, name) + instants_of(after, name)
     return {"amplitude": {item.quantity.name: quantity(item.mean, item.sd, item.quantity.unit) for item in found}}
 
 

@@ -10,7 +10,7 @@ from scipy import stats
 
 from bayesid._math.arrays import Floats, Integers
 from bayesid.diagnosis import Diagnosis
-from bayesid.diagnosis.candidates.signature_products import SignatureProducts
+from bayesid.diagnosis.candidates.linear_model import SignatureProducts
 from bayesid.diagnosis.evidence.cause_sets import CausePrior, enumerate_sets
 from bayesid.diagnosis.evidence.gram import Gram, independent_directions
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence

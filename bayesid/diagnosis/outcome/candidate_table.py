@@ -9,13 +9,12 @@ import numpy as np
 from scipy import stats
 
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.candidates.catalogue_signatures import group_names
-from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
+from bayesid.diagnosis.candidates.cause_kind import CauseAmplitude, cause_kinds
 from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
 from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm
 from bayesid.diagnosis.evidence.gram import Gram
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
-from bayesid.diagnosis.response.effect_functions import CauseAmplitude, report_of, report_slopes
+from bayesid.diagnosis.response.perturbation import report_of, report_slopes
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.model_search import ModelSearch
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS
@@ -29,6 +28,7 @@ __all__ = [
     "candidate_table",
     "cause_power",
     "effect_amplitude",
+    "instants_of",
 ]
 
 POWER_DRAWS = 400
@@ -131,11 +131,9 @@ def _amplitudes(
 
 def _quantities(effects: Sequence[Effect]) -> dict[str, tuple[Quantity, ...]]:
     """Return the amplitudes of each candidate in the order of its columns."""
-    found: dict[str, tuple[Quantity, ...]] = {INITIAL_RATE: tuple(Quantity(axis, "rad/s") for axis in "xyz")}
-    for effect in effects:
-        if not effect.modes_count:
-            units = list(dict.fromkeys(group_names(effect)))
-            found[effect.label] = tuple(sorted(effect.amplitude_quantities, key=lambda item: units.index(item.unit)))
+    found: dict[str, tuple[Quantity, ...]] = {}
+    for kind in cause_kinds():
+        found |= kind.quantities(kind.of(effects))
     return found
 
 
@@ -202,31 +200,21 @@ def cause_power(
 
 
 def amplitudes_of(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:
-    """Return the amplitudes of one cause of a hypothesis; of initial rates, one per axis and recording."""
+    """Return the amplitudes of one cause of a hypothesis."""
     for index, effect in enumerate(hypothesis.fit.effects):
         if label == effect.candidate:
             mean, sd = effect_amplitude(hypothesis, index)
             return list(map(CauseAmplitude, effect.quantities, mean.tolist(), sd.tolist()))
-    if label == INITIAL_RATE:
-        return _initial_rates(hypothesis)
+    for kind in cause_kinds():
+        if found := kind.amplitudes(hypothesis.perturbed, hypothesis.fit, label):
+            return found
     fault = next(fault for fault in hypothesis.faults if fault.label == label)
     return list(map(CauseAmplitude, fault.quantities, fault.mean.tolist(), fault.sd.tolist()))
 
 
-def _initial_rates(hypothesis: Hypothesis) -> list[CauseAmplitude]:
-    fit = hypothesis.fit
-    posterior, sigma = fit.posterior, fit.posterior.unknowns.rate_sigma
-    free = hypothesis.perturbed.free.tolist()
-    spread = np.sqrt(np.diag(fit.covariance))
-    rates = posterior.unknowns.layout.all_rates
-    amplitudes = []
-    for index, place in enumerate(range(rates.start, rates.stop)):
-        if place in free:
-            recording, axis = divmod(index, 3)
-            key = f"{posterior.manoeuvres[recording].recording.name}.{'xyz'[axis]}"
-            mean, sd = sigma * fit.z[place], sigma * spread[free.index(place)]
-            amplitudes.append(CauseAmplitude(Quantity(key, "rad/s"), float(mean), float(sd)))
-    return amplitudes
+def instants_of(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:
+    """Return when a cause of a hypothesis set in, in each recording in which it did; of most causes nothing."""
+    return [item for kind in cause_kinds() for item in kind.instants(hypothesis.perturbed, hypothesis.fit, label)]
 
 
 def amplitudes_of_others(hypothesis: Hypothesis, label: str) -> list[CauseAmplitude]:

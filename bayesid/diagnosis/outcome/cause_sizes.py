@@ -14,7 +14,7 @@ from bayesid.diagnosis.evidence.cause_sets import CauseSet
 from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup
 from bayesid.diagnosis.outcome.candidate_table import Candidate
-from bayesid.diagnosis.response.effect_functions import report_of, report_slopes
+from bayesid.diagnosis.response.perturbation import report_of, report_slopes
 from bayesid.diagnosis.search.fitted_set import Hypothesis
 from bayesid.diagnosis.search.relinearise import SetSearch
 from bayesid.simulation.effects.effect_parameters import PhysicalBound

@@ -13,8 +13,8 @@ from scipy.linalg import block_diag
 
 from bayesid._io.files import write_text
 from bayesid._math.arrays import Floats, Integers
-from bayesid.diagnosis.candidates.generic_signatures import FORCE, TORQUE, WAVES
-from bayesid.diagnosis.candidates.signature_bank import SignatureBank
+from bayesid.diagnosis.candidates.generic_cause import FORCE, TORQUE, WAVES
+from bayesid.diagnosis.candidates.linear_model import SignatureBank
 from bayesid.diagnosis.evidence.gram import GaussianBlock, Gram
 from bayesid.diagnosis.evidence.scales import CandidateCause
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence

@@ -15,10 +15,9 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats
-from bayesid.diagnosis.candidates.catalogue_signatures import amplitude_signatures
-from bayesid.diagnosis.candidates.generic_signatures import error_signatures
-from bayesid.diagnosis.candidates.signature_bank import SignatureBank
-from bayesid.diagnosis.candidates.signature_products import SignatureProducts
+from bayesid.diagnosis.candidates.generic_cause import error_signatures
+from bayesid.diagnosis.candidates.linear_cause import amplitude_signatures
+from bayesid.diagnosis.candidates.linear_model import SignatureBank, SignatureProducts
 from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
 from bayesid.diagnosis.evidence.cause_sets import CausePrior, SetProbabilities, enumerate_sets
 from bayesid.diagnosis.evidence.evidence_alarm import EvidenceAlarm

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from bayesid._math.arrays import Floats, Integers
 from bayesid._math.threads import in_threads
 from bayesid.diagnosis.evidence.gram import GaussianBlock
-from bayesid.diagnosis.response.effect_functions import physical
 from bayesid.diagnosis.response.perturbation import (
     OperatingTrajectory,
     Table,
@@ -29,6 +28,7 @@ from bayesid.diagnosis.response.perturbation import (
     linear_perturbation,
     operating_trajectory_of,
     perturb,
+    physical,
     tables_of,
 )
 from bayesid.inference.perturbed_posterior import (
@@ -180,7 +180,7 @@ class PerturbedModel:
         self.posterior = posterior
         self.frozen = np.array(sorted(frozen), dtype=int)
         self._released = np.array(sorted(released), dtype=int)
-        self._tables: dict[str, Table] = {}
+        self._tables: dict[tuple[str, tuple[float, ...]], Table] = {}
         self._linear: LinearResponses | None = None  # about the last point
 
     def with_posterior(self, posterior: Posterior) -> PerturbedModel:
@@ -391,6 +391,7 @@ class PerturbedModel:
     def _table(self, effect: Effect) -> Table | None:
         if not effect.uses("table"):
             return None
-        if effect.label not in self._tables:
-            self._tables[effect.label] = tables_of(effect, self.posterior)
-        return self._tables[effect.label]
+        key = effect.label, effect.instants  # a label has fewer digits
+        if key not in self._tables:
+            self._tables[key] = tables_of(effect, self.posterior)
+        return self._tables[key]

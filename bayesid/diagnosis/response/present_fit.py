@@ -1,31 +1,55 @@
-"""Fit of the present model, with its bodies held where it uses them up for what the model lacks.
+"""Fit of the present model, with its bodies held where it uses them up for what the model lacks, and along the data.
 
 Where much is lacking, such as a wheel that turns a body by radians, no value of the unknowns follows the data, and the
 fit drives the bodies to where no prior has them: nothing can be linearised there. Such a fit is followed to its end,
 as one that has not converged, since a load of many times its first guess needs more steps than others. If it ends
 astray it is started again from where the bodies have their prior's centre; where it strays from there as well, they
 stay at that centre.
+
+The change by a cause is linear only about a motion that is nearly the true one. Where the present model does not come
+near it, a free torque in every recording, piecewise linear in time, brings the model to the motion that the sensors
+saw, its bodies held at their prior; there, a cause that takes the place of the torque changes the motion little,
+however large both are. The torque is no explanation: the linear model says what each set of causes leaves where the
+torque is zero again.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from scipy.stats import chi2
 
 from bayesid._math.arrays import Floats
 from bayesid._math.least_squares import levenberg_marquardt
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
+from bayesid.inference.posterior import Posterior
+from bayesid.simulation.effects.effect import Effect
+from bayesid.simulation.effects.effect_parameters import Parameter
+from bayesid.simulation.instant import Instant, Wrench
 
-__all__ = ["PresentFit", "fit_present_model", "strayed", "with_bodies_held"]
+__all__ = [
+    "PresentFit",
+    "fit_present_model",
+    "follow",
+    "step_along_data",
+    "strayed",
+    "with_bodies_held",
+    "without_torque",
+]
 
 TOLERANCE = 1e-6
 """Relative tolerance with which a fit is followed; the last steps are those of `PerturbedModel.fit`."""
 
 EVALUATIONS = 300
 """Largest number of evaluations for that; a load of 37 times its guess takes 80."""
+
+KNOTS = 32
+"""Instants per recording and axis at which the torque along the data is free."""
 
 
 @dataclass(frozen=True)
@@ -106,3 +130,67 @@ def _fit_beside_bodies(perturbed: PerturbedModel) -> Fit:
     """Return the fit of everything but the bodies, with the derivatives in the bodies, too."""
     held = bodies_frozen(perturbed).fit()
     return replace(perturbed.fit(z=held.z, operating=held.operating, iterations=0), converged=held.converged)
+
+
+class FollowingTorque(Effect):
+    """Torque in base axes that makes a model follow its data, piecewise linear in time and free in every recording.
+
+    Parameters
+    ----------
+    end : float
+        Time of the last knot [s].
+    sigma : float
+        Standard deviation of the values at the knots [N m], so large that it does not matter.
+    """
+
+    name = "following torque"
+    per_recording: ClassVar[bool] = True
+    constant_names = ("end",)
+
+    def __init__(self, end: float, sigma: float) -> None:
+        self.end = end
+        self.parameters = tuple(Parameter(f"{axis}{knot}", "N m", sigma) for knot in range(KNOTS) for axis in "xyz")
+
+    def wrench(self, values: Array, instant: Instant, inner: Array) -> Wrench:
+        """Return the torque of the instant."""
+        place = instant.environment.time * ((KNOTS - 1) / self.end)
+        weight = jnp.maximum(0.0, 1.0 - jnp.abs(place - jnp.arange(KNOTS)))
+        return Wrench(jnp.zeros(3), weight @ values.reshape(KNOTS, 3))
+
+
+def follow(perturbed: PerturbedModel) -> Fit:
+    """Fit the present model with a following torque and its bodies at their prior's centre.
+
+    The prior of the torque is as wide as the data ask for: one standard deviation at one knot would change the residual
+    by as much as all that the present model leaves.
+    """
+    frozen = bodies_frozen(perturbed)
+    z = frozen.start()
+    operating = frozen.operating(z, ())
+    end = float(np.asarray(operating.node.environment.time).max())
+    size = 3 * KNOTS * len(perturbed.posterior.manoeuvres)
+    data = perturbed.posterior.data.arrays
+    unit = frozen.columns([(FollowingTorque(end, 1.0), np.zeros(size))], operating, z, data)[0]
+    length = np.linalg.norm(unit, axis=0)
+    sigma = float(np.linalg.norm(frozen.residual(z, data)) / np.median(length[length > 0.0]))
+    torque = FollowingTorque(end, sigma)
+    found = frozen.fit([torque])
+    whole = perturbed.fit([torque], found.coordinates, z=found.z, operating=found.operating, iterations=0)
+    return replace(whole, converged=found.converged)
+
+
+def step_along_data(posterior: Posterior) -> float:
+    """Return an integration step [s] that suits the motion of the data: the shortest interval of a sensor's samples.
+
+    The step of the present model suits its own motion, which may be that of a body at rest.
+    """
+    kinds = posterior.model.channels.kinds
+    times = [posterior.data.measured(r, kind)[0] for r in range(len(posterior.manoeuvres)) for kind in kinds]
+    return float(min(np.median(np.diff(time)) for time in times))
+
+
+def without_torque(fit: Fit) -> Fit:
+    """Return a fit along the data without its following torque, by the linear model: what the present model leaves."""
+    residual = fit.residual - fit.added[0] @ fit.coordinates[0]
+    cost = 0.5 * float(residual @ residual + fit.z @ fit.z)
+    return replace(fit, effects=(), coordinates=(), added=(), residual=residual, cost=cost)

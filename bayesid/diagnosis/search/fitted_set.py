@@ -13,27 +13,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
-import jax.numpy as jnp
 import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
-from bayesid.diagnosis.candidates.catalogue_signatures import group_names
-from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
-from bayesid.diagnosis.candidates.vibration_signatures import coupling_matrix, slosh_entries
-from bayesid.diagnosis.evidence.amplitude_posterior import AmplitudePosterior
+from bayesid.diagnosis.candidates.cause_kind import cause_kinds, kind_of
+from bayesid.diagnosis.candidates.linear_cause import group_names
+from bayesid.diagnosis.candidates.linear_model import Linearisation
 from bayesid.diagnosis.evidence.gram import GaussianBlock
 from bayesid.diagnosis.noise.noise_fault import FittedFault
-from bayesid.diagnosis.response.effect_functions import physical
 from bayesid.diagnosis.response.perturbed_model import CLOSE, Fit, PerturbedModel
-from bayesid.diagnosis.search.linearisation import Linearisation
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS
 from bayesid.inference.mode import fit as fit_mode
 from bayesid.inference.noise_changes import without_left_out
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.mass_shift import MassShift
-from bayesid.simulation.instant import Resonance
 from bayesid.simulation.joint_torques import TorqueSensor
 
 __all__ = [
@@ -50,9 +44,6 @@ MOST_STARTS = 6
 
 ROUNDS = 6
 """Simulations after which motion and perturbations agree at given unknowns."""
-
-LIGHTEST = 0.25
-"""Smallest share of a mode's mass that the compliance of the base is taken to leave at the start of a fit."""
 
 
 @dataclass(frozen=True)
@@ -74,14 +65,15 @@ class Hypothesis:
     @property
     def labels(self) -> tuple[str, ...]:
         """Names of its causes."""
-        released = (INITIAL_RATE,) if len(self.fit.released) else ()
-        return (*(effect.candidate for effect in self.fit.effects), *released, *(fault.label for fault in self.faults))
+        effects = (effect.candidate for effect in self.fit.effects)
+        others = (label for kind in cause_kinds() for label in kind.labels(self.fit))
+        return (*effects, *others, *(fault.label for fault in self.faults))
 
 
 def fit_in_amplitudes(
     point: Linearisation,
+    causes: Sequence[str],
     effects: Sequence[Effect],
-    released: bool = False,
     restart_from: float = DEFAULT_SETTINGS.restart_from,
 ) -> tuple[Fit, float]:
     """Fit causes that are linear in their amplitudes, with all unknowns and the scales that the Gram finds likeliest.
@@ -93,27 +85,29 @@ def fit_in_amplitudes(
     ----------
     point : Linearisation
         From whose Gram the scales and the start follow.
+    causes : sequence of str
+        Causes of kinds that have one form.
     effects : sequence of Effect
-        The causes, none of which vibrates.
-    released : bool
-        Whether the initial rates that the study takes to be zero are among the causes.
+        Candidates of the catalogue.
     restart_from : float
         Difference from the predicted cost beyond which the fit is started anew [nats].
 
     Returns
     -------
     fit : Fit
-        With the effects in amplitudes; released rates are no unknowns of it, but keep their values.
+        With the effects in amplitudes; unknowns that a cause released are frozen again, but keep their values.
     expected : float
         Cost that the linear model predicts for it: where both agree, the linear evidence holds.
     """
     evidence = point.evidence
-    names = sorted([*(effect.label for effect in effects), *([INITIAL_RATE] if released else [])])
+    names = sorted(causes)
     columns, deviations = evidence.most_probable(names, evidence.forms(names))
     mean, gain = _mode(point, names, columns, deviations)
     scaled, start = [], []
     sizes = dict(zip(columns.tolist(), zip(deviations, mean, strict=True), strict=True))
     for effect in effects:
+        if effect.label not in names:
+            continue
         linear = copy.copy(effect.in_amplitudes())
         if linear.parameters:
             places = _places(linear, effect, evidence.gram.groups)
@@ -127,25 +121,24 @@ def fit_in_amplitudes(
         else:
             start.append(np.zeros(0))
         scaled.append(linear)
-    perturbed, z = _freed(point, released)
-    frozen = point.perturbed.frozen
+    perturbed, z = _prepared(point, names)
+    same, frozen = perturbed is point.perturbed, point.perturbed.frozen
     expected = point.predicted_cost - gain
-    fit = perturbed.fit(scaled, start, z=z, operating=None if released else point.fit.operating)
+    fit = perturbed.fit(scaled, start, z=z, operating=point.fit.operating if same else None)
     if abs(fit.cost - expected) > restart_from and not point.far:  # far from the data no fit finds them from the centre
         fresh = perturbed.fit(scaled, [np.zeros_like(own) for own in start])
         fit = fresh if fresh.cost < fit.cost else fit
-    if not released:
+    if same:
         return fit, expected
     known = np.delete(fit.own, np.searchsorted(perturbed.free, frozen), axis=1)
     return replace(fit, own=known, released=np.zeros(0, dtype=int), frozen=frozen), expected
 
 
-def _freed(point: Linearisation, released: bool) -> tuple[PerturbedModel, Floats]:
-    """Return the perturbed model and the unknowns to start from, with or without the initial rates freed."""
-    perturbed, z, frozen = point.perturbed, point.fit.z.copy(), point.perturbed.frozen
-    if released:
-        perturbed = perturbed.released()
-        z[frozen] = perturbed.posterior.starting_point()[frozen]
+def _prepared(point: Linearisation, names: Sequence[str]) -> tuple[PerturbedModel, Floats]:
+    """Return the model that is fitted with some causes, and the unknowns to start from."""
+    perturbed, z = point.perturbed, point.fit.z
+    for kind in cause_kinds():
+        perturbed, z = kind.prepared(perturbed, z, names)
     return perturbed, z
 
 
@@ -203,10 +196,10 @@ def fit_hypothesis(
     faulty = {fault.label for fault in faults}
     names = [name for name in causes if name not in faulty]
     named = [effect for effect in effects if effect.label in names]
-    chosen = [_with_instants(effect, point, names) for effect in named]
-    perturbed, z = _freed(point, INITIAL_RATE in names)
+    chosen = [kind_of(effect).with_form(effect, point, names) for effect in named]
+    perturbed, z = _prepared(point, names)
     nearby = point.with_bodies_fixed() if point.far else point  # about large causes free bodies would take their place
-    starts = [_starts(effect, nearby, names) for effect in named]
+    starts = [kind_of(effect).starts(effect, nearby, names) for effect in named]
     along = point.fit.operating if point.far else None
     best: Fit | None = None
     problem = InputError("a hypothesis cannot be fitted", remedy="Name another")
@@ -221,61 +214,6 @@ def fit_hypothesis(
     if best is None:
         raise problem
     return Hypothesis(perturbed, best, tuple(faults))
-
-
-def _starts(effect: Effect, point: Linearisation, names: Sequence[str]) -> Sequence[Floats]:
-    """Return starting points of one effect beside the others of a set."""
-    if not effect.modes_count:
-        linear = effect.in_amplitudes()
-        if linear is effect and effect.parameters:
-            mean = _amplitudes(effect.label, point, names)  # recording after recording, where each has its own
-            return [mean / np.resize([parameter.sigma for parameter in effect.parameters], mean.shape)]
-        return effect.starts
-    amplitudes = _amplitudes(effect.label, point, names)
-    entries = slosh_entries() @ amplitudes if len(amplitudes) == slosh_entries().shape[1] else amplitudes
-    tone = next(item.tone for item in point.bank.signatures if item.name == _first_group(effect, point, names))
-    frequency, damping = (0.1, 0.01) if tone is None else tone
-    coupling = coupling_matrix(entries)
-    (start,) = effect.starts_near([Resonance(frequency, coupling, damping)], False)
-    fixed_base = frequency * _fixed_to_free(effect, start, point)
-    return effect.starts_near([Resonance(fixed_base, coupling, damping)], False)
-
-
-def _fixed_to_free(effect: Effect, start: Floats, point: Linearisation) -> float:
-    """Return the frequency of a vibration with the base fixed, relative to that which is seen with the base free.
-
-    The base yields to the spring, as if the modes were lighter by their coupling through the base's compliance.
-    """
-    modes = effect.modes(jnp.asarray(physical(effect, start)))
-    coupling = np.concatenate([np.asarray(modes.linear), np.asarray(modes.angular)], axis=-1)
-    compliance = point.fit.operating.vibration.compliance.mean(axis=(0, 1))
-    lighter = np.linalg.eigvalsh(np.eye(len(coupling)) - coupling @ compliance @ coupling.T)
-    return float(np.sqrt(np.clip(lighter, LIGHTEST, 1.0).mean()))
-
-
-def _with_instants(effect: Effect, point: Linearisation, names: Sequence[str]) -> Effect:
-    """Return a jump at the instants of its most probable form; other effects as they are."""
-    if not isinstance(effect, MassShift):
-        return effect
-    group = _first_group(effect, point, names)
-    instants = next(item.instants for item in point.bank.signatures if item.name == group)
-    assert instants is not None
-    return MassShift(instants).attach(point.perturbed.posterior.model.robot)
-
-
-def _first_group(effect: Effect, point: Linearisation, names: Sequence[str]) -> str:
-    """Return the name of the first group of amplitudes in an effect's most probable form beside others."""
-    form = point.evidence.forms(names)[effect.label]
-    return point.evidence.causes[effect.label].variants[form].groups[0].name
-
-
-def _amplitudes(label: str, point: Linearisation, names: Sequence[str]) -> Floats:
-    """Return the mean amplitudes of one cause beside the others of a set, in the order of its columns."""
-    free = [name for name in names if not point.evidence.causes[name].fixed]
-    posterior = AmplitudePosterior.of(point.evidence, free)
-    forms = point.evidence.forms(free)
-    groups = point.evidence.causes[label].variants[forms[label]].groups
-    return np.concatenate([posterior.mean[posterior.amplitudes[label, group.name]] for group in groups])
 
 
 def extended_posterior(

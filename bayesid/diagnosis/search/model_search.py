@@ -9,6 +9,7 @@ import numpy as np
 
 from bayesid._io.progress import Progress, silent
 from bayesid._math.memory import give_back_memory
+from bayesid.diagnosis.candidates.linear_model import Linearisation
 from bayesid.diagnosis.evidence.cause_sets import SetProbabilities, enumerate_sets
 from bayesid.diagnosis.evidence.set_evidence import SetEvidence
 from bayesid.diagnosis.evidence.verdict import classes_of_equivalents
@@ -17,7 +18,7 @@ from bayesid.diagnosis.noise.family_alarm import FamilyAlarm, noise_tests
 from bayesid.diagnosis.noise.noise_fault import FitResidual
 from bayesid.diagnosis.noise.noise_model import NoiseModel
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
-from bayesid.diagnosis.search.linearisation import Catalogue, Linearisation, linearise, linearise_along_data
+from bayesid.diagnosis.search.linearisation import Catalogue, linearise, linearise_along_data
 from bayesid.diagnosis.search.relinearise import SetSearch, plausible_vibrations, search_sets, with_fitted_vibrations
 from bayesid.diagnosis.settings import DEFAULT_SETTINGS, DiagnosisSettings
 

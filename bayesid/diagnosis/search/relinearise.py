@@ -14,18 +14,14 @@ import numpy as np
 
 from bayesid._io.errors import InputError
 from bayesid._math.memory import give_back_memory
-from bayesid.diagnosis.candidates.burst_signatures import burst_signatures
-from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
-from bayesid.diagnosis.candidates.shift_tuning import plausible_shift, with_tuned_shift
-from bayesid.diagnosis.candidates.signature_bank import SignatureBank
-from bayesid.diagnosis.candidates.tone_tuning import with_tuned_tones
+from bayesid.diagnosis.candidates.cause_kind import cause_kinds, companies, kind_of
+from bayesid.diagnosis.candidates.linear_model import Linearisation, SignatureBank
 from bayesid.diagnosis.evidence.cause_sets import CauseSet, SetProbabilities, enumerate_sets
 from bayesid.diagnosis.noise.noise_model import NoiseModel
 from bayesid.diagnosis.response.perturbed_model import Fit
 from bayesid.diagnosis.search.fitted_set import Hypothesis, fit_hypothesis, fit_in_amplitudes
-from bayesid.diagnosis.search.linearisation import Catalogue, Linearisation, linearise, linearise_along_data
+from bayesid.diagnosis.search.linearisation import Catalogue, linearise, linearise_along_data
 from bayesid.simulation.effects.effect import Effect
-from bayesid.simulation.effects.mass_shift import MassShift
 
 __all__ = ["SetSearch", "plausible_vibrations", "search_sets", "with_fitted_vibrations"]
 
@@ -76,23 +72,23 @@ def search_sets(noise: NoiseModel, catalogue: Catalogue, base: Linearisation | N
     """
     if base is None and noise.bodies_fixed:
         base = linearise_along_data(noise.perturbed, catalogue)
-    base = _with_bursts(linearise(noise.perturbed, noise.fit, catalogue) if base is None else base)
+    base = _with_suggested(linearise(noise.perturbed, noise.fit, catalogue) if base is None else base)
     point, found, best = *_tuned(base, enumerate_sets(base.evidence, catalogue.prior), catalogue), base.fit
     if base.bodies_fixed:
         point, found = _about_large_causes(point, found, catalogue)
         best = point.fit
     else:
         for _ in range(catalogue.settings.most_linearisations):
-            chosen, released = _best_known(found, catalogue)
-            if not chosen and not released:
+            causes = _best_known(found, catalogue)
+            if not causes:
                 break
-            fit, expected = fit_in_amplitudes(point, chosen, released, catalogue.settings.restart_from)
+            fit, expected = fit_in_amplitudes(point, causes, catalogue.effects, catalogue.settings.restart_from)
             if not np.isfinite(fit.cost) or fit.cost > best.cost:
                 break
             best = fit
             if abs(fit.cost - expected) < catalogue.settings.agrees:
                 break
-            point = _with_bursts(linearise(point.perturbed, best, catalogue))
+            point = _with_suggested(linearise(point.perturbed, best, catalogue))
             point, found = _tuned(point, enumerate_sets(point.evidence, catalogue.prior), catalogue)
     return SetSearch(noise, point.without_products(), found, best)
 
@@ -100,13 +96,11 @@ def search_sets(noise: NoiseModel, catalogue: Catalogue, base: Linearisation | N
 def _tuned(
     point: Linearisation, found: SetProbabilities, catalogue: Catalogue
 ) -> tuple[Linearisation, SetProbabilities]:
-    """Resolve plausible forms between those of the grid: frequencies of vibrations, instants of a jump."""
-    if beside := plausible_vibrations(found, catalogue):
-        point = with_tuned_tones(point, catalogue.effects, catalogue.bounds, beside)
-        found = enumerate_sets(point.evidence, catalogue.prior)
-    if plausible := plausible_shift(found, catalogue.effects):
-        point = with_tuned_shift(point, *plausible, catalogue.bounds)
-        found = enumerate_sets(point.evidence, catalogue.prior)
+    """Resolve plausible forms between those of the grid, such as frequencies of vibrations and instants of a jump."""
+    for kind in cause_kinds():
+        refined = kind.refined(point, found, kind.of(catalogue.effects), catalogue.bounds, catalogue.settings.plausible)
+        if refined is not point:
+            point, found = refined, enumerate_sets(refined.evidence, catalogue.prior)
     return point, found
 
 
@@ -123,15 +117,14 @@ def _about_large_causes(
     fitted: set[frozenset[str]] = set()
     point, along = base, found
     for _ in range(catalogue.settings.most_linearisations):
-        chosen, released = _best_known(found, catalogue)
-        names = frozenset([*(effect.label for effect in chosen), *([INITIAL_RATE] if released else [])])
+        names = frozenset(_best_known(found, catalogue))
         if not names or names in fitted:
             break
-        fit, _ = fit_in_amplitudes(base, chosen, released, catalogue.settings.restart_from)
+        fit, _ = fit_in_amplitudes(base, sorted(names), catalogue.effects, catalogue.settings.restart_from)
         if not np.isfinite(fit.cost):
             break
         fitted.add(names)
-        point = _with_bursts(linearise(base.perturbed, fit, catalogue, far=True))
+        point = _with_suggested(linearise(base.perturbed, fit, catalogue, far=True))
         large = _large(point, names, catalogue.settings.cannot_be_left_out)
         near[large] = _Near(point, enumerate_sets(point.evidence, catalogue.prior, beside=large))
         found = _nearest(_Near(base, along), near, point.log_nothing)
@@ -169,47 +162,30 @@ def _nearest(along: _Near, near: Mapping[frozenset[str], _Near], log_nothing: fl
     return SetProbabilities.of(sets, catalogue.causes, catalogue.generics, catalogue.prior)
 
 
-def _with_bursts(point: Linearisation) -> Linearisation:
-    """Return the linearisation with bursts of the sensors among its candidates."""
-    extended = point.with_bank(SignatureBank.joined([point.bank, burst_signatures(point.perturbed, point.fit)]))
+def _with_suggested(point: Linearisation) -> Linearisation:
+    """Return the linearisation with what the residual suggests among its candidates, such as bursts of the sensors."""
+    suggested = (kind.suggested(point.perturbed, point.fit) for kind in cause_kinds())
+    extended = point.with_bank(SignatureBank.joined([point.bank, *suggested]))
     give_back_memory()
     return extended
 
 
-def _best_known(found: SetProbabilities, catalogue: Catalogue) -> tuple[list[Effect], bool]:
-    """Return the effects of the most probable set that names all of its causes, and whether it frees initial rates.
-
-    There are none where one of them has several forms.
-    """
-    best = next((item for item in found.sets if item.causes and item.generic is None), None)
-    causes = () if best is None else best.causes
-    chosen = [effect for effect in catalogue.effects if effect.label in causes]
-    if any(effect.modes_count or isinstance(effect, MassShift) for effect in chosen):
-        return [], False
-    return chosen, INITIAL_RATE in causes
+def _best_known(found: SetProbabilities, catalogue: Catalogue) -> tuple[str, ...]:
+    """Return the most probable set that names all of its causes; none where one of them has several forms."""
+    best = next((item.causes for item in found.sets if item.causes and item.generic is None), ())
+    return best if all(kind_of(effect).one_form for effect in catalogue.effects if effect.label in best) else ()
 
 
-def plausible_vibrations(found: SetProbabilities, catalogue: Catalogue) -> dict[str, tuple[str, ...]]:
-    """Return all vibrations where one is plausible, each with its company in the most probable set that holds it.
+def plausible_vibrations(found: SetProbabilities, catalogue: Catalogue) -> bool:
+    """Return whether a cause of a kind whose evidence takes a fit, such as a vibration, is plausible.
 
     Parameters
     ----------
     found : SetProbabilities
     catalogue : Catalogue
     """
-    inclusion = found.inclusion
-    if not any(inclusion[label] > catalogue.settings.plausible for label in catalogue.vibrations):
-        return {}
-    return _companies(found, catalogue.vibrations)
-
-
-def _companies(found: SetProbabilities, labels: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Return vibrations, each with the other causes of the most probable set that holds it and nothing generic."""
-    beside = {}
-    for label in labels:
-        best = next(item for item in found.sets if label in item.causes and item.generic is None)
-        beside[label] = tuple(name for name in best.causes if name not in labels)
-    return beside
+    kinds = (kind for kind in cause_kinds() if kind.weighed_by_fits)
+    return any(kind.plausible(found, kind.of(catalogue.effects), catalogue.settings.plausible) for kind in kinds)
 
 
 def with_fitted_vibrations(search: SetSearch, catalogue: Catalogue) -> SetSearch:
@@ -229,7 +205,7 @@ def with_fitted_vibrations(search: SetSearch, catalogue: Catalogue) -> SetSearch
     fits: dict[str, Fit] = {}
     each = {item.names: item.log_evidence for item in found.sets}
     linear = {}
-    for label, others in _companies(found, catalogue.vibrations).items():
+    for label, others in companies(found, catalogue.weighed_by_fits).items():
         names = tuple(sorted((*others, label)))
         linear[label, names] = each[names] if names in each else point.evidence.log_evidence(names)
     for label, names in sorted(linear, key=lambda key: -linear[key]):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bayesid.diagnosis import Candidate, Diagnosis, TorqueReading
-from bayesid.diagnosis.response.effect_functions import CauseAmplitude
+from bayesid.diagnosis.candidates.cause_kind import CauseAmplitude
 from bayesid.inference.predicted_readings import sensor_fits
 from bayesid.report import figures
 from bayesid.report.diagnosis.cause_words import NOTHING, SOMETHING, amplitude_text, limit_text, verdict_text

@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 from bayesid.diagnosis import Candidate, Hypothesis
+from bayesid.diagnosis.candidates.cause_kind import CauseAmplitude
 from bayesid.diagnosis.evidence.verdict import UNKNOWN, ProbableVerdict
 from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
 from bayesid.diagnosis.outcome.cause_sizes import Z95, VectorSize, vector_size
-from bayesid.diagnosis.response.effect_functions import CauseAmplitude
 from bayesid.report.numbers import (
     format_number,
     format_probability,

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from bayesid.diagnosis import Diagnosis
-from bayesid.diagnosis.candidates.jump_instants import jump_instants
-from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
+from bayesid.diagnosis.outcome.candidate_table import amplitudes_of, instants_of
 from bayesid.diagnosis.outcome.cause_sizes import GroupSize
 from bayesid.report import figures
 from bayesid.report.diagnosis.cause_words import NOTHING
@@ -18,7 +17,6 @@ from bayesid.report.numbers import (
     format_signed,
     format_unit,
 )
-from bayesid.simulation.effects.mass_shift import MassShift
 
 __all__ = ["add_causes", "cause_rows", "set_rows"]
 
@@ -87,8 +85,9 @@ def cause_rows(result: Diagnosis) -> Rows:
         for item in amplitudes_of(best, label)
     ]
     instants = [
-        [f"{MassShift.name}.{quantity.name}", format_unit(quantity.unit), format_quantity(mean, sd), "", ""]
-        for quantity, mean, sd in jump_instants(best)
+        [f"{label}.{quantity.name}", format_unit(quantity.unit), format_quantity(mean, sd), "", ""]
+        for label in best.labels
+        for quantity, mean, sd in instants_of(best, label)
     ]
     return sizes + instants
 

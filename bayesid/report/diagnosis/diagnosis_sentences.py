@@ -6,11 +6,10 @@ from collections.abc import Iterator
 
 from bayesid._io.words import joined
 from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Hypothesis, Status, TorqueReading, TorquesNotRead
-from bayesid.diagnosis.candidates.initial_rate_signatures import INITIAL_RATE
-from bayesid.diagnosis.candidates.jump_instants import jump_instants
+from bayesid.diagnosis.candidates.cause_kind import cause_kinds
 from bayesid.diagnosis.evidence.verdict import UNKNOWN
 from bayesid.diagnosis.noise import noise_faults
-from bayesid.diagnosis.outcome.candidate_table import amplitudes_of
+from bayesid.diagnosis.outcome.candidate_table import amplitudes_of, instants_of
 from bayesid.report.diagnosis.cause_words import NOTHING, amplitude_text, probability_text, set_text
 from bayesid.report.numbers import (
     format_fixed,
@@ -24,7 +23,6 @@ from bayesid.report.numbers import (
     relation,
 )
 from bayesid.simulation.effects import known_effects
-from bayesid.simulation.effects.mass_shift import MassShift
 
 __all__ = [
     "action_sentence",
@@ -46,9 +44,6 @@ AT_MOST = 6  # largest number of quantities of one cause in a sentence
 WORTH_SAYING = 0.1  # probability of something without a name from which it is said beside causes that are named
 SHOWN_SETS = 3  # sets named in the sentence of a verdict that names none
 
-RELEASED = "The base was already turning when the recordings began, although the study takes it to be at rest."
-"""Summary of the cause that the initial rate is not zero."""
-
 FIXED = {
     Frame.BASE: "It keeps its direction in base axes: its source is on board.",
     Frame.ORBIT: "It keeps its direction in orbit axes, which turn with the orbit: its source follows the Earth or the "
@@ -63,9 +58,6 @@ SEPARATE_UNKNOWN = (
     "record with the arm at rest."
 )
 """Advice where no cause of the catalogue is at work."""
-
-BEFORE_MOTION = "It is there before the arm moves: record a rest before the motion."
-"""Advice on a base that turns when a recording begins."""
 
 ANYTHING = "Repeat with other amplitudes, other speeds and the base in another attitude."
 """Advice on a cause of which nothing is known."""
@@ -168,7 +160,7 @@ def cause_sentences(result: Diagnosis) -> Iterator[str]:
         if amplitude := amplitudes_of(result.after, label):
             rest = "; all are in the table of the named causes" if len(amplitude) > AT_MOST else ""
             parts.append(f"Its size: {amplitude_text(amplitude, AT_MOST)}{rest}.")
-        if label == MassShift.name and (instants := jump_instants(result.after)):
+        if instants := instants_of(result.after, label):
             parts.append(f"When: {amplitude_text(instants, len(instants))}.")
         if others := result.verdict.equivalent_to.get(label):
             parts.append(f"Other names for the same change: {joined(others)}.")
@@ -190,10 +182,10 @@ def cause_summary(hypothesis: Hypothesis, label: str) -> str:
     for effect in hypothesis.fit.effects:
         if effect.candidate == label:
             return effect.summary
-    if label == "initial-rate":
-        return RELEASED
     fault = noise_faults().get(label)
-    return "" if fault is None else fault.summary
+    if fault is not None:
+        return fault.summary
+    return next((kind.summary for kind in cause_kinds() if kind.name == label), "")
 
 
 def gain_sentence(result: Diagnosis) -> str:
@@ -288,8 +280,7 @@ def _addition(result: Diagnosis) -> str:
     steps = []
     if effects := [effect.entry for effect in result.after.fit.effects if effect.candidate in causes]:
         steps.append(f"add {joined(effects)} to the model's effects")
-    if INITIAL_RATE in causes:
-        steps.append("let the initial rates be unknown")
+    steps += [kind.statement for kind in cause_kinds() if kind.statement and kind.name in causes]
     if faults:
         steps.append(f"state under [model.noise] {joined([fault.statement for fault in faults])}")
     steps.append(f"use the values fitted with {'it' if len(causes) == 1 else 'them'}")
@@ -307,8 +298,9 @@ def advice_sentences(result: Diagnosis) -> Iterator[str]:
 
 def advice(name: str) -> str:
     """Return the manoeuvre that would bring a cause out, as a sentence; of an effect its class states it."""
-    if name == INITIAL_RATE:
-        return BEFORE_MOTION
+    said = next((kind.advice for kind in cause_kinds() if kind.advice and kind.name == name), None)
+    if said is not None:
+        return said
     if fault := noise_faults().get(name):
         return fault.advice
     effect = known_effects().get(name.partition(":")[0])

@@ -162,6 +162,7 @@ class Payload(_OnLink):
     """
 
     name = "payload"
+    is_added_body = True
     summary = "A body that the model lacks is fixed on the link, such as a tool or a captured body."
     separated_by = (
         "It moves with its link: move that joint through another range with the other joints still, and with the wrist "

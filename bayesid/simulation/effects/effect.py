@@ -78,6 +78,12 @@ class Effect:
         Number of inner states, zero at time 0.
     modes_count : int
         Number of vibration modes that `modes` returns.
+    cause_kind : str
+        Kind of cause in a diagnosis (`bayesid.diagnosis.candidates.cause_kind`).
+    is_added_body : bool
+        Whether the amplitudes are the ten moments of a rigid body that the model lacks.
+    instants : tuple of float
+        Instants [s] at which an effect sets in, for all recordings or for each; infinite where it does not.
     """
 
     name: ClassVar[str] = ""
@@ -90,6 +96,9 @@ class Effect:
     needs_latitude: ClassVar[bool] = False
     states: ClassVar[int] = 0
     modes_count: ClassVar[int] = 0
+    cause_kind: ClassVar[str] = "linear"
+    is_added_body: ClassVar[bool] = False
+    instants: tuple[float, ...] = ()
 
     @classmethod
     def lacks(cls, model: Situation) -> str | None:
@@ -140,6 +149,24 @@ class Effect:
     def attach(self, robot: Robot) -> Self:
         """Return the effect on a robot, and raise an `InputError` if the robot lacks its place."""
         return self
+
+    def in_study(self, longest: float | None, records_wheels: bool) -> Self | None:
+        """Return the effect as a candidate in a study, None where the recordings exclude it; by default itself.
+
+        Parameters
+        ----------
+        longest : float or None
+            Length of the longest recording [s], None if it is not known.
+        records_wheels : bool
+            Whether the momentum of the wheels is recorded.
+        """
+        return self
+
+    def at(self, instants: Sequence[float]) -> Self:
+        """Return the effect with other instants."""
+        changed = copy.copy(self)
+        changed.instants = tuple(instants)
+        return changed
 
     def in_recording(self, index: int) -> Self:
         """Return the effect as its `table` and `jumps` are in the recording of an index, by default itself.
@@ -215,6 +242,11 @@ class Effect:
             Whether the effect is fitted without others, so that the cost of more starting points is acceptable.
         """
         return self.starts
+
+    @property
+    def reach_of_swing(self) -> float | None:
+        """Largest distance from the base origin along an axis of a mass on equal springs [m]; None for other modes."""
+        return None
 
     def tuned(self, values: Floats) -> Self:
         """Return the effect with settings that suit the values of its parameters, such as `longest_step`."""

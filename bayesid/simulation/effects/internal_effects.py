@@ -99,6 +99,7 @@ class _Vibration(Effect):
     """Common part of effects of a mass on a spring in the base."""
 
     separated_by = "It continues to swing: excite it with one quick motion, then record with the arm at rest."
+    cause_kind = "vibration"
     frequency: float = FREQUENCY
 
     @property
@@ -221,6 +222,11 @@ class FuelSlosh(_Vibration):
             ),
         )
         return changed
+
+    @property
+    def reach_of_swing(self) -> float:
+        """Largest distance of the tank from the base origin along an axis [m]."""
+        return max(parameter.sigma + abs(parameter.mean) for parameter in self.parameters[3:])
 
     def starts_near(self, resonances: Sequence[Resonance], alone: bool) -> Sequence[Floats]:
         """Return the start of the strongest resonance and, for a fit alone, starts at other positions.

@@ -66,6 +66,7 @@ class MassShift(Effect):
         "It acts from one instant on: before it the model fits, and no constant body fits both parts. Repeat the "
         "manoeuvre; what has come loose stays where it is or moves again."
     )
+    cause_kind = "mass-shift"
     constant_names = ("instants",)
 
     def __init__(self, instants: str | Sequence[float] = (), first: float = 1.0, second: float = 1.0) -> None:
@@ -108,9 +109,7 @@ class MassShift(Effect):
                 f"effect {self.label!r} has {len(self.instants)} instants and there are more recordings",
                 remedy="Give one instant for each recording, or one for all; inf where it does not happen",
             )
-        changed = copy.copy(self)
-        changed.instants = self.instants[index : index + 1]
-        return changed
+        return self.at(self.instants[index : index + 1])
 
     def jumps(self, end: float) -> Sequence[float]:
         """Return the instant, if it is within the recording."""

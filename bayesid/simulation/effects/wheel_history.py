@@ -74,6 +74,12 @@ class WheelHistory(Placed):
         """Return the effect about every base axis."""
         return [cls(axis) for axis in AXES]
 
+    def in_study(self, longest: float | None, records_wheels: bool) -> Self | None:
+        """Return the effect over the longest recording, None where the momentum of the wheels is recorded."""
+        if records_wheels:
+            return None
+        return self if longest is None else type(self)(self.place, longest)
+
     @property
     def entry(self) -> str:
         """The label with the time of the last knot."""

@@ -1,4 +1,4 @@
-"""Signatures of what nobody listed: disturbing torques, forces, errors of sensors, and pulses at unknown instants."""
+"""What nobody listed: disturbing torques and forces, errors of sensors, pulses of torque, and bursts of a sensor."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bayesid._math.arrays import Floats
-from bayesid.diagnosis.candidates.signature_bank import SignatureBank, Signatures
+from bayesid._math.arrays import Floats, Integers
+from bayesid.diagnosis.candidates.cause_kind import Bounds, CauseKind
+from bayesid.diagnosis.candidates.linear_model import SignatureBank, Signatures
 from bayesid.diagnosis.evidence.scales import AmplitudeGroup, CandidateCause
 from bayesid.diagnosis.response.perturbed_model import Fit, PerturbedModel
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.residual_view import by_recording
+from bayesid.inference.residual_view import ResidualView, by_recording
 from bayesid.robot.robot_size import RobotSize
+from bayesid.simulation.effects.effect import Effect
 
-__all__ = ["FORCE", "TORQUE", "WAVES", "error_signatures", "generic_signatures"]
+__all__ = ["FORCE", "TORQUE", "WAVES", "GenericCause", "burst_signatures", "error_signatures", "generic_signatures"]
 
 TORQUE, FORCE = "disturbing torque", "disturbing force"
 """Names of the smooth disturbances."""
@@ -49,6 +51,31 @@ ACCELERATION = 0.01
 
 ERROR = 1000.0
 """Largest unknown error of a sensor, in standard deviations of its noise; assumed."""
+
+LENGTH = 5
+"""Samples of a burst."""
+
+STRONGEST = 6
+"""Places of a burst per sensor that are weighed; at the others it has no evidence."""
+
+LARGEST = 1000.0
+"""Largest error in a burst, in standard deviations of the noise; assumed."""
+
+
+class GenericCause(CauseKind):
+    """Candidates that name nothing: what the catalogue lacks, and bursts where the residual shows some."""
+
+    name = "generic"
+
+    def signatures(
+        self, perturbed: PerturbedModel, fit: Fit, effects: Sequence[Effect], bounds: Bounds
+    ) -> SignatureBank:
+        """Return the bank of smooth disturbances, pulses, and errors of sensors."""
+        return generic_signatures(perturbed, fit)
+
+    def suggested(self, perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
+        """Return the bank of bursts."""
+        return burst_signatures(perturbed, fit)
 
 
 def generic_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
@@ -169,3 +196,52 @@ def error_signatures(posterior: Posterior, name: str, channels: slice) -> Signat
     each = [_courses(count) for count in waves if count]
     spreads = [np.concatenate(parts) for parts in zip(*each, strict=False)]  # bands that all channels can show
     return SignatureBank(tuple(signatures), (_cause(name, ERROR, spreads),))
+
+
+def burst_signatures(perturbed: PerturbedModel, fit: Fit) -> SignatureBank:
+    """Return the bank of one burst per sensor, at the places where the residual is largest.
+
+    A burst may begin at every sample, and has errors of any sign in all samples and channels of its length. All places
+    are equally probable beforehand; only the strongest are evaluated, each with its share of the prior, so that the
+    evidence is a lower bound. The choice depends on the residual: these candidates are no part of the alarm.
+    """
+    posterior = perturbed.posterior
+    view = ResidualView.of(posterior, fit.residual)
+    banks = []
+    for kind in posterior.model.channels.kinds:
+        columns = posterior.model.channels.of(kind)
+        places: list[tuple[float, int, Integers]] = []
+        for r in range(view.recordings):
+            there = np.flatnonzero(view.mask[r, :, columns].any(axis=1))
+            if len(there) < LENGTH:  # a burst needs as many samples as it lasts
+                continue
+            energy = (view.values[r, there, columns] ** 2).sum(axis=1)
+            sums = np.convolve(energy, np.ones(LENGTH), "valid")
+            places += [(float(value), r, there[k : k + LENGTH]) for k, value in enumerate(sums)]
+        if not places:
+            continue
+        name = f"burst of {kind.value}"
+        chosen = _apart(sorted(places, key=lambda item: -item[0]))
+        signatures = []
+        for number, (_, r, rows) in enumerate(chosen):
+            mask = np.zeros((*posterior.residual_shape[1:], len(rows), columns.stop - columns.start))
+            for k, row in enumerate(rows):
+                for c in range(columns.start, columns.stop):
+                    mask[row, c, k, c - columns.start] = float(view.mask[r, row, c])
+            signatures.append(Signatures(f"{name}, place {number + 1}", mask.reshape(len(mask) * mask.shape[1], -1), r))
+        forms = [(AmplitudeGroup(item.name, LARGEST),) for item in signatures]
+        shares = (1.0 / len(places),) * len(forms)
+        cause = CandidateCause(name, forms[0], True, tuple(forms[1:]), shares)
+        banks.append(SignatureBank(tuple(signatures), (cause,)))
+    return SignatureBank.joined(banks)
+
+
+def _apart(places: list[tuple[float, int, Integers]]) -> list[tuple[float, int, Integers]]:
+    """Return the strongest places that do not overlap."""
+    chosen: list[tuple[float, int, Integers]] = []
+    for value, r, rows in places:
+        if all(r != other or rows[0] > own[-1] or rows[-1] < own[0] for _, other, own in chosen):
+            chosen.append((value, r, rows))
+        if len(chosen) == STRONGEST:
+            break
+    return chosen
