@@ -45,8 +45,9 @@ WRITERS = (
     "identifiability.directions",
     "identifiability.parameter_table",
     "identifiability.practical_identifiability",
-    "inference.contraction",
+    "inference.body_quantities",
     "inference.identification",
+    "inference.predicted_readings",
 )
 """Modules whose dictionaries become JSON files."""
 

@@ -22,7 +22,6 @@ from bayesid.recording.joint_motion import Excitation, sample_joints
 from bayesid.recording.recording import Recording
 from bayesid.report import Document, figures, format_quantity, identification_report
 from bayesid.report.document import literal
-from bayesid.report.figures.posterior_figures import widths
 from bayesid.report.figures.robot_figures import equivalent_box
 from bayesid.report.identification_report import agreement_sentences, misfit_rows, parameter_rows, start_rows, verdict
 from bayesid.report.model_assumptions import joint_rows, model_sentences
@@ -347,7 +346,7 @@ def test_the_report_tables_every_parameter_with_its_uncertainty(result, printed)
         assert row[:2] == [f"base_link.{key}", format_unit(unit)]
         assert row[3] == format_quantity(mean, sd)
         assert printed.row(*row)
-    rows = misfit_rows(result.posterior, sensor_fits(result.posterior, result.optimum.z))
+    rows = misfit_rows(result)
     assert [row[:3] for row in rows] == [["planar", "rate", "243"], ["planar", "accel", "243"]]
     assert sum(float(row[3].split()[0]) * int(row[2]) for row in rows) == pytest.approx(
         result.optimum.chi2, abs=0.0011 * 243
@@ -378,7 +377,7 @@ def test_the_report_says_what_was_identified_how_and_on_which_assumptions(result
 
 def test_the_bars_of_the_widths_are_the_ratios(result):
     axes = figures.prior_to_posterior(result).axes[0]
-    prior, posterior = widths(result)
+    prior, posterior = ({name: both[side] for name, both in result.widths.items()} for side in (0, 1))
     low = 10.0 ** -axes.lines[0].get_xdata()[0]  # the line at ratio one
     ratios = [low * 10.0 ** bar.get_width() for bar in axes.patches]
     np.testing.assert_allclose(ratios, [posterior[name] / prior[name] for name in prior])
@@ -457,7 +456,7 @@ def test_verdict_follows_chi2(result):
 
 
 def test_prior_is_no_narrower_than_the_posterior(result):
-    prior, posterior = widths(result)
+    prior, posterior = ({name: both[side] for name, both in result.widths.items()} for side in (0, 1))
     assert list(prior) == list(posterior) == list(result.names)
     for name in ("mass", "inertia.xx", "inertia.yy", "inertia.zz"):
         assert posterior[f"base_link.{name}"] < prior[f"base_link.{name}"]

@@ -832,7 +832,7 @@ def test_the_decision_stands_on_the_first_page(printed, status):
     assert ADVICE in text
     first = PdfText(text.pages[:1])
     assert "Decision. " + status.value.capitalize() in first
-    entries = decision_entries(result, result.parameter_changes, result.simulation_errors, RECORD)
+    entries = decision_entries(result, RECORD)
     for name, said in entries:
         assert f"{name}{said}" in first
     for row in probability_rows(result, 4):
@@ -842,7 +842,7 @@ def test_the_decision_stands_on_the_first_page(printed, status):
 
 
 def test_without_a_record_the_box_has_none(biased):
-    entries = dict(decision_entries(biased, biased.parameter_changes, biased.simulation_errors))
+    entries = dict(decision_entries(biased))
     assert "Record" not in entries
     assert entries["Cause"].startswith("accel-bias, probability > 0.999. The accelerometer")
     assert entries["Size, ± 95 %"] == size_text(biased.after, "accel-bias")

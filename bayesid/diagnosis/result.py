@@ -31,6 +31,7 @@ from bayesid.diagnosis.settings import DiagnosisSettings
 from bayesid.inference import Identification
 from bayesid.inference.body_quantities import quantity
 from bayesid.inference.posterior import Posterior
+from bayesid.inference.residual_view import ResidualView
 from bayesid.simulation.effects.effect import Effect
 from bayesid.simulation.effects.effect_parameters import PhysicalBound
 
@@ -123,6 +124,21 @@ class Diagnosis:
         return self.search.base.evidence
 
     @property
+    def named(self) -> bool:
+        """Whether the verdict names causes."""
+        return bool(self.verdict.causes)
+
+    @property
+    def recordings(self) -> list[str]:
+        """Names of the recordings."""
+        return [manoeuvre.recording.name for manoeuvre in self.before.fit.posterior.manoeuvres]
+
+    @property
+    def residuals(self) -> list[ResidualView]:
+        """Whitened residuals of the present model, and of the extended one where causes are named."""
+        return [self.before.fit.view, self.after.fit.view] if self.named else [self.before.fit.view]
+
+    @property
     def alternatives(self) -> tuple[tuple[str, ...], ...]:
         """Explanations that the verdict names, its own causes first; none where it names nothing."""
         verdict = self.verdict
@@ -184,7 +200,7 @@ class Diagnosis:
     @property
     def strongest_recording(self) -> int:
         """Recording whose chi-square decreases most by the named causes, or is largest where none is named."""
-        return strongest_recording(self.before, self.after if self.verdict.causes else None)
+        return strongest_recording(self.before, self.after if self.named else None)
 
     @cached_property
     def inseparable_pairs(self) -> tuple[CausePair, ...]:
@@ -281,7 +297,7 @@ class Diagnosis:
             "gain": _gain(self),
             "inertial_parameters": {change.name: change.to_dict() for change in self.parameter_changes},
             "simulation_error": {error.kind.value: error.to_dict() for error in self.simulation_errors},
-            "strongest_recording": self.before.fit.posterior.manoeuvres[self.strongest_recording].recording.name,
+            "strongest_recording": self.recordings[self.strongest_recording],
             "vectors": {name: vector.to_dict() for name in verdict.causes if (vector := vector_size(self.after, name))},
             "inseparable": [pair.to_dict() for pair in self.inseparable_pairs[:PAIRS]],
             "unseen": [row.name for row in self.unseen_candidates],

@@ -13,6 +13,7 @@ import numpy as np
 from bayesid._io.files import write_json
 from bayesid._io.progress import Progress, silent
 from bayesid._math.arrays import Floats
+from bayesid._math.on_device import on_device
 from bayesid.inference.body_quantities import (
     BODY_QUANTITIES,
     BodyDraws,
@@ -20,6 +21,7 @@ from bayesid.inference.body_quantities import (
     bodies_of,
     body_dict,
     compare,
+    half_range,
     quantity,
     reported_effect,
 )
@@ -29,9 +31,10 @@ from bayesid.inference.importance import Evidence, choose_parameterisation, impo
 from bayesid.inference.mode import Optimum, maximise
 from bayesid.inference.parameterisation import LinearParameterisation
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.predicted_readings import integration_error_at
+from bayesid.inference.predicted_readings import SensorFit, TorqueFit, integration_error_at, sensor_fits, torque_fits
+from bayesid.simulation.effects.effect import Effect
 
-__all__ = ["Identification", "identify"]
+__all__ = ["EffectQuantity", "Identification", "StartState", "identify"]
 
 
 NEARLY_NORMAL = 0.3
@@ -42,6 +45,54 @@ PRIOR_DRAWS = 4000
 
 MEAN_TOLERANCE, WIDTH_TOLERANCE = 0.25, 0.2
 """Largest unreported difference of two methods: of means in standard deviations, and of widths as a ratio."""
+
+
+@dataclass(frozen=True)
+class EffectQuantity:
+    """One reported quantity of an effect.
+
+    Attributes
+    ----------
+    label : str
+        Effect, with the recording in brackets if it has values in each.
+    name, unit : str
+    prior : tuple of float
+        Ends of the central 68 % of the prior.
+    mean, sd : float
+        Of the posterior.
+    """
+
+    label: str
+    name: str
+    unit: str
+    prior: tuple[float, float]
+    mean: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class StartState:
+    """Unknown state of the base at the start of one recording: its rate, or its rotation from the attitude given.
+
+    Attributes
+    ----------
+    recording, name, unit : str
+    prior_sd : float
+        Standard deviation of the prior per axis, about zero.
+    mean, sd : (3,) array
+        Of the posterior, base axes.
+    """
+
+    recording: str
+    name: str
+    unit: str
+    prior_sd: float
+    mean: Floats
+    sd: Floats
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the state in the form that it has in JSON."""
+        return {**vars(self), "mean": self.mean.tolist(), "sd": self.sd.tolist()}
 
 
 @dataclass(frozen=True)
@@ -92,6 +143,92 @@ class Identification:
             return {}
         both = (np.concatenate([body.values for body in draws.values()], axis=1) for draws in (prior, self.bodies))
         return compare(self.names, *both)
+
+    @cached_property
+    def effect_quantities(self) -> tuple[EffectQuantity, ...]:
+        """Reported quantities of the effects with parameters, in all recordings."""
+        rows = []
+        for effect in self.posterior.model.effects:
+            if not effect.parameters:
+                continue
+            draws = self.effects[effect.label]
+            mean, sd = np.atleast_2d(draws.mean(axis=0)), np.atleast_2d(draws.std(axis=0, ddof=1))
+            prior = list(zip(*prior_range(effect), strict=True))
+            for index, label in enumerate(self._labels(effect)):
+                rows += [
+                    EffectQuantity(label, name, unit, prior[k], float(mean[index, k]), float(sd[index, k]))
+                    for k, (name, unit) in enumerate(effect.quantities)
+                ]
+        return tuple(rows)
+
+    def _labels(self, effect: Effect) -> list[str]:
+        """Return the names of an effect's values, one for each recording if they differ."""
+        if not effect.per_recording:
+            return [effect.label]
+        return [f"{effect.label}[{manoeuvre.recording.name}]" for manoeuvre in self.posterior.manoeuvres]
+
+    @cached_property
+    def starts(self) -> tuple[StartState, ...]:
+        """Unknown initial rates and rotations of the base."""
+        unknowns, values = self.posterior.unknowns, self.posterior.unknowns.values_of(self.chains.flat)
+        states = []
+        for index, manoeuvre in enumerate(self.posterior.manoeuvres):
+            for name, unit, draws, sigma in (
+                ("initial rate", "rad/s", values.rate, unknowns.rate_sigma),
+                ("initial rotation", "rad", values.tilt, unknowns.tilt_sigma[index]),
+            ):
+                if sigma > 0.0:
+                    drawn = np.asarray(draws)[:, index]
+                    mean, sd = drawn.mean(axis=0), drawn.std(axis=0, ddof=1)
+                    states.append(StartState(manoeuvre.recording.name, name, unit, float(sigma), mean, sd))
+        return tuple(states)
+
+    @cached_property
+    def widths(self) -> dict[str, tuple[float, float]]:
+        """Half the central 68 % range of every reported quantity of bodies and effects, in prior and posterior."""
+        z = np.random.default_rng(0).normal(size=(PRIOR_DRAWS, self.posterior.size))
+        drawn = self.posterior.unknowns.values_of(z).effects
+        names, sides = list(self.names), [list[Floats](), list[Floats]()]
+        for side, bodies in zip(sides, (bodies_of(self.posterior, z), self.bodies), strict=True):
+            side.extend(half_range(body.values) for body in bodies.values())
+        for effect, values in zip(self.posterior.model.effects, drawn, strict=True):
+            if effect.parameters:
+                names += [f"{label}.{key}" for label in self._labels(effect) for key, _ in effect.quantities]
+                both = (reported_effect(effect, np.asarray(values)), self.effects[effect.label])
+                for side, draws in zip(sides, both, strict=True):
+                    side.append(half_range(draws.reshape(len(draws), -1)))
+        prior, posterior = (np.concatenate(side).tolist() if side else [] for side in sides)
+        return dict(zip(names, zip(prior, posterior, strict=True), strict=True))
+
+    @cached_property
+    def r_hat(self) -> dict[str, float]:
+        """R-hat of every unknown over the ensembles."""
+        import arviz as az  # here, as it takes a second that commands without samples save
+
+        draws = self.chains.z
+        return {name: float(az.rhat(draws[:, :, k])) for k, name in enumerate(self.posterior.unknowns.names)}
+
+    @property
+    def expected_chi2(self) -> tuple[float, float]:
+        """Chi-square that noise alone gives at the mode, and its standard deviation."""
+        samples = self.posterior.samples
+        return float(samples - self.posterior.size), float(np.sqrt(2.0 * samples))
+
+    @property
+    def chi2_deviation(self) -> float:
+        """Deviation of chi-square at the mode from what noise alone gives, in standard deviations."""
+        expected, sd = self.expected_chi2
+        return (self.optimum.chi2 - expected) / sd
+
+    @cached_property
+    def sensor_fits(self) -> list[list[SensorFit]]:
+        """Readings at the mode: a list per recording, an entry per sensor."""
+        return sensor_fits(self.posterior, self.optimum.z)
+
+    @cached_property
+    def torque_fits(self) -> list[list[TorqueFit]]:
+        """Joint torques at the mode: a list per recording, an entry per joint."""
+        return torque_fits(self.posterior, self.optimum.z)
 
     @cached_property
     def integration_error(self) -> float:
@@ -147,11 +284,29 @@ class Identification:
             "bodies": {name: body_dict(body) for name, body in self.bodies.items()},
             "effects": self._effects_dict(),
             "learnt": {name: item.to_dict() for name, item in self.contraction.items()},
+            "widths": {name: {"prior": both[0], "posterior": both[1]} for name, both in self.widths.items()},
+            "starts": [state.to_dict() for state in self.starts],
             "covariance": {"names": list(self.names), "matrix": self.covariance.tolist()},
-            "fit": {"chi2": self.optimum.chi2, "samples": self.posterior.samples, "unknowns": self.posterior.size},
+            "fit": {
+                "chi2": self.optimum.chi2,
+                "samples": self.posterior.samples,
+                "unknowns": self.posterior.size,
+                "expected_chi2": self.expected_chi2[0],
+                "expected_sd": self.expected_chi2[1],
+            },
+            "misfit": {
+                manoeuvre.recording.name: {
+                    **{fit.kind.value: fit.misfit_dict() for fit in sensors},
+                    **{f"torque.{fit.joint}": fit.misfit_dict() for fit in joints},
+                }
+                for manoeuvre, sensors, joints in zip(
+                    self.posterior.manoeuvres, self.sensor_fits, self.torque_fits, strict=True
+                )
+            },
             "sampler": {
                 "effective_samples": self.chains.effective_samples,
                 "r_hat": self.chains.r_hat,
+                "r_hat_by_unknown": self.r_hat,
                 "evaluations": self.chains.evaluations,
                 "seconds": self.seconds,
                 "converged": self.chains.converged,
@@ -171,23 +326,19 @@ class Identification:
         write_json(file, self.to_dict())
 
     def _effects_dict(self) -> dict[str, Any]:
-        result: dict[str, Any] = {}
-        for effect in self.posterior.model.effects:
-            if not effect.parameters:
-                continue
-            draws = self.effects[effect.label]
-            mean, sd = draws.mean(axis=0), draws.std(axis=0, ddof=1)
-            rows = [(effect.label, mean, sd)]
-            if effect.per_recording:
-                rows = [
-                    (f"{effect.label}[{manoeuvre.recording.name}]", mean[i], sd[i])
-                    for i, manoeuvre in enumerate(self.posterior.manoeuvres)
-                ]
-            for label, centre, width in rows:
-                result[label] = {
-                    key: quantity(centre[k], width[k], unit) for k, (key, unit) in enumerate(effect.quantities)
-                }
-        return result
+        effects: dict[str, Any] = {}
+        for row in self.effect_quantities:
+            entry = {**quantity(row.mean, row.sd, row.unit), "prior_68": list(row.prior)}
+            effects.setdefault(row.label, {})[row.name] = entry
+        return effects
+
+
+def prior_range(effect: Effect) -> tuple[list[float], list[float]]:
+    """Return the ends of the central 68 % of the prior of an effect's quantities."""
+    z = on_device(np.random.default_rng(0).normal(size=(2001, len(effect.parameters))))
+    values = np.stack([np.asarray(p.value(z[:, k])) for k, p in enumerate(effect.parameters)], axis=-1)
+    low, high = np.percentile(reported_effect(effect, values), [16.0, 84.0], axis=0)
+    return low.tolist(), high.tolist()
 
 
 def identify(

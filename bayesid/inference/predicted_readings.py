@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,7 @@ __all__ = [
     "PredictedReadings",
     "SensorFit",
     "TorqueFit",
+    "WhitenedFit",
     "blank_channels",
     "integration_error_at",
     "noise_of",
@@ -216,8 +217,48 @@ def blank_channels(sensors: Sequence[Sensor], count: int, torque: TorqueSensor |
     } | {f"torque.{joint}": np.zeros(count) for joint in joints}
 
 
+class WhitenedFit:
+    """What whitened residuals say, NaN where there is no sample."""
+
+    residual: Floats
+
+    @property
+    def chi2(self) -> float:
+        """Sum of squares of the whitened residuals."""
+        return float(np.nansum(self.residual**2))
+
+    @property
+    def samples(self) -> int:
+        """Number of scalar residuals."""
+        return int(np.isfinite(self.residual).sum())
+
+    @property
+    def chi2_per_sample(self) -> float:
+        """Mean square of the residuals, one if only noise is left."""
+        return self.chi2 / max(self.samples, 1)
+
+    @property
+    def chi2_sd(self) -> float:
+        """Standard deviation that noise alone gives to chi-square per sample."""
+        return float(np.sqrt(2.0 / max(self.samples, 1)))
+
+    @property
+    def largest_residual(self) -> float:
+        """Largest size of a residual, zero without samples."""
+        return float(np.nanmax(np.abs(self.residual), initial=0.0))
+
+    def misfit_dict(self) -> dict[str, Any]:
+        """Return the misfit in the form that it has in JSON."""
+        return {
+            "samples": self.samples,
+            "chi2_per_sample": self.chi2_per_sample,
+            "expected_sd": self.chi2_sd,
+            "largest_residual": self.largest_residual,
+        }
+
+
 @dataclass(frozen=True)
-class SensorFit:
+class SensorFit(WhitenedFit):
     """Readings of one sensor in one recording, measured and predicted.
 
     Attributes
@@ -236,16 +277,6 @@ class SensorFit:
     predicted: Floats
     residual_time: Floats
     residual: Floats
-
-    @property
-    def chi2(self) -> float:
-        """Sum of squares of the whitened residuals."""
-        return float(np.nansum(self.residual**2))
-
-    @property
-    def samples(self) -> int:
-        """Number of scalar residuals."""
-        return int(np.isfinite(self.residual).sum())
 
 
 def sensor_fits(posterior: Posterior, z: Floats) -> list[list[SensorFit]]:
@@ -268,7 +299,7 @@ def sensor_fits(posterior: Posterior, z: Floats) -> list[list[SensorFit]]:
 
 
 @dataclass(frozen=True)
-class TorqueFit:
+class TorqueFit(WhitenedFit):
     """Torque of one joint in one recording, measured and predicted.
 
     Attributes

@@ -8,12 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from bayesid._io.words import counted, joined
-from bayesid._math.arrays import Floats
-from bayesid._math.on_device import on_device
-from bayesid.inference.body_quantities import BODY_QUANTITIES, Contraction, ContractionVerdict, reported_effect
+from bayesid.inference.body_quantities import BODY_QUANTITIES, Contraction, ContractionVerdict
 from bayesid.inference.identification import Identification
-from bayesid.inference.posterior import Posterior
-from bayesid.inference.predicted_readings import SensorFit, TorqueFit, sensor_fits, torque_fits
+from bayesid.inference.predicted_readings import WhitenedFit
 from bayesid.inference.residual_view import ResidualView
 from bayesid.report import figures
 from bayesid.report.document import Document, Rows
@@ -28,7 +25,6 @@ from bayesid.report.numbers import (
     format_unit,
 )
 from bayesid.robot.inertial_parameters import mass_com_inertia
-from bayesid.simulation.effects import Effect
 
 __all__ = ["add_identification", "agreement_sentences", "identification_report", "verdict"]
 
@@ -122,8 +118,6 @@ def _add_robot(document: Document, result: Identification) -> None:
 
 
 def _add_fit(document: Document, result: Identification) -> None:
-    posterior, z = result.posterior, result.optimum.z
-    fits = sensor_fits(posterior, z)
     document.section("Measured against simulated")
     document.paragraph(
         "Residuals are in units of their noise σ: that of the sensor and, through the dynamics, that of the encoders. "
@@ -132,36 +126,34 @@ def _add_fit(document: Document, result: Identification) -> None:
     )
     document.table(
         ["recording", "sensor", "samples", "chi-square per sample", "largest residual"],
-        misfit_rows(posterior, fits),
+        misfit_rows(result),
         "Misfit by recording and sensor. Noise alone gives one, in two cases of three within the ± stated.",
         ["left", "left", "right", "right", "right"],
     )
-    for manoeuvre, sensors in zip(posterior.manoeuvres, fits, strict=True):
+    for manoeuvre, sensors in zip(result.posterior.manoeuvres, result.sensor_fits, strict=True):
         document.figure(
             figures.measured_against_simulated(sensors),
             f"Measured and simulated in {manoeuvre.recording.name}, sensor axes; beneath, the residual in σ.",
         )
     _add_torques(document, result)
     document.figure(
-        figures.residual_statistics(ResidualView.at(posterior, z)),
+        figures.residual_statistics(ResidualView.at(result.posterior, result.optimum.z)),
         "Residuals of all recordings. Left: mean power by frequency, one for noise alone. Right: distribution, with "
         "the standard normal one.",
     )
 
 
 def _add_torques(document: Document, result: Identification) -> None:
-    posterior = result.posterior
-    if posterior.model.torque is None:
+    if result.posterior.model.torque is None:
         return
-    fits = torque_fits(posterior, result.optimum.z)
     document.table(
         ["recording", "joint", "noise per sample", "samples used", "chi-square per sample", "largest residual"],
-        torque_rows(posterior, fits),
+        torque_rows(result),
         "Joint torques. The torque of a joint with dry friction that stands nearly still carries no information and is "
         "left out.",
         ["left", "left", "right", "right", "right", "right"],
     )
-    for manoeuvre, joints in zip(posterior.manoeuvres, fits, strict=True):
+    for manoeuvre, joints in zip(result.posterior.manoeuvres, result.torque_fits, strict=True):
         document.figure(
             figures.torques_over_time(joints), f"Measured and simulated joint torques in {manoeuvre.recording.name}."
         )
@@ -224,13 +216,12 @@ def summary(result: Identification) -> str:
 
 def verdict(result: Identification) -> str:
     """Return whether the model explains the data, judged by chi-square at the mode."""
-    posterior, chi2 = result.posterior, result.optimum.chi2
-    expected, spread = posterior.samples - posterior.size, float(np.sqrt(2.0 * posterior.samples))
-    deviation = (chi2 - expected) / spread
+    posterior, chi2, deviation = result.posterior, result.optimum.chi2, result.chi2_deviation
+    expected, spread = result.expected_chi2
     numbers = (
         f"Chi-square, the sum of squares of the residuals in units of their noise, is {chi2:.0f}, that is "
         f"{chi2 / posterior.samples:.3f} per sample. With {posterior.samples} samples and {posterior.size} unknowns, "
-        f"noise alone gives {expected} ± {spread:.0f}; the difference is {format_signed(deviation)} standard "
+        f"noise alone gives {expected:.0f} ± {spread:.0f}; the difference is {format_signed(deviation)} standard "
         "deviations. "
     )
     if deviation > LIMIT:
@@ -297,97 +288,56 @@ def parameter_rows(result: Identification) -> Rows:
 
 def effect_rows(result: Identification) -> Rows:
     """Return quantity, unit, central 68 % of the prior, posterior and distance from zero of effects with parameters."""
-    rows = []
-    for effect in result.posterior.model.effects:
-        if not effect.parameters:
-            continue
-        draws = result.effects[effect.label]
-        copies = [(effect.label, draws)]
-        if effect.per_recording:
-            names = [manoeuvre.recording.name for manoeuvre in result.posterior.manoeuvres]
-            copies = [(f"{effect.label}[{name}]", draws[:, index]) for index, name in enumerate(names)]
-        prior = prior_range(effect)
-        for label, values in copies:
-            for index, (key, unit) in enumerate(effect.quantities):
-                mean, sd = float(values[:, index].mean()), float(values[:, index].std(ddof=1))
-                rows.append(
-                    [
-                        f"{label}.{key}",
-                        format_unit(unit),
-                        f"{format_number(prior[0][index])} to {format_number(prior[1][index])}",
-                        format_quantity(mean, sd),
-                        f"{format_fixed(abs(mean) / sd, 1)} sd" if sd > 0.0 else "",
-                    ]
-                )
-    return rows
-
-
-def prior_range(effect: Effect) -> tuple[Floats, Floats]:
-    """Return the ends of the central 68 % of the prior of an effect's quantities."""
-    z = on_device(np.random.default_rng(0).normal(size=(2001, len(effect.parameters))))
-    values = np.stack([np.asarray(p.value(z[:, k])) for k, p in enumerate(effect.parameters)], axis=-1)
-    low, high = np.percentile(reported_effect(effect, values), [16.0, 84.0], axis=0)
-    return low, high
+    return [
+        [
+            f"{row.label}.{row.name}",
+            format_unit(row.unit),
+            " to ".join(map(format_number, row.prior)),
+            format_quantity(row.mean, row.sd),
+            f"{format_fixed(abs(row.mean) / row.sd, 1)} sd" if row.sd > 0.0 else "",
+        ]
+        for row in result.effect_quantities
+    ]
 
 
 def start_rows(result: Identification) -> Rows:
     """Return recording, unknown, unit, prior, and posterior per axis for unknown initial rates and attitudes."""
-    posterior = result.posterior
-    values = posterior.unknowns.values_of(result.chains.flat)
-    rows = []
-    for index, manoeuvre in enumerate(posterior.manoeuvres):
-        unknown = [("initial rate", "rad/s", values.rate, posterior.unknowns.rate_sigma)]
-        unknown.append(("initial rotation", "rad", values.tilt, posterior.unknowns.tilt_sigma[index]))
-        for label, unit, draws, sigma in unknown:
-            if sigma > 0.0:
-                drawn = np.asarray(draws)[:, index]
-                texts = [
-                    format_quantity(float(mean), float(sd))
-                    for mean, sd in zip(drawn.mean(axis=0), drawn.std(axis=0, ddof=1), strict=True)
-                ]
-                rows.append([manoeuvre.recording.name, label, unit, f"0 ± {format_number(sigma)}", *texts])
-    return rows
-
-
-def misfit_rows(posterior: Posterior, fits: list[list[SensorFit]]) -> Rows:
-    """Return recording, sensor, number of scalar samples, chi-square per sample and largest residual."""
     return [
         [
-            manoeuvre.recording.name,
-            fit.kind.value,
-            str(fit.samples),
-            _chi2_per_sample(fit.chi2, max(fit.samples, 1)),
-            _largest(fit.residual),
+            *(state.recording, state.name, state.unit, f"0 ± {format_number(state.prior_sd)}"),
+            *map(format_quantity, state.mean.tolist(), state.sd.tolist()),
         ]
-        for manoeuvre, sensors in zip(posterior.manoeuvres, fits, strict=True)
+        for state in result.starts
+    ]
+
+
+def misfit_rows(result: Identification) -> Rows:
+    """Return recording, sensor, number of scalar samples, chi-square per sample and largest residual."""
+    return [
+        [manoeuvre.recording.name, fit.kind.value, str(fit.samples), *_misfit_cells(fit)]
+        for manoeuvre, sensors in zip(result.posterior.manoeuvres, result.sensor_fits, strict=True)
         for fit in sensors
     ]
 
 
-def torque_rows(posterior: Posterior, fits: list[list[TorqueFit]]) -> Rows:
+def torque_rows(result: Identification) -> Rows:
     """Return recording, joint, noise, number of samples used, chi-square per sample and largest residual."""
-    sigmas = () if posterior.model.torque is None else posterior.model.torque.sigma
+    sensor = result.posterior.model.torque
     return [
         [
-            manoeuvre.recording.name,
-            fit.joint,
-            f"{format_number(sigma, 2)} {fit.unit}",
-            f"{len(fit.residual)} of {len(fit.time)}",
-            _chi2_per_sample(float(fit.residual @ fit.residual), len(fit.residual)) if len(fit.residual) else "none",
-            _largest(fit.residual),
+            *(manoeuvre.recording.name, fit.joint, f"{format_number(sigma, 2)} {fit.unit}"),
+            f"{fit.samples} of {len(fit.time)}",
+            *_misfit_cells(fit),
         ]
-        for manoeuvre, joints in zip(posterior.manoeuvres, fits, strict=True)
-        for fit, sigma in zip(joints, sigmas, strict=True)
+        for manoeuvre, joints in zip(result.posterior.manoeuvres, result.torque_fits, strict=True)
+        for fit, sigma in zip(joints, sensor.sigma if sensor else (), strict=True)
     ]
 
 
-def _chi2_per_sample(chi2: float, samples: int) -> str:
-    """Return chi-square per sample ± the standard deviation that noise alone gives it."""
-    return f"{format_fixed(chi2 / samples, 3)} ± {format_fixed(float(np.sqrt(2.0 / samples)), 3)}"
-
-
-def _largest(residual: Floats) -> str:
-    return f"{format_fixed(float(np.nanmax(np.abs(residual), initial=0.0)), 1)} σ"
+def _misfit_cells(fit: WhitenedFit) -> list[str]:
+    """Return chi-square per sample ± the standard deviation that noise alone gives it, and the largest residual."""
+    chi2 = f"{format_fixed(fit.chi2_per_sample, 3)} ± {format_fixed(fit.chi2_sd, 3)}" if fit.samples else "none"
+    return [chi2, f"{format_fixed(fit.largest_residual, 1)} σ"]
 
 
 def _shrinkage(contraction: Contraction) -> str:

@@ -26,14 +26,8 @@ BARS = 20  # largest number of bars of the figure of candidates
 
 def add_causes(document: Document, result: Diagnosis) -> None:
     """Add the most probable sets, the sizes of the named causes, and the strengths of the candidates."""
-    named = bool(result.verdict.causes)
-    document.section(
-        "Why this cause"
-        if len(result.verdict.causes) == 1
-        else "Why these causes"
-        if named
-        else "What could be at work"
-    )
+    titles = ("What could be at work", "Why this cause", "Why these causes")
+    document.section(titles[min(len(result.verdict.causes), 2)])
     document.table(
         ["causes", "probability", "log evidence", "size", "bound", "share of the bound"],
         set_rows(result, SETS),
@@ -43,19 +37,7 @@ def add_causes(document: Document, result: Diagnosis) -> None:
         "beyond its bound is not plausible. Of a body that is missing or sloshes the mass stands for all its moments.",
         ["left", "right", "right", "left", "right", "right"],
     )
-    if named:
-        _add_sizes(document, result)
-    drawn = sorted(result.candidates, key=lambda row: (-row.signal_to_noise, row.name))[:BARS]
-    document.figure(
-        figures.candidate_strengths(drawn, result.verdict.causes, result.alarm.level),
-        f"Signal-to-noise ratio of the {len(drawn)} strongest of {len(result.candidates)} candidates, each alone "
-        "beside the present model. Several can stand out for one cause, since they explain parts of the same residual.",
-        floating=True,
-    )
-
-
-def _add_sizes(document: Document, result: Diagnosis) -> None:
-    if rows := cause_rows(result):
+    if rows := cause_rows(result) if result.named else []:
         document.table(
             ["quantity", "unit", "value ± sd", "from zero", "bound"],
             rows,
@@ -63,8 +45,15 @@ def _add_sizes(document: Document, result: Diagnosis) -> None:
             "with its inertia about its centre of mass; all other vectors are in base or sensor axes.",
             ["left", "left", "right", "right", "right"],
         )
-    else:
+    elif result.named:
         document.paragraph("The named causes have no free parameter: physics fixes their size.")
+    drawn = sorted(result.candidates, key=lambda row: (-row.signal_to_noise, row.name))[:BARS]
+    document.figure(
+        figures.candidate_strengths(drawn, result.verdict.causes, result.alarm.level),
+        f"Signal-to-noise ratio of the {len(drawn)} strongest of {len(result.candidates)} candidates, each alone "
+        "beside the present model. Several can stand out for one cause, since they explain parts of the same residual.",
+        floating=True,
+    )
 
 
 def cause_rows(result: Diagnosis) -> Rows:

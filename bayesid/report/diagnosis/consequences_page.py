@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bayesid.diagnosis import Diagnosis, DisturbingWrench, Frame, Status
+from bayesid.diagnosis import Diagnosis, Frame, Status
 from bayesid.diagnosis.outcome.disturbance import TorqueCorrelation
 from bayesid.diagnosis.outcome.model_change import ParameterChange, SimulationError
 from bayesid.diagnosis.outcome.torque_of_causes import torque_of_causes
@@ -19,21 +19,31 @@ AXES = {Frame.BASE: "base", Frame.ORBIT: "orbit (zenith, along-track, normal)", 
 """Names of the axes in which a disturbance is drawn."""
 
 
-def add_consequences(document: Document, result: Diagnosis, changes: Sequence[ParameterChange]) -> None:
+def add_changes(document: Document, result: Diagnosis, changes: Sequence[ParameterChange], caption: str) -> None:
+    """Add a table of inertial parameters; what a fit with the named causes says only where there are some."""
+    fits = ["without", "with", "shift [sd]"] if result.named else ["fitted"]
+    document.table(
+        ["parameter", "unit", "given", "prior sd", *fits],
+        change_rows(changes, result.named),
+        caption,
+        ["left", "left", "right", "right", *["right"] * len(fits)],
+    )
+
+
+def add_consequences(document: Document, result: Diagnosis) -> None:
     """Add all inertial parameters and the reconstructed disturbance."""
-    named = bool(result.verdict.causes)
+    named, changes = result.named, result.parameter_changes
     document.section("Consequences" if named else "Inertial parameters and the disturbance")
     if changes:
-        document.table(
-            ["parameter", "unit", "given", "prior sd", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
-            change_rows(changes, named),
+        add_changes(
+            document,
+            result,
+            changes,
             "Inertial parameters, ± sd: given with the prior's width, fitted without the named causes, fitted with "
             "them. A shift of many standard deviations of the fit without is the error that would have been believed."
             if named
             else "Inertial parameters, ± sd: given with the prior's width, and fitted with the present model.",
-            ["left", "left", *["right"] * (5 if named else 3)],
         )
-    if changes:
         document.figure(
             figures.parameter_forest(changes, named),
             "Inertial parameters about the values given, as multiples of the prior's width; bars hold 95 %. Widths "
@@ -51,48 +61,40 @@ def add_consequences(document: Document, result: Diagnosis, changes: Sequence[Pa
 
 def _add_disturbance(document: Document, result: Diagnosis) -> None:
     """Add the torque and force that would explain the residual; nothing where only readings are at fault."""
-    named = bool(result.verdict.causes)
-    if result.verdict.status is Status.ADEQUATE or (named and not _may_be_disturbance(result)):
+    named, wrench = result.named, result.disturbance
+    hooks = ("wrench", "momentum", "table", "modes")
+    moves = any(effect.uses(hook) for effect in result.after.fit.effects for hook in hooks)
+    # a fault of the noise could hide a disturbance
+    if result.verdict.status is Status.ADEQUATE or (named and not (moves or result.after.faults)):
         return
-    wrench = result.disturbance
     document.paragraph(
         f"This disturbance of the base would explain the residual{' without the named causes' if named else ''}: "
         "torque about and force through the common centre of mass, smooth in time, with a size estimated from the "
         "data. Bands are ± 1 standard deviation. The part that the model's unknowns can explain is not in it. "
         f"{wrench_sentence(wrench)}"
     )
-    if wrench.signal_to_noise == 0.0:
-        return
-    _add_wrench(document, result, wrench, not named)
-    if named:
-        document.paragraph(f"What the named causes leave. {wrench_sentence(result.unexplained)}")
+    if wrench.signal_to_noise > 0.0:
+        _add_wrench(document, result)
+        if named:
+            document.paragraph(f"What the named causes leave. {wrench_sentence(result.unexplained)}")
 
 
-def _may_be_disturbance(result: Diagnosis) -> bool:
-    """Return whether a named cause acts on the motion, or is a fault of the noise that could hide a disturbance."""
-    hooks = ("wrench", "momentum", "table", "modes")
-    return bool(result.after.faults) or any(effect.uses(hook) for effect in result.after.fit.effects for hook in hooks)
-
-
-def _add_wrench(document: Document, result: Diagnosis, wrench: DisturbingWrench, whole: bool) -> None:
-    """Add the figures of a wrench and the table of its correlations; the whole of it in further axes too."""
-    in_orbit = result.before.fit.posterior.model.orbit is not None
-    for frame, name in AXES.items():
-        if frame is Frame.BASE or (whole and (in_orbit or frame is Frame.INERTIAL)):
-            cause = torque_of_causes(result.after) if not whole else None
-            document.figure(
-                figures.wrench_histories(wrench, frame, cause),
-                f"Reconstructed torque and force, {name} axes."
-                + (
-                    " Dashed: the whole torque of the named causes, with what the model's unknowns could explain of it."
-                    if cause is not None
-                    else ""
-                ),
-                floating=True,
-            )
-    if whole:
+def _add_wrench(document: Document, result: Diagnosis) -> None:
+    """Add the figures of the disturbance and the table of its correlations; in all axes where nothing is named."""
+    cause = torque_of_causes(result.after) if result.named else None
+    dashed = " Dashed: the whole torque of the named causes, with what the model's unknowns could explain of it."
+    frames = [Frame.BASE]
+    if not result.named:
+        frames += [Frame.INERTIAL] if result.before.fit.posterior.model.orbit is None else [Frame.ORBIT, Frame.INERTIAL]
+    for frame in frames:
         document.figure(
-            figures.wrench_spectrum(wrench),
+            figures.wrench_histories(result.disturbance, frame, cause),
+            f"Reconstructed torque and force, {AXES[frame]} axes.{'' if cause is None else dashed}",
+            floating=True,
+        )
+    if not result.named:
+        document.figure(
+            figures.wrench_spectrum(result.disturbance),
             "Amplitude of the reconstructed torque by frequency, base axes, up to the frequency that is resolved.",
             floating=True,
         )

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from bayesid.diagnosis import Diagnosis, Hypothesis, Status
-from bayesid.diagnosis.outcome.model_change import ParameterChange, SimulationError
 from bayesid.report import figures
 from bayesid.report.diagnosis.cause_words import NOTHING, SOMETHING, set_text, size_text, verdict_text
-from bayesid.report.diagnosis.consequences_page import change_rows, most_moved
+from bayesid.report.diagnosis.consequences_page import add_changes, most_moved
 from bayesid.report.diagnosis.diagnosis_sentences import (
     action_sentence,
     cause_summary,
@@ -32,45 +29,42 @@ MOVED = 4  # inertial parameters in the table of the first page
 CLASSES = 4  # classes of causes in the table of probabilities
 
 
-def add_decision(
-    document: Document,
-    result: Diagnosis,
-    changes: Sequence[ParameterChange],
-    record: str | None = None,
-    origin: str | None = None,
-) -> None:
+def add_decision(document: Document, result: Diagnosis, record: str | None = None) -> None:
     """Add the decision, a picture of it, and its tables.
 
     Parameters
     ----------
     document : Document
     result : Diagnosis
-    changes : sequence of ParameterChange
-        All inertial parameters.
     record : str, optional
         How often such a verdict was right where the truth was known.
-    origin : str, optional
-        Files with their hashes, version, seed and command.
     """
-    errors = result.simulation_errors
-    document.decision(
-        f"Decision. {_capital(verdict_text(result.verdict))}", decision_entries(result, changes, errors, record)
+    verdict = verdict_text(result.verdict)
+    document.decision(f"Decision. {verdict[:1].upper()}{verdict[1:]}", decision_entries(result, record))
+    document.figure(
+        figures.cause_picture(result, result.strongest_recording),
+        "Left: the robot as given, with the cause where it acts. Right: what the simulation of "
+        f"{result.recordings[result.strongest_recording]} misses on the axis that "
+        "changes most, in standard deviations of the noise, with running means; the grey band is ± 2 σ.",
     )
-    _add_picture(document, result)
-    _add_changes(document, result, changes)
+    if result.parameter_changes:
+        add_changes(
+            document,
+            result,
+            most_moved(result.parameter_changes, MOVED),
+            "The inertial parameters that move most: given, fitted without the named causes, fitted with them, ± sd."
+            if result.named
+            else "Inertial parameters: given, and fitted with the present model, ± sd. All are on a later page.",
+        )
     document.table(
         ["at work", "probability"],
         probability_rows(result, CLASSES),
         "Probability of being at work, whatever accompanies it; causes that these data cannot tell apart share a row.",
         ["left", "right"],
     )
-    if origin:
-        document.foot(origin)
 
 
-def decision_entries(
-    result: Diagnosis, changes: Sequence[ParameterChange], errors: Sequence[SimulationError], record: str | None = None
-) -> list[tuple[str, str]]:
+def decision_entries(result: Diagnosis, record: str | None = None) -> list[tuple[str, str]]:
     """Return the names and texts of the rows of the box."""
     verdict = result.verdict
     entries = [("Verdict", verdict_sentence(result))]
@@ -87,7 +81,7 @@ def decision_entries(
     if record:
         entries.append(("Record", record))
     entries += [
-        ("What it changes", _change_text(result, changes, errors)),
+        ("What it changes", _change_text(result)),
         ("Conditions", conditions_text(result.after)),
         ("What to do", action_sentence(result)),
     ]
@@ -99,54 +93,20 @@ def _cause_text(result: Diagnosis, cause: str) -> str:
     return f"{cause}, probability {probability}. {cause_summary(result.after, cause)}".rstrip()
 
 
-def _change_text(result: Diagnosis, changes: Sequence[ParameterChange], errors: Sequence[SimulationError]) -> str:
+def _change_text(result: Diagnosis) -> str:
     """Return the parameter that moves most and the errors of the simulation, before and after."""
-    if not result.verdict.causes:
-        return "No inertial parameter: nothing is added to the model. " + _errors_text(errors, named=False)
-    text = ""
-    if moved := most_moved(changes, 1):
-        item = moved[0]
+    text = "" if result.named else "No inertial parameter: nothing is added to the model. "
+    for moved in most_moved(result.parameter_changes, 1) if result.named else ():
         text = (
-            f"{item.name}: given {format_number(item.given, 4)}, fitted without "
-            f"{format_quantity(item.without, item.without_sd)}, with {format_quantity(item.fitted, item.fitted_sd)} "
-            f"{format_unit(item.unit)}. "
+            f"{moved.name}: given {format_number(moved.given, 4)}, fitted without "
+            f"{format_quantity(moved.without, moved.without_sd)}, with "
+            f"{format_quantity(moved.fitted, moved.fitted_sd)} {format_unit(moved.unit)}. "
         )
-    return text + _errors_text(errors, named=True)
-
-
-def _errors_text(errors: Sequence[SimulationError], named: bool) -> str:
-    parts = []
-    for item in errors:
-        after = f" before, {format_number(item.after, 2)} after" if named else ""
-        parts.append(f"{item.kind.value} {format_number(item.before, 2)}{after} {format_unit(item.kind.unit)}")
-    return f"Error of the simulation, rms: {'; '.join(parts)}."
-
-
-def _add_picture(document: Document, result: Diagnosis) -> None:
-    document.figure(
-        figures.cause_picture(result, result.strongest_recording),
-        "Left: the robot as given, with the cause where it acts. Right: what the simulation of "
-        f"{result.before.fit.posterior.manoeuvres[result.strongest_recording].recording.name} misses on the axis that "
-        "changes most, in standard deviations of the noise, with running means; the grey band is ± 2 σ.",
-    )
-
-
-def _add_changes(document: Document, result: Diagnosis, changes: Sequence[ParameterChange]) -> None:
-    named = bool(result.verdict.causes)
-    if not changes:
-        return
-    document.table(
-        ["parameter", "unit", "given", "prior sd", *(["without", "with", "shift [sd]"] if named else ["fitted"])],
-        change_rows(most_moved(changes, MOVED), named),
-        "The inertial parameters that move most: given, fitted without the named causes, fitted with them, ± sd."
-        if named
-        else "Inertial parameters: given, and fitted with the present model, ± sd. All are on a later page.",
-        ["left", "left", *["right"] * (5 if named else 3)],
-    )
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    errors = []
+    for error in result.simulation_errors:
+        after = f" before, {format_number(error.after, 2)} after" if result.named else ""
+        errors.append(f"{error.kind.value} {format_number(error.before, 2)}{after} {format_unit(error.kind.unit)}")
+    return f"{text}Error of the simulation, rms: {'; '.join(errors)}."
 
 
 def conditions_text(hypothesis: Hypothesis) -> str:
@@ -162,8 +122,7 @@ def conditions_text(hypothesis: Hypothesis) -> str:
     noise = f"noise of {', '.join(coloured)} coloured" if coloured else "noise white"
     if hypothesis.faults:
         noise += f", with {', '.join(fault.label for fault in hypothesis.faults)}"
-    known = "geometry exact"
-    return f"{links}, {known}, {noise}; bodies rigid but for the causes considered.".capitalize()
+    return f"{links}, geometry exact, {noise}; bodies rigid but for the causes considered.".capitalize()
 
 
 def probability_rows(result: Diagnosis, most: int) -> Rows:

@@ -46,13 +46,14 @@ def diagnosis_report(
     origin : str, optional
         Where the report comes from: files with their hashes, version, seed and command.
     """
-    changes = result.parameter_changes
     document = Document(title, "Diagnosis")
-    add_decision(document, result, changes, record, origin)
+    add_decision(document, result, record)
+    if origin:
+        document.foot(origin)
     document.page()
     add_evidence(document, result)
     add_causes(document, result)
-    add_consequences(document, result, changes)
+    add_consequences(document, result)
     add_limits(document, result, advice)
     refusal = None if identification is not None else _refusal(result)
     if refusal is not None:
@@ -78,10 +79,10 @@ def _refusal(result: Diagnosis) -> InputError | None:
 
 
 def _add_sampled(document: Document, result: Diagnosis, identification: Identification) -> None:
-    document.section("The extended model, sampled" if result.verdict.causes else "The present model, sampled")
+    document.section("The extended model, sampled" if result.named else "The present model, sampled")
     document.paragraph(
         "The rest of this report is the identification with the "
-        + ("model that holds the named causes" if result.verdict.causes else "present model")
+        + ("model that holds the named causes" if result.named else "present model")
         + " by sampling: uncertainties from here on need no linearisation."
     )
     add_identification(document, identification, [])

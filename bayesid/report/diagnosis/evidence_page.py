@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from bayesid.diagnosis import Diagnosis, Hypothesis
-from bayesid.inference.residual_view import ResidualView
+from bayesid.diagnosis import Diagnosis
 from bayesid.report import figures
 from bayesid.report.diagnosis.diagnosis_sentences import alarm_sentence, gain_sentence
 from bayesid.report.document import Document, Rows
@@ -19,21 +18,20 @@ RECORDINGS = 6  # largest number of further recordings whose residuals are drawn
 def add_evidence(document: Document, result: Diagnosis) -> None:
     """Add the residuals of the strongest recording, the spectra of all, and what the causes gain."""
     document.section("Evidence")
-    sides = _sides(result)
-    strongest = result.strongest_recording
+    sides, strongest = result.residuals, result.strongest_recording
     document.paragraph(
         f"{alarm_sentence(result)} {gain_sentence(result)} Residuals are in units of their noise σ and freed of their "
         "correlation, so that a right model leaves independent values of standard deviation one. "
         + (
             "Before is the present model, after the one with the named causes, all unknowns fitted again."
-            if sides[1:]
+            if result.named
             else ""
         )
     )
     document.figure(
         figures.residual_histories(sides, strongest),
-        f"Residuals in {_names(result)[strongest]}"
-        + (", the recording that changes most" if len(_names(result)) > 1 else "")
+        f"Residuals in {result.recordings[strongest]}"
+        + (", the recording that changes most" if len(result.recordings) > 1 else "")
         + ", sensor axes. The grey band is ± 2 σ; the line is a running mean over a fortieth of the recording.",
         floating=True,
     )
@@ -48,18 +46,20 @@ def add_evidence(document: Document, result: Diagnosis) -> None:
 
 def add_other_residuals(document: Document, result: Diagnosis) -> None:
     """Add the residuals of the other recordings over time."""
-    sides, strongest = _sides(result), result.strongest_recording
-    others = [index for index in range(len(_names(result))) if index != strongest]
+    strongest = result.strongest_recording
+    others = [index for index in range(len(result.recordings)) if index != strongest]
     for index in others[:RECORDINGS]:
-        document.figure(figures.residual_histories(sides, index), f"Residuals in {_names(result)[index]}, sensor axes.")
+        document.figure(
+            figures.residual_histories(result.residuals, index),
+            f"Residuals in {result.recordings[index]}, sensor axes.",
+        )
     if len(others) > RECORDINGS:
         document.paragraph(f"Of {len(others)} further recordings the first {RECORDINGS} are drawn.")
 
 
 def _add_gain(document: Document, result: Diagnosis) -> None:
-    named = bool(result.verdict.causes)
     rows, header = gain_rows(result), ["measure", "before", "after", "expected"]
-    if not named:
+    if not result.named:
         rows, header = [[name, value, expected] for name, value, _, expected in rows], ["measure", "value", "expected"]
     document.table(
         header,
@@ -75,20 +75,6 @@ def _add_gain(document: Document, result: Diagnosis) -> None:
     )
 
 
-def _sides(result: Diagnosis) -> list[ResidualView]:
-    sides = [_residuals(result.before)]
-    return [*sides, _residuals(result.after)] if result.verdict.causes else sides
-
-
-def _residuals(hypothesis: Hypothesis) -> ResidualView:
-    """Return the residuals of a hypothesis at its mode."""
-    return hypothesis.fit.view
-
-
-def _names(result: Diagnosis) -> list[str]:
-    return [manoeuvre.recording.name for manoeuvre in result.before.fit.posterior.manoeuvres]
-
-
 def gain_rows(result: Diagnosis) -> Rows:
     """Return each measure of fit and prediction with its value before and after, and what noise alone would give."""
     before, after = result.gain.before, result.gain.after
@@ -100,10 +86,9 @@ def gain_rows(result: Diagnosis) -> Rows:
     spread = math.sqrt(2.0 / result.before.fit.posterior.samples)
     expected = [f"1 ± {format_fixed(spread, 3)}", "0.683", *["1"] * len(before.rms)]
     if before.held_out is not None and after.held_out is not None:
-        names = [manoeuvre.recording.name for manoeuvre in result.before.fit.posterior.manoeuvres]
         rows += [
             _measure(f"held-out log score of {name}", float(one), float(two), 1)
-            for name, one, two in zip(names, before.held_out, after.held_out, strict=True)
+            for name, one, two in zip(result.recordings, before.held_out, after.held_out, strict=True)
         ]
         rows.append(_measure("held-out log score, sum", float(before.held_out.sum()), float(after.held_out.sum()), 1))
     expected += ["higher is better"] * (len(rows) - len(expected))

@@ -38,7 +38,7 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
         document.table(
             ["cause", "other", "largest cosine", "smallest cosine", ""],
             pair_rows(pairs),
-            ("Named causes" if result.verdict.causes else "The most probable causes")
+            ("Named causes" if result.named else "The most probable causes")
             + " and those that imitate them best, apart from what the model's unknowns explain. Where the largest "
             "cosine is near one, some change by the one can be taken for some change by the other; where the smallest "
             "is, too, these manoeuvres cannot tell them apart at all.",

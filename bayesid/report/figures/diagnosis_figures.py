@@ -69,7 +69,7 @@ def cause_picture(result: Diagnosis, recording: int) -> Figure:
     figure = wide_figure(2.3)
     grid = figure.add_gridspec(1, 2, width_ratios=[1.0, 1.35])
     _draw_robot(figure.add_subplot(grid[0]), result, recording)
-    sides = [_residuals(result.before)] + ([_residuals(result.after)] if result.verdict.causes else [])
+    sides = result.residuals
     kind, axis = moved_axis(sides, recording)
     panels = grid[1].subgridspec(len(sides), 1)
     values = [side.series(recording, kind, axis) for side in sides]
@@ -95,10 +95,6 @@ def moved_axis(sides: list[ResidualView], recording: int) -> tuple[SensorKind, i
         return squares[0] - sum(squares[1:])
 
     return max(((kind, axis) for kind in sides[0].kinds for axis in range(kind.size)), key=lambda item: gain(*item))
-
-
-def _residuals(hypothesis: Hypothesis) -> ResidualView:
-    return hypothesis.fit.view
 
 
 def _draw_robot(axes: Axes, result: Diagnosis, recording: int) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
 from bayesid._math.arrays import Floats
-from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws, bodies_of, half_range, reported_effect
+from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws
 from bayesid.inference.identification import Identification
 from bayesid.report.figures.figure_style import (
     BAND,
@@ -25,7 +25,7 @@ from bayesid.report.figures.figure_style import (
 )
 from bayesid.report.numbers import format_fixed, format_number, format_quantity, format_unit
 
-__all__ = ["convergence", "corner", "correlations", "prior_to_posterior", "widths"]
+__all__ = ["convergence", "corner", "correlations", "prior_to_posterior"]
 
 REACH = 3.5  # half-width of a corner plot's axes in posterior standard deviations
 CELLS = 35  # number of cells of a corner plot's histograms along one axis
@@ -33,7 +33,6 @@ CELLS = 35  # number of cells of a corner plot's histograms along one axis
 LABELS, VALUES = 36, 16
 """Largest numbers of parameters of which a matrix of correlations has room for every name, and for every value."""
 
-PRIOR_DRAWS = 4000  # number of draws from the prior
 SHOWN = 3  # number of coordinates drawn, those in which the ensembles agree least
 RANK_BINS = 20  # number of bins of the histograms of ranks
 
@@ -133,17 +132,10 @@ def correlations(names: Sequence[str], covariance: ArrayLike) -> Figure:
 
 
 @styled
-def prior_to_posterior(result: Identification, seed: int = 0) -> Figure:
-    """Draw posterior width over prior width of every reported quantity, on a logarithmic scale.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the draws from the prior.
-    """
-    prior, posterior = widths(result, seed)
-    names = list(posterior)
-    ratio = np.array([posterior[name] / prior[name] for name in names])
+def prior_to_posterior(result: Identification) -> Figure:
+    """Draw posterior width over prior width of every reported quantity, on a logarithmic scale."""
+    names = list(result.widths)
+    ratio = np.array([posterior / prior for prior, posterior in result.widths.values()])
     figure = wide_figure(0.7 + 0.17 * len(names))
     axes = figure.subplots()
     rows = np.arange(len(names))
@@ -162,46 +154,13 @@ def prior_to_posterior(result: Identification, seed: int = 0) -> Figure:
     return figure
 
 
-def widths(result: Identification, seed: int = 0) -> tuple[dict[str, float], dict[str, float]]:
-    """Return half the central 68 % range of every reported quantity, in the prior and in the posterior."""
-    z = np.random.default_rng(seed).normal(size=(PRIOR_DRAWS, result.posterior.size))
-    values = result.posterior.unknowns.values_of(z)
-    prior = _half_ranges(bodies_of(result.posterior, z))
-    posterior = _half_ranges(result.bodies)
-    for effect, draws in zip(result.posterior.model.effects, values.effects, strict=True):
-        if effect.parameters:
-            prior |= _effect_ranges(result, effect.label, reported_effect(effect, np.asarray(draws)))
-            posterior |= _effect_ranges(result, effect.label, result.effects[effect.label])
-    return prior, posterior
-
-
-def _half_ranges(bodies: dict[str, BodyDraws]) -> dict[str, float]:
-    return {
-        f"{body.name}.{key}": width
-        for body in bodies.values()
-        for key, width in zip(BODY_QUANTITIES, half_range(body.values), strict=True)
-    }
-
-
-def _effect_ranges(result: Identification, label: str, draws: Floats) -> dict[str, float]:
-    effect = next(effect for effect in result.posterior.model.effects if effect.label == label)
-    copies = (
-        [f"{label}[{item.recording.name}]" for item in result.posterior.manoeuvres] if effect.per_recording else [label]
-    )
-    names = [f"{copy}.{key}" for copy in copies for key, _ in effect.quantities]
-    return dict(zip(names, half_range(draws.reshape(len(draws), -1)), strict=True))
-
-
 @styled
 def convergence(result: Identification) -> Figure:
     """Draw running means and ranks of the ensembles, for the coordinates in which they agree least.
 
     Ensembles that sample the same distribution have running means that meet at zero and ranks spread evenly.
     """
-    import arviz as az  # here, as it takes a second that reports without samples save
-
-    chains = result.chains
-    r_hat = np.array([float(az.rhat(chains.z[:, :, k])) for k in range(chains.z.shape[2])])
+    chains, r_hat = result.chains, np.array(list(result.r_hat.values()))
     worst = np.argsort(r_hat)[::-1][:SHOWN]
     figure = wide_figure(0.75 + 1.35 * len(worst))
     panels = figure.subplots(len(worst), 2, squeeze=False, gridspec_kw={"width_ratios": [1.5, 1.0]})
