@@ -67,16 +67,15 @@ def check_report(
 def _add_recording(document: Document, posterior: Posterior, index: int, check: RecordingCheck) -> None:
     document.section(f"Recording {check.name}")
     document.table(
-        ["channel", "samples", "interval [s]", "longest gap [s]"],
+        ["channel", "samples:", "interval [s]:", "longest gap [s]:"],
         [
             [c.name, str(c.samples), format_number(c.interval, 4), format_number(c.longest_gap, 4)]
             for c in check.channels
         ],
         "Channels of the recording.",
-        ["left", "right", "right", "right"],
     )
     document.table(
-        ["sensor", "unit", "declared sigma", "sigma in quiet stretches", "delay against the joints [s]"],
+        ["sensor", "unit", "declared sigma:", "sigma in quiet stretches:", "delay against the joints [s]:"],
         [
             [
                 sensor.kind.value,
@@ -91,18 +90,17 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
         ],
         "Noise and clocks. The noise is estimated from third differences where the signal hardly changes; the delay is "
         "fitted against the robot as given and shifts with its errors.",
-        ["left", "left", "right", "right", "right"],
     )
     if check.joints:
         document.table(
             [
                 "joint",
-                "range",
-                "largest speed",
-                "encoder sigma",
-                "chi-square per sample",
-                "sd of velocity",
-                "sd of acceleration",
+                "range:",
+                "largest speed:",
+                "encoder sigma:",
+                "chi-square per sample:",
+                "sd of velocity:",
+                "sd of acceleration:",
             ],
             [
                 [
@@ -118,7 +116,6 @@ def _add_recording(document: Document, posterior: Posterior, index: int, check: 
             ],
             "Joint motion after smoothing; the last two columns are the standard deviations that the smoothing leaves "
             "[joint unit per s, per s²].",
-            ["left"] + ["right"] * 6,
         )
         manoeuvre = posterior.manoeuvres[index]
         time = np.linspace(manoeuvre.recording.time[0], manoeuvre.recording.time[-1], CURVE_POINTS)

@@ -65,39 +65,42 @@ def _add_result(document: Document, designs: Sequence[Design], best: Design) -> 
     document.section("Result")
     document.paragraph(summary(designs, best))
     document.table(
-        ["manoeuvre", "log-determinant", f"sd relative to {reference.name}", "worst direction", "evaluations", "go"],
+        [
+            "manoeuvre",
+            "log-determinant:",
+            f"sd relative to {reference.name}:",
+            "worst direction:",
+            "evaluations:",
+            "go",
+        ],
         design_rows(designs),
         "Manoeuvres, named after the criterion each was designed by. Logarithm of the determinant of the predicted "
         "posterior covariance of all parameters in SI units; geometric mean of their standard deviations (sd) relative "
         f"to {reference.name}; sd of the log-Cholesky coordinates along the worst direction (relative: a mass is known "
         "to twice it); evaluations of the search; whether all limits hold with 99 % probability.",
-        ["left", "right", "right", "right", "right", "left"],
     )
     document.table(
-        ["quantity", "unit", "prior centre", *(design.name for design in designs)],
+        ["quantity", "unit", "prior centre:", *(f"{design.name}:" for design in designs)],
         sd_rows(designs),
         "Predicted posterior standard deviation of every parameter, in the unit of its row, by manoeuvre.",
-        ["left", "left", *["right"] * (1 + len(designs))],
     )
 
 
 def _add_limits(document: Document, designs: Sequence[Design], best: Design) -> None:
     document.section("Limits")
     document.table(
-        ["quantity", "unit", "limit", "largest", "used", "state"],
+        ["quantity", "unit", "limit:", "largest:", "used:", "state"],
         limit_rows(best),
         f"Limits of {best.name} and the largest value along it, at the prior's centre. A joint's range is counted from "
         "its middle; rest is the joints' speed at both ends; the value of a quiet band is the share of the power of "
         "the base's motion within it.",
-        ["left", "left", "right", "right", "right", "left"],
     )
     if rows := risk_rows(designs):
         document.table(
-            ["manoeuvre", "quantity", "unit", "limit", "99 % below", "go"],
+            ["manoeuvre", "quantity", "unit", "limit:", "99 % below:", "go"],
             rows,
             "Limits that depend on the inertial parameters, under the present uncertainty: the value that the largest "
             "along the manoeuvre stays below with 99 % probability.",
-            ["left", "left", "left", "right", "right", "left"],
         )
 
 

@@ -124,14 +124,16 @@ class Document:
         Parameters
         ----------
         header : sequence of str
-            Title of each column.
+            Title of each column; a colon at its end, which is not printed, sets the column flush right.
         rows : sequence of sequence of str
             Cells, as many in each row as there are columns.
         caption : str, optional
         align : sequence of str, optional
-            Alignment of each column, ``left``, ``center`` or ``right``; by default all are ``left``.
+            Alignment of each column, ``left``, ``center`` or ``right``, for columns of which the titles do not say it.
         """
-        align = ["left"] * len(header) if align is None else list(align)
+        if align is None:
+            align = ["right" if title.endswith(":") else "left" for title in header]
+            header = [title.removesuffix(":") for title in header]
         _check_table(header, rows, align)
         cells = [_cell(text) for row in rows for text in row]
         table = (

@@ -84,11 +84,10 @@ def _add_directions(document: Document, result: Practical) -> None:
     )
     shown = min(SHOWN, len(result.directions))
     document.table(
-        ["no.", "left", "verdict", "direction"],
+        ["no.:", "left:", "verdict", "direction"],
         direction_rows(result, shown),
         f"The {shown} worst known of {len(result.directions)} directions: the share of the prior's width that is left, "
         "and the largest parts of the displacement that the data cannot resolve.",
-        ["right", "right", "left", "left"],
     )
     document.figure(
         figures.displacements(result.directions, result.knowledge.prior_sd),
@@ -100,9 +99,8 @@ def _add_directions(document: Document, result: Practical) -> None:
 def _add_parameters(document: Document, result: Practical) -> None:
     document.section("Parameters")
     document.items(confidence_sentences(result))
-    header = ["parameter", "unit", "value ± sd", "prior sd", "learnt", "verdict", "confused with", "95 % profile"]
+    header = ["parameter", "unit", "value ± sd:", "prior sd:", "learnt:", "verdict", "confused with", "95 % profile"]
     rows = parameter_rows(result)
-    align = ["left", "left", "right", "right", "right", "left", "left", "left"]
     kept = [column for column in range(len(header)) if any(row[column] for row in rows)]
     document.table(
         [header[column] for column in kept],
@@ -111,7 +109,6 @@ def _add_parameters(document: Document, result: Practical) -> None:
         "value and sd of the normal approximation, prior sd, and learnt, which is one minus sd over prior sd; if there "
         "are any, parameters with which the correlation is above 0.9 in size, and the profile interval where the "
         "posterior is not normal.",
-        [align[column] for column in kept],
     )
 
 
@@ -119,14 +116,13 @@ def _add_advice(document: Document, result: Practical) -> None:
     document.section("Recommended measurements")
     document.items(advice_sentences(result))
     worst = min(result.parameters, key=lambda item: item.shrinkage)
-    numbers = [f"no. {number}" for number in range(1, WORST + 1)]
+    numbers = [f"no. {number}:" for number in range(1, WORST + 1)]
     document.table(
-        ["with", *numbers, f"sd of {worst.name}", "nats"],
+        ["with", *numbers, f"sd of {worst.name}:", "nats:"],
         advice_rows(result, worst),
         "Candidates to add to the study, each alone, pulses and swings to every recording: the share of the prior's "
         "width that each would leave in the presently worst directions, the standard deviation it would give to the "
         "presently worst known parameter, and the information on all parameters that it would add.",
-        ["left", *["right"] * (WORST + 2)],
     )
 
 

@@ -80,20 +80,19 @@ def _add_result(document: Document, result: Identification) -> None:
     document.paragraph(verdict(result))
     if rows := parameter_rows(result):
         document.table(
-            ["quantity", "unit", "prior centre", "posterior mean ± sd", "sd / |mean|", "learnt"],
+            ["quantity", "unit", "prior centre:", "posterior mean ± sd:", "sd / |mean|:", "learnt:"],
             rows,
             "Identified bodies, in the axes of the link; inertias are about the body's centre of mass. Learnt is the "
             "share by which the data narrowed the prior (half the central 68 %); prior only stands for less than 10 %.",
-            ["left", "left", "right", "right", "right", "right"],
         )
     if rows := effect_rows(result):
-        header = ["parameter", "unit", "prior, central 68 %", "posterior mean ± sd", "|mean| / sd"]
+        header = ["parameter", "unit", "prior, central 68 %:", "posterior mean ± sd:", "|mean| / sd:"]
         caption = "Parameters of the effects in the model."
-        document.table(header, rows, caption, ["left", "left", "right", "right", "right"])
+        document.table(header, rows, caption)
     if rows := start_rows(result):
-        header = ["recording", "unknown", "unit", "prior", "x", "y", "z"]
+        header = ["recording", "unknown", "unit", "prior:", "x:", "y:", "z:"]
         caption = "State of the base at the start of each recording, base axes."
-        document.table(header, rows, caption, ["left"] * 3 + ["right"] * 4)
+        document.table(header, rows, caption)
 
 
 def _add_robot(document: Document, result: Identification) -> None:
@@ -125,10 +124,9 @@ def _add_fit(document: Document, result: Identification) -> None:
         "of standard deviation one; the grey band is ± 2 σ."
     )
     document.table(
-        ["recording", "sensor", "samples", "chi-square per sample", "largest residual"],
+        ["recording", "sensor", "samples:", "chi-square per sample:", "largest residual:"],
         misfit_rows(result),
         "Misfit by recording and sensor. Noise alone gives one, in two cases of three within the ± stated.",
-        ["left", "left", "right", "right", "right"],
     )
     for manoeuvre, sensors in zip(result.posterior.manoeuvres, result.sensor_fits, strict=True):
         document.figure(
@@ -147,11 +145,10 @@ def _add_torques(document: Document, result: Identification) -> None:
     if result.posterior.model.torque is None:
         return
     document.table(
-        ["recording", "joint", "noise per sample", "samples used", "chi-square per sample", "largest residual"],
+        ["recording", "joint", "noise per sample:", "samples used:", "chi-square per sample:", "largest residual:"],
         torque_rows(result),
         "Joint torques. The torque of a joint with dry friction that stands nearly still carries no information and is "
         "left out.",
-        ["left", "left", "right", "right", "right", "right"],
     )
     for manoeuvre, joints in zip(result.posterior.manoeuvres, result.torque_fits, strict=True):
         document.figure(

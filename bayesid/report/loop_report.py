@@ -56,11 +56,18 @@ def loop_report(history: History, title: str, file: Path, *, origin: str = "") -
     document.decision(TITLES[history.status], entries)
     document.section("Steps")
     document.table(
-        ["step", "designs", "tightest limit", "used", "chi-square per sample", "recordings so far", "goals reached"],
+        [
+            "step:",
+            "designs:",
+            "tightest limit",
+            "used:",
+            "chi-square per sample:",
+            "recordings so far",
+            "goals reached:",
+        ],
         step_rows(history.steps),
         "Every step: how many designs it took until all limits held with 99 %; the limit that the planned manoeuvre "
         "comes closest to, and the share of it that the 99 % quantile uses; the misfit of its identification.",
-        ["right", "right", "left", "right", "right", "left", "right"],
     )
     document.figure(
         figures.loop_progress(done),
@@ -81,17 +88,15 @@ def loop_report(history: History, title: str, file: Path, *, origin: str = "") -
     )
     document.section("Bodies and limits after every step")
     document.table(
-        ["body", "quantity", *(f"after step {step['step']}" for step in done), "unit"],
+        ["body", "quantity", *(f"after step {step['step']}:" for step in done), "unit"],
         body_rows(done),
         "Identified bodies, mean ± standard deviation; the inertia is about the centre of mass, link axes.",
-        ["left", "left", *["right"] * len(done), "left"],
     )
     document.table(
-        ["step", "limit", "allowed", "planned", "99 % quantile", "unit"],
+        ["step:", "limit", "allowed:", "planned:", "99 % quantile:", "unit"],
         limit_rows(done),
         "Limits of the manoeuvres that were flown: the largest planned value at the centre of what was known, and "
         "where it depends on that, the value it stays below with 99 %.",
-        ["right", "left", "right", "right", "right", "left"],
     )
     document.write(file)
 

@@ -19,7 +19,6 @@ from bayesid.simulation.model import Manoeuvre
 __all__ = ["prediction_report"]
 
 CURVE_POINTS = 400  # number of points of a curve over time
-ALIGN = ["left", "left", "left", "right", "right", "right"]  # alignment of three columns of names and three of numbers
 
 
 def prediction_report(
@@ -56,17 +55,15 @@ def prediction_report(
         f"of {len(predictions[0].base.position)} draws from the present knowledge of the robot."
     )
     document.table(
-        ["manoeuvre", "body", "quantity", "x", "y", "z"],
+        ["manoeuvre", "body", "quantity", "x:", "y:", "z:"],
         [row for prediction in predictions for row in pose_rows(prediction)],
         "Predicted final poses.",
-        ALIGN,
     )
     document.table(
-        ["manoeuvre", "body", "quantity", "longest semi-axis", "middle", "shortest", "direction of the longest"],
+        ["manoeuvre", "body", "quantity", "longest semi-axis:", "middle:", "shortest:", "direction of the longest:"],
         [row for prediction in predictions for row in region_rows(prediction)],
         "Ellipsoids that hold the final pose with 95 % probability (normal approximation). The region of the rotation "
         "is that of the small rotation about the predicted attitude, orbit axes.",
-        [*ALIGN, "right"],
     )
     for manoeuvre, prediction in zip(manoeuvres, predictions, strict=True):
         document.section(f"Manoeuvre {prediction.name}")

@@ -59,10 +59,9 @@ def simulation_report(
                 readings = [format_number(float(value), 4) for value in largest]
                 rows.append([recording.name, sensor.kind.value, format_unit(sensor.kind.unit), *readings])
     document.table(
-        ["recording", "sensor", "unit", "x", "y", "z"],
+        ["recording", "sensor", "unit", "x:", "y:", "z:"],
         rows,
         "Largest simulated readings per sensor axis, with the robot as given.",
-        ["left", "left", "left", "right", "right", "right"],
     )
     z = posterior.starting_point()
     beside = (

@@ -67,48 +67,44 @@ def add_appendix(document: Document, result: Diagnosis) -> None:
         ["choice", "verdict", "another"],
         sensitivity_rows(result),
         "Sensitivity of the verdict to the two numbers of the prior and to the range of the causes' scales.",
-        ["left", "left", "left"],
     )
     _add_candidates(document, result)
     _add_torques(document, result)
     document.table(
-        ["cause", "largest size", "why no more is plausible"],
+        ["cause", "largest size:", "why no more is plausible"],
         bound_rows(dict(result.bounds)),
         "Physical bounds on the scales of the causes.",
-        ["left", "right", "left"],
     )
     add_other_residuals(document, result)
-    document.table(["term", "meaning"], [list(entry) for entry in GLOSSARY], "Glossary.", ["left", "left"])
+    document.table(["term", "meaning"], [list(entry) for entry in GLOSSARY], "Glossary.")
 
 
 def _add_candidates(document: Document, result: Diagnosis) -> None:
     document.table(
         [
             "candidate",
-            "probability",
-            "signal to noise",
-            "p, adjusted",
-            "log Bayes factor",
+            "probability:",
+            "signal to noise:",
+            "p, adjusted:",
+            "log Bayes factor:",
             "size, or 95 % limit",
-            "power",
+            "power:",
         ],
         candidate_rows(result.candidates, result.alarm.level),
         f"All {len(result.candidates)} candidates, each alone beside the present model, from the linear response; the "
         "probability is that of being at work, whatever accompanies it. The p-value counts all tests. Sizes are given "
         "of candidates that are seen; of the others, the magnitudes that they stay below with 95 %. A cell is empty "
         "where nothing was evaluated.",
-        ["left", "right", "right", "right", "right", "left", "right"],
     )
 
 
 def _add_torques(document: Document, result: Diagnosis) -> None:
     if isinstance(result.torques, TorqueReading):
         document.table(
-            ["candidate", "probability", "size ± sd"],
+            ["candidate", "probability:", "size ± sd"],
             torque_rows(result.torques),
             "What could act on the joint torques alone, read beside the verdict on the motion: the probability of "
             "being at work, and the size where it is. Something unknown is a torque of any smooth course at one joint.",
-            ["left", "right", "left"],
         )
 
 

@@ -29,21 +29,19 @@ def add_causes(document: Document, result: Diagnosis) -> None:
     titles = ("What could be at work", "Why this cause", "Why these causes")
     document.section(titles[min(len(result.verdict.causes), 2)])
     document.table(
-        ["causes", "probability", "log evidence", "size", "bound", "share of the bound"],
+        ["causes", "probability:", "log evidence:", "size", "bound:", "share of the bound:"],
         set_rows(result, SETS),
         f"The {min(SETS, len(result.probabilities.sets))} most probable sets of causes, of "
         f"{len(result.probabilities.sets)} considered. The log evidence is relative to that of nothing. Sizes are root "
         "mean squares of the amplitudes that share a unit, by the linear model at the most probable scale; a size "
         "beyond its bound is not plausible. Of a body that is missing or sloshes the mass stands for all its moments.",
-        ["left", "right", "right", "left", "right", "right"],
     )
     if rows := cause_rows(result) if result.named else []:
         document.table(
-            ["quantity", "unit", "value ± sd", "from zero", "bound"],
+            ["quantity", "unit", "value ± sd:", "from zero:", "bound:"],
             rows,
             "Size of the named causes, fitted together with all unknowns. Changes of a link are in the link's axes, "
             "with its inertia about its centre of mass; all other vectors are in base or sensor axes.",
-            ["left", "left", "right", "right", "right"],
         )
     elif result.named:
         document.paragraph("The named causes have no free parameter: physics fixes their size.")

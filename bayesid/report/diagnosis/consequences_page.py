@@ -21,12 +21,11 @@ AXES = {Frame.BASE: "base", Frame.ORBIT: "orbit (zenith, along-track, normal)", 
 
 def add_changes(document: Document, result: Diagnosis, changes: Sequence[ParameterChange], caption: str) -> None:
     """Add a table of inertial parameters; what a fit with the named causes says only where there are some."""
-    fits = ["without", "with", "shift [sd]"] if result.named else ["fitted"]
+    fits = ["without:", "with:", "shift [sd]:"] if result.named else ["fitted:"]
     document.table(
-        ["parameter", "unit", "given", "prior sd", *fits],
+        ["parameter", "unit", "given:", "prior sd:", *fits],
         change_rows(changes, result.named),
         caption,
-        ["left", "left", "right", "right", *["right"] * len(fits)],
     )
 
 
@@ -51,10 +50,9 @@ def add_consequences(document: Document, result: Diagnosis) -> None:
             floating=True,
         )
     document.table(
-        ["sensor", "unit", *(["before", "after"] if named else ["error"]), "noise alone"],
+        ["sensor", "unit", *(["before:", "after:"] if named else ["error:"]), "noise alone:"],
         error_rows(result.simulation_errors, named),
         "Root mean square error of the simulation, length of all axes, freed of its correlation.",
-        ["left", "left", *["right"] * (3 if named else 2)],
     )
     _add_disturbance(document, result)
 
@@ -100,11 +98,10 @@ def _add_wrench(document: Document, result: Diagnosis) -> None:
         )
     if rows := correlation_rows(result.torque_correlations):
         document.table(
-            ["component, base axes", "moves with", "correlation"],
+            ["component, base axes", "moves with", "correlation:"],
             rows,
             "Largest correlations of the reconstructed torque with known series, all recordings pooled. The series are "
             "smooth, so that a correlation of one half can be chance.",
-            ["left", "left", "right"],
         )
 
 

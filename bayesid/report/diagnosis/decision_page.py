@@ -57,10 +57,9 @@ def add_decision(document: Document, result: Diagnosis, record: str | None = Non
             else "Inertial parameters: given, and fitted with the present model, ± sd. All are on a later page.",
         )
     document.table(
-        ["at work", "probability"],
+        ["at work", "probability:"],
         probability_rows(result, CLASSES),
         "Probability of being at work, whatever accompanies it; causes that these data cannot tell apart share a row.",
-        ["left", "right"],
     )
 
 

@@ -58,9 +58,10 @@ def add_other_residuals(document: Document, result: Diagnosis) -> None:
 
 
 def _add_gain(document: Document, result: Diagnosis) -> None:
-    rows, header = gain_rows(result), ["measure", "before", "after", "expected"]
+    rows, header = gain_rows(result), ["measure", "before:", "after:", "expected:"]
     if not result.named:
-        rows, header = [[name, value, expected] for name, value, _, expected in rows], ["measure", "value", "expected"]
+        header = ["measure", "value:", "expected:"]
+        rows = [[name, value, expected] for name, value, _, expected in rows]
     document.table(
         header,
         rows,
@@ -71,7 +72,6 @@ def _add_gain(document: Document, result: Diagnosis) -> None:
             else "The held-out log score of a recording is the logarithm of the density that the model, fitted to the "
             "other recordings, gives to it."
         ),
-        ["left", *["right"] * (len(header) - 1)],
     )
 
 

@@ -36,13 +36,12 @@ def add_limits(document: Document, result: Diagnosis, advice: str | None = None)
     _add_unseen(document, result)
     if pairs := result.inseparable_pairs[:PAIRS]:
         document.table(
-            ["cause", "other", "largest cosine", "smallest cosine", ""],
+            ["cause", "other", "largest cosine:", "smallest cosine:", ""],
             pair_rows(pairs),
             ("Named causes" if result.named else "The most probable causes")
             + " and those that imitate them best, apart from what the model's unknowns explain. Where the largest "
             "cosine is near one, some change by the one can be taken for some change by the other; where the smallest "
             "is, too, these manoeuvres cannot tell them apart at all.",
-            ["left", "left", "right", "right", "left"],
         )
     document.paragraph("How the verdict was reached:")
     document.items([*method_sentences(result), computation_sentence(result)])
@@ -55,10 +54,9 @@ def _add_unseen(document: Document, result: Diagnosis) -> None:
             "raised no alarm in more than half of all cases. Their absence from the verdict says little about them."
         )
         document.table(
-            ["candidate", "power", "95 % limits on its magnitude"],
+            ["candidate", "power:", "95 % limits on its magnitude"],
             unseen_rows(hidden),
             "Candidates out of reach of these manoeuvres.",
-            ["left", "right", "left"],
         )
     elif result.verdict.status in (Status.ADEQUATE, Status.EXPLAINED):
         document.paragraph(
