@@ -16,8 +16,14 @@ from bayesid.report.figures.diagnosis_figures import (
     wrench_histories,
     wrench_spectrum,
 )
-from bayesid.report.figures.identifiability_figures import direction_widths, displacements
-from bayesid.report.figures.posterior_figures import convergence, corner, correlations, prior_to_posterior
+from bayesid.report.figures.posterior_figures import (
+    convergence,
+    corner,
+    correlations,
+    direction_widths,
+    displacements,
+    prior_to_posterior,
+)
 from bayesid.report.figures.residual_figures import (
     measured_against_simulated,
     residual_histories,

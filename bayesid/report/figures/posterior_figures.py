@@ -1,4 +1,4 @@
-"""Figures of a posterior: distributions, correlations, widths over the prior's, agreement of the ensembles."""
+"""Figures of a posterior: distributions, correlations, directions, widths over the prior's, agreement of ensembles."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
 from bayesid._math.arrays import Floats
-from bayesid.inference.body_quantities import BODY_QUANTITIES, BodyDraws
+from bayesid.identifiability.directions import Direction
+from bayesid.inference.body_quantities import BODY_QUANTITIES, CONTRACTED, PRIOR_ONLY, BodyDraws, ContractionVerdict
 from bayesid.inference.identification import Identification
 from bayesid.report.figures.figure_style import (
     BAND,
@@ -25,16 +27,29 @@ from bayesid.report.figures.figure_style import (
 )
 from bayesid.report.numbers import format_fixed, format_number, format_quantity, format_unit
 
-__all__ = ["convergence", "corner", "correlations", "prior_to_posterior"]
+__all__ = ["convergence", "corner", "correlations", "direction_widths", "displacements", "prior_to_posterior"]
 
 REACH = 3.5  # half-width of a corner plot's axes in posterior standard deviations
+
 CELLS = 35  # number of cells of a corner plot's histograms along one axis
 
 LABELS, VALUES = 36, 16
 """Largest numbers of parameters of which a matrix of correlations has room for every name, and for every value."""
 
 SHOWN = 3  # number of coordinates drawn, those in which the ensembles agree least
+
 RANK_BINS = 20  # number of bins of the histograms of ranks
+
+WORST, MOST_ROWS = 12, 44  # largest numbers of directions and of parameters in the map of displacements
+
+VISIBLE = 0.1  # displacement over the largest of its direction from which on a parameter counts as moved
+
+LOOK = {
+    ContractionVerdict.CONTRACTED: COLOURS[2],
+    ContractionVerdict.WEAKLY: COLOURS[4],
+    ContractionVerdict.NOT: COLOURS[1],
+}
+"""Colour of each verdict."""
 
 
 @styled
@@ -208,3 +223,53 @@ def _draw_ranks(axes: Axes, draws: Floats) -> None:
     axes.axhline(1.0, color="black", linewidth=0.6)
     axes.set_ylim(0.0, 2.0)
     axes.set_xlim(0.0, 1.0)
+
+
+@styled
+def direction_widths(directions: Sequence[Direction]) -> Figure:
+    """Draw posterior sd over prior sd of every direction."""
+    figure = wide_figure(2.1)
+    axes = figure.subplots()
+    ratio = np.array([item.sd / item.prior_sd for item in directions])
+    numbers = np.arange(1, len(ratio) + 1)
+    for verdict, colour in LOOK.items():
+        chosen = np.array([item.verdict is verdict for item in directions])
+        if chosen.any():
+            axes.semilogy(numbers[chosen], ratio[chosen], "o", markersize=3.5, color=colour, label=verdict.value)
+    axes.axhline(1.0 - CONTRACTED, color="black", linewidth=0.5, linestyle=":")
+    axes.axhline(1.0 - PRIOR_ONLY, color="black", linewidth=0.5, linestyle=":")
+    axes.set_ylim(0.5 * float(ratio.min()), 2.0)
+    axes.set_xlim(0.3, len(ratio) + 0.7)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("direction")
+    axes.set_ylabel("posterior sd / prior sd")
+    axes.legend(loc="lower left")
+    return figure
+
+
+@styled
+def displacements(directions: Sequence[Direction], prior_sd: Floats) -> Figure:
+    """Draw the displacements of the worst known directions in units of the prior's widths, parameters down."""
+    shown = directions[:WORST]
+    moved = np.stack([item.displacement / prior_sd for item in shown], axis=1)
+    # each direction is divided by its largest displacement: otherwise the well-known ones would be white
+    largest = np.abs(moved).max(axis=0)
+    strength = (np.abs(moved) / largest).max(axis=1)
+    rows = np.sort(np.argsort(-strength)[:MOST_ROWS])
+    rows = rows[strength[rows] > VISIBLE]
+    names = [directions[0].names[row] for row in rows]
+    figure = wide_figure(0.9 + 0.155 * len(rows))
+    axes = figure.subplots()
+    axes.grid(False)
+    image = axes.imshow(
+        moved[rows] / largest, vmin=-1.0, vmax=1.0, cmap="RdBu_r", interpolation="nearest", aspect="auto"
+    )
+    axes.set_yticks(range(len(rows)), names)
+    labels = [f"{number}\n{size:.2g}" for number, size in enumerate(largest, start=1)]
+    axes.set_xticks(range(len(shown)), labels)
+    axes.set_xlabel("direction, and its largest displacement in prior sd")
+    for body in range(1, len(rows)):
+        if names[body].split(".")[0] != names[body - 1].split(".")[0]:
+            axes.axhline(body - 0.5, color="black", linewidth=0.5)
+    figure.colorbar(image, ax=axes, label="displacement over the largest", aspect=30)
+    return figure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -50,80 +51,74 @@ NOISE_BAND = "95 % of bins, were it only noise"
 """Legend of the band that holds the bins of a spectrum if the residuals are noise alone."""
 
 
+class Curves(NamedTuple):
+    """What a pair of panels shows: readings above, as measured and simulated, and the residual beneath."""
+
+    title: str
+    time: Floats
+    measured: Floats
+    predicted: Floats
+    residual_time: Floats
+    residual: Floats
+
+
 @styled
 def measured_against_simulated(fits: Sequence[SensorFit]) -> Figure:
-    """Draw the axes of each sensor in one recording: measured and simulated, and the residual beneath.
-
-    Parameters
-    ----------
-    fits : sequence of SensorFit
-        Readings of each sensor.
-    """
-    figure, panels = _paired_panels(len(fits))
-    for row, fit in enumerate(fits):
+    """Draw the axes of each sensor in one recording, a row for each: measured and simulated, and the residual."""
+    rows = []
+    for fit in fits:
         scale, prefix = decimal_scale(fit.measured)
-        for axis in range(fit.kind.size):
-            above, below = panels[2 * row][axis], panels[2 * row + 1][axis]
-            _draw_readings(above, fit.time, fit.measured[:, axis] / scale, fit.predicted[:, axis] / scale)
-            title_panel(above, f"{axis_title(fit.kind, axis)} [{prefix}{format_unit(fit.kind.unit)}]")
-            _draw_residual(below, fit.residual_time, fit.residual[:, axis])
-        for axis in range(fit.kind.size, COLUMNS):
-            panels[2 * row][axis].set_axis_off()
-            panels[2 * row + 1][axis].set_axis_off()
-    shared_legend(figure, panels[0][0], columns=2, markerscale=2.0)
-    return figure
+        title = f"[{prefix}{format_unit(fit.kind.unit)}]"
+        columns = zip(fit.measured.T / scale, fit.predicted.T / scale, fit.residual.T, strict=True)
+        rows.append(
+            [
+                Curves(f"{axis_title(fit.kind, axis)} {title}", fit.time, above, simulated, fit.residual_time, below)
+                for axis, (above, simulated, below) in enumerate(columns)
+            ]
+        )
+    return _paired_panels(rows)
 
 
 @styled
 def torques_over_time(fits: Sequence[TorqueFit]) -> Figure:
-    """Draw the torque of each joint in one recording: measured and simulated, and the residual beneath.
+    """Draw the torque of each joint in one recording, three in a row: measured and simulated, and the residual.
 
-    Parameters
-    ----------
-    fits : sequence of TorqueFit
-        Torque of each joint; the residuals are those of the samples that the likelihood uses.
+    The residuals are those of the samples that the likelihood uses.
     """
-    count = -(-len(fits) // COLUMNS)
-    figure, panels = _paired_panels(count)
-    for index in range(count * COLUMNS):
-        row, column = divmod(index, COLUMNS)
-        above, below = panels[2 * row][column], panels[2 * row + 1][column]
-        if index >= len(fits):
-            above.set_axis_off()
-            below.set_axis_off()
-            continue
-        fit = fits[index]
-        _draw_readings(above, fit.time, fit.measured, fit.predicted)
-        title_panel(above, f"{fit.joint} [{fit.unit}]")
-        _draw_residual(below, fit.residual_time, fit.residual)
-    shared_legend(figure, panels[0][0], columns=2, markerscale=2.0)
-    return figure
+    curves = [
+        Curves(f"{fit.joint} [{fit.unit}]", fit.time, fit.measured, fit.predicted, fit.residual_time, fit.residual)
+        for fit in fits
+    ]
+    return _paired_panels([curves[start : start + COLUMNS] for start in range(0, len(curves), COLUMNS)])
 
 
-def _paired_panels(rows: int) -> tuple[Figure, list[list[Axes]]]:
-    """Return a figure with so many rows of three pairs of panels, readings above and residuals below."""
-    figure = wide_figure(0.3 + 1.95 * rows)
-    panels = figure.subplots(
-        2 * rows, COLUMNS, squeeze=False, sharex=True, gridspec_kw={"height_ratios": [1.5, 1.0] * rows}
-    )
+def _paired_panels(rows: Sequence[Sequence[Curves]]) -> Figure:
+    """Draw rows of up to three pairs of panels."""
+    figure = wide_figure(0.3 + 1.95 * len(rows))
+    ratios = {"height_ratios": [1.5, 1.0] * len(rows)}
+    panels = figure.subplots(2 * len(rows), COLUMNS, squeeze=False, sharex=True, gridspec_kw=ratios)
     for below in panels[1::2, 0]:
         below.set_ylabel("residual [σ]")
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
-    return figure, panels.tolist()
-
-
-def _draw_readings(axes: Axes, time: Floats, measured: Floats, predicted: Floats) -> None:
-    axes.plot(time, measured, ".", color=COLOURS[5], markersize=3.0, label="measured")
-    axes.plot(time, predicted, color="black", linewidth=0.6, label="simulated")
-    axes.locator_params(axis="both", nbins=4)
-
-
-def _draw_residual(axes: Axes, time: Floats, residual: Floats) -> None:
-    axes.axhspan(-2.0, 2.0, **BAND)
-    axes.plot(time, residual, ".", color=COLOURS[1], markersize=1.5)
-    residual_limits(axes, residual)
-    axes.locator_params(axis="both", nbins=4)
+    for row, curves in enumerate(rows):
+        for column in range(COLUMNS):
+            above, below = panels[2 * row, column], panels[2 * row + 1, column]
+            if column >= len(curves):
+                above.set_axis_off()
+                below.set_axis_off()
+                continue
+            drawn = curves[column]
+            title_panel(above, drawn.title)
+            above.plot(drawn.time, drawn.measured, ".", color=COLOURS[5], markersize=3.0, label="measured")
+            above.plot(drawn.time, drawn.predicted, color="black", linewidth=0.6, label="simulated")
+            above.locator_params(axis="both", nbins=4)
+            below.axhspan(-2.0, 2.0, **BAND)
+            below.plot(drawn.residual_time, drawn.residual, ".", color=COLOURS[1], markersize=1.5)
+            residual_limits(below, drawn.residual)
+            below.locator_params(axis="both", nbins=4)
+    shared_legend(figure, panels[0, 0], columns=2, markerscale=2.0)
+    return figure
 
 
 @styled
