@@ -16,6 +16,7 @@ from bayesid.app.command_line import app
 from bayesid.app.schema.editor_schema import editor_schema
 from bayesid.design import known_criteria
 from bayesid.diagnosis.evidence.verdict import Status
+from bayesid.inference.body_quantities import BODY_QUANTITIES
 from bayesid.inference.recording_check import ChannelSampling, JointCheck, RecordingCheck, SensorCheck
 from bayesid.report.effect_catalogue import catalogue
 from bayesid.simulation.effects.register import known_effects
@@ -98,7 +99,7 @@ def test_every_effect_criterion_verdict_and_public_name_is_in_the_manual(text):
 def test_every_key_of_the_results_is_explained(module):
     # words of sentences, units and channels, which are no keys
     others = {"position", "velocity", "torque", "rate", "accel", "rad", "m"}
-    others |= {"base_force", "base_torque", "wheel_momentum"}
+    others |= {"base_force", "base_torque", "wheel_momentum", *BODY_QUANTITIES}
     assert keys_of(module) - results() - others == set()
 
 
