@@ -149,7 +149,7 @@ class Problem:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what the problem is made of, without anything compiled."""
-        return {item.name: getattr(self, item.name) for item in fields(self)}
+        return {part.name: getattr(self, part.name) for part in fields(self)}
 
     def with_limits(self, limits: Limits) -> Problem:
         """Return the problem with other bounds of the same limits, without a new compilation."""
@@ -231,7 +231,7 @@ class Problem:
 
     def cost(self, criterion: Criterion, parameters: Floats, points: Sequence[Floats] = ()) -> tuple[float, Floats]:
         """Return a criterion and its gradient, averaged over points of the unknowns, by default the prior's centre."""
-        alike = [own for own in self.criteria if own.informed is criterion.informed]
+        alike = [one for one in self.criteria if one.informed is criterion.informed]
         compiled = self._informed_cost if criterion.informed else self._motion_cost
         index = alike.index(criterion)
         pairs = [compiled(parameters, z, index, self.precision, self.explained) for z in (points or [self.centre])]
@@ -314,10 +314,10 @@ class Problem:
         """Return the cost by one of the criteria that depend on the information, or of the others."""
 
         def branch(criterion: Criterion) -> Callable[[Array], Array]:
-            return lambda own: criterion.cost(self.plan, Outcome(flight, own, prior))
+            return lambda gained: criterion.cost(self.plan, Outcome(flight, gained, prior))
 
-        own = [branch(criterion) for criterion in self.criteria if criterion.informed is informed]
-        return jax.lax.switch(index, own, information)
+        branches = [branch(criterion) for criterion in self.criteria if criterion.informed is informed]
+        return jax.lax.switch(index, branches, information)
 
     @cached_property
     def _fractions(self):  # type: ignore[no-untyped-def]

@@ -103,18 +103,18 @@ class Design:
             "log_det_covariance": self.predicted.log_det,
             "worst_direction_sd": self.predicted.worst,
             "limits": {
-                item.name: {
-                    "limit": item.limit,
-                    "largest": item.largest,
-                    "unit": item.unit,
-                    "active": bool(item.active),
+                reached.name: {
+                    "limit": reached.limit,
+                    "largest": reached.largest,
+                    "unit": reached.unit,
+                    "active": bool(reached.active),
                 }
-                for item in self.reached
+                for reached in self.reached
             },
             "go": bool(self.go),
             "risk": {
-                item.name: {"limit": item.limit, "quantile_99": item.quantile, "go": bool(item.go)}
-                for item in self.risks
+                risk.name: {"limit": risk.limit, "quantile_99": risk.quantile, "go": bool(risk.go)}
+                for risk in self.risks
             },
             "criteria": dict(self.costs),
             "search": {"costs_of_starts": list(self.found.costs), "evaluations": self.found.evaluations},
@@ -187,8 +187,8 @@ def design(
     *seeds, last, visible = np.random.SeedSequence(seed).spawn(2 * count + 2)
     problem = adapted_to_family(problem.with_encoder(encoder), np.random.default_rng(visible))
     points = {
-        criterion.name: problem.points(criterion, np.random.default_rng(own))
-        for criterion, own in zip(problem.criteria, seeds[count:], strict=True)
+        criterion.name: problem.points(criterion, np.random.default_rng(stream))
+        for criterion, stream in zip(problem.criteria, seeds[count:], strict=True)
     }
     shares = Shares(part_of(progress, 0.0, SEARCHING), count)
 

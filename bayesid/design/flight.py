@@ -96,9 +96,9 @@ class Flight:
         )
 
         def numbers(z: Array) -> tuple[Array, Array]:
-            own = unknowns.values(z)
-            effects = self._alone(own.effects)
-            return self._equations.loads(own.inertial, effects), _joined(effects)
+            values = unknowns.values(z)
+            effects = self._alone(values.effects)
+            return self._equations.loads(values.inertial, effects), _joined(effects)
 
         loads, changes = jax.jacfwd(numbers)(self.z)
         rows = self._tables.unknown @ loads
@@ -157,7 +157,7 @@ class Flight:
 
     def _alone(self, values: Sequence[Array]) -> tuple[Array, ...]:
         pairs = zip(self._equations.effects, values, strict=True)
-        return tuple(own[0] if effect.per_recording else own for effect, own in pairs)
+        return tuple(value[0] if effect.per_recording else value for effect, value in pairs)
 
     @cached_property
     def _rows(self) -> Array:
@@ -207,8 +207,8 @@ class Flight:
         model = self.plan.model
         if any(effect.uses("table") for effect in model.effects):
             return jax.jacfwd(lambda parameters: Flight(self.plan, parameters, self.z)._rows)(self.parameters)
-        own = self._values.inertial.reshape(-1, 10)
-        bodies = {prior.name: own[index] for index, prior in enumerate(model.priors)}
+        vectors = self._values.inertial.reshape(-1, 10)
+        bodies = {prior.name: vectors[index] for index, prior in enumerate(model.priors)}
         by_state = row_sensitivity(model.robot, self._kinematics, self._screws, bodies)
         return jnp.einsum("dtjr,dtjp->trp", by_state, by_joint)
 
@@ -233,12 +233,12 @@ class Flight:
         at = jax.tree.map(lambda x: jnp.asarray(x)[::every][None], self._tables)
         nothing = jnp.zeros((1, 0))
         grid = Grid(nothing, at, nothing, at, nothing, nothing, UnitSpeed(nothing, nothing))
-        splits = np.cumsum([len(own) for own in self._effects])[:-1]
+        splits = np.cumsum([len(value) for value in self._effects])[:-1]
 
         def read(raw: Array, effects: Array) -> Readings:
             parts = jnp.split(effects, splits)[: len(self._effects)]  # one empty part where there are no effects
-            own = zip(self._equations.effects, parts, strict=True)
-            recorded = tuple(part[None] if effect.per_recording else part for effect, part in own)
+            pairs = zip(self._equations.effects, parts, strict=True)
+            recorded = tuple(part[None] if effect.per_recording else part for effect, part in pairs)
             values = self._values._replace(effects=recorded)
             return plan.simulator.faulty(plan.constants, values, grid, raw[None])
 

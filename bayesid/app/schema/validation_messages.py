@@ -65,7 +65,7 @@ def _order(fault: ErrorDetails, data: Any) -> tuple[int, ...]:
     """Return the place of a fault in the file, by the order of its keys; what is missing comes last."""
     order: list[int] = []
     for part in _path_of(fault, data):
-        keys = list(data) if isinstance(data, Mapping) else range(len(data))
+        keys: list[str | int] = list(data) if isinstance(data, Mapping) else list(range(len(data)))
         order.append(keys.index(part) if part in keys else len(keys))
         data = data[part] if part in keys else {}
     return tuple(order)
