@@ -14,7 +14,7 @@ import scipy.linalg as sla
 from bayesid._io.errors import InputError
 from bayesid.inference.mode import maximise
 from bayesid.inference.posterior import Posterior
-from bayesid.inference.whitening import NoiseChannel, NoiseModel, Whitening, apply, build
+from bayesid.inference.whitening import NoiseChannel, SampleNoise, Whitening, apply, build
 from bayesid.recording.joint_motion import MeasuredMotion
 from bayesid.recording.recording import Recording
 from bayesid.recording.smoothing import JointSamples, smooth
@@ -34,7 +34,7 @@ TIME = np.arange(0.0, 20.0, 0.5)
 # against dense Gaussians ----------------------------------------------------------------------------------------------
 
 
-def noise_model(channels: list[NoiseChannel], time: np.ndarray = TIME, encoder: float = 1e-5) -> NoiseModel:
+def noise_model(channels: list[NoiseChannel], time: np.ndarray = TIME, encoder: float = 1e-5) -> SampleNoise:
     """Two joints with a random sensitivity; encoder noise that matters beside channels of 1e-5."""
     rng = np.random.default_rng(0)
     joints = []
@@ -42,10 +42,10 @@ def noise_model(channels: list[NoiseChannel], time: np.ndarray = TIME, encoder: 
         value = 0.3 * np.sin(0.4 * time + index) + encoder * rng.normal(size=len(time))
         joints.append(smooth([JointSamples(0, time, value, encoder)]).lag_covariance(time, len(time) - 1))
     sensitivity = rng.normal(size=(2, 3, len(time), len(channels)))
-    return NoiseModel(time, channels, sensitivity, np.stack(joints))
+    return SampleNoise(time, channels, sensitivity, np.stack(joints))
 
 
-def dense(noise: NoiseModel) -> np.ndarray:
+def dense(noise: SampleNoise) -> np.ndarray:
     """Covariance of all channels at all rows of the grid, index (row, channel), written out."""
     count, channels = len(noise.time), len(noise.channels)
     total = np.zeros((count, channels, count, channels))
@@ -141,7 +141,7 @@ def test_a_filter_does_not_reach_across_a_gap():
     rows = np.delete(np.arange(len(time)), gap)
     plain = Filter(0.25)
     nothing = np.zeros((0, 3, len(time), 1)), np.zeros((0, 1, len(time), 3, 3))
-    noise = NoiseModel(time, [NoiseChannel(1.0, rows, plain)], *nothing)
+    noise = SampleNoise(time, [NoiseChannel(1.0, rows, plain)], *nothing)
     result = build(noise, window=0)
     half = len(plain.taps(0.5)) // 2
     expected = [*range(half, 50 - half), *range(60 + half, len(time) - half)]

@@ -15,7 +15,7 @@ from bayesid._math.on_device import on_device
 from bayesid.inference import whitening
 from bayesid.inference.compiled import Arrays
 from bayesid.inference.encoder_noise import SampledMotion, joint_sensitivity
-from bayesid.inference.whitening import NoiseChannel, NoiseModel, Whitening
+from bayesid.inference.whitening import NoiseChannel, SampleNoise, Whitening
 from bayesid.recording.actions import Actions
 from bayesid.recording.joint_motion import MeasuredMotion, Motion
 from bayesid.recording.recording import Recording
@@ -258,7 +258,7 @@ class RecordedSamples:
         sensor = next(sensor for sensor in self.sensors if sensor.kind == kind)
         return sensor.noise.sigma(float(np.median(np.diff(self.series[kind][0]))))
 
-    def noise_model(self, robot: Robot, seen: SampledMotion) -> NoiseModel:
+    def noise_model(self, robot: Robot, seen: SampledMotion) -> SampleNoise:
         """Return the second moments of the errors.
 
         Parameters
@@ -279,11 +279,11 @@ class RecordedSamples:
         ]
         if not isinstance(self.motion, MeasuredMotion) or not robot.joints:
             empty = np.zeros((0, 3, len(self.time), len(channels)))
-            return NoiseModel(self.time, channels, empty, np.zeros((0, 1, len(self.time), 3, 3)))
+            return SampleNoise(self.time, channels, empty, np.zeros((0, 1, len(self.time), 3, 3)))
         torques = () if self.torque_sensor is None else self.torque_sensor.columns(robot)
         sensitivity = joint_sensitivity(robot, self.motion.evaluate(self.time), seen, self.sensors, torques)
         covariance = self.motion.lag_covariance(self.time, min(max(whitening.WINDOWS), len(self.time) - 1))
-        return NoiseModel(self.time, channels, sensitivity, covariance)
+        return SampleNoise(self.time, channels, sensitivity, covariance)
 
 
 def first_rate(sensor: Sensor, values: Floats) -> Floats:

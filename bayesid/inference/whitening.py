@@ -22,7 +22,7 @@ from bayesid._io.errors import InputError
 from bayesid._math.arrays import Floats, Integers
 from bayesid.simulation.sensors import Filter
 
-__all__ = ["NoiseChannel", "NoiseModel", "Whitening", "apply", "build"]
+__all__ = ["NoiseChannel", "SampleNoise", "Whitening", "apply", "build"]
 
 
 WINDOWS = (0, 2, 4, 8, 16, 32)
@@ -58,7 +58,7 @@ class NoiseChannel(NamedTuple):
 
 
 @dataclass(frozen=True)
-class NoiseModel:
+class SampleNoise:
     """Second moments of one recording's errors.
 
     Parameters
@@ -137,14 +137,14 @@ def apply(weights: Array, start: Array, residual: Array) -> Array:
     return jnp.einsum("oiwj,owj->oi", weights, windows)
 
 
-def build(noise: NoiseModel, window: int | None = None) -> Whitening:
+def build(noise: SampleNoise, window: int | None = None) -> Whitening:
     """Return the whitening of one recording, by default with the shortest window that is accurate."""
     outputs = _outputs(noise)
     with threadpool_limits(limits=1):  # threads only slow down thousands of small factorisations
         return _shortest(noise, outputs) if window is None else _whiten(noise, outputs, window)
 
 
-def _shortest(noise: NoiseModel, outputs: list[tuple[int, list[_Output]]]) -> Whitening:
+def _shortest(noise: SampleNoise, outputs: list[tuple[int, list[_Output]]]) -> Whitening:
     available = max(WINDOWS) if _is_coloured(noise) else noise.joint_covariance.shape[1] - 1
     best = _whiten(noise, outputs, 0)
     for window in WINDOWS[1:]:
@@ -165,7 +165,7 @@ class _Output(NamedTuple):
     taps: Floats
 
 
-def _outputs(noise: NoiseModel) -> list[tuple[int, list[_Output]]]:
+def _outputs(noise: SampleNoise) -> list[tuple[int, list[_Output]]]:
     """Return the filtered scalars of all channels, grouped by their row of the sample grid."""
     blocks: dict[int, list[_Output]] = {}
     for index, channel in enumerate(noise.channels):
@@ -194,7 +194,7 @@ def _filtered(time: Floats, channel: NoiseChannel, index: int) -> list[_Output]:
     return result
 
 
-def _whiten(noise: NoiseModel, blocks: list[tuple[int, list[_Output]]], window: int) -> Whitening:
+def _whiten(noise: SampleNoise, blocks: list[tuple[int, list[_Output]]], window: int) -> Whitening:
     channels = len(noise.channels)
     spans = [(min(o.rows[0] for o in group), max(o.rows[-1] for o in group)) for _, group in blocks]
     first = np.minimum.accumulate(np.array([span[0] for span in spans])[::-1])[::-1]
@@ -306,14 +306,14 @@ def _given_earlier(raw: Floats, local: _Local, new: int) -> tuple[Floats, Floats
     return rows @ combine, np.log(np.diagonal(factor, axis1=1, axis2=2))
 
 
-def _is_coloured(noise: NoiseModel) -> bool:
+def _is_coloured(noise: SampleNoise) -> bool:
     return any(channel.coloured[0] > 0.0 for channel in noise.channels)
 
 
 class _Covariance:
     """Covariance of the residual between rows of the sample grid: sensors' noise and errors of the joint motion."""
 
-    def __init__(self, noise: NoiseModel) -> None:
+    def __init__(self, noise: SampleNoise) -> None:
         self._noise = noise
         self._lags = noise.joint_covariance.shape[1] - 1
         count, self._channels = noise.sensitivity.shape[2:]

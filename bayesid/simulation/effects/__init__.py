@@ -8,13 +8,13 @@ study files; the class states everything else that the package needs to know of 
 # isort: off
 from bayesid.simulation.effects.arm_effects import LinkInertia, Payload
 from bayesid.simulation.effects.arm_motion_effects import EncoderOffset, JointFlexibility, JointLatency
-from bayesid.simulation.effects.sensor_faults import (
+from bayesid.simulation.effects.systematic_faults import (
     AccelPosition,
     AttitudeMisalignment,
     SensorBias,
     SensorClock,
     SensorDrift,
-    SensorFault,
+    SystematicFault,
     SensorLatency,
     SensorMisalignment,
     SensorScale,
@@ -67,12 +67,12 @@ __all__ = [
     "SensorBias",
     "SensorClock",
     "SensorDrift",
-    "SensorFault",
     "SensorLatency",
     "SensorMisalignment",
     "SensorScale",
     "Situation",
     "SolarPressure",
+    "SystematicFault",
     "ThrusterLeak",
     "TorqueBias",
     "WheelHistory",

@@ -32,10 +32,10 @@ __all__ = [
     "SensorBias",
     "SensorClock",
     "SensorDrift",
-    "SensorFault",
     "SensorLatency",
     "SensorMisalignment",
     "SensorScale",
+    "SystematicFault",
 ]
 
 MISMOUNTED = 0.1, "A sensor that was mounted without a measurement of its axes is within six degrees of them."
@@ -45,7 +45,7 @@ WARM_UP = 600.0
 """Time within which an instrument that warms up changes by all of its constant error [s]; assumed."""
 
 
-class SensorFault(Effect):
+class SystematicFault(Effect):
     """Effect on the readings of one sensor.
 
     Attributes
@@ -71,7 +71,7 @@ class SensorFault(Effect):
         return readings.replace(**{key: self.change(values, readings.time, readings.channels[key])})
 
 
-class FaultOfAnyKind(SensorFault):
+class FaultOfAnyKind(SystematicFault):
     """Fault that sensors of all kinds can have; `of` gives the effect for one kind.
 
     In the name SENSOR stands for the kind, and the summary has places for the words of its `Instrument`. A sensor whose
@@ -260,7 +260,7 @@ class SensorMisalignment(FaultByAxis):
 
 
 @register
-class AccelPosition(SensorFault):
+class AccelPosition(SystematicFault):
     """Error of the accelerometer's mounting point: true less stated position, base axes; the prior is 5 cm.
 
     The gravity gradient over the error is left out, since it is below 2e-7 m/s2 for 5 cm in any orbit.
@@ -290,7 +290,7 @@ class AccelPosition(SensorFault):
 
 
 @register
-class AttitudeMisalignment(SensorFault):
+class AttitudeMisalignment(SystematicFault):
     """Constant rotation of the measured attitude in base axes, the prior being two degrees per axis.
 
     The measured base axes are the true ones turned by the rotation vector (x, y, z) in base axes, which is also the
