@@ -22,11 +22,14 @@ from bayesid.diagnosis.noise.noise_fault import FitResidual, FittedFault
 from bayesid.diagnosis.noise.noise_model import NoiseModel
 from bayesid.diagnosis.response.perturbed_model import PerturbedModel
 from bayesid.inference import identify
+from bayesid.inference.noise_changes import without_left_out
 from bayesid.inference.posterior import Posterior
+from bayesid.recording.recording import _VECTOR_FAMILIES, Recording
 from bayesid.report.diagnosis.decision_page import conditions_text
 from bayesid.report.model_assumptions import model_sentences
 from bayesid.simulation.effects import create
 from bayesid.simulation.effects.effect_parameters import Quantity
+from bayesid.simulation.model import Manoeuvre
 from bayesid.simulation.sensors import Scaled, SensorKind
 from tests.conftest import PLANAR, SIGMA
 
@@ -260,3 +263,26 @@ def test_two_faults_of_one_name_are_refused(stuck):
         @register_fault
         class Another(SensorFault):
             name = "stuck"
+
+
+def test_outliers_of_a_sensor_with_axes_of_its_own_are_left_out(monkeypatch):
+    monkeypatch.setitem(_VECTOR_FAMILIES, "field", ("a", "b"))
+
+    class Field(SensorKind):
+        value, unit, axes = "field", "1", ("a", "b")
+
+    time = np.arange(20.0)
+    channels = dict.fromkeys(("field.a", "field.b", "rate.x", "rate.y", "rate.z"), time)
+    manoeuvre = Manoeuvre(Recording("one", None, time, channels), motion=None)
+    data = SimpleNamespace(left_out_times=lambda index: {Field(): np.array([2.0])})
+    (kept,) = without_left_out(SimpleNamespace(manoeuvres=(manoeuvre,), data=data))
+    for axis in "ab":
+        np.testing.assert_array_equal(kept.recording.channels[f"field.{axis}"], np.where(time == 2.0, np.nan, time))
+    assert np.isfinite(kept.recording.channels["rate.x"]).all()
+
+
+def test_the_conditions_of_a_verdict_say_which_noise_is_coloured(planar_case):
+    fault = noise_faults()["coloured-noise:accel"]
+    model = fault.in_model(planar_case.posterior.model, [2e-5, 3.0])
+    hypothesis = SimpleNamespace(fit=SimpleNamespace(posterior=SimpleNamespace(model=model)), faults=())
+    assert "noise of accel coloured;" in conditions_text(hypothesis)
