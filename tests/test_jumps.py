@@ -13,8 +13,9 @@ from bayesid.recording.integrated_process import HIGHER, IntegratedProcess, Jump
 from bayesid.recording.jumps import smooth_joints
 from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
 from studies.truth.bodies import SERVICER3
-from studies.truth.motions import ProfiledManoeuvres, smooth_motion, trapezoid
+from studies.truth.motions import smooth_motion
 from studies.truth.mujoco import write_study
+from tests.profiled_motions import ProfiledManoeuvres, trapezoid
 from tests.test_smoothing import swing
 
 TIME = np.arange(0.0, 160.01, 0.5)

@@ -10,7 +10,7 @@ import pytest
 
 from bayesid.recording.jumps import roughened, smooth_joints
 from bayesid.recording.smoothing import JointSamples, SmoothedJoint, smooth
-from studies.truth.motions import ProfiledManoeuvres, cycloid, septic
+from tests.profiled_motions import ProfiledManoeuvres, cycloid, septic
 from tests.test_smoothing import TIME, wiener
 
 SIGMA = 1e-5

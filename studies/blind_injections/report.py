@@ -16,28 +16,9 @@ from bayesid._io.words import joined
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import AFTER, BEFORE, TRUTH, styled, wide_figure
 from bayesid.report.numbers import format_number
-from studies.blind_injections.goals import (
-    LEFT,
-    SURE,
-    TORQUES,
-    barely_left,
-    goals_of,
-    in_basilisk,
-    record_of,
-    share_text,
-    wrongly_explained,
-)
+from studies.blind_injections import goals, rows
+from studies.blind_injections.goals import LEFT, SURE, TORQUES, barely_left, share_text, wrongly_explained
 from studies.blind_injections.limits import DRAWS
-from studies.blind_injections.rows import (
-    confusion,
-    confusion_matrix,
-    errors,
-    rates,
-    reliability,
-    reliability_figure,
-    scores,
-    snap_limit,
-)
 from studies.blind_injections.trials import Trial, plan, read
 from studies.blind_injections.trials import run as make_trials
 from studies.common.monte_carlo import Workers
@@ -72,26 +53,26 @@ def run(
     if not done:
         raise ValueError(f"{trials} holds no trials; leave out --made to make some")
     if record is not None:
-        write_json(record, record_of(done))
+        write_json(record, goals.record_of(done))
     return Campaign(done, len(plans))
 
 
 def _report(campaign: Campaign) -> Report[Campaign]:
     trials, planned = campaign
-    goals = goals_of(trials)
+    judged = goals.goals_of(trials)
     nulls = [trial for trial in trials if trial.kind == "adequate"]
     sure = [trial for trial in trials if (trial.probability or 0.0) >= SURE]
-    verdicts = [goal.verdict for goal in goals]
+    verdicts = [goal.verdict for goal in judged]
     right, alarmed = sum(trial.holds for trial in sure), sum(trial.alarmed for trial in nulls)
     answer = (
         f"Of the causes named with a probability of {SURE:g} or more {share_text(right, len(sure))} were hidden; where "
         f"nothing is hidden {share_text(alarmed, len(nulls))} trials raised an alarm"
     )
-    if any(goal.verdict is Verdict.FAIL and "wrongly explained" in goal.text for goal in goals):
+    if any(goal.verdict is Verdict.FAIL and "wrongly explained" in goal.text for goal in judged):
         answer += f"; {_explained_outside(trials)[0]}"
     if len(trials) < planned:
         answer += (
-            f"; {len(trials):,} of {planned:,} planned trials leave {verdicts.count(Verdict.OPEN)} of {len(goals)} "
+            f"; {len(trials):,} of {planned:,} planned trials leave {verdicts.count(Verdict.OPEN)} of {len(judged)} "
             "goals undecided"
         )
     seconds = np.median([trial.seconds["total"] for trial in trials])
@@ -101,7 +82,7 @@ def _report(campaign: Campaign) -> Report[Campaign]:
         question="How often does the diagnosis name a hidden cause, rightly or wrongly, and how often does it raise an "
         "alarm where nothing is hidden?",
         answer=f"{answer}.",
-        goals=goals,
+        goals=judged,
         valid="a base carries an arm of three to five joints whose links are exact or known to 2 %, and noise is white "
         "and as declared where its fault is not what is hidden.",
         full=len(trials) >= planned,
@@ -129,8 +110,8 @@ def _setup(trials: Sequence[Trial], planned: int) -> Setup:
     seeds = [trial.seed for trial in trials]
     return Setup(
         robot="Three robots of three to five joints, one with slides and branches, in MuJoCo: bodies, springs, fields "
-        f"and sensor faults, without any code of the package. In {len(in_basilisk(trials))} trials two of them fly in "
-        "Basilisk, whose joints follow a soft servo: its own wheel, leak, slosh or panel, or nothing, is hidden.",
+        f"and sensor faults, without any code of the package. In {len(goals.in_basilisk(trials))} trials two of them "
+        "fly in Basilisk, whose joints follow a soft servo: its own wheel, leak, slosh or panel, or nothing, is hidden.",
         manoeuvre="Three recordings of 120 to 170 s each; a single one in some trials.",
         sensors=f"At 2 Hz, noise per sample: rate {format_number(1e-5)} rad/s, accelerometer {format_number(1e-5)} "
         f"m/s², encoders {format_number(1e-6)} rad.",
@@ -231,7 +212,7 @@ def _snaps(trials: Sequence[Trial]) -> list[str]:
     limits = []
     for size, seed in zip(sizes, seeds, strict=True):
         rng = np.random.default_rng(seed)
-        limits.append([snap_limit(size, rng) for _ in range(SNAPS)])
+        limits.append([rows.snap_limit(size, rng) for _ in range(SNAPS)])
     low, median, high = np.quantile(limits, [0.1, 0.5, 0.9])
     least = TORQUES["snaps and pulses"][0]
     beyond = f": the goal of {least:g} lies beyond what rates tell" if high < least else ""
@@ -258,7 +239,7 @@ def _evidence(document: Document, campaign: Campaign) -> None:
     add_number_table(
         document,
         ["signal-to-noise", "trials", "alarm", "limit", "in the set", "named alone", "limit", "misnamed"],
-        rates(campaign.trials),
+        rows.rates(campaign.trials),
         "Trials with a cause of the catalogue hidden, by its signal-to-noise ratio: the root of its noncentrality "
         "after the model's unknowns have taken their share. The limits are the numbers expected of a test that knows "
         "which effect to look for (family-wise 1 %), and of the Bayes decision between all sets of causes on data of "
@@ -270,7 +251,7 @@ def _evidence(document: Document, campaign: Campaign) -> None:
 def _calibration(document: Document, campaign: Campaign) -> None:
     trials = campaign.trials
     document.section("Whether stated probabilities and intervals hold")
-    stated = reliability(trials)
+    stated = rows.reliability(trials)
     if stated:
         add_number_table(
             document,
@@ -281,7 +262,7 @@ def _calibration(document: Document, campaign: Campaign) -> None:
             "large, as the prior of the diagnosis says, so that stated and found shares need not agree exactly.",
         )
         document.figure(
-            reliability_figure(trials),
+            rows.reliability_figure(trials),
             "Share of verdicts whose named causes are all hidden, against the probability stated, with 95 % intervals "
             "(Wilson). The grey line is where both agree.",
         )
@@ -290,7 +271,7 @@ def _calibration(document: Document, campaign: Campaign) -> None:
     add_number_table(
         document,
         ["errors in stated sd", "numbers", "mean", "rms", "within 1 sd", "within 2 sd"],
-        errors(trials),
+        rows.errors(trials),
         "Errors of what is reported in the standard deviations stated; ideal are mean 0, rms 1, 68 % and 95 %. The ten "
         "parameters of a base are correlated.",
     )
@@ -302,7 +283,7 @@ def _answers(document: Document, campaign: Campaign) -> None:
     add_number_table(
         document,
         SCORES,
-        [[row[0], *(cell.replace("-", "−") for cell in row[1:])] for row in scores(trials)],
+        [[row[0], *(cell.replace("-", "−") for cell in row[1:])] for row in rows.scores(trials)],
         "Scores of the stated probabilities with standard errors, over the trials: of each cause stated above 1 %, of "
         "something outside the catalogue, and of nothing.",
     )
@@ -314,7 +295,7 @@ def _answers(document: Document, campaign: Campaign) -> None:
         add_number_table(
             document,
             ["hidden", "said, with the number of trials"],
-            sorted(confusion([trial for trial in trials if trial.case in mixed])),
+            sorted(rows.confusion([trial for trial in trials if trial.case in mixed])),
             f"Answers of the {len(mixed)} cases of which at least {SHOWN} trials were not answered rightly, all "
             f"strengths together. Those of the {others} other cases are in blind_injections-answers.csv.",
             words=2,
@@ -333,12 +314,12 @@ def _answered(trial: Trial) -> bool:
 def _tables(trials: Sequence[Trial]) -> list[CsvTable]:
     fields = {name: None for trial in trials for name in asdict(trial)}
     kept = [name for name in fields if name not in ("probabilities", "amplitude_errors", "body_errors", "seconds")]
-    rows = [[*(_cell(getattr(trial, name)) for name in kept), f"{trial.seconds['total']:.1f}"] for trial in trials]
+    every = [[*(_cell(getattr(trial, name)) for name in kept), f"{trial.seconds['total']:.1f}"] for trial in trials]
     return [
-        CsvTable("trials", [*kept, "seconds"], rows),
-        CsvTable("answers", ["hidden", "said"], confusion(trials)),
-        CsvTable("confusion", *confusion_matrix(trials)),
-        CsvTable("scores", SCORES, scores(trials)),
+        CsvTable("trials", [*kept, "seconds"], every),
+        CsvTable("answers", ["hidden", "said"], rows.confusion(trials)),
+        CsvTable("confusion", *rows.confusion_matrix(trials)),
+        CsvTable("scores", SCORES, rows.scores(trials)),
     ]
 
 

@@ -14,20 +14,10 @@ from bayesid.inference.importance import TRUSTED
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number, format_p_value, format_percent
+from studies.calibration import outcomes
 from studies.calibration.data import ARM_SPREAD, BASE_SPREAD, DRAWINGS_SPREAD, INDEPENDENT, REPLICATES, Case
 from studies.calibration.encoders import NEAR, Smoothed, smooth_share, smoothed_errors
-from studies.calibration.outcomes import (
-    ALL,
-    LEVELS,
-    POINTS,
-    Replicates,
-    coverage,
-    holm,
-    interval_coverage,
-    pooled_coverage,
-    read,
-    uniform_p_value,
-)
+from studies.calibration.outcomes import ALL, LEVELS, POINTS, Replicates, holm, pooled_coverage, uniform_p_value
 from studies.calibration.replicate import ARMS, LOG_LIKELIHOOD, Method, make, plan
 from studies.common.ets7 import START, ets7
 from studies.common.figures import robot_outline
@@ -61,7 +51,7 @@ def goals_of(cases: Sequence[Replicates]) -> list[Goal]:
 
 def _coverage_goals(cases: Sequence[Replicates]) -> list[Goal]:
     """Return the goal on the coverage of the intervals of each level, in every case and in all together."""
-    found = interval_coverage(cases)
+    found = outcomes.interval_coverage(cases)
     corrected = holm({key: item.p_value for key, item in found.items()})
     complete = all(
         any(item.case is case and len(item.results) >= planned for item in cases)
@@ -115,7 +105,7 @@ def run(
     """Make the replicates that the store does not hold yet, unless those ``made`` so far are enough, and read all."""
     if not made:
         run_trials(make, plan(full), trials, seed=SEED, workers=workers, progress=progress)
-    return read(trials)
+    return outcomes.read(trials)
 
 
 def _report(cases: Sequence[Replicates]) -> Report[Sequence[Replicates]]:
@@ -266,7 +256,7 @@ def _failures(document: Document, cases: Sequence[Replicates]) -> None:
     ]
     short = [
         f"{name} {item} at {format_percent(level)}"
-        for (name, level), item in interval_coverage(cases).items()
+        for (name, level), item in outcomes.interval_coverage(cases).items()
         if level - item.share > SHORT * item.error
     ]
     if short:
@@ -293,7 +283,7 @@ def _coverage_rows(cases: Sequence[Replicates]) -> list[list[str]]:
         for method in Method:
             ranks = item.bodies(method)
             if len(ranks) > 1:
-                cells = [_percent(*coverage(ranks, level)) for level in LEVELS]
+                cells = [_percent(*outcomes.coverage(ranks, level)) for level in LEVELS]
                 doubt = bad if method is Method.IMPORTANCE else "-"
                 rows.append([f"{item.case}: {method}", str(len(ranks)), *cells, doubt])
     for method in Method:

@@ -49,7 +49,7 @@ def goals_of(cost: Cost) -> list[Goal]:
         )
     )
     goals.append(_nested(cost))
-    for name, (_, limit) in COMMANDS.items():
+    for name, limit in COMMANDS.items():
         if limit is not None and name in cost.commands:
             walls = [item.wall for item in cost.commands[name][1:]]
             text = f"{name}, files to report, with compiled code kept: at most {limit:g} s"

@@ -55,13 +55,8 @@ DIAGNOSES = (
     Diagnosed("swinging torque", "swinging-torque", 10.0, 40.0),
 )
 
-# other commands: words, and the longest wanted time with compiled code kept, from files to report [s]
-COMMANDS = {
-    "check": (("check",), None),
-    "identify": (("identify",), 20.0),
-    "identifiability": (("identifiability",), 30.0),
-    "design": (("design",), 120.0),
-}
+# other commands, and the longest wanted time with compiled code kept, from files to report [s]
+COMMANDS = {"check": None, "identify": 20.0, "identifiability": 30.0, "design": 120.0}
 
 
 def write_case(name: str, folder: Path) -> Path:
@@ -320,7 +315,7 @@ def run(
                 runs = timed(f"{item.title}, samples", ("diagnose", "--no-fly-next"), files[item.title], 2, cache)
                 sampled[item.title] = runs[-1]
         others = {
-            name: timed(name, COMMANDS[name][0], files[chosen[0].title], 1 + repeats, place / f"cache-{name}")
+            name: timed(name, (name,), files[chosen[0].title], 1 + repeats, place / f"cache-{name}")
             for name in commands
         }
         progress("search for manoeuvres")
