@@ -141,7 +141,6 @@ def _count(goals: Sequence[Judged], verdict: Verdict) -> int:
 
 
 def _where(goals: Sequence[Judged]) -> str:
-    """Return how many goals each study misses."""
     missed: dict[str, int] = {}
     for item in goals:
         if item.goal.verdict is Verdict.FAIL:

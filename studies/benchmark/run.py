@@ -213,7 +213,6 @@ def run(*, full: bool = False, seed: int = 0, progress: Callable[[str], None] = 
 
 
 def _measured(*, full: bool, seed: int) -> Benchmark:
-    """Measure everything once."""
     robot = ets7()
     single = posterior_of(robot)
     whitening = {"white": 0.0, "encoder 1e-6 rad": 1e-6, "encoder 1e-4 rad": 1e-4}

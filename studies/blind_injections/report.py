@@ -111,7 +111,8 @@ def _setup(trials: Sequence[Trial], planned: int) -> Setup:
     return Setup(
         robot="Three robots of three to five joints, one with slides and branches, in MuJoCo: bodies, springs, fields "
         f"and sensor faults, without any code of the package. In {len(goals.in_basilisk(trials))} trials two of them "
-        "fly in Basilisk, whose joints follow a soft servo: its own wheel, leak, slosh or panel, or nothing, is hidden.",
+        "fly in Basilisk, whose joints follow a soft servo: its own wheel, leak, slosh or panel, or nothing, is "
+        "hidden.",
         manoeuvre="Three recordings of 120 to 170 s each; a single one in some trials.",
         sensors=f"At 2 Hz, noise per sample: rate {format_number(1e-5)} rad/s, accelerometer {format_number(1e-5)} "
         f"m/s², encoders {format_number(1e-6)} rad.",
@@ -161,7 +162,6 @@ def _failure(alike: Sequence[Trial]) -> str:
 
 
 def _failures(document: Document, campaign: Campaign) -> None:
-    """Add sentences on every wrong answer, and on what is missed though it is large."""
     document.section("What went wrong")
     trials = campaign.trials
     wrong = [trial for trial in trials if trial.misnamed or (trial.kind == "adequate" and trial.alarmed)]

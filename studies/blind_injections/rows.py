@@ -137,7 +137,6 @@ def confusion_matrix(trials: Iterable[Trial]) -> tuple[list[str], list[list[str]
 
 
 def _answers(trials: Iterable[Trial]) -> dict[str, Counter[str]]:
-    """Return the numbers of the answers to each hidden case."""
     said: dict[str, Counter[str]] = {}
     for trial in trials:
         answer = " + ".join(sorted(trial.causes)) or trial.status

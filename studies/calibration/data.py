@@ -85,7 +85,6 @@ def model_of(case: Case) -> Model:
 
 
 def _whole(robot: Robot) -> tuple[BodyPrior, ...]:
-    """Return priors of all bodies with mass."""
     widths = {BASE: BASE_SPREAD, LOAD.name: LOAD_SPREAD}
     return tuple(
         BodyPrior(name, link.inertial, widths.get(name, DRAWINGS_SPREAD))
@@ -174,7 +173,6 @@ def record(case: Case, truth: Truth, rng: np.random.Generator) -> Recorded:
 
 
 def _true_robot(model: Model, truth: Truth) -> Robot:
-    """Return the robot with the true bodies."""
     robot = model.robot
     for prior, z in zip(model.priors, truth.bodies.reshape(-1, 10), strict=True):
         vector = log_cholesky_vector(prior.centre, jnp.asarray(prior.spread * z))

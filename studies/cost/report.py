@@ -58,7 +58,6 @@ def goals_of(cost: Cost) -> list[Goal]:
 
 
 def _search_goals(search: SearchTimes | None) -> list[Goal]:
-    """Return the goals of the search for manoeuvres."""
     step = f"One criterion of a design with its gradient, one core: at most {1e3 * STEP:g} ms"
     begin = f"Cold start of a search for manoeuvres: at most {BEGIN:g} s"
     if search is None:
@@ -76,7 +75,6 @@ def _search_goals(search: SearchTimes | None) -> list[Goal]:
 
 
 def _times(cost: Cost, names: Sequence[str], kind: str, limit: float) -> Goal:
-    """Return the goal of the time from files to verdict of some diagnoses."""
     part = slice(0, 1) if kind == "cold" else slice(1, None)
     each = {name: [item.to_verdict for item in cost.diagnoses[name][part]] for name in names}
     said = ", ".join(f"{name} {_spread(values)}" for name, values in each.items())
@@ -86,7 +84,6 @@ def _times(cost: Cost, names: Sequence[str], kind: str, limit: float) -> Goal:
 
 
 def _nested(cost: Cost) -> Goal:
-    """Return the goal of the ratio to nested sampling."""
     text = f"One run of dynesty for each candidate over the verdict on all of them: at least {CHEAPER:g} times"
     if cost.nested is None:
         return Goal(text, "dynesty is not installed", Verdict.NOT_TESTED)

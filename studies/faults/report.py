@@ -161,7 +161,6 @@ def _conditions(document: Document, result: Result) -> None:
 
 
 def _goals(result: Result) -> list[Goal]:
-    """Return each goal, what was reached, and whether that passes."""
     numbers, units, around = result.numbers, result.by("unit"), result.by("around")
     total, kills, killed = sum(numbers.values()), result.kills, result.by("kill")
     broken = [name for item in killed.values() for name in item["half_written"]]
@@ -200,7 +199,6 @@ def _goals(result: Result) -> list[Goal]:
 
 
 def _refused(title: str, item: Made | None) -> Goal:
-    """Return the goal on one fault around a run."""
     text = f"{title}: one clear error"
     if item is None:
         return Goal(text, "not tried; see tests/test_faults.py", Verdict.NOT_TESTED)

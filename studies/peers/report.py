@@ -359,7 +359,6 @@ def _found(made: Made, unknowns: int, sampler: str) -> Mapping[str, Any] | None:
 
 
 def _peers(made: Made, unknowns: int) -> dict[Sampler, Mapping[str, Any]]:
-    """Return what the peers reached."""
     found = {name: _found(made, unknowns, name) for name in list(Sampler)[1:]}
     return {name: result for name, result in found.items() if result is not None}
 

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from bayesid import Posterior
+from bayesid._math.arrays import Floats
 from bayesid.inference.body_quantities import bodies_of
 from studies.throws.data import WHEEL_INERTIA, Timing, Truth, read_throws, regress
 from studies.throws.joint import SMOOTH, Joint, SmoothWidth, Throw, fit_widths, maximise_jointly, width_of
 from studies.throws.left_over import LeftOver, left_over
 from studies.throws.model import STEP, extended, is_calibration, is_own, manoeuvres
-
-Floats = NDArray[np.floating]
 
 PLATE_SD = 0.03  # relative uncertainty of the plate's moments, which are from the authors' CAD: "a few percent"
 

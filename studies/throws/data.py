@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from bayesid import InertialParameters, InputError, Recording
-
-Floats = NDArray[np.floating]
+from bayesid._math.arrays import Floats
 
 DEFAULT_FOLDER = Path(__file__).resolve().parents[3] / "shared" / "data" / "throws"  # beside the checkout
 

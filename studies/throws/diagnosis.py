@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bayesid import Manoeuvre, Model, Posterior, Recording
 from bayesid._io.progress import Progress, silent
+from bayesid._math.arrays import Floats
 from bayesid.diagnosis import Diagnosis, Hypothesis, candidates, diagnose
 from bayesid.diagnosis.search.fitted_set import extended_posterior, extended_start
 from bayesid.inference.mode import fit
@@ -29,8 +29,6 @@ from studies.throws.model import (
     manoeuvres,
     rigid,
 )
-
-Floats = NDArray[np.floating]
 
 SPREAD = 0.1  # relative width of the body's prior about a linear regression on the throws
 TESTING = 2  # throws at most that are predicted

@@ -17,14 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bayesid import Posterior
+from bayesid._math.arrays import Floats
 from studies.throws.model import Smooth, is_calibration, is_fitted, is_own
-
-Floats = NDArray[np.floating]
 
 ITERATIONS = 40
 HALVINGS = 12
@@ -93,11 +93,12 @@ class Joint:
         return np.column_stack([np.full(len(values), mass), values[:, columns]])
 
 
-class _Layout:
-    """Where the unknowns of each throw are in the vector of shared ones."""
+class _System:
+    """Normal equations of many throws, and where the unknowns of each are in the vector of shared ones."""
 
     def __init__(self, throws: Sequence[Throw], free: Callable[[str], bool]) -> None:
         shared = [throw.shared() for throw in throws]
+        self.throws = throws
         self.names = tuple(dict.fromkeys(name for names in shared for name in names if free(name)))
         place = {name: i for i, name in enumerate(self.names)}
         self.places = [np.array([place[name] for name in names if name in place]) for names in shared]
@@ -106,6 +107,43 @@ class _Layout:
             np.array([i for i, name in enumerate(throw.posterior.unknowns.names) if is_own(name) and free(name)])
             for throw in throws
         ]
+
+    def with_shared(self, points: Sequence[Floats], value: Floats) -> list[Floats]:
+        """Return the unknowns of each throw with others of the shared ones."""
+        points = [z.copy() for z in points]
+        for z, places, columns in zip(points, self.places, self.columns, strict=True):
+            z[columns] = value[places]
+        return points
+
+    def cost(self, points: Sequence[Floats], value: Floats) -> float:
+        """Return the sum of squares of residuals and coordinates."""
+        total = float(value @ value)
+        for throw, z, own in zip(self.throws, points, self.own, strict=True):
+            total += float((throw.residuals(z) ** 2).sum() + ((z[own] / throw.width[own]) ** 2).sum())
+        return total if np.isfinite(total) else np.inf
+
+    def normal_equations(self, points: Sequence[Floats], value: Floats) -> tuple[list[_Block], Floats, Floats]:
+        """Return the blocks of the throws, Hessian and gradient of the shared unknowns."""
+        each = zip(self.throws, points, self.own, self.columns, strict=True)
+        blocks = [_eliminate(throw, z, own, columns) for throw, z, own, columns in each]
+        hessian, gradient = np.eye(len(value)), value.copy()
+        for block, places in zip(blocks, self.places, strict=True):
+            hessian[np.ix_(places, places)] += block.information
+            gradient[places] += block.pull
+        return blocks, hessian, gradient
+
+    def search(
+        self, points: list[Floats], value: Floats, blocks: Sequence[_Block], step: Floats, cost: float
+    ) -> tuple[list[Floats], Floats, float]:
+        """Halve the step until the cost falls; where it never does, stay."""
+        for size in 0.5 ** np.arange(HALVINGS):
+            trial = self.with_shared(points, value + size * step)
+            for z, block, own, places in zip(trial, blocks, self.own, self.places, strict=True):
+                z[own] += size * (block.own_step + block.own_response @ step[places])
+            lower = self.cost(trial, value + size * step)
+            if lower < cost:
+                return trial, value + size * step, lower
+        return points, value, cost
 
 
 def maximise_jointly(throws: Sequence[Throw], free: Callable[[str], bool] = is_fitted) -> Joint:
@@ -117,42 +155,41 @@ def maximise_jointly(throws: Sequence[Throw], free: Callable[[str], bool] = is_f
         Which unknowns are fitted; the others stay where ``throws`` has them. Left out, all but the first
         log-Cholesky coordinate, which is the mass: the scales know it and torque-free motion does not tell it.
     """
-    layout = _Layout(throws, free)
-    points = [throw.z.copy() for throw in throws]
-    value: Floats = np.zeros(len(layout.names))
-    for z, places, columns in zip(points, layout.places, layout.columns, strict=True):
-        value[places] = z[columns]
-    _spread(points, layout, value)
-    cost, converged = _cost(throws, layout, points, value), False
+    system = _System(throws, free)
+    value: Floats = np.zeros(len(system.names))
+    for throw, places, columns in zip(throws, system.places, system.columns, strict=True):
+        value[places] = throw.z[columns]
+    points = system.with_shared([throw.z for throw in throws], value)
+    cost, converged = system.cost(points, value), False
     for _ in range(ITERATIONS):
-        blocks = [_eliminate(throw, z, layout, i) for i, (throw, z) in enumerate(zip(throws, points, strict=True))]
-        hessian, gradient = _assemble(blocks, layout, value)
+        blocks, hessian, gradient = system.normal_equations(points, value)
         step = -np.linalg.solve(hessian, gradient)
-        points, value, lower = _search(throws, layout, points, value, blocks, step, cost)
+        points, value, lower = system.search(points, value, blocks, step, cost)
         converged, cost = cost - lower < PRECISION * cost, lower
         if converged:
             break
-    blocks = [_eliminate(throw, z, layout, i) for i, (throw, z) in enumerate(zip(throws, points, strict=True))]
-    hessian, _ = _assemble(blocks, layout, value)
-    found = tuple(replace(throw, z=z) for throw, z in zip(throws, points, strict=True))
-    information = np.stack(
-        [_scatter(block.information, layout.places[i], len(value)) for i, block in enumerate(blocks)]
+    blocks, hessian, _ = system.normal_equations(points, value)
+    information = np.zeros((len(throws), len(value), len(value)))
+    pull, covariance, variance = np.zeros(information.shape[:2]), np.linalg.inv(hessian), []
+    for index, (block, places) in enumerate(zip(blocks, system.places, strict=True)):
+        information[index][np.ix_(places, places)], pull[index, places] = block.information, block.pull
+        response = block.own_response
+        variance.append(block.own_variance + ((response @ covariance[np.ix_(places, places)]) * response).sum(axis=1))
+    return Joint(
+        names=system.names,
+        value=value,
+        covariance=covariance,
+        throws=tuple(replace(throw, z=z) for throw, z in zip(throws, points, strict=True)),
+        information=information,
+        pull=pull,
+        own_variance=tuple(variance),
+        fitted=np.stack([block.fitted for block in blocks]),
+        own=tuple(system.own),
+        converged=converged,
     )
-    pull = np.zeros((len(throws), len(value)))
-    for row, block, places in zip(pull, blocks, layout.places, strict=True):
-        row[places] = block.pull
-    covariance = np.linalg.inv(hessian)
-    variance = tuple(
-        block.own_variance
-        + ((block.own_response @ covariance[np.ix_(places, places)]) * block.own_response).sum(axis=1)
-        for block, places in zip(blocks, layout.places, strict=True)
-    )
-    own, fitted = tuple(layout.own), np.stack([block.fitted for block in blocks])
-    return Joint(layout.names, value, covariance, found, information, pull, variance, fitted, own, converged)
 
 
-@dataclass(frozen=True)
-class _Block:
+class _Block(NamedTuple):
     """Normal equations of one throw with its own unknowns eliminated, and how those follow the shared ones."""
 
     information: Floats
@@ -163,8 +200,7 @@ class _Block:
     fitted: Floats
 
 
-def _eliminate(throw: Throw, z: Floats, layout: _Layout, index: int) -> _Block:
-    own, columns = layout.own[index], layout.columns[index]
+def _eliminate(throw: Throw, z: Floats, own: NDArray[np.intp], columns: NDArray[np.intp]) -> _Block:
     residual, jacobian, precision = throw.residuals(z).ravel(), throw.jacobian(z), throw.width[own] ** -2
     a, b = jacobian[:, columns], jacobian[:, own]
     factor = np.linalg.cholesky(b.T @ b + np.diag(precision))
@@ -175,54 +211,6 @@ def _eliminate(throw: Throw, z: Floats, layout: _Layout, index: int) -> _Block:
     pull = a.T @ residual - mixed.T @ pulled
     fitted = (np.linalg.solve(factor, b.T) ** 2).sum(axis=0).reshape(-1, 6).sum(axis=0)
     return _Block(a.T @ a - mixed.T @ mixed, pull, -back[:, -1], -back[:, :-1], variance, fitted)
-
-
-def _assemble(blocks: Sequence[_Block], layout: _Layout, value: Floats) -> tuple[Floats, Floats]:
-    hessian, gradient = np.eye(len(value)), value.copy()
-    for block, places in zip(blocks, layout.places, strict=True):
-        hessian[np.ix_(places, places)] += block.information
-        gradient[places] += block.pull
-    return hessian, gradient
-
-
-def _search(
-    throws: Sequence[Throw],
-    layout: _Layout,
-    points: list[Floats],
-    value: Floats,
-    blocks: Sequence[_Block],
-    step: Floats,
-    cost: float,
-) -> tuple[list[Floats], Floats, float]:
-    """Halve the step until the cost falls; where it never does, stay."""
-    for halving in range(HALVINGS):
-        size = 0.5**halving
-        trial = [z.copy() for z in points]
-        for z, block, own, places in zip(trial, blocks, layout.own, layout.places, strict=True):
-            z[own] += size * (block.own_step + block.own_response @ step[places])
-        _spread(trial, layout, value + size * step)
-        lower = _cost(throws, layout, trial, value + size * step)
-        if lower < cost:
-            return trial, value + size * step, lower
-    return points, value, cost
-
-
-def _spread(points: Sequence[Floats], layout: _Layout, value: Floats) -> None:
-    for z, places, columns in zip(points, layout.places, layout.columns, strict=True):
-        z[columns] = value[places]
-
-
-def _cost(throws: Sequence[Throw], layout: _Layout, points: Sequence[Floats], value: Floats) -> float:
-    total = float(value @ value)
-    for throw, z, own in zip(throws, points, layout.own, strict=True):
-        total += float((throw.residuals(z) ** 2).sum() + ((z[own] / throw.width[own]) ** 2).sum())
-    return total if np.isfinite(total) else np.inf
-
-
-def _scatter(block: Floats, places: NDArray[np.intp], size: int) -> Floats:
-    full = np.zeros((size, size))
-    full[np.ix_(places, places)] = block
-    return full
 
 
 SMOOTH = ("smooth-torque", "smooth-force")

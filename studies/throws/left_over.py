@@ -21,10 +21,9 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from bayesid import Recording, SensorKind
+from bayesid._math.arrays import Floats
 from studies.throws.data import CALIBRATION, INTERVAL, POLE_PAIRS, SMOOTH, WHEEL_INERTIA, Timing, read_raw
 from studies.throws.joint import Throw
-
-Floats = NDArray[np.floating]
 
 CHANNELS = ("gyro x", "gyro y", "gyro z", "accel. x", "accel. y", "accel. z")
 

@@ -12,7 +12,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
-from numpy.typing import NDArray
 
 from bayesid import (
     BodyPrior,
@@ -26,6 +25,7 @@ from bayesid import (
     SensorKind,
     White,
 )
+from bayesid._math.arrays import Floats
 from bayesid.simulation.effects import Effect, Instant, Parameter, Readings, SensorBias, Situation, Wrench
 from bayesid.simulation.effects.effect_parameters import PhysicalBound
 from studies.throws.data import SMOOTH, WHEEL_COUNT, WHEEL_INERTIA, quiet_noise
@@ -220,8 +220,6 @@ class ThrowBias(SensorBias):
         """Integration step that suits half a second [s]."""
         return STEP
 
-
-Floats = NDArray[np.floating]
 
 URDF = """<robot name="thrown"><link name="base_link"><inertial><origin xyz="{com}"/><mass value="{mass}"/>
 <inertia ixx="{0}" ixy="{1}" ixz="{2}" iyy="{3}" iyz="{4}" izz="{5}"/></inertial></link></robot>"""

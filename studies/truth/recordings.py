@@ -17,29 +17,18 @@ from studies.truth.orbit import Orbit
 
 
 class Truth(NamedTuple):
-    """Noise-free motion at n times; base axes unless said otherwise.
+    """Noise-free motion at n times; base axes unless said otherwise."""
 
-    Fields
-    ------
-    times : (n,) array [s]
-    position, speed, acceleration, torque : (n, joints) array
-        Motion and torque of the driven joints, in the order of the URDF.
-    rate : (n, 3) array [rad/s]
-    attitude : (n, 4) array
-        Quaternion x, y, z, w, base axes to orbit axes.
-    accel : (n, 3) array [m/s2]
-    force, external_torque : (n, 3) array
-        Thrust at the base origin [N, N m].
-    """
-
-    times: Array
+    times: Array  # (n,)
+    # (n, joints): motion and torque of the driven joints, in the order of the URDF
     position: Array
     speed: Array
     acceleration: Array
     torque: Array
-    rate: Array
-    attitude: Array
-    accel: Array
+    rate: Array  # (n, 3)
+    attitude: Array  # (n, 4): quaternion x, y, z, w, base axes to orbit axes
+    accel: Array  # (n, 3)
+    # (n, 3): thrust at the base origin [N, N m]
     force: Array
     external_torque: Array
 
@@ -210,7 +199,6 @@ def study_toml(
 
 
 def _orbit_lines(orbit: Orbit | None) -> list[str]:
-    """Lines of the orbit's section."""
     if orbit is None:
         return []
     lines = ["[orbit]", f"radius = {orbit.radius!r}"]

@@ -31,30 +31,16 @@ Wheel = Callable[[float], tuple[ArrayLike, ArrayLike]]
 
 
 class Response(NamedTuple):
-    """What the reference robot does at the n requested times.
+    """What the reference robot does at the n requested times."""
 
-    Fields
-    ------
-    times : (n,) array [s]
-    rate : (n, 3) array
-        Angular velocity of the base relative to inertial space, base axes [rad/s].
-    attitude : (n, 3, 3) array
-        Rotation from base axes to orbit axes.
-    accel : (n, 3) array
-        Non-gravitational acceleration of the accelerometer's mounting point, base axes [m/s2].
-    com, com_velocity : (n, 3) array
-        Composite centre of mass in orbit axes [m, m/s].
-    angular_momentum : (n, 3) array
-        About the composite centre of mass, wheel included, orbit axes [N m s].
-    """
-
-    times: Array
-    rate: Array
-    attitude: Array
-    accel: Array
+    times: Array  # (n,)
+    rate: Array  # (n, 3): angular velocity of the base relative to inertial space, base axes [rad/s]
+    attitude: Array  # (n, 3, 3): rotation from base axes to orbit axes
+    accel: Array  # (n, 3): non-gravitational acceleration of the accelerometer's mounting point, base axes [m/s2]
+    # (n, 3): composite centre of mass in orbit axes [m, m/s]
     com: Array
     com_velocity: Array
-    angular_momentum: Array
+    angular_momentum: Array  # (n, 3): about the composite centre of mass, wheel included, orbit axes [N m s]
 
 
 class Reference:

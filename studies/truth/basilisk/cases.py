@@ -34,7 +34,6 @@ _NOTHING, _SENSORS, _MANOEUVRES = BasiliskHidden(), Sensors(), Manoeuvres()
 def _recording(
     joints: Sequence[str], truth: Truth, sensors: Sensors, generator: np.random.Generator
 ) -> tuple[Array, Table]:
-    """Sample times and noisy columns of a recording."""
     period = sensors.encoder_period
     stride = round(period / STEP)
     if stride < 1 or abs(stride * STEP - period) > 1e-9 or (sensors.rate_period, sensors.accel_period) != (period,) * 2:
@@ -164,8 +163,6 @@ def _panel(draw: Generator, strength: float) -> BasiliskHidden:
 
 
 def _all(*builds: Build) -> Build:
-    """Hide what several builds hide."""
-
     def build(draw: Generator, strength: float) -> BasiliskHidden:
         parts = [vars(one(draw, strength)) for one in builds]
         return BasiliskHidden(**{key: part for found in parts for key, part in found.items() if part is not None})

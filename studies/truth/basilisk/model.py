@@ -272,17 +272,10 @@ def _derivatives(values: Array) -> tuple[Array, Array]:
 
 
 class Run(NamedTuple):
-    """Noise-free motion at the steps from time 0 on, and the angular momentum about the centre of mass.
-
-    Fields
-    ------
-    truth : Truth
-    momentum : (n, 3) array
-        Angular momentum of all parts, inertial axes [N m s].
-    """
+    """Noise-free motion at the steps from time 0 on, and the angular momentum about the centre of mass."""
 
     truth: Truth
-    momentum: Array
+    momentum: Array  # (n, 3): angular momentum of all parts, inertial axes [N m s]
 
 
 def simulate(

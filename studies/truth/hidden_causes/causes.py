@@ -64,8 +64,6 @@ def merge(first: Options, second: Options) -> Options:
 
 
 def _in_turn(*distortions: Distortion) -> Distortion:
-    """Distortion that applies the given ones one after the other."""
-
     def both(table: Table, truth: Truth) -> None:
         for distortion in distortions:
             distortion(table, truth)
@@ -155,7 +153,6 @@ class Quantisation:
 
 
 def _hide(**parts: Any) -> Options:
-    """Keywords that hide parts or fields."""
     return {"hidden": mj.Hidden(**parts)}
 
 

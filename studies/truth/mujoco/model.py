@@ -44,7 +44,6 @@ def _quaternion(rotation: Array) -> Array:
 
 
 def _set_inertial(spec_body: mujoco.MjsBody, body: Body) -> None:
-    """Give a body of the model its inertial parameters."""
     moments, axes = np.linalg.eigh(body.inertia)
     axes[:, 2] *= np.linalg.det(axes)
     spec_body.explicitinertial = True
@@ -169,7 +168,6 @@ class TruthModel:
         self._stiffen(springs, np.zeros(len(self.joints)) if configuration is None else configuration)
 
     def _stiffen(self, springs: Mapping[str, Flexibility], configuration: ArrayLike) -> None:
-        """Give flexible joints their stiffness and damping."""
         if not springs:
             return
         data, model = self.data, self.model
@@ -197,7 +195,6 @@ class TruthModel:
         self._spring_v = self._free_v[6:]
 
     def _prescribed(self, motion: Motion, time: float) -> tuple[Array, Array, Array]:
-        """Positions, speeds and accelerations of all that is driven."""
         arm = motion(time)
         extra = []
         if self.rotor is not None:
@@ -266,7 +263,6 @@ class TruthModel:
         return result
 
     def _derivative(self, motion: Motion, time: float, y: Array, action_time: float) -> Array:
-        """Time derivative of positions and speeds."""
         nq = self.model.nq
         qvel = y[nq:]
         acceleration = self._solve(motion, time, y[:nq], qvel, action_time)
