@@ -19,8 +19,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_model, load_posterior
 from bayesid.inference.posterior import Posterior
 from bayesid.simulation.own_effects import check_own_effect
-from studies.faults.fuzz import Spoilt, answer_to, spoilt
-from studies.faults.surroundings import with_plugin
+from studies.faults.surroundings import Spoilt, answer_to, spoilt, with_plugin
 from studies.truth.bodies import SERVICER4
 from studies.truth.mujoco import Manoeuvres, write_study
 

@@ -10,9 +10,8 @@ import pytest
 from bayesid.identifiability import base_parameters
 from bayesid.robot.robot import Robot
 from studies.base_parameters import Result, run
-from studies.base_parameters.peers import compare
-from studies.base_parameters.report import STUDY, goals_of
-from studies.base_parameters.texts import regrouping_rows, symbol, unchanged
+from studies.base_parameters.report import STUDY, goals_of, regrouping_rows, symbol, unchanged
+from studies.base_parameters.structure import compare
 from studies.common.study import Verdict
 from tests.report_rules import broken_rules
 

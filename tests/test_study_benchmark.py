@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from bayesid.inference.predicted_readings import integration_error_at
-from studies.benchmark.cases import chain, posterior_of
 from studies.benchmark.report import STUDY, figures_of_merit, goals_of
-from studies.benchmark.run import Benchmark, Result, Rival, Sampling, seconds_per_evaluation
+from studies.benchmark.run import Benchmark, Result, Rival, Sampling, chain, posterior_of, seconds_per_evaluation
 from studies.common.study import Verdict
 from tests.pdf_text import PdfText
 from tests.report_rules import broken_rules

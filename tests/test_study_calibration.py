@@ -10,8 +10,7 @@ from arviz.stats.ecdf_utils import ecdf_confidence_band
 from scipy import stats
 
 from studies.calibration import STUDY, make, plan, read
-from studies.calibration.data import REPLICATES, Case
-from studies.calibration.encoders import _ratios, smooth_share
+from studies.calibration.data import REPLICATES, Case, _ratios, smooth_share
 from studies.calibration.outcomes import ALL, POINTS, Replicates, coverage, holm, interval_coverage, uniform_p_value
 from studies.calibration.replicate import Method
 from studies.calibration.report import goals_of

@@ -14,7 +14,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.inference.wrong_units import refuse_wrong_units
 from bayesid.simulation.model import Manoeuvre
-from studies.faults.fuzz import SLIPS
+from studies.faults.surroundings import SLIPS
 from studies.truth.bodies import SERVICER3
 from studies.truth.mujoco import Manoeuvres, write_study
 

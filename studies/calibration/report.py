@@ -15,8 +15,18 @@ from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number, format_p_value, format_percent
 from studies.calibration import outcomes
-from studies.calibration.data import ARM_SPREAD, BASE_SPREAD, DRAWINGS_SPREAD, INDEPENDENT, REPLICATES, Case
-from studies.calibration.encoders import NEAR, Smoothed, smooth_share, smoothed_errors
+from studies.calibration.data import (
+    ARM_SPREAD,
+    BASE_SPREAD,
+    DRAWINGS_SPREAD,
+    INDEPENDENT,
+    NEAR,
+    REPLICATES,
+    Case,
+    Smoothed,
+    smooth_share,
+    smoothed_errors,
+)
 from studies.calibration.outcomes import ALL, LEVELS, POINTS, Replicates, holm, pooled_coverage, uniform_p_value
 from studies.calibration.replicate import ARMS, LOG_LIKELIHOOD, Method, make, plan
 from studies.common.ets7 import START, ets7

@@ -23,8 +23,7 @@ from bayesid.app.schema import Study
 from bayesid.app.study_to_model import load_manoeuvres, load_model
 from bayesid.diagnosis import Diagnosis, candidates, diagnose
 from bayesid.inference import choose_parameterisation, compiled, maximise
-from studies.benchmark.cases import chain, posterior_of
-from studies.benchmark.run import best_of, seconds_per_evaluation
+from studies.benchmark.run import best_of, chain, posterior_of, seconds_per_evaluation
 from studies.common.ets7 import ets7
 from studies.cost.search_times import SearchTimes, search_times
 from studies.peers.density import Target

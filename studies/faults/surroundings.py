@@ -1,7 +1,8 @@
-"""Faults around a run: a full disk, a closed folder, two runs into one folder, and failing effects of a user."""
+"""Wrong inputs and surroundings of a command: spoilt files, mistaken units, a full disk, a closed folder and more."""
 
 from __future__ import annotations
 
+import csv
 import fcntl
 import os
 import re
@@ -11,11 +12,20 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NoReturn
+from unittest.mock import patch
 
+import numpy as np
+from hypothesis import strategies as st
 from typer.testing import CliRunner
 
+from bayesid._io.errors import InputError
+from bayesid.app import study_to_model
 from bayesid.app.command_line import app
+from bayesid.app.schema import Study
+from bayesid.app.study_to_model import load_manoeuvres, load_model
 
 # file of a user's effect, but for the method that fails
 PLUGIN = '''
@@ -135,3 +145,163 @@ def _claimed(folder: Path) -> Iterator[None]:
         yield
     finally:
         os.close(handle)
+
+
+# texts that take the place of a value
+JUNK = (
+    *("nan", "inf", "-inf", "-1.0", "0", "0.0", "1e-300", "1e300", "1e400", "9" * 400, "-0.0", "1_000", "0x10", "1,5"),
+    *("true", "''", '""', '"x"', "'..'", "'/'", '"\\u0000"', "[]", "[1.0]", "[nan, nan, nan]", "[[]]", "{}", "{x = 1}"),
+    *("1979-05-27", "", " ", ",", '"', "'", "\x00", "\ufeff", "é", "\u202e", "<", ">", "&", "#", "=", "[", "]"),
+)
+
+ACCEPTED = "the files are accepted"  # message of what ends a command after it has read its files
+
+
+@dataclass(frozen=True)
+class Spoilt:
+    """One change of one file."""
+
+    file: str  # ending of the name of the file
+    kind: str  # name of the change, one of `KINDS`
+    place: float  # where in the file, from 0 at its start to 1 at its end
+    text: str  # what is put there
+
+    def apply(self, folder: Path) -> None:
+        """Change the file in a folder."""
+        file = min(folder.glob(f"*{self.file}"))
+        content = file.read_bytes()
+        at = min(int(self.place * len(content)), len(content) - 1)
+        new = self.text.encode("utf-8", "surrogatepass")
+        start, end = _word(content, at)
+        line_start, line_end = content.rfind(b"\n", 0, at) + 1, (content.find(b"\n", at) + 1) or len(content)
+        line = content[line_start:line_end]
+        changed = {
+            "replace a value": content[:start] + new + content[end:],
+            "insert": content[:at] + new + content[at:],
+            "cut off": content[:at],
+            "drop a line": content[:line_start] + content[line_end:],
+            "repeat a line": content[:line_end] + line + content[line_end:],
+            "another byte": content[:at] + bytes([content[at] ^ 0x80]) + content[at + 1 :],
+        }
+        file.write_bytes(changed[self.kind])
+
+
+KINDS = ("replace a value", "insert", "cut off", "drop a line", "repeat a line", "another byte")  # changes of a file
+
+
+def _word(content: bytes, at: int) -> tuple[int, int]:
+    """Return where the value about a place begins and ends: it holds no separator of any of the formats."""
+    separators = b' ,\n"=<>[]'
+    start = end = at
+    while start and content[start - 1] not in separators:
+        start -= 1
+    while end < len(content) and content[end] not in separators:
+        end += 1
+    return start, end
+
+
+def spoilt() -> st.SearchStrategy[Spoilt]:
+    """Return the strategy of changes."""
+    text = st.one_of(st.sampled_from(JUNK), st.floats().map(repr), st.text(max_size=8))
+    places = st.floats(0.0, 1.0)
+    return st.builds(Spoilt, st.sampled_from([".toml", ".csv", ".urdf"]), st.sampled_from(KINDS), places, text)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command answers to a study."""
+
+    status: int  # exit status
+    message: str  # what it says
+    accepted: bool  # whether it accepts the files
+    # what is wrong with the answer: a traceback, another status than 2, no message or several; empty if nothing is
+    fault: str
+
+
+def answer_to(study: Path, change: Spoilt, folder: Path) -> Answer:
+    """Copy the folder of a study, change it, and return what ``bayesid check`` answers once it has read the files."""
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(study.parent, folder)
+    change.apply(folder)
+    with _reading_alone():
+        done = CliRunner().invoke(app, ["check", str(folder / study.name), "--output", str(folder / "out")])
+    errors = done.output.count("Error: ")
+    fault = ""
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        fault = f"{type(done.exception).__name__}: {done.exception}"
+    elif done.exit_code != 2:
+        fault = f"exit status {done.exit_code}"
+    elif errors < 1 or not done.output.startswith("Error: "):
+        fault = "no message"
+    elif (folder / "out").exists():
+        fault = "something is written"
+    return Answer(done.exit_code, done.output, ACCEPTED in done.output, fault)
+
+
+@contextmanager
+def _reading_alone() -> Iterator[None]:
+    """End a command when it has read all files, before anything is compiled."""
+
+    def read(study: Study, window: int | None = None) -> NoReturn:
+        load_manoeuvres(study, load_model(study).robot)
+        raise InputError(ACCEPTED)
+
+    with patch.object(study_to_model, "load_posterior", read):
+        yield
+
+
+def _columns(prefix: str, factor: float) -> Callable[[Path], None]:
+    """Return a change that multiplies all columns of the recordings whose names begin alike."""
+
+    def change(folder: Path) -> None:
+        for file in folder.glob("*.csv"):
+            with file.open(newline="") as stream:
+                header, *rows = csv.reader(stream)
+            scaled = [at for at, name in enumerate(header) if name.startswith(prefix)]
+            for row in rows:
+                for at in scaled:
+                    row[at] = repr(float(row[at]) * factor) if row[at] else ""
+            with file.open("w", newline="") as stream:
+                csv.writer(stream).writerows([header, *rows])
+
+    return change
+
+
+def _key(pattern: str, factor: float) -> Callable[[Path], None]:
+    """Return a change that multiplies the numbers of the study after a pattern, to the end of the line."""
+
+    def change(folder: Path) -> None:
+        file = folder / "study.toml"
+        number = re.compile(r"-?\d+\.?\d*(e-?\d+)?")
+
+        def scaled(found: re.Match[str]) -> str:
+            return found[1] + number.sub(lambda text: repr(float(text[0]) * factor), found[2])
+
+        file.write_text(re.sub(rf"({pattern} = )(.*)", scaled, file.read_text()))
+
+    return change
+
+
+# changes of the folder of a study, by what they stand for
+SLIPS: Mapping[str, Callable[[Path], None]] = {
+    "joint positions in degrees": _columns("position.", 180.0 / np.pi),
+    "rate in degrees per second": _columns("rate.", 180.0 / np.pi),
+    "rate in arcseconds per second": _columns("rate.", 648000.0 / np.pi),
+    "acceleration in mm/s²": _columns("accel.", 1000.0),
+    "acceleration in g": _columns("accel.", 1.0 / 9.80665),
+    "acceleration in mg": _columns("accel.", 1000.0 / 9.80665),
+    "time in milliseconds": _columns("time", 1000.0),
+    "time in minutes": _columns("time", 1.0 / 60.0),
+    "radius of the orbit in km": _key("radius", 1e-3),
+    "place of the accelerometer in mm": _key("position", 1000.0),
+}
+
+
+def refused(study: Path, slip: str, folder: Path) -> tuple[bool, str]:
+    """Return whether ``bayesid check`` refuses a study with one wrong unit with exit status 2, and what it says."""
+    copied = folder / "study"
+    shutil.copytree(study.parent, copied)
+    SLIPS[slip](copied)
+    done = CliRunner().invoke(app, ["check", str(copied / study.name), "--output", str(folder / "out")])
+    clear = done.exit_code == 2 and done.output.startswith("Error: ") and not (folder / "out").exists()
+    return clear, " ".join(done.output.split())

@@ -28,7 +28,7 @@ from bayesid.inference import (
 )
 from bayesid.inference.parameterisation import StudentT
 from bayesid.inference.predicted_readings import simulate_manoeuvre
-from studies.benchmark.cases import DURATION, excitation
+from studies.benchmark.run import DURATION, excitation
 from studies.common.ets7 import ACCEL, BASE, ENCODER, INTERVAL, RATE, ets7
 from studies.common.models import ARM_SPREAD, base_model
 
