@@ -38,15 +38,14 @@ SUBJECTS = (
     Subject("Does it withstand faults?", ("faults",)),
 )
 
-ORDER = (Verdict.FAIL, Verdict.OPEN, Verdict.NOT_TESTED, Verdict.PASS)  # verdicts, misses first
-
-# section of each verdict
+# section of each verdict, misses first
 SECTIONS = {
     Verdict.FAIL: "Where it falls short",
     Verdict.OPEN: "What is not decided",
     Verdict.NOT_TESTED: "What is not tested",
     Verdict.PASS: "What is met",
 }
+ORDER = tuple(SECTIONS)
 
 BESIDE = ("manual", "validation")  # files among the reports that are no studies
 

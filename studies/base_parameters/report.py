@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import groupby
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -73,24 +73,15 @@ def _sum(base: BaseParameters, row: NDArray[np.floating]) -> str:
             for name, value in zip(base.dependent, row, strict=True)
             if name.endswith(f".{letter}") and value
         ]
-        for run in _runs(terms):
-            first, last, value = run[0][0], run[-1][0], run[0][1]
+        # successive bodies with one coefficient: body less place is the same for all of them
+        for _, alike in groupby(enumerate(terms), key=lambda item: (item[1][0] - item[0], item[1][1])):
+            run_of = [term for _, term in alike]
+            first, last, value = run_of[0][0], run_of[-1][0], run_of[0][1]
             one = symbol(f"{bodies[first]}.{letter}", bodies)
             group = one if first == last else one + f"-{last}".translate(_LOWERED)
             size = "" if abs(value) == 1.0 else f"{format_number(abs(value), 6)} "
             text += f" {'−' if value < 0.0 else '+'} {size}{group}"
     return text
-
-
-def _runs(terms: list[tuple[int, float]]) -> list[list[tuple[int, float]]]:
-    """Split terms where the body is not the next one or the coefficient changes."""
-    runs = [terms[:1]] if terms else []
-    for before, term in pairwise(terms):
-        if term[0] == before[0] + 1 and term[1] == before[1]:
-            runs[-1].append(term)
-        else:
-            runs.append([term])
-    return runs
 
 
 COUNTS = (24, 52)  # numbers of base parameters by the paper's rules: 30 − 6 for two joints, 70 − 18 for six
@@ -181,6 +172,9 @@ def _report(result: Result) -> Report[Result]:
     )
 
 
+_ABSENT = "FIGAROH not installed", Verdict.NOT_TESTED
+
+
 def goals_of(result: Result) -> list[Goal]:
     """Return the goals."""
     counts = (result.planar.base.count, result.arm.base.count)
@@ -188,9 +182,7 @@ def goals_of(result: Result) -> list[Goal]:
     ranks = [(case.count, case.rank) for case in (*result.peers, result.tilted)]
     angles = [case.angle for case in (*result.peers, result.tilted)]
     peer = (
-        Goal(
-            "the same space of base parameters as FIGAROH on a fixed base", "FIGAROH not installed", Verdict.NOT_TESTED
-        )
+        Goal("the same space of base parameters as FIGAROH on a fixed base", *_ABSENT)
         if any(angle is None for angle in angles)
         else Goal(
             f"the same space of base parameters as {result.tilted.tool} on a fixed base, three cases",
@@ -310,7 +302,7 @@ def _evidence(document: Document, result: Result) -> None:
 
 def _tables(result: Result) -> list[CsvTable]:
     planar, arm = result.planar.base, result.arm.base
-    bodies = list(dict.fromkeys(name.split(".", 1)[0] for name in planar.standard))
+    bodies = _bodies(planar)
     beta = [
         [symbol(name, bodies), *(f"{value:.10g}" for value in row), f"{grouped:.10g}"]
         for name, row, grouped in zip(

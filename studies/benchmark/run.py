@@ -28,8 +28,7 @@ from bayesid import (
 )
 from bayesid.design.design_result import sample_times
 from bayesid.inference import Chains, LogCholeskyParameterisation, identify
-from bayesid.inference.predicted_readings import integration_error_at
-from bayesid.inference.predicted_readings import simulate_manoeuvre
+from bayesid.inference.predicted_readings import integration_error_at, simulate_manoeuvre
 from bayesid.simulation.effects import GravityGradient
 from studies.common.ets7 import INTERVAL, RADIUS, ets7
 from studies.common.study import show

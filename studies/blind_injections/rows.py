@@ -35,21 +35,11 @@ def rates(trials: Sequence[Trial]) -> list[list[str]]:
 
 
 def _row(trials: Sequence[Trial]) -> list[str]:
-    count = {
-        key: str(sum(getattr(trial, key) for trial in trials))
-        for key in ("alarmed", "in_set", "named_rightly", "misnamed")
-    }
+    keys = ("alarmed", "in_set", "named_rightly", "misnamed")
+    alarmed, in_set, named, misnamed = (str(sum(getattr(trial, key) for trial in trials)) for key in keys)
     limits = [(t.detection, t.detection * t.naming) for t in trials if t.detection is not None and t.naming is not None]
     detection, naming = (f"{sum(column):.1f}" for column in zip(*limits, strict=True)) if limits else ("–", "–")
-    return [
-        str(len(trials)),
-        count["alarmed"],
-        detection,
-        count["in_set"],
-        count["named_rightly"],
-        naming,
-        count["misnamed"],
-    ]
+    return [str(len(trials)), alarmed, detection, in_set, named, naming, misnamed]
 
 
 def reliability(trials: Iterable[Trial]) -> list[list[str]]:
@@ -94,16 +84,9 @@ def scores(trials: Iterable[Trial]) -> list[list[str]]:
             brier = (p - true) ** 2
             logs = np.log(np.clip(np.where(true, p, 1.0 - p), LEAST, None))
             error = np.sqrt(len(p))
-            rows.append(
-                [
-                    name,
-                    str(len(p)),
-                    f"{brier.mean():.4f} ± {brier.std() / error:.4f}",
-                    f"{logs.mean():.3f} ± {logs.std() / error:.3f}",
-                    f"{p.mean():.3f}",
-                    f"{true.mean():.3f}",
-                ]
-            )
+            brier_text = f"{brier.mean():.4f} ± {brier.std() / error:.4f}"
+            log_text = f"{logs.mean():.3f} ± {logs.std() / error:.3f}"
+            rows.append([name, str(len(p)), brier_text, log_text, f"{p.mean():.3f}", f"{true.mean():.3f}"])
     return rows
 
 
@@ -111,13 +94,8 @@ def _reliable(named: Sequence[tuple[float, bool]]) -> list[str]:
     right, total = sum(held for _, held in named), len(named)
     interval = stats.binomtest(right, total).proportion_ci(method="wilson")
     stated = float(np.mean([probability for probability, _ in named]))
-    return [
-        str(total),
-        f"{stated:.3f}",
-        str(right),
-        f"{right / total:.3f}",
-        f"{interval.low:.3f} to {interval.high:.3f}",
-    ]
+    ends = f"{interval.low:.3f} to {interval.high:.3f}"
+    return [str(total), f"{stated:.3f}", str(right), f"{right / total:.3f}", ends]
 
 
 def confusion(trials: Iterable[Trial]) -> list[list[str]]:

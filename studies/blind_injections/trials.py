@@ -219,13 +219,10 @@ def _trial(content: Mapping[str, Any]) -> Trial:
     """Return a trial from what JSON has of it; earlier versions let rounding lift sums of probabilities above one."""
     tuples = {key: tuple(content[key]) for key in ("hidden", "accept", "causes", "amplitude_errors", "body_errors")}
     probabilities = {name: min(value, 1.0) for name, value in content["probabilities"].items()}
-    singles = {key: _at_most_one(content[key]) for key in ("probability", "unknown", "nothing")}
+    stated = ("probability", "unknown", "nothing")
+    singles = {key: None if content[key] is None else min(content[key], 1.0) for key in stated}
     sets = tuple(tuple(labels) for labels in content["sets"])
     return Trial(**{**content, **tuples, **singles, "probabilities": probabilities, "sets": sets})
-
-
-def _at_most_one(value: float | None) -> float | None:
-    return None if value is None else min(value, 1.0)
 
 
 def make(item: Plan) -> Trial:
@@ -242,6 +239,7 @@ def make(item: Plan) -> Trial:
         weaker = case.make(Path(folder) / "weaker", item.seed, WEAKER * item.strength) if _visible(case) else None
         size = _NOT_SEEN if weaker is None else _limits(result, case, item.seed, _signal(result, Study.load(weaker)))
     wrench = case if isinstance(case, hidden_causes.Case) and case.frame is not None else None
+    found = result.probabilities
     return Trial(
         case=item.case,
         seed=item.seed,
@@ -252,20 +250,18 @@ def make(item: Plan) -> Trial:
         status=result.verdict.status.value,
         causes=result.verdict.causes,
         sets=_sets(result),
-        signal_to_noise=size.signal_to_noise,
-        detection=size.detection,
-        naming=size.naming,
         p_value=result.alarm.p_value,
-        probability=_probability(result),
-        probabilities=_inclusion(result),
-        unknown=result.probabilities.unknown,
-        nothing=result.probabilities.nothing,
+        probability=result.probability_of(result.verdict.causes) if result.verdict.causes else None,
+        probabilities={c: p for c in found.causes if (p := found.inclusion[c]) > MATTERS},
+        unknown=found.unknown,
+        nothing=found.nothing,
         amplitude_errors=_amplitude_errors(result, case.amplitudes(item.seed, item.strength)),
         body_errors=_body_errors(result, written),
         frame=None if result.unexplained.fixed_in is None else result.unexplained.fixed_in.value,
         true_frame=None if wrench is None else wrench.frame,
         correlation=None if wrench is None else _correlation(result, wrench, item, written),
         seconds={**result.seconds, "total": total},
+        **vars(size),
     )
 
 
@@ -322,21 +318,6 @@ def _correlation(result: Diagnosis, case: hidden_causes.Case, item: Plan, writte
         true += [np.interp(time_, truth.times, there[:, axis]) for axis in range(3)]
         estimated += list(torque.T)
     return float(np.corrcoef(np.concatenate(estimated), np.concatenate(true))[0, 1])
-
-
-def _probability(result: Diagnosis) -> float | None:
-    """Return the probability that all named causes are at work, by any of their names."""
-    causes = result.verdict.causes
-    if not causes:
-        return None
-    classes = [set(next(members for members in result.classes if cause in members)) for cause in causes]
-    sets = result.probabilities.sets
-    return sum(item.probability for item in sets if not any(members.isdisjoint(item.causes) for members in classes))
-
-
-def _inclusion(result: Diagnosis) -> dict[str, float]:
-    found = result.probabilities
-    return {name: found.inclusion[name] for name in found.causes if found.inclusion[name] > MATTERS}
 
 
 def _sets(result: Diagnosis) -> tuple[tuple[str, ...], ...]:

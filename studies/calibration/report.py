@@ -309,10 +309,8 @@ def _percent(share: float, error: float) -> str:
 
 
 def _smoothed_row(row: Smoothed) -> list[str]:
-    return [
-        f"{row.interval:g} s, {format_number(row.encoder)} rad",
-        *(f"{value:.2f}" for value in (*row.between, *row.near)),
-    ]
+    ratios = (f"{value:.2f}" for value in (*row.between, *row.near))
+    return [f"{row.interval:g} s, {format_number(row.encoder)} rad", *ratios]
 
 
 def _mean(values: Floats) -> str:
@@ -335,10 +333,8 @@ def ecdf_figure(cases: Sequence[Replicates], family: int) -> Figure:
         for name, ranks in item.ranks().items():
             share = np.searchsorted(np.sort(ranks), POINTS, side="right") / count
             special = name == LOG_LIKELIHOOD
-            style = (
-                {"color": COLOURS[1], "linewidth": 1.4, "zorder": 3} if special else {"color": "0.6", "linewidth": 0.5}
-            )
-            axes.plot(POINTS, share - POINTS, **style)
+            colour, width, order = (COLOURS[1], 1.4, 3) if special else ("0.6", 0.5, 2)
+            axes.plot(POINTS, share - POINTS, color=colour, linewidth=width, zorder=order)
         axes.set_title(f"{item.case} ({count})", fontsize=7)
     for axes in panels.ravel()[len(shown) :]:
         axes.set_visible(False)

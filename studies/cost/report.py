@@ -181,17 +181,12 @@ def _phases(document: Document, cost: Cost) -> None:
         "read within the phases that use them.",
         columns("l" + "r" * (len(phases) + 1)),
     )
-    rows = [
-        [
-            name,
-            f"{runs[0].wall:.1f}",
-            _spread([item.wall for item in runs[1:]]),
-            f"{max(r.memory for r in runs):.2f}",
-            ", ".join(f"{phase} {np.median([r.phases[phase] for r in runs[1:]]):.1f}" for phase in runs[-1].phases)
-            or "-",
-        ]
-        for name, runs in cost.commands.items()
-    ]
+    rows = []
+    for name, runs in cost.commands.items():
+        warm, memory = runs[1:], max(run.memory for run in runs)
+        phases_of = ", ".join(f"{phase} {np.median([r.phases[phase] for r in warm]):.1f}" for phase in runs[-1].phases)
+        walls = _spread([run.wall for run in warm])
+        rows.append([name, f"{runs[0].wall:.1f}", walls, f"{memory:.2f}", phases_of or "-"])
     silent = [name for name, runs in cost.commands.items() if not runs[-1].phases]
     unsaid = f" The files of {joined(silent)} state no time by phase." if silent else ""
     if rows:

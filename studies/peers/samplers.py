@@ -28,7 +28,7 @@ from emcee.moves import DEMove, DESnookerMove, StretchMove
 from scipy.special import logsumexp
 
 from bayesid._math.arrays import Floats
-from bayesid.inference import importance_sample, sample
+from bayesid.inference import Chains, Evidence, importance_sample, sample
 from bayesid.inference.parameterisation import StudentT
 from studies.peers.density import Target
 
@@ -117,20 +117,20 @@ class _Counted:
         return self._function(x)
 
 
-def ours(target: Target, budget: Budget, rng: np.random.Generator) -> Reached:
+def _sampled(target: Target, budget: Budget, rng: np.random.Generator) -> tuple[Evidence, Chains]:
     """Sample as `bayesid.identify` does once it has the mode: importance sampling, then emcee with its own moves."""
+    evidence, wanted = importance_sample(target.parameterisation, target.optimum, rng), budget.effective_samples
+    seed, trusted = int(rng.integers(2**31)), evidence.trusted
+    return evidence, sample(target.parameterisation, target.optimum, seed, effective_samples=wanted, trusted=trusted)
+
+
+def ours(target: Target, budget: Budget, rng: np.random.Generator) -> Reached:
+    """Sample with the package's own moves."""
     import arviz  # noqa: F401 - imported before the clock runs, as every peer is
 
     target.log_density(np.zeros((1, target.size)))
     clock = _Clock()
-    evidence = importance_sample(target.parameterisation, target.optimum, rng)
-    chains = sample(
-        target.parameterisation,
-        target.optimum,
-        int(rng.integers(2**31)),
-        effective_samples=budget.effective_samples,
-        trusted=evidence.trusted,
-    )
+    evidence, chains = _sampled(target, budget, rng)
     seconds = clock.seconds
     x = target.whitened(chains.y.reshape(-1, target.size)).reshape(len(chains.y), -1, chains.walkers, target.size)
     return Reached(
@@ -240,16 +240,10 @@ def dynesty(target: Target, budget: Budget, rng: np.random.Generator) -> Reached
         sampler.run_nested(n_effective=int(budget.effective_samples), maxcall=calls, print_progress=False)
     found = sampler.results
     effective = float(get_neff_from_logwt(found.logwt))
-    return Reached(
-        clock.seconds,
-        density.evaluations,
-        0,
-        effective,
-        effective >= budget.effective_samples,
-        float(found.logz[-1]),
-        float(found.logzerr[-1]),
-        (found.importance_weights() @ found.samples).tolist(),
-    )
+    evidence = float(found.logz[-1]), float(found.logzerr[-1])
+    mean = (found.importance_weights() @ found.samples).tolist()
+    enough = effective >= budget.effective_samples
+    return Reached(clock.seconds, density.evaluations, 0, effective, enough, *evidence, mean)
 
 
 def nautilus(target: Target, budget: Budget, rng: np.random.Generator) -> Reached:
@@ -268,16 +262,9 @@ def nautilus(target: Target, budget: Budget, rng: np.random.Generator) -> Reache
     except _Expired:
         return Reached(clock.seconds, density.evaluations, 0, 0.0, False)
     points, log_weights, _ = sampler.posterior()
-    return Reached(
-        clock.seconds,
-        density.evaluations,
-        0,
-        float(sampler.n_eff),
-        True,
-        float(sampler.log_z),
-        float(1.0 / np.sqrt(sampler.n_eff)),
-        (np.exp(log_weights) @ points).tolist(),
-    )
+    effective, mean = float(sampler.n_eff), (np.exp(log_weights) @ points).tolist()
+    error = float(1.0 / np.sqrt(sampler.n_eff))
+    return Reached(clock.seconds, density.evaluations, 0, effective, True, float(sampler.log_z), error, mean)
 
 
 # samplers by name, the package's own first
@@ -297,14 +284,7 @@ ITERATIONS = 100  # number of iterations of the bridge, many more than it needs
 def reference(target: Target, budget: Budget, rng: np.random.Generator) -> Reached:
     """Return the reference, with as many effective samples as the budget wants; its time is no part of a comparison."""
     began = time.process_time()
-    trusted = importance_sample(target.parameterisation, target.optimum, rng).trusted
-    chains = sample(
-        target.parameterisation,
-        target.optimum,
-        int(rng.integers(2**31)),
-        effective_samples=budget.effective_samples,
-        trusted=trusted,
-    )
+    _, chains = _sampled(target, budget, rng)
     y = chains.y.reshape(len(chains.y), -1, chains.walkers, target.size)
     halves = np.array_split(np.arange(len(y)), 2)
     values, evaluations = [], chains.evaluations

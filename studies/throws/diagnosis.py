@@ -111,13 +111,9 @@ def lacking(
     plain, longer = Posterior.of(model, throws), extended_posterior(taken)
     modes = fit(plain, plain.starting_point()).z, fit(longer, extended_start(taken, longer)).z
     testing = manoeuvres(model, left)
-    held = HeldOut(
-        tuple(recording.name for recording in left),
-        *(_predict(p, z, testing) for p, z in zip((plain, longer), modes, strict=True)),
-    )
-    bodies = {
-        name: tensors(p, z[None, :10]) for name, p, z in zip(("rigid", "extended"), (plain, longer), modes, strict=True)
-    }
+    predicted = (_predict(plain, modes[0], testing), _predict(longer, modes[1], testing))
+    held = HeldOut(tuple(recording.name for recording in left), *predicted)
+    bodies = {"rigid": tensors(plain, modes[0][None, :10]), "extended": tensors(longer, modes[1][None, :10])}
     return Lacking(body, tuple(recording.name for recording in used), found, taken, held, bodies)
 
 
