@@ -11,8 +11,16 @@ from scipy import stats
 
 from studies.calibration import STUDY, make, plan, read
 from studies.calibration.data import REPLICATES, Case, _ratios, smooth_share
-from studies.calibration.outcomes import ALL, POINTS, Replicates, coverage, holm, interval_coverage, uniform_p_value
-from studies.calibration.replicate import Method
+from studies.calibration.replicate import (
+    ALL,
+    POINTS,
+    Method,
+    Replicates,
+    coverage,
+    holm,
+    interval_coverage,
+    uniform_p_value,
+)
 from studies.calibration.report import goals_of
 from studies.common.monte_carlo import run_trials
 from studies.common.study import Verdict

@@ -6,8 +6,7 @@ draw the truth from the posterior of one data set, and some let MuJoCo make the 
 line. ``python -m studies.calibration --full`` makes those that are missing and writes ``reports/calibration.pdf``.
 """
 
-from studies.calibration.outcomes import Replicates, read
-from studies.calibration.replicate import make, plan
+from studies.calibration.replicate import Replicates, make, plan, read
 from studies.calibration.report import STUDY
 
 __all__ = ["STUDY", "Replicates", "main", "make", "plan", "read"]

@@ -14,7 +14,7 @@ from bayesid.inference.importance import TRUSTED
 from bayesid.report import Document
 from bayesid.report.figures.figure_style import COLOURS, styled, wide_figure
 from bayesid.report.numbers import format_number, format_p_value, format_percent
-from studies.calibration import outcomes
+from studies.calibration import replicate
 from studies.calibration.data import (
     ARM_SPREAD,
     BASE_SPREAD,
@@ -27,8 +27,7 @@ from studies.calibration.data import (
     smooth_share,
     smoothed_errors,
 )
-from studies.calibration.outcomes import ALL, LEVELS, POINTS, Replicates, holm, pooled_coverage, uniform_p_value
-from studies.calibration.replicate import ARMS, LOG_LIKELIHOOD, Method, make, plan
+from studies.calibration.replicate import ALL, ARMS, LEVELS, LOG_LIKELIHOOD, POINTS, Method, Replicates, pooled_coverage
 from studies.common.ets7 import START, ets7
 from studies.common.figures import robot_outline
 from studies.common.monte_carlo import Workers, run_trials
@@ -61,8 +60,8 @@ def goals_of(cases: Sequence[Replicates]) -> list[Goal]:
 
 def _coverage_goals(cases: Sequence[Replicates]) -> list[Goal]:
     """Return the goal on the coverage of the intervals of each level, in every case and in all together."""
-    found = outcomes.interval_coverage(cases)
-    corrected = holm({key: item.p_value for key, item in found.items()})
+    found = replicate.interval_coverage(cases)
+    corrected = replicate.holm({key: item.p_value for key, item in found.items()})
     complete = all(
         any(item.case is case and len(item.results) >= planned for item in cases)
         for case, planned in REPLICATES.items()
@@ -85,14 +84,14 @@ def _emcee_goal(cases: Sequence[Replicates]) -> Goal:
     """Return the goal on emcee where the arm is unknown, which is judged like the others once it is run there."""
     text = "ranks uniform, emcee: unknown arm and whole system"
     p_values = {
-        (item.case, name): uniform_p_value(ranks)
+        (item.case, name): replicate.uniform_p_value(ranks)
         for item in cases
         if item.case in ARMS
         for name, ranks in item.ranks(Method.EMCEE).items()
     }
     if not p_values:
         return Goal(text, "none made", Verdict.NOT_TESTED)
-    least = min(holm(p_values).values())
+    least = min(replicate.holm(p_values).values())
     verdict = Verdict.FAIL if least <= FAMILYWISE else Verdict.OPEN  # so few replicates show gross errors alone
     made = {item.case: len(item.bodies(Method.EMCEE)) for item in cases if item.case in ARMS}
     counts = ", ".join(f"{count or 'none'} of {case}" for case, count in made.items())
@@ -101,7 +100,7 @@ def _emcee_goal(cases: Sequence[Replicates]) -> Goal:
 
 def corrected_p_values(cases: Sequence[Replicates]) -> dict[tuple[Case, str], float]:
     """Return Holm's p-values of all unknowns of all cases together."""
-    return holm({(item.case, name): p for item in cases for name, p in item.p_values.items()})
+    return replicate.holm({(item.case, name): p for item in cases for name, p in item.p_values.items()})
 
 
 def run(
@@ -114,8 +113,8 @@ def run(
 ) -> list[Replicates]:
     """Make the replicates that the store does not hold yet, unless those ``made`` so far are enough, and read all."""
     if not made:
-        run_trials(make, plan(full), trials, seed=SEED, workers=workers, progress=progress)
-    return outcomes.read(trials)
+        run_trials(replicate.make, replicate.plan(full), trials, seed=SEED, workers=workers, progress=progress)
+    return replicate.read(trials)
 
 
 def _report(cases: Sequence[Replicates]) -> Report[Sequence[Replicates]]:
@@ -228,9 +227,9 @@ def _findings(document: Document, cases: Sequence[Replicates]) -> None:
                 f"{', '.join(f'{100.0 * level:g}' for level in LEVELS)} % intervals."
             )
     pooled = np.concatenate([item.ranks()[LOG_LIKELIHOOD] for item in cases if item.results])
+    p_value = format_p_value(replicate.uniform_p_value(pooled))
     sentences.append(
-        f"The log likelihood of all {len(pooled)} replicates together: p = {format_p_value(uniform_p_value(pooled))} "
-        "of its ranks being uniform."
+        f"The log likelihood of all {len(pooled)} replicates together: p = {p_value} of its ranks being uniform."
     )
     chi2 = [np.concatenate([item.chi2(sensor) for item in cases if item.results]) for sensor in ("rate", "accel")]
     sentences.append(
@@ -266,7 +265,7 @@ def _failures(document: Document, cases: Sequence[Replicates]) -> None:
     ]
     short = [
         f"{name} {item} at {format_percent(level)}"
-        for (name, level), item in outcomes.interval_coverage(cases).items()
+        for (name, level), item in replicate.interval_coverage(cases).items()
         if level - item.share > SHORT * item.error
     ]
     if short:
@@ -293,7 +292,7 @@ def _coverage_rows(cases: Sequence[Replicates]) -> list[list[str]]:
         for method in Method:
             ranks = item.bodies(method)
             if len(ranks) > 1:
-                cells = [_percent(*outcomes.coverage(ranks, level)) for level in LEVELS]
+                cells = [_percent(*replicate.coverage(ranks, level)) for level in LEVELS]
                 doubt = bad if method is Method.IMPORTANCE else "-"
                 rows.append([f"{item.case}: {method}", str(len(ranks)), *cells, doubt])
     for method in Method:
