@@ -465,6 +465,13 @@ def check_in_study(effect: Effect, hook: str) -> None:
     assert effect.in_study(100.0, True) is None
 
 
+def check_members(effect: Effect, hook: str) -> None:
+    """All that the registration of the class makes known is known, the effect among it."""
+    names = {member.name for member in type(effect).members()}
+    assert effect.name in names
+    assert names <= set(known_effects())
+
+
 CHECKS: dict[str, Callable[[Effect, str], None]] = {
     **dict.fromkeys(CALLS, check_values),
     "name": check_name,
@@ -502,8 +509,9 @@ CHECKS: dict[str, Callable[[Effect, str], None]] = {
     "cause_kind": check_cause_kind,
     "reach_of_swing": check_reach_of_swing,
     "in_study": check_in_study,
+    "members": check_members,
 }
-FRAMEWORK = {"uses", "uses_latitude", "constants", "bound", "amplitude_units", "instants", "at", "members"}
+FRAMEWORK = {"uses", "uses_latitude", "constants", "bound", "amplitude_units", "instants", "at"}
 """What the simulation asks of an effect and no effect overrides."""
 
 
