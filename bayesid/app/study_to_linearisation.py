@@ -33,10 +33,10 @@ MISFIT = 3.0
 class LinearisationPoint:
     """Posterior with the mode at which it is linearised."""
 
-    basis: Basis  # basis of the posterior, a fit or a prediction
-    statement: str  # description of the basis in sentences
-    posterior: Posterior  # posterior with its noise linearised at the mode
-    optimum: Optimum  # mode of the posterior
+    basis: Basis  #: basis of the posterior, a fit or a prediction
+    statement: str  #: description of the basis in sentences
+    posterior: Posterior  #: posterior with its noise linearised at the mode
+    optimum: Optimum  #: mode of the posterior
 
 
 def missing_part(study: Study) -> str:

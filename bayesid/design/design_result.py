@@ -38,11 +38,11 @@ DRAWS = 200  # number of draws of the prior for the risk of breaking a limit, en
 class Risk:
     """Risk of breaking a limit under the present uncertainty of the robot."""
 
-    name: str  # name of the limit
-    limit: float  # bound of the limited quantity, in the unit
-    # value that the quantity stays below along the whole manoeuvre with probability `CERTAIN`, in the unit
+    name: str  #: name of the limit
+    limit: float  #: bound of the limited quantity, in the unit
+    #: value that the quantity stays below along the whole manoeuvre with probability `CERTAIN`, in the unit
     quantile: float
-    unit: str  # unit of the quantity
+    unit: str  #: unit of the quantity
 
     @property
     def go(self) -> bool:
@@ -54,16 +54,16 @@ class Risk:
 class Design:
     """Designed manoeuvre."""
 
-    name: str  # name of the manoeuvre, which is also the stem of its file
-    criterion: str  # name of the criterion by which it was designed
-    problem: Problem  # design problem
-    parameters: Floats  # (n,) parameters of the motion in its family
-    found: Found  # outcome of the search
-    costs: Mapping[str, float]  # values of all criteria of the problem, by name
-    posterior: Posterior  # posterior of the manoeuvre as it would be recorded without noise
-    predicted: Predicted  # predicted posterior of the bodies to identify
-    reached: Sequence[Reached]  # largest values of all limited quantities
-    risks: Sequence[Risk]  # risks of the limits that depend on the inertial parameters
+    name: str  #: name of the manoeuvre, which is also the stem of its file
+    criterion: str  #: name of the criterion by which it was designed
+    problem: Problem  #: design problem
+    parameters: Floats  #: (n,) parameters of the motion in its family
+    found: Found  #: outcome of the search
+    costs: Mapping[str, float]  #: values of all criteria of the problem, by name
+    posterior: Posterior  #: posterior of the manoeuvre as it would be recorded without noise
+    predicted: Predicted  #: predicted posterior of the bodies to identify
+    reached: Sequence[Reached]  #: largest values of all limited quantities
+    risks: Sequence[Risk]  #: risks of the limits that depend on the inertial parameters
 
     @property
     def designed_by(self) -> Criterion | None:

@@ -29,10 +29,10 @@ SMALLEST = 0.05  # smallest factor by which one attempt tightens a limit, so tha
 class Attempt:
     """One design on the way to a plan that may be flown."""
 
-    limits: Limits  # limits under which the manoeuvre was designed
-    found: Found  # outcome of the search
-    risks: Sequence[Risk]  # risks against the limits of the problem
-    reached: Sequence[Reached]  # largest values at the prior's centre, against the limits of the problem
+    limits: Limits  #: limits under which the manoeuvre was designed
+    found: Found  #: outcome of the search
+    risks: Sequence[Risk]  #: risks against the limits of the problem
+    reached: Sequence[Reached]  #: largest values at the prior's centre, against the limits of the problem
 
     @property
     def go(self) -> bool:

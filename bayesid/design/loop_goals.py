@@ -34,13 +34,13 @@ DRAWS = 300  # number of draws of what is known from which the region of the end
 class StepKnowledge:
     """What a loop knows after a step."""
 
-    model: Model  # model whose prior is the posterior after the step
-    bodies: Mapping[str, BodyDraws]  # draws of the quantities of the bodies to identify
-    flown: Manoeuvre  # manoeuvre of the step
-    # probability that a cause of the catalogue, or ``"unknown"``, is at work in what was recorded so far; empty where
-    # the recordings are not diagnosed
+    model: Model  #: model whose prior is the posterior after the step
+    bodies: Mapping[str, BodyDraws]  #: draws of the quantities of the bodies to identify
+    flown: Manoeuvre  #: manoeuvre of the step
+    #: probability that a cause of the catalogue, or ``"unknown"``, is at work in what was recorded so far; empty where
+    #: the recordings are not diagnosed
     causes: Mapping[str, float]
-    seed: int  # seed of the random numbers that a goal needs
+    seed: int  #: seed of the random numbers that a goal needs
 
 
 class Goal(Protocol):
@@ -225,10 +225,10 @@ def goal_dict(goal: Goal, value: float) -> dict[str, Any]:
 class Review:
     """What the recordings so far say of the model."""
 
-    status: str  # status of the verdict, such as ``adequate`` or ``explained``
-    causes: tuple[str, ...]  # causes that the verdict names
-    trusted: bool  # whether the model may be right, so that it makes sense to identify it further
-    probabilities: Mapping[str, float]  # probability of every cause of the catalogue, and of ``"unknown"``
+    status: str  #: status of the verdict, such as ``adequate`` or ``explained``
+    causes: tuple[str, ...]  #: causes that the verdict names
+    trusted: bool  #: whether the model may be right, so that it makes sense to identify it further
+    probabilities: Mapping[str, float]  #: probability of every cause of the catalogue, and of ``"unknown"``
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entry of loop.json."""

@@ -24,12 +24,12 @@ STAGES = ("plan", "recording", "identification")
 class History:
     """History of a loop, step by step."""
 
-    folder: Path  # folder of the loop's files
-    key: str  # SHA-256 of robot, sensors, prior, manoeuvre, limits, search and seed
-    # status ``running``, ``waiting`` (for a recording), ``reached``, ``at-most``, ``no-go`` or ``wrong-model``
+    folder: Path  #: folder of the loop's files
+    key: str  #: SHA-256 of robot, sensors, prior, manoeuvre, limits, search and seed
+    #: status ``running``, ``waiting`` (for a recording), ``reached``, ``at-most``, ``no-go`` or ``wrong-model``
     status: str = "running"
-    stages: tuple[str, ...] = STAGES  # names of the stages of each step
-    # entries of the stages, one dictionary per step, and what was noted of it
+    stages: tuple[str, ...] = STAGES  #: names of the stages of each step
+    #: entries of the stages, one dictionary per step, and what was noted of it
     steps: list[dict[str, Any]] = field(default_factory=list)
 
     @classmethod

@@ -24,10 +24,10 @@ __all__ = ["Encoder", "Predicted", "describe", "planned_manoeuvre", "planned_pos
 class Predicted:
     """Predicted posterior of the bodies to identify, the Laplace approximation at a linearisation point."""
 
-    names: tuple[str, ...]  # names of the n quantities, as in identification.json
-    mean: Floats  # (n,) values of the quantities at the linearisation point, in SI units
-    covariance: Floats  # (n, n) covariance of the quantities, in SI units
-    relative: Floats  # (n, n) covariance of the bodies' log-Cholesky coordinates, which are relative [1]
+    names: tuple[str, ...]  #: names of the n quantities, as in identification.json
+    mean: Floats  #: (n,) values of the quantities at the linearisation point, in SI units
+    covariance: Floats  #: (n, n) covariance of the quantities, in SI units
+    relative: Floats  #: (n, n) covariance of the bodies' log-Cholesky coordinates, which are relative [1]
 
     @property
     def sd(self) -> Floats:

@@ -30,9 +30,9 @@ SPARE = 0.999  # fraction of a bound at which such a limit is to end
 class Refined:
     """Best motion of a descent that keeps the limits."""
 
-    parameters: Floats  # (n,) parameters of the motion
-    cost: float  # its cost; infinite where none keeps the limits
-    evaluations: int  # number of evaluations of the cost
+    parameters: Floats  #: (n,) parameters of the motion
+    cost: float  #: its cost; infinite where none keeps the limits
+    evaluations: int  #: number of evaluations of the cost
 
 
 class Shared:

@@ -17,18 +17,18 @@ __all__ = ["BaseAtStart", "Trajectory", "base_quantities", "trajectory_of"]
 class Trajectory(NamedTuple):
     """Motion of the robot at T instants."""
 
-    time: Floats  # (T,) instants [s]
-    # (T, joints) positions [rad, m] and speeds [rad/s, m/s] of the joints
+    time: Floats  #: (T,) instants [s]
+    #: (T, joints) positions [rad, m] and speeds [rad/s, m/s] of the joints
     position: Array
     velocity: Array
-    # (T,) speed [m/s] and angular rate [rad/s] of the tip, the larger of those relative to base and inertial space
+    #: (T,) speed [m/s] and angular rate [rad/s] of the tip, the larger of those relative to base and inertial space
     tip_speed: Array
     tip_rate: Array
-    rotation: Array  # (T,) angle of the base's rotation since the start [rad]
-    # (T, 6) displacement of the base origin [m] and Cardan angles x, y, z of the base [rad], in the axes of the start
+    rotation: Array  #: (T,) angle of the base's rotation since the start [rad]
+    #: (T, 6) displacement of the base origin [m] and Cardan angles x, y, z of the base [rad], in the axes of the start
     excursion: Array
-    # (T, 3) angular velocity [rad/s] and acceleration [rad/s2] of the base, and acceleration of its origin [m/s2], base
-    # axes
+    #: (T, 3) angular velocity [rad/s] and acceleration [rad/s2] of the base, and acceleration of its origin [m/s2], base
+    #: axes
     rate: Array
     rate_change: Array
     acceleration: Array

@@ -77,10 +77,10 @@ THOROUGH = Search(exchanges=36, loosened=3.0)
 class Found:
     """Outcome of a search."""
 
-    parameters: Floats  # (n,) parameters of the best motion
-    cost: float  # cost of the best motion
-    costs: tuple[float, ...]  # costs of the descents that were followed to the end, the best first
-    evaluations: int  # number of evaluations of the cost over all starts
+    parameters: Floats  #: (n,) parameters of the best motion
+    cost: float  #: cost of the best motion
+    costs: tuple[float, ...]  #: costs of the descents that were followed to the end, the best first
+    evaluations: int  #: number of evaluations of the cost over all starts
 
 
 @threadpool_limits.wrap(limits=1)  # sums of several threads are rounded by chance

@@ -56,17 +56,17 @@ PARTS = (0.35, 0.45, 0.55, 0.65)
 class Advice:
     """Predicted effect of one candidate."""
 
-    # name and description of the candidate
+    #: name and description of the candidate
     name: str
     text: str
-    # ratios of posterior to prior standard deviation in the presently worst directions
+    #: ratios of posterior to prior standard deviation in the presently worst directions
     directions: tuple[float, ...] = ()
-    parameter: str = ""  # name of the presently worst known quantity
-    sd: float = np.nan  # standard deviation that the quantity would have, in its unit
-    # shrinkage that the quantity would have, one minus the ratio of posterior to prior standard deviation
+    parameter: str = ""  #: name of the presently worst known quantity
+    sd: float = np.nan  #: standard deviation that the quantity would have, in its unit
+    #: shrinkage that the quantity would have, one minus the ratio of posterior to prior standard deviation
     shrinkage: float = np.nan
-    information: float = np.nan  # information gained on all quantities beyond what is known now [nats]
-    reason: str = ""  # reason why the candidate was not evaluated; empty if it was
+    information: float = np.nan  #: information gained on all quantities beyond what is known now [nats]
+    reason: str = ""  #: reason why the candidate was not evaluated; empty if it was
 
     def to_dict(self) -> dict[str, Any]:
         """Return the advice as it stands in identifiability.json."""
@@ -146,9 +146,9 @@ class NotEvaluated(Exception):  # noqa: N818 - a verdict, not an error
 class AddedMeasurement:
     """One candidate for a measurement, a motion or knowledge to add to an experiment."""
 
-    name: str  # short, unique name
-    text: str  # description with the candidate's figures
-    # function that returns the changed experiment; it raises `NotEvaluated` where the candidate does not apply
+    name: str  #: short, unique name
+    text: str  #: description with the candidate's figures
+    #: function that returns the changed experiment; it raises `NotEvaluated` where the candidate does not apply
     change: Callable[[Experiment], Experiment]
 
 

@@ -233,15 +233,15 @@ LINEAR = (
 class BaseParameters:
     """Independent standard parameters of a robot, and how the others regroup into them."""
 
-    # all parameters, ten for every link with mass and for every load, such as ``link1.first.x`` (`LINEAR`)
+    #: all parameters, ten for every link with mass and for every load, such as ``link1.first.x`` (`LINEAR`)
     standard: tuple[str, ...]
-    # parameters K_1, parameters K_2, and those that a fixed base leaves without effect; together they are `standard`
+    #: parameters K_1, parameters K_2, and those that a fixed base leaves without effect; together they are `standard`
     independent: tuple[str, ...]
     dependent: tuple[str, ...]
     without_effect: tuple[str, ...]
-    regrouping: Floats  # (independent, dependent) matrix beta of (24), ``K_B = K_1 + beta K_2``
-    # smallest singular value kept and largest one dropped, relative to the largest, for the regressor with columns of
-    # unit length
+    regrouping: Floats  #: (independent, dependent) matrix beta of (24), ``K_B = K_1 + beta K_2``
+    #: smallest singular value kept and largest one dropped, relative to the largest, for the regressor with columns of
+    #: unit length
     gap: tuple[float, float]
 
     @property

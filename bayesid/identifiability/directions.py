@@ -38,14 +38,14 @@ NOUNS = {"mass": "mass", "com": "centre of mass", "inertia": "inertia"}
 class Direction:
     """One combination of the bodies' quantities, and what is known of it."""
 
-    names: tuple[str, ...]  # names of the n quantities
-    # (n,) weights of the quantities in the combination, scaled so that the largest product of a weight and the prior
-    # standard deviation of its quantity is one; the combination is therefore a pure number
+    names: tuple[str, ...]  #: names of the n quantities
+    #: (n,) weights of the quantities in the combination, scaled so that the largest product of a weight and the prior
+    #: standard deviation of its quantity is one; the combination is therefore a pure number
     weights: Floats
-    # (n,) change of every quantity, in its unit, when the combination changes by one posterior standard deviation
+    #: (n,) change of every quantity, in its unit, when the combination changes by one posterior standard deviation
     displacement: Floats
-    prior_sd: float  # prior standard deviation of the combination [1]
-    sd: float  # posterior standard deviation of the combination [1]
+    prior_sd: float  #: prior standard deviation of the combination [1]
+    sd: float  #: posterior standard deviation of the combination [1]
 
     @property
     def shrinkage(self) -> float:

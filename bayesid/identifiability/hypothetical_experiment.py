@@ -36,12 +36,12 @@ ABSENT, FINEST = 1e6, 0.1
 class Experiment:
     """Properties of an experiment that a candidate may change."""
 
-    manoeuvres: tuple[Manoeuvre, ...]  # manoeuvres of the experiment
-    sensors: tuple[Sensor, ...]  # sensors that are present
-    torque: TorqueSensor | None = None  # torque sensor of the joints, None where there is none
-    # names of bodies whose mass is known beyond the prior, with the relative standard deviations of their masses
+    manoeuvres: tuple[Manoeuvre, ...]  #: manoeuvres of the experiment
+    sensors: tuple[Sensor, ...]  #: sensors that are present
+    torque: TorqueSensor | None = None  #: torque sensor of the joints, None where there is none
+    #: names of bodies whose mass is known beyond the prior, with the relative standard deviations of their masses
     weighed: tuple[tuple[str, float], ...] = ()
-    times: int = 1  # number of times that every manoeuvre is flown
+    times: int = 1  #: number of times that every manoeuvre is flown
 
 
 class InformationPredictor:

@@ -52,20 +52,20 @@ STEPS, LARGEST = 2000, 40
 class ParameterRow:
     """What is known of one quantity."""
 
-    # name and unit of the quantity
+    #: name and unit of the quantity
     name: str
     unit: str
-    # mean, posterior and prior standard deviation of the normal approximation, in the unit
+    #: mean, posterior and prior standard deviation of the normal approximation, in the unit
     mean: float
     sd: float
     prior_sd: float
-    conditional_sd: float  # posterior standard deviation if all other quantities of the bodies were known, in the unit
-    # names and correlations of the quantities most strongly correlated with this one, the strongest first
+    conditional_sd: float  #: posterior standard deviation if all other quantities of the bodies were known, in the unit
+    #: names and correlations of the quantities most strongly correlated with this one, the strongest first
     correlated_with: tuple[tuple[str, float], ...]
-    # mean and standard deviation of the draws; None where the draws may not be trusted
+    #: mean and standard deviation of the draws; None where the draws may not be trusted
     sampled: tuple[float, float] | None
-    normal: bool | None  # True where the posterior is nearly normal, None where that is not known
-    profile: Profile | None = None  # profile of the quantity, None where it was not computed
+    normal: bool | None  #: True where the posterior is nearly normal, None where that is not known
+    profile: Profile | None = None  #: profile of the quantity, None where it was not computed
 
     @property
     def shrinkage(self) -> float:
@@ -181,13 +181,13 @@ class Method(Enum):
 class Draws:
     """Weighted draws of the bodies' quantities."""
 
-    method: Method  # method that produced the draws
-    values: Floats  # (m, n) draws of the n quantities, in their units
-    weights: Floats  # (m,) weights of the draws, whose sum is one
-    # True if Pareto k-hat (importance sampling), or R-hat and the number of effective samples (emcee), are good enough
-    # to use the draws
+    method: Method  #: method that produced the draws
+    values: Floats  #: (m, n) draws of the n quantities, in their units
+    weights: Floats  #: (m,) weights of the draws, whose sum is one
+    #: True if Pareto k-hat (importance sampling), or R-hat and the number of effective samples (emcee), are good enough
+    #: to use the draws
     trusted: bool
-    pareto_k: float  # Pareto k-hat of importance sampling, even where emcee produced the draws
+    pareto_k: float  #: Pareto k-hat of importance sampling, even where emcee produced the draws
 
     @property
     def covariance(self) -> Floats:

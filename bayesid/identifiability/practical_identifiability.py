@@ -31,15 +31,15 @@ class Basis(Enum):
 class Practical:
     """Result of `practical`."""
 
-    basis: Basis  # basis of the statements
-    posterior: Posterior  # posterior that was examined
-    optimum: Optimum  # mode of the posterior
-    knowledge: Knowledge  # posterior and prior knowledge, linearised at the mode
-    directions: tuple[Direction, ...]  # directions from the worst known to the best
-    words: tuple[str, ...]  # description of each direction
-    parameters: tuple[ParameterRow, ...]  # table of what is known of each quantity
-    draws: Draws  # draws from the posterior
-    advice: tuple[Advice, ...]  # advice on what to measure, the most informative first
+    basis: Basis  #: basis of the statements
+    posterior: Posterior  #: posterior that was examined
+    optimum: Optimum  #: mode of the posterior
+    knowledge: Knowledge  #: posterior and prior knowledge, linearised at the mode
+    directions: tuple[Direction, ...]  #: directions from the worst known to the best
+    words: tuple[str, ...]  #: description of each direction
+    parameters: tuple[ParameterRow, ...]  #: table of what is known of each quantity
+    draws: Draws  #: draws from the posterior
+    advice: tuple[Advice, ...]  #: advice on what to measure, the most informative first
 
     def to_dict(self) -> dict[str, Any]:
         """Return the entries of identifiability.json that concern the posterior."""

@@ -44,9 +44,9 @@ class Target(NamedTuple):
 class Profile:
     """Profile of one quantity."""
 
-    values: Floats  # (k,) values of the quantity, increasing
-    # (k,) signed square roots of twice the loss of log posterior density; they are -1 and 1 at the ends of the 68 %
-    # interval, and linear in the values for a normal posterior
+    values: Floats  #: (k,) values of the quantity, increasing
+    #: (k,) signed square roots of twice the loss of log posterior density; they are -1 and 1 at the ends of the 68 %
+    #: interval, and linear in the values for a normal posterior
     roots: Floats
 
     def interval(self, root: float) -> tuple[float | None, float | None]:

@@ -153,19 +153,19 @@ class BagTopics:
 class ImportedTopic:
     """What became of a topic."""
 
-    # name, type and frame of the topic
+    #: name, type and frame of the topic
     name: str
     kind: str
     frame: str
-    columns: tuple[str, ...]  # columns of the recording that hold it
-    # number of messages in the bag, and of those in the recording
+    columns: tuple[str, ...]  #: columns of the recording that hold it
+    #: number of messages in the bag, and of those in the recording
     messages: int
     used: int
-    # median and longest time between the used messages [s]
+    #: median and longest time between the used messages [s]
     interval: float
     longest_gap: float
-    left_out: Mapping[str, int]  # number of messages left out, by what is wrong with them
-    reordered: int  # number of messages that were recorded after one of a later stamp
+    left_out: Mapping[str, int]  #: number of messages left out, by what is wrong with them
+    reordered: int  #: number of messages that were recorded after one of a later stamp
 
 
 @dataclass(frozen=True)

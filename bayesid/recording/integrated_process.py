@@ -20,9 +20,9 @@ HIGHER = 0.3
 class Jump(NamedTuple):
     """Jump of a derivative of a position, of normal size and at an instant known to lie in one of some steps."""
 
-    first: int  # number of the first of the steps, which lie between two nodes each and follow one another
-    derivative: int  # 2 for the acceleration, 3 for the jerk
-    # variance of the jump times the probability of each of the equal parts of each step, in scaled time
+    first: int  #: number of the first of the steps, which lie between two nodes each and follow one another
+    derivative: int  #: 2 for the acceleration, 3 for the jerk
+    #: variance of the jump times the probability of each of the equal parts of each step, in scaled time
     variances: tuple[tuple[float, ...], ...]
 
     @property

@@ -65,21 +65,21 @@ class SmoothedJoint:
     """Posterior of one joint's motion."""
 
     nodes: Floats
-    states: Floats  # derivatives (n, order) in scaled time
-    scale: float  # unit of the scaled time [s]
-    factor: Floats  # banded Cholesky factor of the posterior precision in scaled time
-    sigmas: tuple[float, ...]  # standard deviation of the noise of each series of samples, declared or estimated
-    declared: tuple[bool, ...]  # whether the user declared the noise of each series
-    order: int  # order of the derivative of the position that is white noise
-    intensity: float  # square root of the spectral density of that derivative
+    states: Floats  #: derivatives (n, order) in scaled time
+    scale: float  #: unit of the scaled time [s]
+    factor: Floats  #: banded Cholesky factor of the posterior precision in scaled time
+    sigmas: tuple[float, ...]  #: standard deviation of the noise of each series of samples, declared or estimated
+    declared: tuple[bool, ...]  #: whether the user declared the noise of each series
+    order: int  #: order of the derivative of the position that is white noise
+    intensity: float  #: square root of the spectral density of that derivative
     log_likelihood: float
-    # Chi-square of the samples and their number. A ratio well above one says that the spline does not follow them.
+    #: Chi-square of the samples and their number. A ratio well above one says that the spline does not follow them.
     chi2: float
     samples: int
-    series: tuple[JointSamples, ...]  # samples
-    start: float | None  # exact position at time 0, if known
-    jumps: tuple[Jump, ...]  # jumps of the acceleration or the jerk that the process has
-    roughness: Floats | None  # (n - 1,) factor on the variance of the process in each step between nodes; None for one
+    series: tuple[JointSamples, ...]  #: samples
+    start: float | None  #: exact position at time 0, if known
+    jumps: tuple[Jump, ...]  #: jumps of the acceleration or the jerk that the process has
+    roughness: Floats | None  #: (n - 1,) factor on the variance of the process in each step between nodes; None for one
 
     def with_noise(self, factor: float) -> SmoothedJoint:
         """Smooth the samples anew with the declared noise times a factor; estimated noise is estimated again."""

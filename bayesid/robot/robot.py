@@ -80,13 +80,13 @@ class Robot:
     name: str
     file: Path | None
     urdf: str
-    links: Mapping[str, Link]  # bodies that may have mass, loads included, with the base first
-    joints: tuple[Joint, ...]  # moving joints in Pinocchio's order
+    links: Mapping[str, Link]  #: bodies that may have mass, loads included, with the base first
+    joints: tuple[Joint, ...]  #: moving joints in Pinocchio's order
     loads: tuple[str, ...]
-    # Kinematic tree with a free-flyer base and no gravity. Its inertias are those of the URDF; the present parameters
-    # are those in `links`.
+    #: Kinematic tree with a free-flyer base and no gravity. Its inertias are those of the URDF; the present parameters
+    #: are those in `links`.
     model: pin.Model
-    remarks: tuple[str, ...] = ()  # what the file left open or got wrong, and how it was read
+    remarks: tuple[str, ...] = ()  #: what the file left open or got wrong, and how it was read
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the content for another process, to which a read-only mapping cannot be sent."""

@@ -78,8 +78,8 @@ class RobotSize:
 class BeyondJoint(NamedTuple):
     """Bodies that a joint carries."""
 
-    mass: float  # their mass [kg]
-    inertia: float  # their largest moment of inertia about the joint in any posture [kg m2]
+    mass: float  #: their mass [kg]
+    inertia: float  #: their largest moment of inertia about the joint in any posture [kg m2]
 
 
 def beyond_joint(robot: Robot, joint: int) -> BeyondJoint:

@@ -83,10 +83,10 @@ class ColouredNoise(SensorFault):
     parameters = "sigma [unit of the sensor], time [s]: of the correlation"
     slow = True
 
-    TIMES: ClassVar[tuple[float, ...]] = (2.0, 6.0, 20.0)  # correlation times that it is looked for at, in samples
-    LONGEST: ClassVar[float] = 0.05  # longest correlation time, in lengths of a recording; beyond it is drift
-    TRIALS: ClassVar[int] = 8  # evaluations of the evidence in the search for its size
-    REFITS: ClassVar[int] = 1  # steps of the fit at each of them
+    TIMES: ClassVar[tuple[float, ...]] = (2.0, 6.0, 20.0)  #: correlation times that it is looked for at, in samples
+    LONGEST: ClassVar[float] = 0.05  #: longest correlation time, in lengths of a recording; beyond it is drift
+    TRIALS: ClassVar[int] = 8  #: evaluations of the evidence in the search for its size
+    REFITS: ClassVar[int] = 1  #: steps of the fit at each of them
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -256,8 +256,8 @@ class Outliers(SensorFault):
     advice = "They are single samples: look at the readings themselves, and record at rest."
     parameters = "fraction [1]: of the samples"
 
-    LEVEL: ClassVar[float] = 1e-3  # probability of more outliers by chance than a study with a fraction allows
-    ROUNDS: ClassVar[int] = 3  # fits after which what is left out stands, where a study states a fraction
+    LEVEL: ClassVar[float] = 1e-3  #: probability of more outliers by chance than a study with a fraction allows
+    ROUNDS: ClassVar[int] = 3  #: fits after which what is left out stands, where a study states a fraction
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -354,9 +354,9 @@ class Quantisation(SensorFault):
     advice = "The readings lie on a lattice: record at rest, and compare with the resolution in the data sheet."
     parameters = "step [unit of the sensor]"
 
-    CERTAIN: ClassVar[float] = -1e3  # logarithm of a p-value that stands for zero: noise never falls on a lattice
-    COARSE: ClassVar[float] = 0.4  # steps, in sigma, below which rounding does no harm
-    ON_LATTICE: ClassVar[float] = 0.02  # largest distance from a multiple of the step, in steps
+    CERTAIN: ClassVar[float] = -1e3  #: logarithm of a p-value that stands for zero: noise never falls on a lattice
+    COARSE: ClassVar[float] = 0.4  #: steps, in sigma, below which rounding does no harm
+    ON_LATTICE: ClassVar[float] = 0.02  #: largest distance from a multiple of the step, in steps
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
