@@ -27,8 +27,8 @@ class Trajectory(NamedTuple):
     rotation: Array  #: (T,) angle of the base's rotation since the start [rad]
     #: (T, 6) displacement of the base origin [m] and Cardan angles x, y, z of the base [rad], in the axes of the start
     excursion: Array
-    #: (T, 3) angular velocity [rad/s] and acceleration [rad/s2] of the base, and acceleration of its origin [m/s2], base
-    #: axes
+    #: (T, 3) angular velocity [rad/s] and acceleration [rad/s2] of the base, and acceleration of its origin [m/s2], in
+    #: base axes
     rate: Array
     rate_change: Array
     acceleration: Array
