@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from itertools import pairwise
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -18,6 +21,31 @@ from tests.gram_problem import LinearProblem
 
 def cause(name: str, low: float | None, high: float, spread: np.ndarray | None = None) -> CandidateCause:
     return CandidateCause(name, (AmplitudeGroup(name, high, low, spread),))
+
+
+def draw(posterior: AmplitudePosterior, rng: np.random.Generator, draws: int) -> np.ndarray:
+    """Draw amplitudes, shape (draws, m), from each term of the mixture as often as it is probable."""
+    counts = rng.multinomial(draws, posterior.weights)
+    normal = np.split(rng.normal(size=(draws, posterior.means.shape[1])), np.cumsum(counts)[:-1])
+    terms = zip(posterior.means, posterior.roots, normal, strict=True)
+    return np.concatenate([mean + part @ root for mean, root, part in terms])
+
+
+def test_evidence_loads_neither_the_simulation_nor_the_rest_of_the_diagnosis():
+    names = ("gram", "set_evidence", "cause_sets", "evidence_alarm", "verdict", "amplitude_posterior")
+    code = "import sys\n" + "".join(f"import bayesid.diagnosis.evidence.{name}\n" for name in names)
+    code += "print(*(name for name in sys.modules if name.split('.')[0] in ('bayesid', 'jax')))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    allowed = ("bayesid._math", "bayesid.diagnosis.evidence", "bayesid.diagnosis.settings")
+    assert "bayesid.diagnosis.evidence.gram" in loaded
+    assert {name for name in loaded if not name.startswith(allowed)} == {"bayesid", "bayesid.diagnosis"}
+
+
+def test_functions_of_the_diagnosis_are_not_hidden_by_submodules_of_their_names():
+    import bayesid.diagnosis.candidates.cause_kind
+    import bayesid.diagnosis.diagnose
+
+    assert all(not isinstance(getattr(bayesid.diagnosis, name), ModuleType) for name in bayesid.diagnosis.__all__)
 
 
 # Gram -----------------------------------------------------------------------------------------------------------------
@@ -350,7 +378,7 @@ def test_draws_of_amplitudes_and_their_limits_belong_to_the_same_posterior():
     problem = LinearProblem.random(rng, {"a": 2, "b": 1}).observed(rng, {"a": np.array([1.0, -0.2])})
     evidence = SetEvidence(problem.gram(), [cause("a", None, 5.0), cause("b", None, 5.0)])
     posterior = AmplitudePosterior.of(evidence, ["b", "a"])
-    draws = posterior.draw(np.random.default_rng(0), 40_000)
+    draws = draw(posterior, np.random.default_rng(0), 40_000)
     deviation = np.sqrt(np.diag(posterior.covariance))
     np.testing.assert_allclose(draws.mean(axis=0), posterior.mean, atol=5.0 * deviation.max() / 200.0)
     np.testing.assert_allclose(np.cov(draws.T), posterior.covariance, atol=0.04 * deviation.max() ** 2)
@@ -362,6 +390,5 @@ def test_draws_of_amplitudes_and_their_limits_belong_to_the_same_posterior():
     np.testing.assert_allclose(posterior.mean[known], [1.0, -0.2], atol=4.0 * deviation[known].max())
     with pytest.raises(ValueError, match=r"received 1\.5"):
         posterior.upper_limits(1.5)
-    assert len(posterior.draw(rng, 0)) == 0
     with pytest.raises(ValueError, match="at least one cause"):
         AmplitudePosterior.of(evidence, [])

@@ -1,4 +1,8 @@
-"""Posterior of the amplitudes of a set of causes: a mixture of normal distributions over the scales."""
+"""Posterior of the amplitudes of a set of causes: a mixture of normal distributions over the scales.
+
+Given the scales it is the normal posterior of a linear model with a normal prior (A. Gelman et al., Bayesian Data
+Analysis, 3rd ed. 2013, chapter 14); the weights of the mixture are the posterior probabilities of the nodes.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +46,14 @@ class AmplitudePosterior:
 
     @staticmethod
     def of(evidence: SetEvidence, names: Iterable[str]) -> AmplitudePosterior:
-        """Return the posterior of the amplitudes of a set with at least one cause."""
+        """Return the posterior of the amplitudes of a set.
+
+        Parameters
+        ----------
+        evidence : SetEvidence
+        names : iterable of str
+            At least one cause.
+        """
         names = tuple(names)
         if not names:
             raise ValueError("a posterior of amplitudes needs at least one cause, received none")
@@ -53,15 +64,17 @@ class AmplitudePosterior:
         kept = order[: min(int(np.searchsorted(np.cumsum(weights[order]), KEPT)) + 1, MOST_TERMS)]
         where = np.unravel_index(kept, average.log_posterior.shape)
         parts = zip(average.nodes, where, spectra, strict=True)
-        deviations = np.concatenate([nodes.scales[index, None] * own.root for nodes, index, own in parts], axis=1)
-        columns = np.concatenate([own.columns for own in spectra])
+        deviations = np.concatenate(
+            [nodes.scales[index, None] * spectrum.root for nodes, index, spectrum in parts], axis=1
+        )
+        columns = np.concatenate([spectrum.columns for spectrum in spectra])
         roots, _ = covariance_roots(evidence.gram.matrix[np.ix_(columns, columns)], deviations)
         means = -(np.swapaxes(roots, 1, 2) @ (roots @ evidence.gram.score[columns])[..., None])[..., 0]
         amplitudes, first = {}, 0
-        for (name, place), own in zip(evidence.places(names, forms), spectra, strict=True):
+        for (name, place), spectrum in zip(evidence.places(names, forms), spectra, strict=True):
             key = (name, evidence.causes[name].variants[forms[name]].groups[place].name)
-            amplitudes[key] = np.arange(first, first + len(own.columns))
-            first += len(own.columns)
+            amplitudes[key] = np.arange(first, first + len(spectrum.columns))
+            first += len(spectrum.columns)
         return AmplitudePosterior(amplitudes, weights[kept] / weights[kept].sum(), means, roots)
 
     @property
@@ -76,13 +89,6 @@ class AmplitudePosterior:
         within = (np.sqrt(self.weights)[:, None, None] * self.roots).reshape(-1, size)
         between = np.sqrt(self.weights)[:, None] * (self.means - self.mean)
         return within.T @ within + between.T @ between
-
-    def draw(self, rng: np.random.Generator, draws: int) -> Floats:
-        """Draw amplitudes, shape (draws, m)."""
-        counts = rng.multinomial(draws, self.weights)
-        normal = np.split(rng.normal(size=(draws, self.means.shape[1])), np.cumsum(counts)[:-1])
-        terms = [mean + part @ root for mean, root, part in zip(self.means, self.roots, normal, strict=True)]
-        return rng.permutation(np.concatenate(terms))
 
     def upper_limits(self, probability: float = 0.95) -> Floats:
         """Return the values below which the magnitudes of the amplitudes lie with a probability, shape (m,)."""

@@ -1,4 +1,9 @@
-"""Evidence of a body of positive mass at a bounded place, from the Gram of its ten moments."""
+"""Evidence of a body of positive mass at a bounded place, from the Gram of its ten moments.
+
+The evidence is Laplace's approximation (L. Tierney and J. B. Kadane, Accurate approximations for posterior moments and
+marginal densities, JASA 81, 1986) about a mode that is found by damped least squares (D. W. Marquardt, An algorithm for
+least-squares estimation of nonlinear parameters, J. SIAM 11, 1963).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Sets of causes that could be at work: their prior and posterior probabilities, and which of them are weighed."""
+"""Sets of causes that could be at work: their prior and posterior probabilities, and which of them are weighed.
+
+All sets of one size share the prior of the size, which pays for the number of candidates (J. G. Scott and J. O. Berger,
+Bayes and empirical-Bayes multiplicity adjustment in the variable-selection problem, Annals of Statistics 38, 2010).
+Sets far less probable than the best so far are not extended (D. Madigan and A. E. Raftery, Model selection and
+accounting for model uncertainty in graphical models using Occam's window, JASA 89, 1994).
+"""
 
 from __future__ import annotations
 
@@ -138,16 +144,24 @@ class SetProbabilities:
     def of(
         sets: Iterable[CauseSet], causes: Iterable[str], generics: Iterable[str], prior: CausePrior
     ) -> SetProbabilities:
-        """Return the probabilities of sets of known evidence, the empty one among them."""
+        """Return the probabilities of sets of known evidence.
+
+        Parameters
+        ----------
+        sets : iterable of CauseSet
+            The empty one among them.
+        causes, generics : iterable of str
+            Names of all candidates of the catalogue and of all generic ones.
+        prior : CausePrior
+        """
         causes, generics, sets = tuple(sorted(causes)), tuple(sorted(generics)), list(sets)
-        sizes = [(len(item.causes), item.generic is not None) for item in sets]
-        log_priors = {own: prior.log_probability(own[0], len(causes), own[1], len(generics)) for own in set(sizes)}
-        totals = [log_priors[own] + item.log_evidence for own, item in zip(sizes, sets, strict=True)]
+        sizes = [(len(cause_set.causes), cause_set.generic is not None) for cause_set in sets]
+        log_priors = {size: prior.log_probability(size[0], len(causes), size[1], len(generics)) for size in set(sizes)}
+        totals = [log_priors[size] + cause_set.log_evidence for size, cause_set in zip(sizes, sets, strict=True)]
         shares = np.exp(np.array(totals) - logsumexp(totals)).tolist()
         rows = sorted(zip(sets, sizes, totals, shares, strict=True), key=lambda row: (-row[2], row[0].names))
         ranked = tuple(
-            CauseSet(item.causes, item.generic, item.log_evidence, log_priors[size], share)
-            for item, size, _, share in rows
+            replace(cause_set, log_prior=log_priors[size], probability=share) for cause_set, size, _, share in rows
         )
         return SetProbabilities(ranked, causes, generics, prior)
 
@@ -158,31 +172,31 @@ class SetProbabilities:
     @property
     def nothing(self) -> float:
         """Probability that nothing is lacking."""
-        return _total(item for item in self.sets if not item.names)
+        return _total(cause_set for cause_set in self.sets if not cause_set.names)
 
     @property
     def unknown(self) -> float:
         """Probability that something generic is at work, whatever causes accompany it."""
-        return _total(item for item in self.sets if item.generic is not None)
+        return _total(cause_set for cause_set in self.sets if cause_set.generic is not None)
 
     def of_any(self, names: Collection[str]) -> float:
         """Return the probability that at least one of some candidates is at work, such as a class of equivalents."""
-        wanted = set(names)
-        return _total(item for item in self.sets if not wanted.isdisjoint(item.names))
+        candidates = set(names)
+        return _total(cause_set for cause_set in self.sets if not candidates.isdisjoint(cause_set.names))
 
     @property
     def inclusion(self) -> dict[str, float]:
         """Probability of each candidate, generic ones included, to be at work, whatever accompanies it."""
         holding: dict[str, list[CauseSet]] = {name: [] for name in (*self.causes, *self.generics)}
-        for item in self.sets:
-            for name in item.names:
-                holding[name].append(item)
+        for cause_set in self.sets:
+            for name in cause_set.names:
+                holding[name].append(cause_set)
         return {name: _total(sets) for name, sets in holding.items()}
 
 
 def _total(sets: Iterable[CauseSet]) -> float:
     """Return the probability of any of some sets, which rounding does not lift above one."""
-    return min(math.fsum(item.probability for item in sets), 1.0)
+    return min(math.fsum(cause_set.probability for cause_set in sets), 1.0)
 
 
 def enumerate_sets(
@@ -219,7 +233,7 @@ def enumerate_sets(
         keys = _extensions(last, evidence)
         many = size > 1 and sum(_combinations(key, evidence) for key in keys) > FEW
         if many and size == 2:
-            last = [item for item in _ranked(sets, evidence, prior) if len(item.names) == 1][:SINGLES]
+            last = [cause_set for cause_set in _ranked(sets, evidence, prior) if len(cause_set.names) == 1][:SINGLES]
         elif size > 2 and len(keys) > FEW:
             last = _best(_ranked(sets, evidence, prior), size - 1)
             keys = _extensions(last, evidence)
@@ -259,10 +273,12 @@ def _others(parent: CauseSet, evidence: SetEvidence) -> list[str]:
 def _extensions(sets: Iterable[CauseSet], evidence: SetEvidence) -> list[_Key]:
     """Return all sets with one candidate more, each once, in the order of their names."""
     keys: set[_Key] = set()
-    for item in sets:
-        keys.update((tuple(sorted((*item.causes, name))), item.generic) for name in _others(item, evidence))
-        if item.generic is None:
-            keys.update((item.causes, name) for name in evidence.generics)
+    for cause_set in sets:
+        keys.update(
+            (tuple(sorted((*cause_set.causes, name))), cause_set.generic) for name in _others(cause_set, evidence)
+        )
+        if cause_set.generic is None:
+            keys.update((cause_set.causes, name) for name in evidence.generics)
     return _in_order(keys)
 
 
@@ -273,10 +289,11 @@ def _best(ranked: Iterable[CauseSet], size: int) -> list[CauseSet]:
     probable set without it is therefore extended, too, however improbable it is.
     """
     ranked = list(ranked)
-    last = [item for item in ranked if len(item.names) == size]
-    always = (*last[:1], *[item for item in last if item.generic is None][:1])
+    last = [cause_set for cause_set in ranked if len(cause_set.names) == size]
+    always = (*last[:1], *[cause_set for cause_set in last if cause_set.generic is None][:1])
     least = PROMISING * ranked[0].probability
-    return [item for place, item in enumerate(last) if item in always or (place < BEST and item.probability >= least)]
+    promising = [cause_set for cause_set in last[:BEST] if cause_set.probability >= least]
+    return [cause_set for cause_set in last if cause_set in always or cause_set in promising]
 
 
 def _screened(
@@ -304,7 +321,7 @@ def _screened(
         # a bound that was too high hides others, so that the best one must have been evaluated
         ranked = _ranked([*sets, *new.values()], evidence, prior)
         least = np.exp(-NEAR) * ranked[0].probability
-        likely = {(item.causes, item.generic) for item in ranked if item.probability >= least}
+        likely = {(cause_set.causes, cause_set.generic) for cause_set in ranked if cause_set.probability >= least}
         matter = _in_order(likely & weighed.keys() - whole)
         if not matter:
             return list(new.values())

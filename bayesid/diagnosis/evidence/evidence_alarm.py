@@ -4,6 +4,10 @@ The statistic is the largest evidence among all single candidates, generic ones 
 is lacking follows from draws of the score, normal with covariance ``A``, without simulation: `Gram.null_scores` derives
 why, for unknowns drawn from their prior. The promise is a frequentist one: whatever the prior of causes, of the studies
 that lack nothing one in a hundred raises the alarm at the level of 1 %, all candidates together.
+
+That the largest of many statistics holds its level however they correlate: P. H. Westfall and S. S. Young,
+Resampling-Based Multiple Testing, 1993. The tail beyond the draws is that of exceedances over a threshold: J. Pickands,
+Statistical inference using extreme order statistics, Annals of Statistics 3, 1975.
 """
 
 from __future__ import annotations
@@ -115,7 +119,7 @@ class EvidenceAlarm:
         names = sorted(evidence.causes)
         scores = np.concatenate([evidence.gram.score[None], evidence.gram.null_scores(rng, draws)])
         values = np.stack([evidence.log_evidences([name], scores) for name in names])
-        each = {name: NullTail(np.sort(own[1:]), 1) for name, own in zip(names, values, strict=True)}
+        each = {name: NullTail(np.sort(drawn[1:]), 1) for name, drawn in zip(names, values, strict=True)}
         largest = NullTail(np.sort(values[:, 1:].max(axis=0)), len(names))
         return EvidenceAlarm(dict(zip(names, values[:, 0].tolist(), strict=True)), each, largest)
 

@@ -7,7 +7,8 @@ whose prior is standard normal, and the signatures ``S`` of whatever the model m
     A = S'S - S'X (X'X + 1)^-1 X'S,    g = S'r - S'X (X'X + 1)^-1 (X'r + z)
 
 alone: the likelihood of ``a`` relative to that of ``a = 0`` is ``exp(-g'a - a'A a / 2)``. At the mode of the present
-model ``X'r + z = 0``, and the score ``g`` is ``S'r``.
+model ``X'r + z = 0``, and the score ``g`` is ``S'r``. The step is the linear model with some of its coefficients
+integrated out (C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, 2006, section 2.7).
 """
 
 from __future__ import annotations
@@ -105,7 +106,14 @@ class GaussianBlock:
 
     @staticmethod
     def of(information: Floats, deviations: Floats | None = None) -> GaussianBlock:
-        """Return the block of amplitudes with some information, (m, m), and prior deviations, (m,), by default one."""
+        """Return the block of some amplitudes.
+
+        Parameters
+        ----------
+        information : (m, m) array
+        deviations : (m,) array, optional
+            Prior standard deviations, by default one.
+        """
         deviations = np.ones(len(information)) if deviations is None else deviations
         return GaussianBlock(_scaled_factor(information, deviations), deviations)
 
@@ -157,11 +165,20 @@ class Gram:
         size = len(self.score)
         if self.matrix.shape != (size, size):
             raise ValueError(f"a score of length {size} needs a matrix of that size, received {self.matrix.shape}")
-        object.__setattr__(self, "groups", {name: np.array(own, dtype=int) for name, own in self.groups.items()})
+        object.__setattr__(
+            self, "groups", {name: np.array(columns, dtype=int) for name, columns in self.groups.items()}
+        )
 
     @staticmethod
     def owning(matrix: Floats, score: Floats, groups: Mapping[str, Integers]) -> Gram:
-        """Return the Gram of arrays that nobody else keeps: they are locked instead of copied."""
+        """Return the Gram of arrays that nobody else keeps: they are locked instead of copied.
+
+        Parameters
+        ----------
+        matrix : (m, m) array
+        score : (m,) array
+        groups : mapping of str to (k,) arrays of int
+        """
         return Gram(_locked("matrix", matrix), _locked("score", score), groups)
 
     @staticmethod
@@ -197,9 +214,9 @@ class Gram:
     def keeping(self, names: Iterable[str]) -> Gram:
         """Return the Gram of some of the groups, in the order of the names."""
         names = list(names)
-        kept = self.columns(names)
+        columns = self.columns(names)
         groups = _side_by_side({name: len(self.groups[name]) for name in names})
-        return Gram.owning(self.matrix[np.ix_(kept, kept)], self.score[kept], groups)
+        return Gram.owning(self.matrix[np.ix_(columns, columns)], self.score[columns], groups)
 
     def conditioned(self, columns: Integers, deviations: Floats, names: Iterable[str] | None = None) -> Gram:
         """Return the Gram of some groups after other columns have taken their share (`GaussianBlock`).
@@ -228,20 +245,26 @@ class Gram:
 
         The largest says how well some change by the one group can imitate some change by the other; only where the
         smallest is near one, too, can the groups imitate each other altogether. ``k`` is the smaller of their ranks.
+        Source: H. Hotelling, Relations between two sets of variates, Biometrika 28, 1936.
+
+        Parameters
+        ----------
+        first, second : str
+            Names of the groups.
         """
-        own, other = self.groups[first], self.groups[second]
-        left = independent_directions(self.matrix[np.ix_(own, own)])
-        right = independent_directions(self.matrix[np.ix_(other, other)])
-        found = np.linalg.svd(left.T @ self.matrix[np.ix_(own, other)] @ right, compute_uv=False)
-        return np.minimum(found, 1.0)
+        columns, others = self.groups[first], self.groups[second]
+        left = independent_directions(self.matrix[np.ix_(columns, columns)])
+        right = independent_directions(self.matrix[np.ix_(others, others)])
+        correlations = np.linalg.svd(left.T @ self.matrix[np.ix_(columns, others)] @ right, compute_uv=False)
+        return np.minimum(correlations, 1.0)
 
     def signal_to_noise(self, *names: str) -> float:
         """Return the root of the improvement of chi-square by groups, fitted jointly with the unknowns, less its rank.
 
         The improvement includes that of the unknowns' prior. Where it is below the rank, the ratio is zero.
         """
-        own = self.columns(names)
-        fitted = independent_directions(self.matrix[np.ix_(own, own)]).T @ self.score[own]
+        columns = self.columns(names)
+        fitted = independent_directions(self.matrix[np.ix_(columns, columns)]).T @ self.score[columns]
         return float(np.sqrt(max(float(fitted @ fitted) - len(fitted), 0.0)))
 
     def null_scores(self, rng: np.random.Generator, draws: int) -> Floats:
@@ -252,6 +275,11 @@ class Gram:
         independent and standard normal. The score is the product of that with the projected signatures, so that its
         covariance is the products of the projected signatures with one another, which is ``A``. No simulation is
         needed where the model is linear over its posterior.
+
+        Parameters
+        ----------
+        rng : Generator
+        draws : int
         """
         drawn = rng.normal(size=(draws, len(self.score)))
         root = self._root()

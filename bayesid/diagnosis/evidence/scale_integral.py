@@ -9,12 +9,17 @@ every scale at once, ``A + P`` is never inverted, and neither a singular ``A`` n
 remains for the next group is its information and score after those before have taken their share. The last group
 costs one eigendecomposition for all its scales. The largest group comes first; its eigenvectors are found once and
 serve all sets that it belongs to.
+
+The factor is the evidence of a linear model, and its determinant the Occam factor, of D. J. C. MacKay, Bayesian
+interpolation, Neural Computation 4, 1992. Why few nodes are enough: L. N. Trefethen and J. A. C. Weideman, The
+exponentially convergent trapezoidal rule, SIAM Review 56, 2014.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -67,26 +72,40 @@ class GroupSpectrum:
 
     @staticmethod
     def of(groups: Sequence[AmplitudeGroup], gram: Gram) -> list[GroupSpectrum]:
-        """Return the spectra of groups; those of one size are decomposed together."""
+        """Return the spectra of groups; those of one size are decomposed together.
+
+        Parameters
+        ----------
+        groups : sequence of AmplitudeGroup
+        gram : Gram
+        """
         columns = [group.columns(gram) for group in groups]
         sizes: dict[int, list[int]] = {}
         for place, part in enumerate(columns):
             sizes.setdefault(len(part), []).append(place)
-        found: dict[int, GroupSpectrum] = {}
+        spectra: dict[int, GroupSpectrum] = {}
         for places in sizes.values():
-            own = np.stack([columns[place] for place in places])
+            block = np.stack([columns[place] for place in places])
             root = np.stack([groups[place].roots(gram) for place in places])
-            information = root[:, :, None] * gram.matrix[own[:, :, None], own[:, None, :]] * root[:, None, :]
+            information = root[:, :, None] * gram.matrix[block[:, :, None], block[:, None, :]] * root[:, None, :]
             values, vectors = np.linalg.eigh(information)
-            score = (np.swapaxes(vectors, 1, 2) @ (root * gram.score[own])[:, :, None])[..., 0]
+            score = (np.swapaxes(vectors, 1, 2) @ (root * gram.score[block])[:, :, None])[..., 0]
             values = np.maximum(values, 0.0)
             for row, place in enumerate(places):
                 scales = range_of(groups[place], float(values[row].max(initial=0.0)))
-                found[place] = GroupSpectrum(own[row], root[row], scales, values[row], vectors[row], score[row])
-        return [found[place] for place in range(len(groups))]
+                spectra[place] = GroupSpectrum(block[row], root[row], scales, values[row], vectors[row], score[row])
+        return [spectra[place] for place in range(len(groups))]
 
     def nodes(self, thinned: float = 1.0, part: tuple[float, float] | None = None) -> LogNodes:
-        """Return nodes over a part of the range of the scale, by default all of it."""
+        """Return nodes of the scale.
+
+        Parameters
+        ----------
+        thinned : float
+            Factor on their number, at most 1.
+        part : pair of float, optional
+            Ends of a part of the range, in the unit of the amplitudes; by default all of it.
+        """
         part = (self.range.low, self.range.high) if part is None else part
         return log_nodes(self.range, part, self.values, thinned)
 
@@ -123,7 +142,7 @@ def log_evidences(groups: Sequence[GroupSpectrum]) -> Floats:
         scores = np.stack([groups[place].score for place in places])
         ranges = [groups[place].range for place in places]
         if single:
-            scales = np.array([[own.high] for own in ranges])
+            scales = np.array([[scale_range.high] for scale_range in ranges])
             log_weights = np.zeros_like(scales)
         else:
             scales, log_weights = log_nodes_of_many(ranges, values)
@@ -136,7 +155,16 @@ def log_evidences(groups: Sequence[GroupSpectrum]) -> Floats:
 
 
 def log_ratios(groups: Sequence[GroupSpectrum], gram: Gram, nodes: Sequence[LogNodes]) -> Floats:
-    """Return the logarithm of the evidence relative to nothing at every combination of scales, shape (t1, ..., tk)."""
+    """Return the logarithm of the evidence relative to nothing at every combination of scales, shape (t1, ..., tk).
+
+    Parameters
+    ----------
+    groups : sequence of GroupSpectrum
+        Of ``k`` groups, in the order in which they are integrated out.
+    gram : Gram
+    nodes : sequence of LogNodes
+        Scales of each group.
+    """
     if not groups:
         return np.zeros(())
     first, rest = groups[0], groups[1:]
@@ -147,7 +175,7 @@ def log_ratios(groups: Sequence[GroupSpectrum], gram: Gram, nodes: Sequence[LogN
     gain = np.zeros(1)
     shared = first.root[:, None] * gram.matrix[np.ix_(first.columns, columns)] * root
     values, along, cross = first.values[None], first.score[None], (first.vectors.T @ shared)[None]
-    for index, own in enumerate(nodes):
+    for index, grid in enumerate(nodes):
         if index:
             size = len(groups[index].columns)
             values, vectors = np.linalg.eigh(matrix[:, :size, :size])
@@ -156,7 +184,7 @@ def log_ratios(groups: Sequence[GroupSpectrum], gram: Gram, nodes: Sequence[LogN
             along = (turned @ score[:, :size, None])[..., 0]
             cross = turned @ matrix[:, :size, size:]
             matrix, score = matrix[:, size:, size:], score[:, size:]
-        squared = own.scales[:, None] ** 2
+        squared = grid.scales[:, None] ** 2
         visible = squared * values[:, None, :]  # (b, t, k)
         share = squared / (1.0 + visible)
         now = 0.5 * ((share @ along[..., None] ** 2)[..., 0] - np.log1p(visible).sum(axis=-1))
@@ -166,7 +194,7 @@ def log_ratios(groups: Sequence[GroupSpectrum], gram: Gram, nodes: Sequence[LogN
             weighted = np.swapaxes(cross, 1, 2)[:, None] * share[:, :, None, :]  # (b, t, m, k)
             matrix = (matrix[:, None] - weighted @ cross[:, None]).reshape(-1, left, left)
             score = (score[:, None] - (weighted @ along[:, None, :, None])[..., 0]).reshape(-1, left)
-    return gain.reshape([len(own.scales) for own in nodes])
+    return gain.reshape([len(grid.scales) for grid in nodes])
 
 
 def average_over_scales(groups: Sequence[GroupSpectrum], gram: Gram) -> ScaleAverage:
@@ -176,6 +204,12 @@ def average_over_scales(groups: Sequence[GroupSpectrum], gram: Gram) -> ScaleAve
     is not negligible, and a finer one covers that. The trapezoidal rule of a smooth integrand converges so fast that
     even the thinned grid does better than as many quasi-random points. With scales of five decades the error of the
     logarithm is about 0.01 (rms) for up to five groups, one of them of 180 amplitudes, and 0.1 at most.
+
+    Parameters
+    ----------
+    groups : sequence of GroupSpectrum
+        The largest first.
+    gram : Gram
     """
     parts = [(group.range.low, group.range.high) for group in groups]
     cube = float(sum(len(group.columns) for group in groups[1:])) ** 3
@@ -188,9 +222,8 @@ def average_over_scales(groups: Sequence[GroupSpectrum], gram: Gram) -> ScaleAve
             for place, (group, part) in enumerate(zip(groups, parts, strict=True))
         )
         log_terms = log_ratios(groups, gram, nodes)
-        for axis, own in enumerate(nodes):
-            log_terms = log_terms + own.log_weights.reshape([-1 if axis == other else 1 for other in range(len(nodes))])
-        narrower = [_narrowed(own, axis, log_terms) for axis, own in enumerate(nodes)]
+        log_terms = log_terms + reduce(np.add.outer, [np.zeros(()), *(grid.log_weights for grid in nodes)])
+        narrower = [_narrowed(grid, axis, log_terms) for axis, grid in enumerate(nodes)]
         if thinned == 1.0 or (narrower == parts and not coarse):
             break
         parts = narrower

@@ -3,7 +3,8 @@
 The amplitudes of a group are normal, ``a ~ N(0, tau^2 Lambda)``, and their scale ``tau`` is log-uniform between a floor
 below what the data can resolve and a physical bound. A Gaussian prior at the bound would charge a group with many small
 amplitudes for every one of them; here the common scale is charged once. Every candidate has a prior of this one form,
-so that their Occam factors are comparable.
+so that their Occam factors are comparable (D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992). The
+prior of a scale is H. Jeffreys', Theory of Probability, 1939.
 """
 
 from __future__ import annotations
@@ -83,12 +84,12 @@ class AmplitudeGroup:
 
     def columns(self, gram: Gram) -> Integers:
         """Return the columns of the Gram whose amplitudes are not absent, shape (k,)."""
-        own = gram.groups[self.name]
+        columns = gram.groups[self.name]
         if self.spread is None:
-            return own
-        if self.spread.shape != own.shape:
-            raise ValueError(f"{self.name}: {len(own)} amplitudes need so many variances, received {self.spread.shape}")
-        return own[self.spread > 0.0]
+            return columns
+        if self.spread.shape != columns.shape:
+            raise ValueError(f"{self.name}: {len(columns)} amplitudes need so many variances, not {self.spread.shape}")
+        return columns[self.spread > 0.0]
 
     def roots(self, gram: Gram) -> Floats:
         """Return the standard deviations relative to the scale of the amplitudes in `columns`, shape (k,)."""
@@ -159,6 +160,12 @@ class CandidateCause:
 
         A floor that the data would set is written down first, so that it is multiplied, too. What physics fixes keeps
         its size.
+
+        Parameters
+        ----------
+        gram : Gram
+        bound, floor : float
+            Factors.
         """
         if self.fixed:
             return self
@@ -185,9 +192,15 @@ class ScaleRange:
 
 
 def scale_range(group: AmplitudeGroup, gram: Gram) -> ScaleRange:
-    """Return the range of a group's scale (`range_of`)."""
-    own, root = group.columns(gram), group.roots(gram)
-    values = np.linalg.eigvalsh(root[:, None] * gram.matrix[np.ix_(own, own)] * root)
+    """Return the range of a group's scale (`range_of`).
+
+    Parameters
+    ----------
+    group : AmplitudeGroup
+    gram : Gram
+    """
+    columns, root = group.columns(gram), group.roots(gram)
+    values = np.linalg.eigvalsh(root[:, None] * gram.matrix[np.ix_(columns, columns)] * root)
     return range_of(group, float(values.max(initial=0.0)))
 
 
@@ -196,6 +209,12 @@ def range_of(group: AmplitudeGroup, largest: float) -> ScaleRange:
 
     The floor that the data set is the scale whose square times that eigenvalue is 0.01. A group whose bound is below
     that floor is invisible: its evidence is that of nothing, whatever the data.
+
+    Parameters
+    ----------
+    group : AmplitudeGroup
+    largest : float
+        The eigenvalue, per square of the unit of the amplitudes.
     """
     floor = np.sqrt(UNRESOLVED_GAIN / largest) if largest > 0.0 else np.inf
     low = min(floor, group.high) if group.low is None else group.low
@@ -248,7 +267,7 @@ def log_nodes_of_many(ranges: Sequence[ScaleRange], values: Floats) -> tuple[Flo
     scales, log_weights : (n, t) arrays
         Rows with fewer nodes than others end with some of no weight.
     """
-    ends = np.array([(own.low, own.high) for own in ranges])
+    ends = np.array([(whole.low, whole.high) for whole in ranges])
     return _nodes(ends, np.log(ends[:, 1] / ends[:, 0]), values, 1.0)
 
 
@@ -284,7 +303,13 @@ def _density(logs: Floats, values: Floats) -> Floats:
 
 
 def thinning(counts: Sequence[int], limit: int) -> float:
-    """Return the factor on the numbers of nodes at which their product stays about at a limit."""
+    """Return the factor on the numbers of nodes at which their product stays about at a limit.
+
+    Parameters
+    ----------
+    counts : sequence of int
+    limit : int
+    """
     several = [count for count in counts if count > 1]
     product = float(np.prod([float(count) for count in several]))
     return 1.0 if product <= limit else float((limit / product) ** (1.0 / len(several)))

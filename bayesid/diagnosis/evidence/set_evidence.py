@@ -1,11 +1,15 @@
-"""Evidence of any set of causes relative to nothing, from the Gram alone."""
+"""Evidence of any set of causes relative to nothing, from the Gram alone.
+
+Amplitudes and scales are integrated out (D. J. C. MacKay, Bayesian interpolation, Neural Computation 4, 1992, with the
+average over the scales in place of their most probable values), and the forms of each cause are averaged over.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import product
 
 import numpy as np
@@ -189,7 +193,14 @@ class SetEvidence:
         return sorted(sizes, key=lambda place: -sizes[place])
 
     def spectra(self, names: Iterable[str], forms: Mapping[str, int] | None = None) -> list[GroupSpectrum]:
-        """Return the spectra of the groups of a set, in the order of `places`."""
+        """Return the spectra of the groups of a set, in the order of `places`.
+
+        Parameters
+        ----------
+        names : iterable of str
+        forms : mapping of str to int, optional
+            Form of each cause; by default the most probable ones.
+        """
         forms = self.forms(names) if forms is None else forms
         return [self._spectra[name][forms[name]][place] for name, place in self.places(names, forms)]
 
@@ -212,7 +223,7 @@ class SetEvidence:
         forms = self._choices(ordered)
         if choices is not None:
             forms = [tuple(choice[name] for name in ordered) for choice in choices]
-        values = [self._log_evidence(ordered, own) for own in forms]
+        values = [self._log_evidence(ordered, choice) for choice in forms]
         best = dict(zip(ordered, forms[int(np.argmax(values))], strict=True))
         return log_sum(values) + self._bodily(ordered, best)
 
@@ -294,6 +305,18 @@ class SetEvidence:
         """Return the columns of a set and the standard deviations of their amplitudes at the most probable scales.
 
         What physics fixes is left out.
+
+        Parameters
+        ----------
+        names : iterable of str
+        forms : mapping of str to int
+            Form of each cause.
+
+        Returns
+        -------
+        columns : (k,) array of int
+        deviations : (k,) array
+            In the units of the amplitudes.
         """
         ordered = tuple(sorted(names))
         key = (ordered, tuple(forms[name] for name in ordered))
@@ -302,9 +325,9 @@ class SetEvidence:
             where = np.unravel_index(int(np.argmax(average.log_posterior)), average.log_posterior.shape)
             columns, deviations = [np.zeros(0, dtype=int)], [np.zeros(0)]
             spectra = self.spectra([name for name in ordered if not self.causes[name].fixed], forms)
-            for nodes, index, own in zip(average.nodes, where, spectra, strict=True):
-                columns.append(own.columns)
-                deviations.append(nodes.scales[index] * own.root)
+            for nodes, index, spectrum in zip(average.nodes, where, spectra, strict=True):
+                columns.append(spectrum.columns)
+                deviations.append(nodes.scales[index] * spectrum.root)
             self._scaled[key] = np.concatenate(columns), np.concatenate(deviations)
         return self._scaled[key]
 
@@ -321,9 +344,9 @@ class SetEvidence:
         best = self.forms(ordered)
         near = {name: near_best(self.gains_beside(set(best) - {name}, best, [name])[name]) for name in best}
         return [
-            own
-            for own in product(*(near[name] for name in ordered))
-            if sum(form != best[name] for name, form in zip(ordered, own, strict=True)) < 2
+            choice
+            for choice in product(*(near[name] for name in ordered))
+            if sum(form != best[name] for name, form in zip(ordered, choice, strict=True)) < 2
         ]
 
     @cached_property
@@ -339,7 +362,10 @@ class SetEvidence:
         if len(free) == len(ordered):
             return average_over_scales(spectra, self.gram)
         shifted, gain = self._with_fixed(ordered, self.gram.score[None])
-        moved = [replace(own, score=own.vectors.T @ (own.root * shifted[0][own.columns])) for own in spectra]
+        moved = [
+            replace(spectrum, score=spectrum.vectors.T @ (spectrum.root * shifted[0][spectrum.columns]))
+            for spectrum in spectra
+        ]
         average = average_over_scales(moved, replace(self.gram, score=shifted[0]))
         return average._replace(log_evidence=average.log_evidence + float(gain[0]))
 
@@ -348,9 +374,9 @@ class SetEvidence:
         gain = np.zeros(len(scores))
         for name in ordered:
             if self.causes[name].fixed:
-                own = self.gram.groups[self.causes[name].groups[0].name]
-                gain = gain - scores[:, own].sum(axis=1) - 0.5 * self.gram.matrix[np.ix_(own, own)].sum()
-                scores = scores + self.gram.matrix[:, own].sum(axis=1)
+                columns = self.gram.groups[self.causes[name].groups[0].name]
+                gain = gain - scores[:, columns].sum(axis=1) - 0.5 * self.gram.matrix[np.ix_(columns, columns)].sum()
+                scores = scores + self.gram.matrix[:, columns].sum(axis=1)
         return scores, gain
 
     def log_evidences(self, names: Iterable[str], scores: Floats) -> Floats:
@@ -367,11 +393,11 @@ class SetEvidence:
         ordered = sorted(names)
         free = [name for name in ordered if not self.causes[name].fixed]
         shifted, gain = self._with_fixed(ordered, scores)
-        found = []
+        values = []
         for forms in self._choices(ordered):
             chosen = dict(zip(ordered, forms, strict=True))
-            found.append(self._many(self.spectra(free, chosen), shifted) + self._log_weight(ordered, forms))
-        return np.asarray(logsumexp(found, axis=0)) + gain
+            values.append(self._many(self.spectra(free, chosen), shifted) + self._log_weight(ordered, forms))
+        return np.asarray(logsumexp(values, axis=0)) + gain
 
     def _many(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
         """Return the log evidence of groups for many scores."""
@@ -379,23 +405,23 @@ class SetEvidence:
             return np.zeros(len(scores))
         if len(spectra) > 1:
             return self._several(spectra, scores)
-        (own,) = spectra
-        nodes = own.nodes()
-        visible = nodes.scales[:, None] ** 2 * own.values
-        squares = ((scores[:, own.columns] * own.root) @ own.vectors) ** 2
+        (spectrum,) = spectra
+        nodes = spectrum.nodes()
+        visible = nodes.scales[:, None] ** 2 * spectrum.values
+        squares = ((scores[:, spectrum.columns] * spectrum.root) @ spectrum.vectors) ** 2
         share = nodes.scales[:, None] ** 2 / (1.0 + visible)
         offset = nodes.log_weights - 0.5 * np.log1p(visible).sum(axis=1)
         return log_sums(squares @ (0.5 * share).T + offset)
 
     def _several(self, spectra: Sequence[GroupSpectrum], scores: Floats) -> Floats:
         """Return the same for several groups, on the product of their nodes."""
-        thinned = thinning([len(own.nodes().scales) for own in spectra], MOST_NODES)
-        nodes = [own.nodes(thinned) for own in spectra]
-        scales = np.meshgrid(*(own.scales for own in nodes), indexing="ij")
-        log_weights = np.sum(np.meshgrid(*(own.log_weights for own in nodes), indexing="ij"), axis=0).ravel()
-        columns = np.concatenate([own.columns for own in spectra])
+        thinned = thinning([len(spectrum.nodes().scales) for spectrum in spectra], MOST_NODES)
+        nodes = [spectrum.nodes(thinned) for spectrum in spectra]
+        scales = np.meshgrid(*(grid.scales for grid in nodes), indexing="ij")
+        log_weights = reduce(np.add.outer, (grid.log_weights for grid in nodes)).ravel()
+        columns = np.concatenate([spectrum.columns for spectrum in spectra])
         deviations = np.concatenate(
-            [grid.reshape(-1, 1) * own.root for grid, own in zip(scales, spectra, strict=True)], axis=1
+            [scale.reshape(-1, 1) * spectrum.root for scale, spectrum in zip(scales, spectra, strict=True)], axis=1
         )
         roots, half_log_det = covariance_roots(self.gram.matrix[np.ix_(columns, columns)], deviations)
         covariance = np.swapaxes(roots, 1, 2) @ roots
@@ -414,4 +440,6 @@ def _with_forms(cause: CandidateCause, places: Sequence[int]) -> CandidateCause:
     """Return a cause with some of its forms, each with the share of the prior that it has among all."""
     chosen = [cause.variants[place] for place in places]
     shares = tuple(float(np.exp(variant.log_weight)) for variant in chosen)
-    return replace(cause, groups=chosen[0].groups, others=tuple(own.groups for own in chosen[1:]), shares=shares)
+    return replace(
+        cause, groups=chosen[0].groups, others=tuple(variant.groups for variant in chosen[1:]), shares=shares
+    )

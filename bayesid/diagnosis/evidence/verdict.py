@@ -1,4 +1,8 @@
-"""From the probabilities of sets of causes to the verdict, and how it rests on what had to be chosen."""
+"""From the probabilities of sets of causes to the verdict, and how it rests on what had to be chosen.
+
+The alternatives of an ambiguous verdict are the smallest credible set among sets of causes (J. A. Hoeting et al.,
+Bayesian model averaging: a tutorial, Statistical Science 14, 1999, on the probabilities behind it).
+"""
 
 from __future__ import annotations
 
@@ -98,24 +102,24 @@ def probable_verdict(
         return ProbableVerdict(Status.UNKNOWN)
     merged = _merged(probabilities, classes)
     alternatives = _alternatives(merged, settings.covered)
-    best = next(item for item in merged if UNKNOWN not in item)
+    best = next(alternative for alternative in merged if UNKNOWN not in alternative)
     inclusion = probabilities.inclusion
     ordered = [sorted(members, key=lambda name: (-inclusion[name], name)) for members in classes]
     names = {members[0]: ordered[index] for index, members in enumerate(map(sorted, classes))}
     at_work = dict.fromkeys(names, 0.0)
-    for item, probability in merged.items():
-        for key in item - {UNKNOWN}:
+    for alternative, probability in merged.items():
+        for key in alternative - {UNKNOWN}:
             at_work[key] += probability
 
-    def named(item: frozenset[str]) -> tuple[str, ...]:
-        known = sorted(item - {UNKNOWN}, key=lambda key: (-at_work[key], key))
-        return (*(names[key][0] for key in known), *([UNKNOWN] if UNKNOWN in item else []))
+    def named(alternative: frozenset[str]) -> tuple[str, ...]:
+        known = sorted(alternative - {UNKNOWN}, key=lambda key: (-at_work[key], key))
+        return (*(names[key][0] for key in known), *(alternative & {UNKNOWN}))
 
     explained = bool(best) and all(at_work[key] >= settings.named_from for key in best)
     if not explained and (not best or not 2 <= len(alternatives) <= settings.most_alternatives):
         return ProbableVerdict(Status.UNRESOLVED)
-    others = () if explained else tuple(named(item) for item in alternatives if item != best)
-    mentioned = {name for item in (named(best), *others) for name in item}
+    others = () if explained else tuple(named(alternative) for alternative in alternatives if alternative != best)
+    mentioned = set(named(best)).union(*others)
     equivalent = {members[0]: tuple(members[1:]) for members in ordered if len(members) > 1 and members[0] in mentioned}
     return ProbableVerdict(Status.EXPLAINED if explained else Status.AMBIGUOUS, named(best), equivalent, others)
 
@@ -124,9 +128,10 @@ def _merged(probabilities: SetProbabilities, classes: Sequence[Sequence[str]]) -
     """Return the probabilities of sets of classes, each by its first name, the most probable first."""
     key = {name: min(members) for members in classes for name in members}
     total: dict[frozenset[str], float] = {}
-    for item in probabilities.sets:
-        own = frozenset([*(key[name] for name in item.causes), *([UNKNOWN] if item.generic is not None else [])])
-        total[own] = total.get(own, 0.0) + item.probability
+    for cause_set in probabilities.sets:
+        unknown = [] if cause_set.generic is None else [UNKNOWN]
+        classes_at_work = frozenset([*(key[name] for name in cause_set.causes), *unknown])
+        total[classes_at_work] = total.get(classes_at_work, 0.0) + cause_set.probability
     return dict(sorted(total.items(), key=lambda pair: (-pair[1], sorted(pair[0]))))
 
 
@@ -136,9 +141,9 @@ def _alternatives(merged: dict[frozenset[str], float], enough: float) -> list[fr
     covered = 0.0
     left = dict(merged)
     while left and covered < enough:
-        item = next(iter(left))
-        chosen.append(item)
-        within = [other for other in left if other == item or (item and item <= other)]
+        likeliest = next(iter(left))
+        chosen.append(likeliest)
+        within = [other for other in left if other == likeliest or (likeliest and likeliest <= other)]
         covered += sum(left.pop(other) for other in within)
     return chosen
 
@@ -193,23 +198,20 @@ def verdict_sensitivity(
         name: probable_verdict(probabilities.under(changed), classes, silent, settings)
         for name, changed in _other_priors(probabilities.prior).items()
     }
-    for name, factors in {
-        "bounds a decade higher": (DECADE, 1.0),
-        "floors a decade lower": (1.0, 1.0 / DECADE),
-    }.items():
-        others[name] = probable_verdict(widened(*factors), classes, silent, settings)
+    for name, bound, floor in (("bounds a decade higher", DECADE, 1.0), ("floors a decade lower", 1.0, 1.0 / DECADE)):
+        others[name] = probable_verdict(widened(bound, floor), classes, silent, settings)
     return VerdictSensitivity(probable_verdict(probabilities, classes, silent, settings), others)
 
 
 def _other_priors(prior: CausePrior) -> dict[str, CausePrior]:
     """Return the prior with each of its numbers halved and doubled; a probability stays below one."""
-    found = {}
+    priors = {}
     for number, words in (("one_more", "causes"), ("generic", "unknown")):
         for factor, verb in ((0.5, "half"), (2.0, "twice")):
             value = getattr(prior, number) * factor
             changed = min(value, 0.5 * (1.0 + getattr(prior, number)))
-            found[f"{words} {verb} as probable"] = replace(prior, **{number: changed})
-    return found
+            priors[f"{words} {verb} as probable"] = replace(prior, **{number: changed})
+    return priors
 
 
 def classes_of_equivalents(
@@ -232,8 +234,8 @@ def classes_of_equivalents(
     columns, units, directions = {}, {}, {}
     for name in evidence.catalogue:
         spectra = evidence.spectra([name])
-        columns[name] = np.concatenate([own.columns for own in spectra])
-        units[name] = np.concatenate([own.root * own.range.high for own in spectra])
+        columns[name] = np.concatenate([spectrum.columns for spectrum in spectra])
+        units[name] = np.concatenate([spectrum.root * spectrum.range.high for spectrum in spectra])
         directions[name] = independent_directions(evidence.gram.matrix[np.ix_(columns[name], columns[name])])
     visible = {name for name in evidence.catalogue if _largest(evidence.gram, columns[name], units[name]) >= seen}
 
@@ -243,18 +245,13 @@ def classes_of_equivalents(
 
     classes: list[list[str]] = []
     for name in evidence.catalogue:
-        fitting = (
-            members
-            for members in classes
-            if name in visible
-            and members[0] in visible
-            and all(imitated(name, other) and imitated(other, name) for other in members)
-        )
-        joined = next(fitting, None)
-        if joined is None:
-            classes.append([name])
+        for members in classes if name in visible else ():
+            equivalent = (imitated(name, other) and imitated(other, name) for other in members)
+            if members[0] in visible and all(equivalent):
+                members.append(name)
+                break
         else:
-            joined.append(name)
+            classes.append([name])
     return tuple(tuple(members) for members in classes)
 
 
