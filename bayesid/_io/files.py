@@ -49,9 +49,9 @@ def write_json(file: str | Path, content: dict[str, Any]) -> None:
 def _finite(value: Any) -> Any:
     match value:
         case dict():
-            return {key: _finite(item) for key, item in value.items()}
+            return {key: _finite(part) for key, part in value.items()}
         case list() | tuple():
-            return [_finite(item) for item in value]
+            return [_finite(part) for part in value]
         case np.ndarray() | np.generic():
             return _finite(value.tolist())
         case float() if not math.isfinite(value):
@@ -103,8 +103,8 @@ def claimed_folder(folder: Path) -> Iterator[None]:
     try:
         _lock(handle, folder)
         _claimed.add(key)
-        for item in [*folder.glob(".part-*"), *folder.glob(".*.part")]:
-            shutil.rmtree(item) if item.is_dir() else item.unlink()
+        for leftover in [*folder.glob(".part-*"), *folder.glob(".*.part")]:
+            shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink()
         yield
     finally:
         _claimed.discard(key)
@@ -130,5 +130,5 @@ def complete_folder(output: Path) -> Iterator[Path]:
     """Yield a temporary folder whose files are moved to the output together, unless the block fails."""
     with claimed_folder(output), tempfile.TemporaryDirectory(dir=output, prefix=".part-") as name:
         yield Path(name)
-        for item in sorted(Path(name).iterdir()):
-            shutil.move(str(item), output / item.name)
+        for entry in sorted(Path(name).iterdir()):
+            shutil.move(str(entry), output / entry.name)

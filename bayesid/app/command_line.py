@@ -50,8 +50,8 @@ app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_
 """Application of typer, to which the commands are added below."""
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(requested: bool) -> None:
+    if requested:
         typer.echo(f"bayesid {bayesid.__version__}")
         raise typer.Exit
 

@@ -45,10 +45,10 @@ def copy_demonstration(folder: Path) -> dict[str, dict[str, float]]:
     create_folder(folder)
     shipped = files("bayesid.app") / "demonstration_data"
     answer: dict[str, dict[str, float]] = {}
-    for item in shipped.iterdir():
-        text = item.read_text(encoding="utf-8")
-        if item.name == "hidden.json":
+    for entry in shipped.iterdir():
+        text = entry.read_text(encoding="utf-8")
+        if entry.name == "hidden.json":
             answer = json.loads(text)
         else:
-            write_text(folder / item.name, text)
+            write_text(folder / entry.name, text)
     return answer

@@ -74,10 +74,10 @@ def run(
         except InputError as error:
             raise error.within(file=file) from None
         with complete_folder(output) as folder:
-            content = {"title": study.title, "seed": seed, "manoeuvres": [item.to_dict() for item in designs]}
+            content = {"title": study.title, "seed": seed, "manoeuvres": [motion.to_dict() for motion in designs]}
             write_json(folder / "design.json", {**content, "best": best.name})
-            for item in designs:
-                write_motion(item, folder / f"{item.name}.csv")
+            for motion in designs:
+                write_motion(motion, folder / f"{motion.name}.csv")
             origin = report_origin(
                 study,
                 "design",

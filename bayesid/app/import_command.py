@@ -51,8 +51,10 @@ def run(
     from bayesid.recording.ros_bag import format_stamp
 
     window = TimeWindow.of_options(start, end, duration)
-    wanted = BagTopics(tuple(joints), imu, attitude, tuple(without or ()), velocity, effort, accel, window, most_faulty)
-    imported = import_bag(bag, wanted)
+    selected = BagTopics(
+        tuple(joints), imu, attitude, tuple(without or ()), velocity, effort, accel, window, most_faulty
+    )
+    imported = import_bag(bag, selected)
     recording = imported.recording
     file = output / f"{recording.name}.csv"
     with complete_folder(output) as folder:

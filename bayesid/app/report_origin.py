@@ -44,9 +44,9 @@ def _words(options: Mapping[str, Option]) -> list[str]:
         if isinstance(value, bool):
             words.append(f"--{'' if value else 'no-'}{name}")
         else:
-            several = value if isinstance(value, list) else [] if value is None else [value]
-            for item in several:
-                words += [f"--{name}", *(item if isinstance(item, tuple) else [_typed(item)])]
+            arguments = value if isinstance(value, list) else [] if value is None else [value]
+            for argument in arguments:
+                words += [f"--{name}", *(argument if isinstance(argument, tuple) else [_typed(argument)])]
     return words
 
 

@@ -182,12 +182,12 @@ def _encoder(robot: Robot, recordings: Sequence[Recording]) -> str:
     lines = [_line("[sensors.encoder]", "what is left out is estimated whenever the recordings are read")]
     for key, family, unit in (("sigma", "position", "rad or m"), ("velocity_sigma", "velocity", "rad/s or m/s")):
         seen = {joint.name: channel_noise(recordings, f"{family}.{joint.name}") for joint in robot.joints}
-        found = {name: sigma for name, sigma in seen.items() if sigma is not None}
-        if not found:
+        estimated = {name: sigma for name, sigma in seen.items() if sigma is not None}
+        if not estimated:
             continue
-        alike = len(found) == len(robot.joints) and max(found.values()) <= ALIKE * min(found.values())
-        each = ", ".join(f"{_quoted(name)} = {sigma:.1e}" for name, sigma in found.items())
-        value = f"{np.median(list(found.values())):.1e}" if alike else f"{{ {each} }}"
+        alike = len(estimated) == len(robot.joints) and max(estimated.values()) <= ALIKE * min(estimated.values())
+        each = ", ".join(f"{_quoted(name)} = {sigma:.1e}" for name, sigma in estimated.items())
+        value = f"{np.median(list(estimated.values())):.1e}" if alike else f"{{ {each} }}"
         lines.append(_unsure(f"{key} = {value}", f"{unit}, per sample, estimated from the recordings"))
     return _section(*lines)
 
@@ -256,8 +256,8 @@ def channel_noise(recordings: Sequence[Recording], column: str) -> float | None:
     rough; where the samples are too uneven for differences, the likelihood of a smoothing spline says how noisy they
     are.
     """
-    found = [_noise(*recording.series(column)) for recording in recordings if column in recording.channels]
-    return _median(found)
+    sigmas = [_noise(*recording.series(column)) for recording in recordings if column in recording.channels]
+    return _median(sigmas)
 
 
 def vector_noise(recordings: Sequence[Recording], family: str) -> tuple[float, float, float] | None:
@@ -297,6 +297,6 @@ def _noise(time: Floats, values: Floats) -> float | None:
     return sigma if sigma > LEAST * float(np.ptp(values)) and sigma > 0.0 else None
 
 
-def _median(found: Sequence[float | None]) -> float | None:
-    seen = [sigma for sigma in found if sigma is not None]
+def _median(sigmas: Sequence[float | None]) -> float | None:
+    seen = [sigma for sigma in sigmas if sigma is not None]
     return float(np.median(seen)) if seen else None

@@ -207,8 +207,8 @@ def fly_next(study: Study, rivals: tuple[str, str], seed: int, progress: Progres
         return best_design(design(problem, seed, noise, effort, progress=progress))
 
 
-def write_motion(item: Design, file: Path) -> None:
+def write_motion(design: Design, file: Path) -> None:
     """Write the positions of the joints along a manoeuvre as a recording."""
-    recording = item.manoeuvre.recording
+    recording = design.manoeuvre.recording
     joints = {key: values for key, values in recording.channels.items() if key.startswith("position.")}
-    Recording(item.name, None, recording.time, joints).write(file)
+    Recording(design.name, None, recording.time, joints).write(file)

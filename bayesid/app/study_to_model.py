@@ -246,8 +246,8 @@ def _orbit(study: Study) -> Orbit | None:
 
 def _sensors(study: Study) -> tuple[Sensor, ...]:
     given = study.sensors
-    own = {SensorKind.RATE: given.rate, SensorKind.ACCEL: given.accel, SensorKind.ATTITUDE: given.attitude}
-    sensors = [_sensor(kind, section.noise, section) for kind, section in own.items() if section is not None]
+    sections = {SensorKind.RATE: given.rate, SensorKind.ACCEL: given.accel, SensorKind.ATTITUDE: given.attitude}
+    sensors = [_sensor(kind, section.noise, section) for kind, section in sections.items() if section is not None]
     return (*sensors, *(_other_sensor(name, section) for name, section in given.other.items()))
 
 

@@ -55,7 +55,7 @@ def without_stated_faults(study: Study, model: Model, manoeuvres: Sequence[Manoe
     """
     known = noise_faults([sensor.kind for sensor in model.sensors])
     # outliers last: they stand out from a fit with all else as stated
-    for label, given in sorted(study.model.noise.items(), key=lambda item: known[item[0]].in_residual):
+    for label, given in sorted(study.model.noise.items(), key=lambda fault: known[fault[0]].in_residual):
         manoeuvres = known[label].in_data(model, manoeuvres, _sizes(known[label], given))
     return list(manoeuvres)
 

@@ -85,7 +85,7 @@ def joint_names(topics: Sequence[StampedTopic], without: Sequence[str]) -> tuple
     if not names:
         raise topics[0].error("no joint is left", remedy="Name a topic that holds the robot's joints")
     for name in names:
-        holders = [topic for topic, own in zip(topics, of_topic, strict=True) if name in own]
+        holders = [topic for topic, in_topic in zip(topics, of_topic, strict=True) if name in in_topic]
         if len(holders) > 1:
             raise holders[1].error(
                 f"the joint {name!r} is in {holders[0].name} too",
@@ -125,11 +125,11 @@ def _joint_family(topic: StampedTopic, names: Sequence[str], field: str, family:
         for name, value in zip(message.name, getattr(message, field), strict=False):
             if name in names and np.isfinite(value):
                 samples.setdefault(f"{family}.{name}", []).append((int(stamp), float(value)))
-    found = {}
+    channels = {}
     for channel, pairs in samples.items():
         stamps, rows = np.unique([stamp for stamp, _ in pairs], return_index=True)
-        found[channel] = stamps, np.array([value for _, value in pairs])[rows]
-    return found
+        channels[channel] = stamps, np.array([value for _, value in pairs])[rows]
+    return channels
 
 
 def imu_channels(topic: StampedTopic, *, accel: bool) -> Channels:
@@ -211,5 +211,7 @@ def _quaternion(message: Any) -> list[float]:
     """Return x, y, z, w of a message of one of `ATTITUDES`."""
     inner = getattr(message, "pose", None) or getattr(message, "transform", None) or message
     inner = getattr(inner, "pose", inner)  # of a pose with covariance
-    found = next(getattr(inner, name) for name in ("quaternion", "orientation", "rotation") if hasattr(inner, name))
-    return [found.x, found.y, found.z, found.w]
+    quaternion = next(
+        getattr(inner, name) for name in ("quaternion", "orientation", "rotation") if hasattr(inner, name)
+    )
+    return [quaternion.x, quaternion.y, quaternion.z, quaternion.w]

@@ -89,16 +89,16 @@ class TimeWindow:
         """
         stamps = [topic.stamps[topic.stamps > 0] for topic in topics]
         if not all(map(len, stamps)):
-            topic = topics[[len(own) for own in stamps].index(0)]
+            topic = topics[[len(times) for times in stamps].index(0)]
             problem = f"the stamp of the header is zero ({len(topic.messages)} such messages)"
             remedy = "Have the driver stamp its messages; the time of arrival is no substitute"
             raise topic.error(problem, message=0, remedy=remedy)
-        first = min(int(own.min()) for own in stamps)
-        last = max(int(own.max()) for own in stamps)
+        first = min(int(times.min()) for times in stamps)
+        last = max(int(times.max()) for times in stamps)
         low = first + round(1e9 * self.start)
         high = last if self.end is None else first + round(1e9 * self.end)
-        for topic, own in zip(topics, stamps, strict=True):
-            if not ((own >= low) & (own <= high)).any():
+        for topic, times in zip(topics, stamps, strict=True):
+            if not ((times >= low) & (times <= high)).any():
                 raise topic.error(
                     f"it has no message from {self.start:g} to {(high - first) / 1e9:g} s",
                     remedy=f"Choose a window within the bag, which lasts {(last - first) / 1e9:.6g} s",
@@ -177,7 +177,7 @@ class ImportedBag:
     topics: tuple[ImportedTopic, ...]
 
 
-def import_bag(bag: Path, wanted: BagTopics) -> ImportedBag:
+def import_bag(bag: Path, selected: BagTopics) -> ImportedBag:
     """Return the recording of a bag.
 
     Raises
@@ -186,35 +186,39 @@ def import_bag(bag: Path, wanted: BagTopics) -> ImportedBag:
         If the bag or a topic cannot be read, the topics are stamped by different clocks, a topic has no message in the
         window, too many messages of one are faulty, a joint is in two topics, or the IMU feels gravity.
     """
-    kinds = dict.fromkeys(wanted.joints, JOINTS)
-    for name, allowed in ((wanted.attitude, ATTITUDES), (wanted.imu, IMU)):
+    kinds = dict.fromkeys(selected.joints, JOINTS)
+    for name, allowed in ((selected.attitude, ATTITUDES), (selected.imu, IMU)):
         kinds |= {} if name is None else {name: allowed}
     whole = read_topics(bag, kinds)
-    between = wanted.window.of(list(whole.values()))
+    between = selected.window.of(list(whole.values()))
 
     def sound(name: str, fault: Callable[[Any], str | None]) -> StampedTopic:
-        return whole[name].sound(fault, wanted.most_faulty, between)
+        return whole[name].sound(fault, selected.most_faulty, between)
 
-    arms = [sound(name, joint_fault) for name in wanted.joints]
-    names = joint_names(arms, wanted.without)
-    found: list[tuple[StampedTopic, Channels, str]] = []
+    arms = [sound(name, joint_fault) for name in selected.joints]
+    names = joint_names(arms, selected.without)
+    read: list[tuple[StampedTopic, Channels, str]] = []
     for topic in arms:
         used = topic.kept([not set(names).isdisjoint(message.name) for message in topic.messages])
-        found.append((used, joint_channels(used, names, velocity=wanted.velocity, effort=wanted.effort), ""))
-    joints = [stamps for _, channels, _ in found for stamps, _ in channels.values()]
+        read.append((used, joint_channels(used, names, velocity=selected.velocity, effort=selected.effort), ""))
+    joints = [stamps for _, channels, _ in read for stamps, _ in channels.values()]
     known = max(int(stamps[0]) for stamps in joints), min(int(stamps[-1]) for stamps in joints)
     base = [
-        *([] if wanted.imu is None else [(sound(wanted.imu, imu_fault), partial(imu_channels, accel=wanted.accel))]),
-        *([] if wanted.attitude is None else [(sound(wanted.attitude, attitude_fault), attitude_channels)]),
+        *(
+            []
+            if selected.imu is None
+            else [(sound(selected.imu, imu_fault), partial(imu_channels, accel=selected.accel))]
+        ),
+        *([] if selected.attitude is None else [(sound(selected.attitude, attitude_fault), attitude_channels)]),
     ]
     refuse_mixed_clocks([*arms, *(topic for topic, _ in base)])
     for topic, channels_of in base:
         inside = _during(arms[0], topic, known)
-        found.append((inside, channels_of(inside), inside.frame()))
+        read.append((inside, channels_of(inside), inside.frame()))
     topics = tuple(
-        _described(topic, channels, frame, len(whole[topic.name].messages)) for topic, channels, frame in found
+        _described(topic, channels, frame, len(whole[topic.name].messages)) for topic, channels, frame in read
     )
-    return ImportedBag(*_recording(bag, [channels for _, channels, _ in found]), topics)
+    return ImportedBag(*_recording(bag, [channels for _, channels, _ in read]), topics)
 
 
 def _during(joints: StampedTopic, topic: StampedTopic, known: tuple[int, int]) -> StampedTopic:
@@ -225,14 +229,14 @@ def _during(joints: StampedTopic, topic: StampedTopic, known: tuple[int, int]) -
     return inside
 
 
-def _recording(bag: Path, found: Sequence[Channels]) -> tuple[Recording, int]:
+def _recording(bag: Path, by_topic: Sequence[Channels]) -> tuple[Recording, int]:
     """Return a recording with one row for every stamp, and its first stamp; what has no message there has no sample."""
-    stamps = np.unique(np.concatenate([own for channels in found for own, _ in channels.values()]))
+    stamps = np.unique(np.concatenate([sampled for channels in by_topic for sampled, _ in channels.values()]))
     columns = {}
-    for channels in found:
-        for name, (own, values) in channels.items():
+    for channels in by_topic:
+        for name, (sampled, values) in channels.items():
             columns[name] = np.full(len(stamps), np.nan)
-            columns[name][np.searchsorted(stamps, own)] = values
+            columns[name][np.searchsorted(stamps, sampled)] = values
     name = bag.name if bag.is_dir() else bag.stem
     try:
         return Recording(name, None, (stamps - stamps[0]) / 1e9, columns), int(stamps[0])
@@ -250,7 +254,7 @@ def _described(topic: StampedTopic, channels: Channels, frame: str, messages: in
         messages=messages,
         used=len(topic.messages),
         interval=float(np.median(np.concatenate(steps))),
-        longest_gap=float(max(own.max() for own in steps)),
+        longest_gap=float(max(step.max() for step in steps)),
         left_out=topic.left_out,
         reordered=topic.reordered,
     )

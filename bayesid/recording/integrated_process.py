@@ -61,13 +61,13 @@ def jump_moments(derivative: int, order: int, step: Floats, weights: Floats) -> 
     -------
     (n, order, order) array
     """
-    found = np.zeros((len(step), order, order))
-    for own in range(derivative, order):
-        unit, powers = _moments_of_unit_step(own, weights.shape[1])
+    summed = np.zeros((len(step), order, order))
+    for jumping in range(derivative, order):
+        unit, powers = _moments_of_unit_step(jumping, weights.shape[1])
         size = len(powers)
         moments = (weights @ unit.reshape(len(unit), -1)).reshape(-1, size, size)
-        found[:, :size, :size] += HIGHER ** (own - derivative) * moments * step[:, None, None] ** powers
-    return found
+        summed[:, :size, :size] += HIGHER ** (jumping - derivative) * moments * step[:, None, None] ** powers
+    return summed
 
 
 @lru_cache(maxsize=32)
@@ -110,8 +110,8 @@ class IntegratedProcess:
         self._added: dict[int, Floats] = {}
         for jump in jumps:
             moments = jump_moments(jump.derivative, order, step[jump.steps], np.array(jump.variances))
-            for place, own in zip(jump.steps, moments, strict=True):
-                self._added[place] = self._added.get(place, 0.0) + own
+            for place, moment in zip(jump.steps, moments, strict=True):
+                self._added[place] = self._added.get(place, 0.0) + moment
         self._jumped = np.array(sorted(self._added), dtype=np.intp)
         self._jumps = np.array([self._added[place] for place in sorted(self._added)]).reshape(-1, order, order)
 
@@ -180,19 +180,19 @@ def covariances_by_distance(factor: Floats, order: int) -> Iterator[Floats]:
         Covariances of the states of node ``i`` with those of node ``i + d``.
     """
     count = factor.shape[1] // order
-    own, next_ = np.zeros((count, order, order)), np.zeros((count, order, order))
+    diagonal, coupling = np.zeros((count, order, order)), np.zeros((count, order, order))
     for column in range(order):
         for row in range(2 * order):
-            block = own if row < order else next_
+            block = diagonal if row < order else coupling
             if row >= column:
                 block[:, row % order, column] = factor[row - column, column::order]
-    inverse = np.linalg.solve(own, np.broadcast_to(np.eye(order), own.shape))
+    inverse = np.linalg.solve(diagonal, np.broadcast_to(np.eye(order), diagonal.shape))
     noise = inverse.transpose(0, 2, 1) @ inverse
-    gain = -inverse.transpose(0, 2, 1) @ next_.transpose(0, 2, 1)
-    found = np.empty_like(own)
-    found[-1] = noise[-1]
+    gain = -inverse.transpose(0, 2, 1) @ coupling.transpose(0, 2, 1)
+    covariance = np.empty_like(diagonal)
+    covariance[-1] = noise[-1]
     for node in range(count - 2, -1, -1):
-        found[node] = noise[node] + gain[node] @ found[node + 1] @ gain[node].T
-    while len(found):
-        yield found
-        found = gain[: len(found) - 1] @ found[1:]
+        covariance[node] = noise[node] + gain[node] @ covariance[node + 1] @ gain[node].T
+    while len(covariance):
+        yield covariance
+        covariance = gain[: len(covariance) - 1] @ covariance[1:]

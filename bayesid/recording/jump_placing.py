@@ -63,7 +63,7 @@ def placed_jumps(joints: Sequence[SmoothedJoint]) -> list[SmoothedJoint]:
                 jump = joints[index].jumps[number]
                 variances = tuple(tuple(row) for row in (jump.variance * kept).tolist())
                 placed[index][number] = Jump(steps[likely[0]], jump.derivative, variances)
-    return [_smoothed(joint, _apart(joint, own)) for joint, own in zip(joints, placed, strict=True)]
+    return [_smoothed(joint, _apart(joint, of_joint)) for joint, of_joint in zip(joints, placed, strict=True)]
 
 
 def _smoothed(joint: SmoothedJoint, jumps: list[Jump]) -> SmoothedJoint:
@@ -80,8 +80,8 @@ def _overlap(some: range, others: range) -> bool:
 
 def _close(jumps: Sequence[Jump], number: int) -> bool:
     """Return whether another jump may lie in the steps in which one is sought."""
-    own = jumps[number].steps
-    wider = range(own.start - BESIDE, own.stop + BESIDE)
+    steps = jumps[number].steps
+    wider = range(steps.start - BESIDE, steps.stop + BESIDE)
     return any(_overlap(jump.steps, wider) for place, jump in enumerate(jumps) if place != number)
 
 
@@ -104,14 +104,14 @@ def _freed(joint: SmoothedJoint) -> SmoothedJoint:
 
 
 def _free(joint: SmoothedJoint, jump: Jump) -> Jump:
-    found = all(len(parts) == 1 for parts in jump.variances)
-    return jump if found else _even(jump, _beside(joint, jump))
+    unplaced = all(len(parts) == 1 for parts in jump.variances)
+    return jump if unplaced else _even(jump, _beside(joint, jump))
 
 
 def _even(jump: Jump, *steps: range) -> Jump:
     """Return a jump as likely in every step of some ranges and between them."""
-    first = min(own.start for own in steps)
-    count = max(own.stop for own in steps) - first
+    first = min(span.start for span in steps)
+    count = max(span.stop for span in steps) - first
     return Jump(first, jump.derivative, ((jump.variance / count,),) * count)
 
 
@@ -154,21 +154,21 @@ class _NearNodes:
         weight, seen = self._seen[number]
         lengths = np.diff(joint.nodes[steps.start : steps.stop + 1] / joint.scale)
         others = [
-            own.within(steps) for place, own in enumerate(jumps) if place != number and _overlap(own.steps, steps)
+            other.within(steps) for place, other in enumerate(jumps) if place != number and _overlap(other.steps, steps)
         ]
         roughness = None if joint.roughness is None else joint.roughness[steps.start : steps.stop]
         process = IntegratedProcess(lengths, order, others, roughness)
         rest = sla.block_diag(*(process.covariance(joint.scaled_intensity, row) for row in range(len(steps))))
         known = np.eye(len(seen)) + weight @ rest @ weight.T
-        found = np.empty((len(steps), PARTS))
+        evidence = np.empty((len(steps), PARTS))
         for row, length in enumerate(lengths):
             columns = weight[:, row * order : (row + 1) * order]
             moments = jump_moments(jump.derivative, order, np.full(PARTS, length), np.eye(PARTS))
             factor = np.linalg.cholesky(known + jump.variance * columns @ moments @ columns.T)
             left = np.linalg.solve(factor, np.broadcast_to(seen[:, None], (PARTS, len(seen), 1)))[..., 0]
             log_det = np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-            found[row] = -0.5 * (left**2).sum(axis=1) - log_det + np.log(length)
-        return found
+            evidence[row] = -0.5 * (left**2).sum(axis=1) - log_det + np.log(length)
+        return evidence
 
     def _observed(self, steps: range) -> tuple[Floats, Floats]:
         """Return what the samples say of the increments of some steps: observations of unit noise.

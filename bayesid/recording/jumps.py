@@ -128,11 +128,14 @@ def _with_all_jumps(joints: list[SmoothedJoint], level: float) -> list[SmoothedJ
 def _searched(joints: list[SmoothedJoint], level: float) -> list[SmoothedJoint]:
     """Return the joints with all jumps that their samples show at a level, wherever they are."""
     for number in range(MOST_ROUNDS):
-        found = _new_jumps(joints, level) if joints else []
-        if not any(found):
+        new_jumps = _new_jumps(joints, level) if joints else []
+        if not any(new_jumps):
             break
         any_order = number < ROUNDS_OF_ORDERS
-        before, joints = joints, [_extended(joint, new, any_order) for joint, new in zip(joints, found, strict=True)]
+        before, joints = (
+            joints,
+            [_extended(joint, added, any_order) for joint, added in zip(joints, new_jumps, strict=True)],
+        )
         if _same(joints, before):
             break
     return joints
@@ -156,18 +159,20 @@ def _new_jumps(joints: Sequence[SmoothedJoint], level: float) -> list[list[Jump]
     scores = [_scores(joint) for joint in joints]
     alone = [[index] for index in range(len(joints))]
     groups = [_Group.of(members, joints, scores) for members in alone + _together(joints)]
-    found: list[list[Jump]] = [[] for _ in joints]
+    new_jumps: list[list[Jump]] = [[] for _ in joints]
     while True:
         best = min(groups, key=lambda group: float(group.log_p.min()))
         step, column = np.unravel_index(np.argmin(best.log_p), best.log_p.shape)
         if best.log_p[step, column] > np.log(level):
-            return found
+            return new_jumps
         first, probability = _place(best.statistic[:, column], int(step))
         for index in best.members:
             score, information = scores[index].score[step, column], scores[index].information[step, column]
             if information > 0.0:
                 variance = FREE**2 * ((score / information) ** 2 + 1.0 / information)
-                found[index].append(Jump(first, DERIVATIVES[column], tuple((part,) for part in variance * probability)))
+                new_jumps[index].append(
+                    Jump(first, DERIVATIVES[column], tuple((part,) for part in variance * probability))
+                )
         last = first + len(probability)
         for group in groups:
             group.leave_out(best.nodes[max(0, first - APART)], best.nodes[min(last + APART, len(best.nodes) - 1)])
@@ -215,8 +220,8 @@ def roughened(joint: SmoothedJoint) -> SmoothedJoint:
             if freedom.sum() < FEWEST:
                 return joint
             width = max(free.sum() / freedom.sum(), 1.0)
-        wanted = (PRIOR + _about(energy * factors, width)) / (PRIOR + _about(freedom, width))
-        moved = wanted if number % 2 else np.sqrt(factors * wanted)
+        estimate = (PRIOR + _about(energy * factors, width)) / (PRIOR + _about(freedom, width))
+        moved = estimate if number % 2 else np.sqrt(factors * estimate)
         changed = joint.with_roughness(moved)
         if not np.isfinite(changed.chi2):  # rounding leaves no solution
             return joint

@@ -84,9 +84,9 @@ class StampedTopic:
             )
         return str(frames[0])
 
-    def kept(self, wanted: Sequence[bool] | NDArray[np.bool_]) -> StampedTopic:
+    def kept(self, mask: Sequence[bool] | NDArray[np.bool_]) -> StampedTopic:
         """Return the topic with some of its messages, given by a truth value for each."""
-        return self.ordered(np.flatnonzero(np.asarray(wanted, dtype=bool)))
+        return self.ordered(np.flatnonzero(np.asarray(mask, dtype=bool)))
 
     def ordered(self, rows: Integers) -> StampedTopic:
         """Return the topic with some of its messages, given by their places, shape (m,)."""
@@ -179,14 +179,14 @@ def _trusted_stamps(stamps: Integers) -> tuple[Integers, list[str | None]]:
     return np.where([text is None for text in faults], stamps, near), faults
 
 
-def read_topics(bag: Path, wanted: Mapping[str, Sequence[str]]) -> dict[str, StampedTopic]:
+def read_topics(bag: Path, types: Mapping[str, Sequence[str]]) -> dict[str, StampedTopic]:
     """Return the messages of topics.
 
     Parameters
     ----------
     bag : Path
         File or folder of the bag.
-    wanted : mapping of str to sequence of str
+    types : mapping of str to sequence of str
         Types of messages that each topic may have, such as ``"sensor_msgs/Imu"``.
 
     Raises
@@ -209,10 +209,10 @@ def read_topics(bag: Path, wanted: Mapping[str, Sequence[str]]) -> dict[str, Sta
         # bags with the storage sqlite3 of older releases hold no definitions, and the wanted types never changed
         with AnyReader([bag], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             kinds = {name: _plain(info.msgtype or "several types") for name, info in reader.topics.items()}
-            for name, allowed in wanted.items():
+            for name, allowed in types.items():
                 _check_topic(bag, name, allowed, kinds)
-            raw: dict[str, list[tuple[int, Any, bytes]]] = {name: [] for name in wanted}
-            chosen = [connection for connection in reader.connections if connection.topic in wanted]
+            raw: dict[str, list[tuple[int, Any, bytes]]] = {name: [] for name in types}
+            chosen = [connection for connection in reader.connections if connection.topic in types]
             for connection, arrival, data in reader.messages(chosen):
                 message = reader.deserialize(data, connection.msgtype)
                 raw[connection.topic].append((arrival, message, bytes(data)))

@@ -166,10 +166,10 @@ class SmoothedJoint:
     def _increment_covariance(self, process: IntegratedProcess, factor: Floats) -> Floats:
         """Return the posterior covariance of the increment of each step, (n - 1, order, order)."""
         blocks = covariances_by_distance(factor, self.order)
-        own, next_ = next(blocks), next(blocks)
-        lifted = process.transition @ next_
-        covariance = own[1:] - lifted - lifted.transpose(0, 2, 1)
-        return np.asarray(covariance + process.transition @ own[:-1] @ process.transition.transpose(0, 2, 1))
+        of_node, to_next = next(blocks), next(blocks)
+        lifted = process.transition @ to_next
+        covariance = of_node[1:] - lifted - lifted.transpose(0, 2, 1)
+        return np.asarray(covariance + process.transition @ of_node[:-1] @ process.transition.transpose(0, 2, 1))
 
     @property
     def _problem(self) -> tuple[_Problem, list[float]]:
@@ -309,8 +309,8 @@ def smooth(
     nodes, scale = _nodes(np.concatenate([series.time for series in samples]))
     best = None
     for order in orders:
-        own = tuple(jump for jump in jumps if jump.derivative < order)
-        fit = _fit(samples, nodes, scale, start, order, own, roughness)
+        applicable = tuple(jump for jump in jumps if jump.derivative < order)
+        fit = _fit(samples, nodes, scale, start, order, applicable, roughness)
         if best is not None and order > best.order and fit.log_likelihood < best.log_likelihood:
             break
         if best is None or fit.log_likelihood > best.log_likelihood:
@@ -421,16 +421,16 @@ class _Problem:
 
     def intensity_over(self, horizon: float, sigmas: Sequence[float]) -> float:
         """Return the intensity with which the process leaves a polynomial by the noise within a number of steps."""
-        found = []
+        intensities = []
         for (derivative, _, _), sigma in zip(self.series, sigmas, strict=True):
             power = self.order - derivative
             growth = horizon ** (power - 0.5) / (math.sqrt(2 * power - 1) * math.factorial(power - 1))
-            found.append(sigma / growth)
-        return min(found)
+            intensities.append(sigma / growth)
+        return min(intensities)
 
     def roughness(self) -> float:
         """Return a first guess of the intensity from finite differences of the longest series."""
-        derivative, _, values = max(self.series, key=lambda item: len(item[2]))
+        derivative, _, values = max(self.series, key=lambda series: len(series[2]))
         rough = np.diff(values, n=self.order - derivative)
         return float(np.sqrt(np.mean(rough**2))) / 10.0 + 1e-12
 

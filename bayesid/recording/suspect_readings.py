@@ -84,7 +84,7 @@ def suspect_readings(recording: Recording) -> list[SuspectReadings]:
     for family in ("rate", "accel", "attitude"):
         columns = tuple(f"{family}.{axis}" for axis in VECTOR_FAMILIES[family])
         groups += [columns] if columns[0] in recording.channels else []
-    return [found for columns in groups for found in _of_columns(recording, columns)]
+    return [suspect for columns in groups for suspect in _of_columns(recording, columns)]
 
 
 def _sampled_together(recording: Recording, columns: list[str]) -> bool:

@@ -149,7 +149,7 @@ def screws(robot: Robot, motion: Kinematics) -> Screws:
     return Screws(screw, screw_rate, change)
 
 
-def row_sensitivity(robot: Robot, motion: Kinematics, own: Screws, bodies: dict[str, Array]) -> Traceable:
+def row_sensitivity(robot: Robot, motion: Kinematics, joint_screws: Screws, bodies: dict[str, Array]) -> Traceable:
     """Return the changes of the summed row per unit of joint position, velocity and acceleration.
 
     Parameters
@@ -157,7 +157,7 @@ def row_sensitivity(robot: Robot, motion: Kinematics, own: Screws, bodies: dict[
     robot : Robot
     motion : Kinematics
         Motion of the joint frames at T instants.
-    own : Screws
+    joint_screws : Screws
         Screws of the joints at these instants.
     bodies : dict of str to (10,) array
         Linear inertial parameters of the links that are not as in the robot.
@@ -177,8 +177,8 @@ def row_sensitivity(robot: Robot, motion: Kinematics, own: Screws, bodies: dict[
     composite, flow, surge = (
         jnp.einsum("jk,tkab->tjab", beyond(robot), left @ jnp.swapaxes(jnp.asarray(part), -1, -2)) for part in motion
     )
-    screw = own.screw
-    turned, turned_rate, turned_acceleration = (jnp.swapaxes(part, -1, -2) for part in own)
+    screw = joint_screws.screw
+    turned, turned_rate, turned_acceleration = (jnp.swapaxes(part, -1, -2) for part in joint_screws)
     pushed = composite @ turned
     slower = composite @ turned_rate + flow @ turned
     nothing = jnp.zeros_like(pushed)

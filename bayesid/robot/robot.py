@@ -133,7 +133,7 @@ class Robot:
     def shipped(cls, name: str) -> Robot:
         """Return a robot of the package by its name, ``"ets7"`` or ``"planar"``."""
         folder = files("bayesid.robot") / "models"
-        known = sorted(Path(str(item)).stem for item in folder.iterdir() if str(item).endswith(".urdf"))
+        known = sorted(Path(str(entry)).stem for entry in folder.iterdir() if str(entry).endswith(".urdf"))
         if name not in known:
             raise InputError(f"no shipped robot {name!r}", remedy=f"Choose one of {', '.join(known)}")
         return cls.from_urdf(Path(str(folder / f"{name}.urdf")))
@@ -244,7 +244,7 @@ class Robot:
                 ET.SubElement(joint, "parent", link=self._carrier(name))
                 ET.SubElement(joint, "child", link=name)
             else:
-                element = next(item for item in root.findall("link") if item.get("name") == name)
+                element = next(candidate for candidate in root.findall("link") if candidate.get("name") == name)
             write_inertial(element, link.inertial)
         ET.indent(root)
         return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
@@ -288,7 +288,7 @@ def _built(urdf: str, root: ET.Element, file: Path | None) -> pin.Model:
 
 def _joint(model: pin.Model, index: int, root: ET.Element) -> Joint:
     name = model.names[index]
-    element = next(item for item in root.findall("joint") if item.get("name") == name)
+    element = next(candidate for candidate in root.findall("joint") if candidate.get("name") == name)
     limit = element.find("limit")
     kind = element.get("type", "")
 

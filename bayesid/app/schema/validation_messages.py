@@ -50,8 +50,8 @@ def explain(error: ValidationError, data: Mapping[str, Any], study: type[Section
     A misspelt key comes first, because it is usually the reason why another key is missing, then what stands first in
     the file.
     """
-    found = error.errors(include_url=False)
-    faults = sorted(found, key=lambda fault: (fault["type"] != "extra_forbidden", _order(fault, data)))
+    errors = error.errors(include_url=False)
+    faults = sorted(errors, key=lambda fault: (fault["type"] != "extra_forbidden", _order(fault, data)))
     first = _one_error(faults[0], data, study)
     # an error in one number that stands for three axes counts once
     others = len({_path_of(fault, data) for fault in faults}) - 1
@@ -102,10 +102,10 @@ def _one_error(fault: ErrorDetails, data: Mapping[str, Any], study: type[Section
     if isinstance(cause, InputError):
         within = ".".join(part for part in (place, cause.place) if part)
         return InputError(cause.problem, place=within or None, remedy=cause.remedy)
-    wanted = fault["msg"].removeprefix("Input should be ")
+    expected = fault["msg"].removeprefix("Input should be ")
     if kind.startswith(("greater_than", "less_than")):
-        wanted = f"a value {wanted}"
-    return InputError(f"got {fault['input']!r}", place=place, remedy=f"Give {_WANTED.get(kind, wanted)}")
+        expected = f"a value {expected}"
+    return InputError(f"got {fault['input']!r}", place=place, remedy=f"Give {_WANTED.get(kind, expected)}")
 
 
 def _place(path: Sequence[str | int]) -> str:
